@@ -1,8 +1,12 @@
-"""Finding what is wrong with a lake: `doctor` by its structure, `verify` by re-hashing every byte."""
+"""Finding what is wrong with a lake: `doctor` by its structure, `verify` by re-hashing every byte.
+
+How an artifact is made again whose object is damaged or missing: the remedy that a finding names.
+"""
 
 from __future__ import annotations
 
 import random
+import shlex
 from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from datetime import timedelta
@@ -13,7 +17,6 @@ import pyarrow as pa
 from flagdata.errors import FlagdataError
 from flagdata.files import is_beside
 from flagdata.findings import Finding, Severity
-from flagdata.lake.again import made_again
 from flagdata.lake.artifact import OBJECT_NAME, Artifact
 from flagdata.lake.collect import left_uploads
 from flagdata.lake.durable import SCRATCH
@@ -24,11 +27,38 @@ from flagdata.lake.leases import COLLECT, TURN, LeaseState, last_written, leases
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import DAMAGED, StoredObject
+from flagdata.lake.refs import MAIN
 from flagdata.lake.removals import erased, expirations, removals
-from flagdata.printable import counted
+from flagdata.printable import SHORT, counted
 from flagdata.schema import FORMAT_VERSION, Kind
 from flagdata.storage import Place, StoreError
 from flagdata.storage.uploads import Upload
+
+_BY_KIND = {
+    Kind.MESHES: "simulate or build its recipe again",
+    Kind.RECORDING: "align, declare or build it again as before",
+    Kind.CLIP: "align, declare or build its recording again as before",
+    Kind.NETWORK: "train it again",
+    Kind.WIND: "align or declare it again as before",
+}
+"""Of what has no file that it was ingested from."""
+
+
+def made_again(artifact: Artifact) -> str:
+    """What replaces the object of an artifact that is damaged or missing."""
+    branch = "" if artifact.branch == MAIN else f" --branch {artifact.branch}"
+    if artifact.kind in (Kind.MEASUREMENT, Kind.MODEL):
+        withdraw = f"flagdata withdraw {artifact.id[:SHORT]}{branch} -m 'its data are lost'"
+        return (
+            f"give the command that made it again by the same code ({artifact.code_version}), which replaces the "
+            f"object; or flagdata pull a clone of this lake, restore it from a copy, or {withdraw}"
+        )
+    if artifact.source_name is not None:
+        how = f"flagdata ingest {shlex.quote(artifact.source_name)}{branch} again, with the options of the first time"
+    else:
+        how = f"{_BY_KIND.get(artifact.kind, 'give the command that made it again')}{branch and f', with{branch}'}"
+    return f"{how}: it replaces the object; or flagdata pull a clone of this lake, or restore it from a copy"
+
 
 GRACE = timedelta(hours=24)
 """How long unreferenced files are left alone."""

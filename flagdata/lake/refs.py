@@ -4,6 +4,8 @@ A view is what a ref shows: for each branch of its line, that branch's rows at o
 view is its own rows at the head, and its parent's view at the version it forked from, without rows that were withdrawn
 from the branch; so `main` may go on without the branch noticing. Every row names the branch that it was committed on. A
 tag stores its whole view and stays what it was. Each file ends with the SHA-256 of what it states.
+
+Instants by which a version can be named: 2026-11-26 (the end of that day, UTC), a time with its zone, 3.days.ago.
 """
 
 from __future__ import annotations
@@ -12,17 +14,50 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 from flagdata.documents import from_json
-from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import ConflictError, CorruptError, NotFoundError, TimeError, UnknownNameError, UsageError
 from flagdata.files import open_regular
 from flagdata.lake.durable import confirming, disk_errors, flush_folder, put_if_absent, unreadable
-from flagdata.lake.moments import moment
 from flagdata.provenance import recipe_hash
 from flagdata.storage import Place
+from flagdata.timebase import NANOSECONDS, from_datetime, names_zone, parse
+
+_DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
+_AGO = re.compile(r"(\d{1,6})\.(second|minute|hour|day|week)s?\.ago")
+_SECONDS = {"second": 1, "minute": 60, "hour": 3600, "day": 86_400, "week": 7 * 86_400}
+
+
+def moment(text: str, *, now: datetime | None = None) -> int | None:
+    """The instant that a text names [UTC ns]; `None` for what names none.
+
+    Args:
+        now: from which "ago" counts; the system's clock if `None`.
+
+    Raises:
+        UsageError: a day that the calendar does not have, or a time without its zone.
+    """
+    ago = _AGO.fullmatch(text)
+    if ago is not None:
+        passed = timedelta(seconds=int(ago[1]) * _SECONDS[ago[2]])
+        try:
+            return from_datetime((now or datetime.now(UTC)) - passed)
+        except OverflowError:
+            raise UsageError(f"{text!r} is before the year 1", where="--at", fix="name a later instant") from None
+    if not re.match(_DAY, text):
+        return None
+    try:
+        if _DAY.fullmatch(text):
+            return parse(f"{text}T00:00:00Z") + 86_400 * NANOSECONDS - 1
+        if not names_zone(text):
+            raise UsageError(f"{text!r} names no zone", where="--at", fix=f"write {text}Z, or +02:00 behind it")
+        return parse(text)
+    except TimeError as error:
+        raise UsageError(error.what, where="--at", fix="write 2026-11-26, or 2026-11-26T12:00:00Z") from None
+
 
 MAIN = "main"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")

@@ -1,4 +1,13 @@
-"""Writes a record: frames, wind, parameters and attachments into one MCAP file, streaming, with reproducible bytes."""
+"""Writes a record: frames, wind, parameters and attachments into one MCAP file, streaming, with reproducible bytes.
+
+Attachments of a record packed as they are read, piece by piece.
+
+Wind samples and their means as protobuf messages in bulk: arrays in, rows of bytes out.
+
+The bytes are those of `messages.WindSample` and `messages.WindMean` serialised one by one in order of field numbers,
+which is tested. Source: Protocol Buffers, Encoding: tag = number << 3 | wire type, base-128 varints, doubles as
+8 bytes.
+"""
 
 from __future__ import annotations
 
@@ -18,19 +27,168 @@ from numpy.typing import NDArray
 from flagdata.averaging import average
 from flagdata.clock import ClockModel
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
-from flagdata.record import messages, wind_messages
+from flagdata.record import messages
 from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
 from flagdata.record.key_frames import is_key
 from flagdata.record.mcap_file import MessageBlock
 from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
 from flagdata.record.output import Output
-from flagdata.record.packing import packed, pieces_of
 from flagdata.schema import FORMAT_VERSION, TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
 
 if TYPE_CHECKING:
     from flagdata.record.video import VideoEncoder
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from flagdata.signals import Series, WindAverage
+
+_VARINT, _DOUBLE, _LENGTH = 0, 1, 2  # wire types
+
+
+@dataclass(frozen=True, kw_only=True)
+class Payloads:
+    """Messages as rows.
+
+    Attributes:
+        data: (n, w) uint8.
+        used: (n, w) bool, which bytes of a row are its message.
+    """
+
+    data: NDArray[np.uint8]
+    used: NDArray[np.bool_]
+
+
+def samples(series: WindSeries, log_time: NDArray[np.int64], rows: slice) -> Payloads:
+    """`WindSample` of some rows of a series, whose instants on the common clock are `log_time` (n,) [UTC ns]."""
+    numbers = {messages.WIND_FIELDS[name]: values for name, values in series.channels.items()}
+    parts = [_timestamp("timestamp", messages.WindSample, log_time[rows])]
+    for (name, _), values in sorted(numbers.items(), key=lambda item: item[0][1]):
+        parts.append(_double(name, messages.WindSample, np.asarray(values, dtype=np.float64)[rows], presence=True))
+    parts.append(_integer("flags", messages.WindSample, series.flags[rows].astype(np.int64)))
+    if series.host_time is not None:
+        parts.append(_timestamp("host_time", messages.WindSample, series.host_time[rows]))
+    return _joined(parts)
+
+
+def means(average: WindAverage) -> Payloads:
+    """`WindMean` of each bin."""
+    kind = messages.WindMean
+    period = np.full(len(average.time), average.period)
+    return _joined(
+        [
+            _timestamp("timestamp", kind, average.time),
+            *(_double(name, kind, getattr(average, name), presence=False) for name in ("speed", "sigma", "direction")),
+            _integer("count", kind, average.count.astype(np.int64)),
+            _double("period", kind, period, presence=False),
+        ]
+    )
+
+
+def _joined(parts: Sequence[Payloads]) -> Payloads:
+    return Payloads(data=np.hstack([p.data for p in parts]), used=np.hstack([p.used for p in parts]))
+
+
+def _tag(number: int, wire: int) -> list[int]:
+    value, out = number << 3 | wire, []
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    return [*out, value]
+
+
+def _number(name: str, kind: object) -> int:
+    fields: Mapping[str, object] = kind.DESCRIPTOR.fields_by_name  # pyright: ignore[reportAttributeAccessIssue]
+    return fields[name].number  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def _tagged(tag: list[int], values: Payloads, present: NDArray[np.bool_]) -> Payloads:
+    """Values (n, w) behind their tag; rows that are not `present` are empty."""
+    n = len(present)
+    front = np.broadcast_to(np.array(tag, dtype=np.uint8), (n, len(tag)))
+    return Payloads(
+        data=np.hstack([front, values.data]),
+        used=np.hstack([np.ones((n, len(tag)), dtype=bool), values.used]) & present[:, None],
+    )
+
+
+def _double(name: str, kind: object, values: Series, *, presence: bool) -> Payloads:
+    """A double; a field without presence leaves out +0."""
+    raw = np.ascontiguousarray(values, dtype="<f8")
+    bits = raw.view("<u8")
+    written = np.ones(len(raw), dtype=bool) if presence else bits != 0
+    data = raw.view(np.uint8).reshape(-1, 8)
+    return _tagged(_tag(_number(name, kind), _DOUBLE), Payloads(data=data, used=np.ones(data.shape, bool)), written)
+
+
+def _integer(name: str, kind: object, values: NDArray[np.int64]) -> Payloads:
+    """A whole number; 0 is left out."""
+    return _tagged(_tag(_number(name, kind), _VARINT), _varint(values), values != 0)
+
+
+def _timestamp(name: str, kind: object, time: NDArray[np.int64]) -> Payloads:
+    """A google.protobuf.Timestamp."""
+    seconds, nanos = np.divmod(time, NANOSECONDS)
+    inner = _joined(
+        [
+            _tagged(_tag(1, _VARINT), _varint(seconds), seconds != 0),
+            _tagged(_tag(2, _VARINT), _varint(nanos), nanos != 0),
+        ]
+    )
+    length = inner.used.sum(axis=1, dtype=np.int64)[:, None].astype(np.uint8)
+    body = _joined([Payloads(data=length, used=np.ones(length.shape, bool)), inner])
+    return _tagged(_tag(_number(name, kind), _LENGTH), body, np.ones(len(time), dtype=bool))
+
+
+def _varint(values: NDArray[np.int64]) -> Payloads:
+    """Base-128 varints, least significant group first; of a negative number those of its two's complement."""
+    unsigned = np.ascontiguousarray(values, dtype=np.int64).view(np.uint64)
+    width = max(1, -(-int(unsigned.max(initial=0)).bit_length() // 7))
+    groups = unsigned[:, None] >> (7 * np.arange(width, dtype=np.uint64))
+    more = (groups >> 7) > 0
+    used = np.hstack([np.ones((len(values), 1), dtype=bool), more[:, :-1]])
+    return Payloads(data=((groups & 0x7F) | (more.astype(np.uint64) << np.uint64(7))).astype(np.uint8), used=used)
+
+
+PIECE = 1 << 20
+"""Bytes read at a time."""
+QUICK_ABOVE = 8 << 20
+"""Bytes from which an attachment is packed for speed: zlib's level 1 takes a quarter of level 9's time on a log."""
+_GZIP = 31  # wbits of zlib for a gzip stream, whose header then holds neither name nor time
+
+
+def pieces_of(path: Path, size: int) -> Iterator[bytes]:
+    """The content of a file of `size` bytes.
+
+    Raises:
+        InputError: it cannot be read.
+        ConflictError: it has another size by now.
+    """
+    done = 0
+    try:
+        with path.open("rb") as stream:
+            while piece := stream.read(PIECE):
+                done += len(piece)
+                yield piece
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check its permissions") from None
+    if done != size:
+        raise ConflictError(
+            f"the file had {size} bytes and then {done}", where=str(path), fix="ingest it when it is complete"
+        )
+
+
+def packed(data: Iterable[bytes], size: int) -> list[bytes] | None:
+    """`data` of `size` bytes gzipped, in pieces; `None` where that is not smaller."""
+    level = 1 if size > QUICK_ABOVE else 9
+    coder = zlib.compressobj(level, zlib.DEFLATED, _GZIP)
+    out = [coder.compress(piece) for piece in data]
+    out.append(coder.flush())
+    kept = [piece for piece in out if piece]
+    return kept if sum(map(len, kept)) < size else None
+
 
 JPEG_QUALITY = 90
 FRAME_ID = "camera"
@@ -171,7 +329,7 @@ class RecordWriter:
         aligned = replace(series, time=common)
         for first in range(0, len(series), _ROWS_AT_ONCE):
             rows = slice(first, first + _ROWS_AT_ONCE)
-            payloads = wind_messages.samples(series, common, rows)
+            payloads = samples(series, common, rows)
             self._messages(TOPIC_WIND, messages.WindSample, payloads, common[rows], series.time[rows])
         if "wind_speed" in series.channels:
             self._means(aligned)
@@ -266,7 +424,7 @@ class RecordWriter:
 
     def _means(self, aligned: WindSeries) -> None:
         means = average(aligned, MEAN_PERIOD)
-        self._messages(TOPIC_WIND_1HZ, messages.WindMean, wind_messages.means(means), means.time, means.time)
+        self._messages(TOPIC_WIND_1HZ, messages.WindMean, means(means), means.time, means.time)
 
     def _check_order(self, log_time: int, publish_time: int) -> None:
         if self._last_frame is not None and (log_time <= self._last_frame[0] or publish_time <= self._last_frame[1]):
@@ -295,7 +453,7 @@ class RecordWriter:
         self,
         topic: str,
         kind: Any,
-        payloads: wind_messages.Payloads,
+        payloads: Payloads,
         log_time: NDArray[np.int64],
         publish_time: NDArray[np.int64],
     ) -> None:

@@ -4,21 +4,176 @@ The server listens on loopback. Its address has a part that is drawn anew at eac
 other users of the machine, and pages of others in the user's browser, do not know it. The header Host must be the
 server's own, so that a name on the web that leads here is refused. Answers forbid the browser everything that does not
 come from this server.
+
+From an address to an answer, without a socket: which pages there are, and what an error looks like.
+
+No part of an address becomes a path: artifacts are named by their ids, versions by refs that the lake looks up.
 """
 
 from __future__ import annotations
 
+import json
+import re
 import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from email.message import Message
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import cast
+from typing import Any, cast
+from urllib.parse import parse_qs, urlsplit
 
-from flagdata.errors import NotFoundError, RefusedError, UsageError
+from flagdata.console import foreseen
+from flagdata.errors import (
+    ConflictError,
+    FlagdataError,
+    InputError,
+    LimitError,
+    NotFoundError,
+    RefusedError,
+    TimeError,
+    UsageError,
+)
 from flagdata.lake import Lake
+from flagdata.view import pages
 from flagdata.view.media import Media
 from flagdata.view.pages import Site
-from flagdata.view.routes import Answer, answer, refusal
+
+_FIELDS = 8
+_STATUS: tuple[tuple[type[FlagdataError], HTTPStatus], ...] = (
+    (NotFoundError, HTTPStatus.NOT_FOUND),
+    (UsageError, HTTPStatus.BAD_REQUEST),
+    (LimitError, HTTPStatus.BAD_REQUEST),
+    (TimeError, HTTPStatus.BAD_REQUEST),
+    (InputError, HTTPStatus.BAD_REQUEST),
+    (ConflictError, HTTPStatus.CONFLICT),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What goes back: status, media type and bytes."""
+
+    status: HTTPStatus
+    media_type: str
+    content: bytes
+
+
+Route = Callable[[Site, tuple[str, ...], Mapping[str, str]], Answer]
+"""Answers a request: the site at its version, the parts of the path in brackets, the fields of the query."""
+
+
+def answer(site: Site, target: str) -> Answer:
+    """The answer to a request for an address.
+
+    Args:
+        site: at the head of main.
+        target: path and query of the address.
+    """
+    try:
+        site, function, groups, fields = _found(site, target)
+        return function(site, groups, fields)
+    except Exception as error:  # noqa: BLE001  every error is a page
+        return refusal(site, foreseen(error))
+
+
+def refusal(site: Site, error: FlagdataError, status: HTTPStatus | None = None) -> Answer:
+    """The page of an error.
+
+    Args:
+        status: by the kind of the error if `None`.
+    """
+    if status is None:
+        kinds = (found for kind, found in _STATUS if isinstance(error, kind))
+        status = next(kinds, HTTPStatus.INTERNAL_SERVER_ERROR)
+    return _html(pages.problem(replace(site, at=None), error, status), status)
+
+
+def _found(site: Site, target: str) -> tuple[Site, Route, tuple[str, ...], Mapping[str, str]]:
+    try:
+        address = urlsplit(target)
+        given = parse_qs(address.query, max_num_fields=_FIELDS, errors="strict")
+    except ValueError:
+        raise UsageError("an address that cannot be read", fix="go back to the overview") from None
+    if not address.path.startswith(site.base):
+        raise NotFoundError("nothing is here", fix="open the whole address that flagdata view printed")
+    path = address.path.removeprefix(site.base)
+    fields = {name: values[-1] for name, values in given.items()}
+    for pattern, function in _ROUTES.items():
+        if match := re.fullmatch(pattern, path, flags=re.ASCII):
+            return replace(site, at=fields.get("at")), function, match.groups(), fields
+    raise NotFoundError("there is no such page", fix="go back to the overview")
+
+
+def _overview(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+    page = fields.get("page", "0")
+    if not re.fullmatch("[0-9]{1,9}", page, flags=re.ASCII):
+        raise UsageError(f"{page!r} is no number of a page", fix="go back to the overview")
+    return _html(pages.overview(site, kind=fields.get("kind"), name=fields.get("name"), page=int(page)))
+
+
+def _query(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+    text, error = pages.sql(site, fields.get("sql"))
+    return _html(text, HTTPStatus.OK if error is None else HTTPStatus.BAD_REQUEST)
+
+
+def _artifact(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+    return _html(pages.artifact(site, groups[0]))
+
+
+def _thumbnail(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+    return Answer(status=HTTPStatus.OK, media_type="image/jpeg", content=site.media.thumbnail(site.row(groups[0])))
+
+
+def _frames(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+    content = site.media.frames(site.row(groups[0]), int(groups[1]))
+    return Answer(status=HTTPStatus.OK, media_type="application/octet-stream", content=content)
+
+
+def _series(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+    return _json(site.media.series(site.row(groups[0])))
+
+
+def _evidence(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+    return _json(site.media.evidence(site.row(groups[0])))
+
+
+def _style(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+    return Answer(status=HTTPStatus.OK, media_type="text/css; charset=utf-8", content=pages.style())
+
+
+def _script(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+    return Answer(status=HTTPStatus.OK, media_type="text/javascript; charset=utf-8", content=pages.script())
+
+
+def _icon(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+    return Answer(status=HTTPStatus.OK, media_type="image/svg+xml", content=pages.ICON)
+
+
+def _html(text: str, status: HTTPStatus = HTTPStatus.OK) -> Answer:
+    return Answer(status=status, media_type="text/html; charset=utf-8", content=text.encode(errors="backslashreplace"))
+
+
+def _json(content: Mapping[str, Any]) -> Answer:
+    text = json.dumps(content, allow_nan=False, ensure_ascii=False)
+    return Answer(status=HTTPStatus.OK, media_type="application/json", content=text.encode())
+
+
+_ARTIFACT_ID = "([0-9a-f]{32})"
+_ROUTES: dict[str, Route] = {
+    "": _overview,
+    "query": _query,
+    "style.css": _style,
+    "script.js": _script,
+    "icon.svg": _icon,
+    f"artifact/{_ARTIFACT_ID}": _artifact,
+    f"thumbnail/{_ARTIFACT_ID}": _thumbnail,
+    f"frames/{_ARTIFACT_ID}/([0-9]{{1,9}})": _frames,
+    f"series/{_ARTIFACT_ID}": _series,
+    f"evidence/{_ARTIFACT_ID}": _evidence,
+}
+"""Pattern of an address behind the base → what answers it."""
+
 
 HOST = "127.0.0.1"
 _PATIENCE = 30.0  # s, for a request to arrive

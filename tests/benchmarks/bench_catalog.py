@@ -36,7 +36,7 @@ from flagdata.rng import stream
 from flagdata.schema import Kind, catalog_schema
 from flagdata.view.media import Media
 from flagdata.view.pages import Site
-from flagdata.view.routes import answer
+from flagdata.view.server import answer
 
 ROWS = int(os.environ.get("FLAGDATA_BENCH_ROWS", "1_000_000"))
 BATCHES = 10
@@ -81,7 +81,7 @@ from io import StringIO
 from flagdata.lake import Artifact, Lake
 from flagdata.view.media import Media
 from flagdata.view.pages import Site
-from flagdata.view.routes import answer
+from flagdata.view.server import answer
 def site():
     return Site(lake=lake, media=Media(lake), base="/key/")
 wall, cpu = time.perf_counter(), time.process_time()

@@ -22,7 +22,7 @@ VERBS = {
     "measure": ("measure/estimate", "measure/gate", "measure/anemometer", "measure/refine"),
     "observe": ("measure/observables", "measure/estimate"),
     "calibrate": ("measure/calibrate", "measure/anemometer", "measure/observables", "measure/estimate"),
-    "align": ("flagdata/align", "flagdata/commands/align.py", "flagdata/commands/align_logs.py"),
+    "align": ("flagdata/align", "flagdata/commands/align.py", "flagdata/commands/align.py"),
     "ingest": ("flagdata/ingest", "flagdata/commands/ingest_options.py", "flagdata/commands/confirm.py"),
     "close-loop": ("measure/closing", "measure/films", "measure/observe", "measure/calibrate"),
 }

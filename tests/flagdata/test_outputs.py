@@ -23,11 +23,12 @@ from flagdata.outputs import (
     check_rewrite,
     fresh_file,
     fresh_folder,
+    is_signed,
     rewrite,
+    signed,
     write_file,
     write_files,
 )
-from flagdata.signature import is_signed, signed
 
 SCHEMA = "made.demo/1"
 

@@ -11,8 +11,7 @@ from scipy import ndimage
 from torch.nn import functional
 
 from flagdata.errors import InputError
-from models.filters import gaussian, pooled_derivatives, smoothing_matrix
-from models.frontend import WAVE_CHANNELS, FrontEnd, standardised
+from models.frontend import WAVE_CHANNELS, FrontEnd, gaussian, pooled_derivatives, smoothing_matrix, standardised
 from models.spectral import SpectralDecomposition, periodogram
 from tests.refusals import unrefused
 

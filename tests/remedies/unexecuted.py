@@ -118,7 +118,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("measure/observe/markers.py", "name a marker artifact;"),
     ),
     "said to a browser, by a page; tests/flagdata/view opens the addresses": (
-        ("flagdata/view/routes.py", "open the whole address t"),
+        ("flagdata/view/server.py", "open the whole address t"),
         ("flagdata/view/server.py", "open the address that fl"),
         ("flagdata/view/server.py", "open the whole address t"),
     ),

@@ -20,7 +20,7 @@ from sim.integrate import Integrator
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import Symplectic
 from sim.material import named
-from sim.run.diagnostics import principal_strains
+from sim.run.batch import principal_strains
 from sim.scene import Scene, assemble, flag
 from sim.state import State
 from sim.system import System

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from sim.run.diagnostics import CRUMPLED
+from sim.run.batch import CRUMPLED
 from sim.scene import GRAVITY
 from tests.validation.arcsim import ReferenceMotion
 from tests.validation.flags_runs import CAMEL, ENERGY_EVERY, RATE, REPLICATES, SETTLED, Ensemble

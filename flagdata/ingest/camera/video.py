@@ -1,11 +1,27 @@
-"""Video files through PyAV: a survey of the packets, then decoding that survives damage and says what it skipped."""
+"""Video files through PyAV: a survey of the packets, then decoding that survives damage and says what it skipped.
+
+The recording time that AVCHD camcorders (MTS files) write into the video stream itself.
+
+An H.264 message of unregistered user data (ITU-T H.264, D.1.6) with the identifier below holds "MDPM", a count, and
+entries of a tag and four bytes, after the packs of DV (IEC 61834-4): 0x18 is a zone byte, century, year, month; 0x19 is
+day, hour, minute, second, all as binary-coded decimals. The zone byte is left aside: many cameras leave it at zero
+whatever zone they are set to. So the time is wall-clock time without a zone.
+
+What the delays of a GIF say of its frames' rate: whole hundredths of a second, and nothing at all below two.
+
+GIF89a counts delays in hundredths (section 23, Graphic Control Extension). Programs write 0 or 1 for "as fast as
+possible"; browsers play both as 10, a demuxer plays 1 as 1: a camera of unknown rate would count as one of 100 Hz.
+"""
 
 from __future__ import annotations
 
 import heapq
 import math
+import re
+import struct
 from collections.abc import Iterator
 from contextlib import suppress
+from datetime import datetime
 from fractions import Fraction
 from functools import partial
 from itertools import islice
@@ -19,10 +35,8 @@ from av.container import InputContainer
 from av.sidedata.sidedata import SideData, Type
 from av.video.stream import VideoStream
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, TimeError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.camera import gif
-from flagdata.ingest.camera.avchd import recording_time
 from flagdata.ingest.camera.boxes import edits, is_cut
 from flagdata.ingest.camera.clock import COUNTERS
 from flagdata.ingest.camera.container import (
@@ -40,6 +54,75 @@ from flagdata.ingest.camera.luma import luma_of_frame
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import Timing
+
+CONTAINER = "gif"
+SHORTEST = 2
+"""The shortest delay that is taken for a statement [hundredths of a second]."""
+HALF = Fraction(1, 200)
+"""What rounding to hundredths leaves open [s]."""
+LOOKED_AT = 16 * 1024**2
+"""Bytes of the file whose delays are read."""
+# The extension's label, its size, flags, the delay, an index, the end; a picture or another extension follows.
+_DELAY = re.compile(rb"\x21\xf9\x04.(..).\x00[\x21\x2c]", re.DOTALL)
+
+
+def delays(path: Path) -> list[int]:
+    """Delays that a GIF states, as far as `LOOKED_AT` [hundredths of a second]."""
+    with path.open("rb") as stream:
+        head = stream.read(LOOKED_AT)
+    return [struct.unpack("<H", match)[0] for match in _DELAY.findall(head)]
+
+
+def check(path: Path, timing: Timing, *, true_fps: float | None) -> list[Finding]:
+    """What is open about the rate of a GIF with `timing`; nothing where the user named the camera's.
+
+    Raises:
+        TimeError: its delays say nothing, and no rate was named.
+    """
+    if true_fps is not None:
+        return []
+    period = timing.period * timing.tick
+    stated = delays(path)
+    if stated and float(np.median(stated)) < SHORTEST:
+        raise TimeError(
+            f'the GIF states delays of {float(np.median(stated)):g} hundredths of a second, which stands for "as fast '
+            "as possible\": the camera's rate is not known",
+            where=str(path),
+            fix="give the rate at which the camera ran, --true-fps HZ, or the film that the GIF was made of",
+        )
+    if timing.variable or period.denominator > 100:
+        return []  # delays of 3, 3 and 4 hundredths keep a mean
+    low, high = float(1 / (period + HALF)), float(1 / (period - HALF))
+    return [
+        Finding(
+            kind="gif-delays",
+            severity=Severity.WARNING,
+            value=float(1 / period),
+            what=f"a GIF states times in hundredths of a second: delays of {float(period):g} s say that the rate is "
+            f"between {low:.3g} and {high:.3g} Hz, and {float(1 / period):.4g} Hz is assumed",
+            fix="if the camera's rate is known, give it: --true-fps HZ",
+        )
+    ]
+
+
+_IDENTIFIER = bytes.fromhex("17ee8c60f84d11d98cd60800200c9a66") + b"MDPM"
+
+
+def recording_time(message: bytes) -> str | None:
+    """ISO 8601 wall-clock time, to the second and without a zone, of one user-data message; `None` if it has none."""
+    if not message.startswith(_IDENTIFIER):
+        return None
+    body = message[len(_IDENTIFIER) :]
+    entries = {body[i]: body[i + 1 : i + 5] for i in range(1, len(body) - 4, 5)}
+    if not {0x18, 0x19} <= entries.keys():
+        return None
+    digits = (entries[0x18][1:] + entries[0x19]).hex()
+    try:
+        # A wall-clock time; the caller attaches the camera's zone.
+        return datetime.strptime(digits, "%Y%m%d%H%M%S").isoformat()  # noqa: DTZ007
+    except ValueError:
+        return None
+
 
 _CAPTURE_RATE = "com.android.capture.fps"
 _RATES_AGREE = 0.1
@@ -127,8 +210,8 @@ class VideoSource:
 
     def _stream_findings(self, first: av.VideoFrame) -> list[Finding]:
         found = []
-        if self._container.format.name == gif.CONTAINER:
-            found += gif.check(self._path, self._timing, true_fps=self._options.true_fps)
+        if self._container.format.name == CONTAINER:
+            found += check(self._path, self._timing, true_fps=self._options.true_fps)
         if first.interlaced_frame:
             found.append(
                 Finding(

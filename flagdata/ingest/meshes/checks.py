@@ -1,16 +1,176 @@
-"""Errors of a mesh sequence that its own numbers show: units, scale, faces turned over."""
+"""Errors of a mesh sequence that its own numbers show: units, scale, faces turned over.
+
+T-joints: a vertex on an edge of a face that does not have it as a corner.
+
+Where one side of a line was subdivided and the other was not, the cloth looks whole and is open: the two sides share no
+edge, so that no force crosses it and it opens as soon as it is simulated.
+
+Whether frames are of one cloth in motion: vertices that change places, jumps, a topology that changes.
+
+Programs that export each frame by itself may number vertices anew. Then one row of the positions is two points of the
+cloth, and whatever is measured along time is of neither.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.meshes.continuity import continuity
-from flagdata.ingest.meshes.joints import t_joints
 from flagdata.ingest.meshes.pieces import in_pieces, slits
 from flagdata.lake.meshes import Mesh, MeshSequence, RaggedMeshSequence
+
+_STRETCHED = 1.5
+"""Length of an edge over that in the material beyond which it is no cloth's: knits tear at 1.3 to 1.5, and a vertex
+that takes its neighbour's place doubles an edge."""
+_SUDDEN = 10.0
+"""Times the usual way between two frames beyond which a frame is elsewhere."""
+_FAR = 0.2
+"""The same, in sizes of the cloth."""
+
+
+def continuity(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
+    """Return what speaks against one cloth in motion: `edges-stretched`, `cloth-jumps`, `topology-changes`."""
+    return (*_stretched(sequence), *_jumps(sequence), *_changes(sequence))
+
+
+def _stretched(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
+    counts = np.array([_long_edges(sequence.frame(index)) for index in range(len(sequence))])
+    worst = int(counts.argmax())
+    if not counts[worst]:
+        return
+    where = np.flatnonzero(counts)
+    frames = f"frame {where[0]}" if len(where) == 1 else f"{len(where)} frames, the first frame {where[0]}"
+    yield Finding(
+        kind="edges-stretched",
+        severity=Severity.WARNING,
+        count=int(counts[worst]),
+        where=f"frame {worst}",
+        what=f"{counts[worst]} edges are more than {_STRETCHED:g} times as long as in the material ({frames}): "
+        "vertices that change places, a tear, or texture coordinates that are not the cloth's own lengths",
+        fix="export all frames with the vertices in one order, and texture coordinates in metres",
+    )
+
+
+def _long_edges(mesh: Mesh) -> int:
+    edges = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
+    edges = np.unique(np.sort(edges, axis=1), axis=0)
+    space, rest = (
+        np.linalg.norm(np.diff(points[edges].astype(np.float64), axis=1)[:, 0], axis=1)
+        for points in (mesh.positions, mesh.rest)
+    )
+    return int((space > _STRETCHED * rest)[rest > 0].sum())
+
+
+def _jumps(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
+    if isinstance(sequence, RaggedMeshSequence) or len(sequence) < 4:
+        return
+    used = np.unique(sequence.faces)
+    places = sequence.positions[:, used].astype(np.float64)
+    ways = np.median(np.linalg.norm(np.diff(places, axis=0), axis=2), axis=1)
+    size = float(np.linalg.norm(np.ptp(sequence.rest[used].astype(np.float64), axis=0)))
+    usual = float(np.median(ways))
+    sudden: NDArray[np.int64] = np.flatnonzero((ways > _SUDDEN * usual) & (ways > _FAR * size))
+    if len(sudden):
+        first = int(sudden[0])
+        yield Finding(
+            kind="cloth-jumps",
+            severity=Severity.WARNING,
+            count=len(sudden),
+            where=f"frame {first + 1}",
+            value=float(ways[first]),
+            what=f"half of the vertices move {ways[first]:.3g} m or more from frame {first} to frame {first + 1}, and "
+            f"{usual:.2g} m between others: vertices that are numbered anew, or frames of another run",
+            fix="export all frames of one run, with the vertices in one order",
+        )
+
+
+def _changes(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
+    if isinstance(sequence, MeshSequence):
+        return
+    vertices, faces = np.diff(sequence.vertex_offset), np.diff(sequence.face_offset)
+    frames = [sequence.frame(index) for index in range(len(sequence))]
+    other = [
+        index
+        for index in range(1, len(frames))
+        if not (
+            np.array_equal(frames[index].faces, frames[index - 1].faces)
+            and np.array_equal(frames[index].rest, frames[index - 1].rest)
+        )
+    ]
+    yield Finding(
+        kind="topology-changes",
+        severity=Severity.NOTE,
+        count=len(other),
+        where=f"frame {other[0]}",
+        what=f"the mesh changes at {len(other)} of {len(frames) - 1} frames: {vertices.min()} to {vertices.max()} "
+        f"vertices, {faces.min()} to {faces.max()} faces",
+        fix="none needed, if the simulator remeshes; else export all frames with one mesh",
+    )
+
+
+_ON_THE_LINE = 1e-3  # distance from the edge in the material, in edge lengths; exporters keep four digits or more
+_NEAR = 0.1  # the same in space, along the edge too: cloth stretches, and bends away from an edge's middle
+_WITHIN = 1e-2  # from an edge's ends, in edge lengths
+
+
+def t_joints(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
+    """A finding where vertices lie on open edges of other faces, of the frame with most of them."""
+    frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
+    joints = [_joints(sequence.frame(index)) for index in frames]
+    worst = max(frames, key=lambda index: len(joints[index]), default=0)
+    if not joints or not len(joints[worst]):
+        return ()
+    first = int(joints[worst][0])
+    return (
+        Finding(
+            kind="t-joints",
+            severity=Severity.WARNING,
+            count=len(joints[worst]),
+            where=f"frame {worst}",
+            what=f"{len(joints[worst])} vertices lie on an edge of a face that they are no corner of (the first is "
+            f"vertex {first}): the cloth is open there",
+            fix="split those faces at the vertex, or subdivide both sides alike, and export it anew",
+        ),
+    )
+
+
+def _joints(mesh: Mesh) -> NDArray[np.int64]:
+    """Numbers of the vertices on the inside of an edge that only one face has, in the material and in space."""
+    edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
+    edges, counts = np.unique(edges, axis=0, return_counts=True)
+    border = edges[counts == 1]
+    corners = np.unique(border).astype(np.int64)
+    if not len(corners):
+        return corners
+    rest, space = mesh.rest.astype(np.float64), mesh.positions.astype(np.float64)
+    ends = rest[border]
+    half = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2
+    beside = KDTree(rest[corners]).query_ball_point(ends.mean(axis=1), half)
+    number = np.repeat(np.arange(len(border)), [len(found) for found in beside])
+    vertex = corners[np.concatenate([np.asarray(found, dtype=np.int64) for found in beside])]
+    first, last = border[number].astype(np.int64).T
+    along, off = _beside(rest, vertex, first, last)
+    along_in_space, off_in_space = _beside(space, vertex, first, last)
+    inside = (off < _ON_THE_LINE) & (off_in_space < _NEAR) & (np.abs(along_in_space - along) < _NEAR)
+    for share in (along, along_in_space):
+        inside &= (share > _WITHIN) & (share < 1 - _WITHIN)
+    return np.unique(vertex[inside])
+
+
+def _beside(
+    place: NDArray[np.float64], vertex: NDArray[np.int64], first: NDArray[np.int64], last: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where vertices lie along edges, 0 at the first end and 1 at the last, and how far beside, in edge lengths."""
+    edge, arm = place[last] - place[first], place[vertex] - place[first]
+    square = np.maximum((edge**2).sum(axis=1), np.finfo(np.float64).tiny)
+    along = (edge * arm).sum(axis=1) / square
+    return along, np.linalg.norm(arm - along[:, None] * edge, axis=1) / np.sqrt(square)
+
 
 # Median edge length in space over that in the material. Cloth stretches and crumples by some per cent; a factor of two
 # is beyond any, and below the steps between units that are mixed up (2.54, 10, 12, 100, 1000).

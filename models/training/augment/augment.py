@@ -21,7 +21,7 @@ BEFORE = Registry(
     {
         "tree": "models.training.augment.rim:TREE",
         "second-flag": "models.training.augment.rim:SECOND_FLAG",
-        "shake": "models.training.augment.camera:SHAKE",
+        "shake": "models.training.augment.motion:SHAKE",
         "blur": "models.training.augment.light:BLUR",
         "gamma": "models.training.augment.light:GAMMA",
         "dusk": "models.training.augment.light:DUSK",

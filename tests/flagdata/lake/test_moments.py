@@ -10,7 +10,7 @@ import pytest
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake import refs as references
-from flagdata.lake.moments import moment
+from flagdata.lake.refs import moment
 
 NOON = datetime(2026, 11, 26, 12, tzinfo=UTC)
 

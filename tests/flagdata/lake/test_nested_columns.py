@@ -14,7 +14,7 @@ from flagdata.errors import CorruptError, InputError
 from flagdata.export.source import Entry
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.health import doctor
-from flagdata.lake.older_rows import with_data_sets
+from flagdata.lake.rowfiles import with_data_sets
 from flagdata.record import Record
 from flagdata.schema import Kind, catalog_schema
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pyarrow as pa
 
 from flagdata.lake import Artifact
-from flagdata.lake.older_rows import with_data_sets
+from flagdata.lake.rowfiles import with_data_sets
 from flagdata.schema import Kind, catalog_schema
 
 

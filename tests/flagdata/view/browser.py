@@ -18,8 +18,8 @@ from typing import Any
 import pytest
 
 from flagdata.lake import Lake
-from flagdata.view import pages, routes, server
-from flagdata.view.routes import Answer
+from flagdata.view import pages, server
+from flagdata.view.server import Answer
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 _PATIENCE = 60.0  # s
@@ -89,12 +89,12 @@ def asked(
 
     with pytest.MonkeyPatch.context() as patch, server.Server(lake) as served:
         patch.setattr(pages, "script", lambda: script)
-        patch.setitem(routes._ROUTES, "held", held)
-        patch.setitem(routes._ROUTES, "found", found)
+        patch.setitem(server._ROUTES, "held", held)
+        patch.setitem(server._ROUTES, "found", found)
         if width < _NARROWEST:
             policy = server.HEADERS["Content-Security-Policy"].replace("frame-ancestors 'none'", "frame-src 'self'")
             policy = policy.replace("style-src 'self'", "style-src 'self' 'unsafe-inline'")
-            patch.setitem(routes._ROUTES, "framed", framed)
+            patch.setitem(server._ROUTES, "framed", framed)
             patch.setitem(server.HEADERS, "Content-Security-Policy", policy)
         threading.Thread(target=served.serve_forever, daemon=True).start()
         kept = f"--screenshot={screenshot}" if screenshot is not None else "--dump-dom"

@@ -16,7 +16,7 @@ from PIL import Image
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.results import keep
 from flagdata.schema import Kind
-from flagdata.view.routes import Answer, answer
+from flagdata.view.server import Answer, answer
 from tests.flagdata.view.conftest import CURVE, NAME, Shown
 
 

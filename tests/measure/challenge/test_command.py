@@ -9,7 +9,7 @@ import pytest
 import torch
 from click.testing import CliRunner
 
-from flagdata import signature
+from flagdata import outputs
 from measure.challenge import history
 from measure.challenge.command import challenge
 from measure.challenge.folder import ChallengeFolder
@@ -50,6 +50,6 @@ def test_the_page_on_stdout_is_the_one_that_is_written(invoke, tiny: ChallengeFo
     run(tiny, lambda e, s: cases.verdict(Conclusion.SUFFICIENT), seed=1, workers=IN_THIS_PROCESS)
     shown = invoke("score", str(tiny.path), "--out", str(tmp_path)).stdout
     page = tmp_path / "challenge-score.md"
-    assert signature.is_signed(page, command="challenge score")
+    assert outputs.is_signed(page, command="challenge score")
     written, _, _ = page.read_text().partition("<!-- written by flagdata challenge score;")
     assert shown == written.replace("\n![Power curves](challenge-score.png)\n", "", 1)

@@ -31,7 +31,7 @@ from flagdata.locks import alone_in
 from models import estimator, shipping
 from models.storage import WEIGHTS, read_card
 from models.targets import Cloth
-from models.training import inputs, publish
+from models.training import command, inputs
 from models.training.command import sides_of
 from models.training.inputs import prepare_clips, prepare_films
 from models.training.recipe import TRAININGS, load, parse
@@ -87,10 +87,10 @@ def test_a_model_was_made_from_the_recordings_of_both_sides(lake: Path, monkeypa
     made_from = {row["recording"] for row in catalog if row["artifact"] in clips}
     model = opened.rows({"kind": "network"}).to_pylist()[0]
     assert set(model["parents"]) == made_from
-    monkeypatch.setattr(publish, "PARENTS", 2)
-    data = publish.data_identity(opened, train, validation, at="v1")
-    bounded = publish.network_artifact(
-        opened, recipe, data, [*publish.recordings_of(train, validation), "f" * 32], branch="main"
+    monkeypatch.setattr(command, "PARENTS", 2)
+    data = command.data_identity(opened, train, validation, at="v1")
+    bounded = command.network_artifact(
+        opened, recipe, data, [*command.recordings_of(train, validation), "f" * 32], branch="main"
     )
     assert bounded.parents == tuple(sorted(made_from)[:2])
     assert bounded.recipe["recordings"] == len(made_from) + 1

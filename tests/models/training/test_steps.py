@@ -24,7 +24,6 @@ from models.frontend import FrontEnd
 from models.learner import Learner, Loss
 from models.training import checkpoint
 from models.training.augment import Augment
-from models.training.batches import Batches
 from models.training.inputs import Prepared
 from models.training.recipe import (
     DataSpec,
@@ -35,7 +34,7 @@ from models.training.recipe import (
     Schedule,
     TrainingRecipe,
 )
-from models.training.steps import DivergedError, Trained, Training, learning_rate
+from models.training.steps import Batches, DivergedError, Trained, Training, learning_rate
 
 SIZE = 24
 FRONT_END = FrontEnd(maps="wave-maps", size=SIZE)

@@ -15,8 +15,7 @@ from sim import membrane
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import Symplectic
 from sim.material import named
-from sim.run.batch import Outcome, Stepper, run
-from sim.run.diagnostics import principal_strains
+from sim.run.batch import Outcome, Stepper, principal_strains, run
 from sim.run.members import Crew
 from sim.run.reading import parse
 from sim.scene import assemble, flag

@@ -12,8 +12,7 @@ import torch
 from sim.air import NO_AIR
 from sim.integrate.symplectic import Symplectic, advance
 from sim.material import Material, isotropic, named
-from sim.run.batch import Stepper, run
-from sim.run.diagnostics import CRUMPLED, Monitor
+from sim.run.batch import CRUMPLED, Monitor, Stepper, run
 from sim.run.members import Crew
 from sim.run.reading import parse
 from sim.scene import assemble, flag

@@ -1,23 +1,151 @@
 """netCDF files that keep the CF conventions, read through xarray: wind by its standard names, as a table of text.
 
 Source: CF standard name table (wind_speed, wind_from_direction, wind_to_direction, eastward_wind, northward_wind).
+
+Times of a netCDF file by the CF conventions: numbers of a unit since a date, as UTC nanoseconds.
+
+Source: CF conventions 1.12, section 4.4; UDUNITS for the writing of the date and its zone, which is UTC where it has
+none. Whole numbers stay exact. Calendars of models, and units of no fixed length, have no instants: they are refused.
 """
 
 from __future__ import annotations
 
+import datetime as dt
 import importlib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flagdata.errors import InputError, LimitError
+from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.containers.cf_time import NOT_A_TIME, instants, is_time
+from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, snapped
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
-from flagdata.timebase import iso
+from flagdata.timebase import NANOSECONDS, from_datetime, iso
 from flagdata.units import UNITS, spelled
+
+_UNITS = {
+    "nanosecond": 1,
+    "nsec": 1,
+    "ns": 1,
+    "microsecond": 1_000,
+    "microsec": 1_000,
+    "usec": 1_000,
+    "us": 1_000,
+    "millisecond": 1_000_000,
+    "millisec": 1_000_000,
+    "msec": 1_000_000,
+    "ms": 1_000_000,
+    "second": NANOSECONDS,
+    "sec": NANOSECONDS,
+    "s": NANOSECONDS,
+    "minute": 60 * NANOSECONDS,
+    "min": 60 * NANOSECONDS,
+    "hour": HOUR,
+    "hr": HOUR,
+    "h": HOUR,
+    "day": DAY,
+    "d": DAY,
+}
+"""Nanoseconds of a unit; with an s behind it as well."""
+_CALENDARS = ("standard", "gregorian", "proleptic_gregorian")
+_SINCE = re.compile(r"\s*(?P<unit>\S+)\s+since\s+(?P<date>\S.*?)\s*", re.IGNORECASE)
+_DATE = re.compile(
+    r"(?P<Y>\d{1,4})-(?P<m>\d{1,2})-(?P<d>\d{1,2})"
+    r"(?:(?:T|\s+)(?P<H>\d{1,2})(?::(?P<M>\d{1,2})(?::(?P<S>\d{1,2})(?:\.(?P<f>\d{0,9}))?)?)?)?"
+    r"\s*(?:Z|UTC|GMT|(?P<sign>[+-]?)(?P<h>\d{1,2}):?(?P<min>\d{2})?)?",
+    re.IGNORECASE,
+)
+_REFORM = dt.date(1582, 10, 15)
+"""The first day of the Gregorian calendar; before it days of the calendar "standard" are Julian."""
+_FIRST, _END = (np.datetime64(year, "ns").astype(np.int64) for year in ("1970", "2200"))
+NOT_A_TIME = np.iinfo(np.int64).min
+
+
+@dataclass(frozen=True, kw_only=True)
+class Since:
+    """The unit [ns] of a count, and the instant [UTC ns] of its zero."""
+
+    unit: int
+    zero: int
+
+
+def is_time(attributes: Mapping[str, Any]) -> bool:
+    """Whether a variable's units are those of a time since a date."""
+    return _SINCE.fullmatch(str(attributes.get("units", ""))) is not None
+
+
+def since(attributes: Mapping[str, Any], *, where: str) -> Since:
+    """What the units and the calendar of a time say.
+
+    Raises:
+        TimeError: a calendar that is not the one of clocks, a unit of no fixed length, or a date that cannot be read.
+    """
+    units, calendar = str(attributes["units"]), str(attributes.get("calendar", "standard")).lower()
+    if calendar not in _CALENDARS:
+        what = f"the times are of the calendar {calendar!r}, whose days are not those of clocks in UTC"
+        fix = f"write them in one of the calendars {', '.join(_CALENDARS)}, or export the readings as CSV"
+        raise TimeError(what, where=where, fix=fix)
+    match = _SINCE.fullmatch(units)
+    unit = _UNITS.get(name := match["unit"].lower()) or _UNITS.get(name.removesuffix("s")) if match else None
+    if match is None or unit is None:
+        fix = "write the times in seconds, minutes, hours or days since a date"
+        raise TimeError(f"the times are in {units!r}, a unit of no fixed length", where=where, fix=fix)
+    date = _DATE.fullmatch(match["date"])
+    fix = "write the date as in 'seconds since 2026-05-01 12:00:00 +00:00'"
+    if date is None:
+        raise TimeError(f"the times are in {units!r}, whose date cannot be read", where=where, fix=fix)
+    offset = (int(date["h"] or 0) * 60 + int(date["min"] or 0)) * (-1 if date["sign"] == "-" else 1)
+    try:
+        parts = (int(date[name] or 0) for name in "YmdHMS")
+        zero = dt.datetime(*parts, tzinfo=dt.timezone(dt.timedelta(minutes=offset)))  # type: ignore[misc]
+    except ValueError:
+        raise TimeError(f"the times are in {units!r}, which is no date", where=where, fix=fix) from None
+    if calendar != "proleptic_gregorian" and zero.date() < _REFORM:
+        what = f"the times are in {units!r}: of days before {_REFORM} it does not say whether they are Julian"
+        raise TimeError(what, where=where, fix="state the calendar proleptic_gregorian, or write a later date")
+    return Since(unit=unit, zero=from_datetime(zero, nanosecond=int((date["f"] or "").ljust(9, "0"))))
+
+
+def instants(
+    values: NDArray[Any], attributes: Mapping[str, Any], *, where: str
+) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
+    """(n,) UTC nanoseconds of a variable as it is stored, `NOT_A_TIME` for missing ones and years beyond 1970 to 2199.
+
+    Raises:
+        TimeError: see `since`.
+    """
+    count = since(attributes, where=where)
+    absent = np.zeros(len(values), dtype=bool)
+    for name in ("_FillValue", "missing_value"):
+        absent |= np.isin(values, np.atleast_1d(attributes[name])) if name in attributes else False
+    scale, offset = (np.asarray(attributes.get(name, rest)) for name, rest in (("scale_factor", 1), ("add_offset", 0)))
+    packed = bool((scale != 1).any() or (offset != 0).any())
+    numbers = values * scale.astype(np.float64) + offset.astype(np.float64) if packed else values
+    with np.errstate(invalid="ignore", over="ignore"):
+        about = numbers.astype(np.float64) * count.unit + count.zero
+        absent |= ~((about > _FIRST) & (about < _END))
+        kept = np.where(absent, 0, numbers)
+        whole = np.floor(kept).astype(np.int64)
+        rest = np.zeros(len(values)) if kept.dtype.kind in "iu" else np.round((kept - whole) * float(count.unit))
+        units, further = divmod(count.zero, count.unit)  # the nanoseconds from year 1 do not fit into 64 bits
+        time = (whole + units) * count.unit + further + rest.astype(np.int64)
+    found: tuple[Finding, ...] = ()
+    step = float(np.spacing(np.abs(kept).max(initial=0))) * count.unit if kept.dtype.kind == "f" else 0.0
+    time = snapped(time, 1_000_000, round(step)) if step <= 1_000 else time
+    if step > NANOSECONDS / 1000:
+        what = f"the times are numbers of {8 * kept.dtype.itemsize} bits, which are {step / NANOSECONDS:.3g} s apart"
+        fix = "write them as numbers of 64 bits"
+        found = (
+            Finding(kind="coarse-stamps", severity=Severity.WARNING, value=step / NANOSECONDS, what=what, fix=fix),
+        )
+    return np.where(absent, NOT_A_TIME, time), found
+
 
 _HDF = b"\x89HDF"
 _STANDARD = {

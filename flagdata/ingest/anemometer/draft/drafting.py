@@ -2,6 +2,8 @@
 
 A draft gives no rows. Where nothing is open, its recipe can be read and shown; where anything of it is inferred or
 assumed, what was read counts only when it is confirmed (see `confirm`).
+
+The recipe of a draft as TOML; "?" stands where it is open.
 """
 
 from __future__ import annotations
@@ -24,12 +26,67 @@ from flagdata.ingest.anemometer.draft.times import (
     of_columns,
     unread_count,
 )
-from flagdata.ingest.anemometer.draft.toml import ChannelText, quoted, recipe_text, reference
 from flagdata.ingest.anemometer.draft.words import MOVING, Meaning, fits, meaning
 from flagdata.ingest.anemometer.instants import dates
 from flagdata.ingest.anemometer.instants.stamps import EPOCH
 from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.recipe import DELIMITERS
 from flagdata.units import canonical, spelled
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelText:
+    """A channel of a recipe: its column by heading or number, its unit, and whether the wind blows that way."""
+
+    column: str | int
+    unit: str
+    towards: bool = False
+
+
+def recipe_text(
+    shape: Shape,
+    *,
+    time: Sequence[int] | None,
+    form: str | None,
+    zone: str | None,
+    channels: Mapping[str, ChannelText],
+    label: str,
+    missing: Sequence[str],
+) -> str:
+    """The recipe of a table."""
+    delimiter = next(name for name, character in DELIMITERS.items() if character == shape.delimiter)
+    lines = [
+        'name = "drafted"',
+        'about = "drafted from the first lines of the file"',
+        'source = "the file"',
+        "",
+        "[file]",
+        f"delimiter = {quoted(delimiter)}",
+        f"decimal = {quoted(shape.decimal)}",
+        f"preamble = {shape.preamble}",
+        f"header = {shape.header}",
+        f"missing = [{', '.join(map(quoted, missing))}]",
+        "",
+        "[time]",
+    ]
+    columns = ["?"] if time is None else [shape.reference(i) for i in time]
+    lines += [f"columns = [{', '.join(map(reference, columns))}]", f"format = {quoted(form or '?')}"]
+    lines += [f"zone = {quoted(zone)}"] if zone is not None else []
+    for name, channel in channels.items():
+        lines += ["", f"[channels.{name}]", f"column = {reference(channel.column)}", f"unit = {quoted(channel.unit)}"]
+        lines += ['convention = "to"'] if channel.towards else []
+    return "\n".join([*lines, "", "[sensor]", f"name = {quoted(label)}", ""])
+
+
+def quoted(text: str) -> str:
+    """A text as TOML writes it."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t") + '"'
+
+
+def reference(column: str | int) -> str:
+    """A column as TOML writes it: its heading, or its number."""
+    return str(column) if isinstance(column, int) else quoted(column)
+
 
 Origin = Literal["stated", "inferred", "assumed", "given"]
 _BESIDE = {

@@ -11,7 +11,7 @@ from scipy.io import netcdf_file
 
 from flagdata.errors import FlagdataError, LimitError
 from flagdata.ingest.anemometer import Limits, WindOptions, read_log
-from flagdata.ingest.anemometer.containers.cf_time import instants
+from flagdata.ingest.anemometer.containers.netcdf import instants
 
 Variable = tuple[str, str, str, Sequence[float]]
 SPEED: Variable = ("ff", "wind_speed", "knots", [4.0, 5.0, np.nan, 6.0])

@@ -22,7 +22,7 @@ from flagdata.errors import FlagdataError, InputError, LimitError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CameraOptions, Limits, open_camera, probe
 from flagdata.ingest.camera.boxes import top
-from flagdata.ingest.camera.stills import heads
+from flagdata.ingest.camera.sequence import heads
 from flagdata.signals import Frame
 
 FRAMES = 50

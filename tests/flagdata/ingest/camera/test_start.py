@@ -7,8 +7,8 @@ import pytest
 from flagdata.commands.ingest_options import camera_options
 from flagdata.errors import TimeError
 from flagdata.findings import quality_flags
-from flagdata.ingest.camera.avchd import recording_time
 from flagdata.ingest.camera.start import Start, find_start
+from flagdata.ingest.camera.video import recording_time
 from flagdata.timebase import iso, parse
 
 TEN = parse("2026-05-01T10:00:00Z")

@@ -10,8 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from flagdata.ingest.meshes.checks import findings
-from flagdata.ingest.meshes.continuity import continuity
+from flagdata.ingest.meshes.checks import continuity, findings
 from flagdata.ingest.meshes.folder import frame_files, read_folder
 from flagdata.ingest.meshes.obj import Obj, obj_text
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flagdata.ingest.meshes.checks import findings
-from flagdata.ingest.meshes.joints import t_joints
+from flagdata.ingest.meshes.checks import findings, t_joints
 from flagdata.lake.meshes import MeshSequence
 
 # A square metre of which the left half is one quad and the right half two, so that vertex 6 lies on the edge 1–2.
