@@ -28,7 +28,7 @@ carried too slowly.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import torch
@@ -61,6 +61,7 @@ class FiniteSpanLoading(ForceEffect):
         density: ρ of the air.
     """
 
+    revision: ClassVar[int] = 2  # the ends continued from within
     share: Annotated[
         Value,
         strength(

@@ -26,7 +26,11 @@ the others are a force.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
+import numpy as np
+import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from sim.cloth import Cloth
@@ -45,6 +49,7 @@ class ReactiveLoading(ForceEffect):
         mass: m_a, per area of cloth.
     """
 
+    revision: ClassVar[int] = 2  # the ends continued from within
     mass: MassPerArea = 0.0
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
@@ -56,12 +61,17 @@ class ReactiveLoading(ForceEffect):
 
 
 def momentum_rates(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-    """A vertex's rest area times D V without the acceleration's term (see above): (vertex, 1, batch) [m³/s²]."""
+    """A vertex's rest area times D V without the acceleration's term (see above): (vertex, 1, batch) [m³/s²].
+
+    At the hoist and the fly V, s and then D V are continued from within (see `sim.ends`).
+    """
     relative = velocity - wind
     normal = mean_normals(cloth, position)
     turning = mean_normal_rates(cloth, position, velocity)
     across = (relative * normal).sum(1, keepdim=True)
     slip = across * normal - relative
+    ends = cloth.mesh.ends
+    across, slip = (_continued(cloth, field, ends.parabola) for field in (across, slip))
 
     g0, g1, g2 = shape_gradients(cloth, position)
     v0, v1, v2 = cloth.at_corners(across)
@@ -69,7 +79,20 @@ def momentum_rates(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tenso
     following = ((s0 + s1 + s2) / 3 * (g0 * v0 + g1 * v1 + g2 * v2)).sum(1, keepdim=True)
     spreading = (v0 + v1 + v2) / 3 * (g0 * s0 + g1 * s1 + g2 * s2).sum(1, keepdim=True)
     swept = (cloth.areas / 3)[:, None, None] * (following + spreading / 2)
-    return rest_areas(cloth)[:, None, None] * (turning * relative).sum(1, keepdim=True) + cloth.shared_out(swept)
+    areas = rest_areas(cloth)[:, None, None]
+    rate = (turning * relative).sum(1, keepdim=True) + cloth.shared_out(swept) / areas
+    return areas * _continued(cloth, rate, ends.line)
+
+
+def _continued(cloth: Cloth, field: Tensor, weights: NDArray[np.float64]) -> Tensor:
+    """A field (vertex, …, batch) with its values at the ends from those within."""
+    ends = cloth.mesh.ends
+    if not len(ends.vertices):
+        return field
+    at, within = (torch.as_tensor(index, device=cloth.device) for index in (ends.vertices, ends.within))
+    own = torch.as_tensor(weights, dtype=field.dtype, device=cloth.device)
+    return field.index_copy(0, at, torch.einsum("ek,ek...->e...", own, field[within]))
+
 
 
 def shape_gradients(cloth: Cloth, position: Tensor) -> tuple[Tensor, Tensor, Tensor]:
