@@ -1,14 +1,12 @@
 """Fields of a cloth continued from within to its hoist and its fly.
 
-A vertex at the end of a cloth has faces on one side only. A mean over them is that of half a cell further in, which is an error
-of the first order; a difference of such means along the cloth is half of what it should be beside the end, whatever the
-mesh. What is differentiated along the cloth is therefore taken, at both ends, from the vertices within:
+A vertex at the end of a cloth has faces on one side only. A mean over them is that of half a cell further in; a difference of
+such means along the cloth is then half of what it should be beside the end, however small the cells are. What is to be
+differentiated along the cloth is therefore continued to both ends from the vertices within, by a parabola through the
+three next to the end in its row: means within have errors that vary smoothly along the cloth, and so has the parabola, so
+that a difference keeps an error of the second order.
 
-- by a parabola through the three next to the end in its row, as mean values there have errors that vary smoothly: what
-  is differentiated afterwards keeps an error of the second order;
-- by a line through the two next to the end, for what is not differentiated any more.
-
-Where vertices are not in rows, by the least weights of the sixteen nearest that are right for all polynomials of that degree.
+Where vertices are not in rows, it is by the least weights of the sixteen nearest that are right for all parabolas.
 """
 
 from __future__ import annotations
@@ -16,7 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 Floats = NDArray[np.float64]
 
@@ -34,14 +34,20 @@ class Ends:
     Attributes:
         vertices: (end,) indices.
         within: (end, k) indices of vertices that are at no end.
-        parabola: (end, k) weights.
-        line: (end, k) weights.
+        weights: (end, k) of their values.
     """
 
     vertices: NDArray[np.int64]
     within: NDArray[np.int64]
-    parabola: Floats
-    line: Floats
+    weights: Floats
+
+    def continued(self, field: Tensor) -> Tensor:
+        """A field (vertex, …) with its values at the ends from those within."""
+        if not len(self.vertices):
+            return field
+        at, within = (torch.as_tensor(index, device=field.device) for index in (self.vertices, self.within))
+        weights = torch.as_tensor(self.weights, dtype=field.dtype, device=field.device)
+        return field.index_copy(0, at, torch.einsum("ek,ek...->e...", weights, field[within]))
 
 
 def ends_of(rest: Floats) -> Ends:
@@ -53,40 +59,32 @@ def ends_of(rest: Floats) -> Ends:
     u = rest[:, 0]
     at_end = (u - u.min() <= _SAME * size[0]) | (u.max() - u <= _SAME * size[0])
     inner = np.flatnonzero(~at_end)
-    found: list[tuple[int, NDArray[np.int64], Floats, Floats]] = []
+    found: list[tuple[int, NDArray[np.int64], Floats]] = []
     for vertex in np.flatnonzero(at_end).tolist():
         offsets = rest[inner] - rest[vertex]
-        row = np.flatnonzero(np.abs(offsets[:, 1]) <= _SAME * max(size[1], size[0]))
+        row = np.flatnonzero(np.abs(offsets[:, 1]) <= _SAME * size[1])
         near = row[np.argsort(np.abs(offsets[row, 0]), kind="stable")[:3]]
         if len(near) == 3:
-            along = offsets[near, 0]
-            weights = _exact(along[:, None] ** np.arange(3)), np.append(_exact(along[:2, None] ** np.arange(2)), 0.0)
+            weights = _exact(offsets[near, :1] ** np.arange(3))
         else:
             near = np.argsort(np.hypot(*offsets.T), kind="stable")[:_NEAREST]
             a, b = offsets[near].T
-            one = np.ones(len(near))
-            weights = _exact(np.stack([one, a, b, a * a, a * b, b * b], 1)), _exact(np.stack([one, a, b], 1))
-        if all(len(w) and np.abs(w).sum() <= _LARGEST for w in weights):
-            found.append((vertex, inner[near], *weights))
-    width = max((len(near) for _, near, _, _ in found), default=0)
-    parabola, line = np.zeros((2, len(found), width))
-    within = np.array([np.resize(near, width) for _, near, _, _ in found], dtype=np.int64).reshape(len(found), width)
-    for place, (_, near, second, first) in enumerate(found):
-        parabola[place, : len(near)], line[place, : len(near)] = second, first
-    return Ends(
-        vertices=np.array([vertex for vertex, *_ in found], dtype=np.int64),
-        within=within,
-        parabola=parabola,
-        line=line,
-    )
+            weights = _exact(np.stack([np.ones(len(near)), a, b, a * a, a * b, b * b], axis=1))
+        if weights is not None and np.abs(weights).sum() <= _LARGEST:
+            found.append((vertex, inner[near], weights))
+    width = max((len(near) for _, near, _ in found), default=0)
+    within, weights = np.zeros((len(found), width), dtype=np.int64), np.zeros((len(found), width))
+    for place, (_, near, own) in enumerate(found):
+        within[place], weights[place, : len(near)] = np.resize(near, width), own
+    return Ends(vertices=np.array([vertex for vertex, *_ in found], dtype=np.int64), within=within, weights=weights)
 
 
-def _exact(terms: Floats) -> Floats:
-    """(k,) least weights that give polynomials of terms (k, term), at offsets, their value at none; empty where none do."""
-    scaled = terms / np.maximum(np.abs(terms).max(0), np.finfo(float).tiny) if len(terms) else terms
-    wanted = np.zeros(terms.shape[1])
-    wanted[0] = 1.0
+def _exact(terms: Floats) -> Floats | None:
+    """(k,) least weights of values at offsets that give polynomials of terms (k, term) their value at no offset; None
+    where none do."""
     if len(terms) < terms.shape[1]:
-        return np.empty(0)
-    weights = np.linalg.lstsq(scaled.T, wanted, rcond=1e-6)[0]
-    return weights if np.abs(scaled.T @ weights - wanted).max() < 1e-9 else np.empty(0)
+        return None
+    scaled = terms / np.maximum(np.abs(terms).max(0), np.finfo(float).tiny)
+    wanted = np.arange(terms.shape[1]) == 0
+    weights = np.linalg.lstsq(scaled.T, wanted.astype(float), rcond=1e-6)[0]
+    return weights if np.abs(scaled.T @ weights - wanted).max() < 1e-9 else None

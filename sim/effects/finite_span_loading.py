@@ -86,7 +86,7 @@ class FiniteSpanLoading(ForceEffect):
 
         modes, gains = real(cosines(cloth.mesh)), real(relative_masses(cloth.mesh))
         root = real(np.sqrt(profile_over_height(cloth.mesh)))[:, None]
-        rates = momentum_rates(cloth, position, velocity, wind)[:, 0]
+        rates = momentum_rates(cloth, position, velocity, wind, ends=cloth.mesh.ends)[:, 0]
         smooth = modes @ (gains[:, None] * (modes.T @ (root * rates)))
         size = self._longest(cloth.mesh) * rest_areas(cloth)[:, None] * root * smooth
         return -size.unsqueeze(1) * mean_normals(cloth, position)

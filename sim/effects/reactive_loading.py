@@ -26,16 +26,13 @@ the others are a force.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
-import numpy as np
-import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from sim.cloth import Cloth
 from sim.effects.added_mass import AddedMass, MassPerArea
 from sim.effects.effect import ForceEffect
+from sim.ends import Ends
 from sim.inertia import mean_normal_rates, mean_normals, rest_areas
 from sim.state import State
 from sim.system import System
@@ -49,7 +46,6 @@ class ReactiveLoading(ForceEffect):
         mass: m_a, per area of cloth.
     """
 
-    revision: ClassVar[int] = 2  # the ends continued from within
     mass: MassPerArea = 0.0
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
@@ -60,18 +56,22 @@ class ReactiveLoading(ForceEffect):
         return -self.mass * momentum_rates(cloth, position, velocity, wind) * mean_normals(cloth, position)
 
 
-def momentum_rates(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+def momentum_rates(
+    cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor, *, ends: Ends | None = None
+) -> Tensor:
     """A vertex's rest area times D V without the acceleration's term (see above): (vertex, 1, batch) [m³/s²].
 
-    At the hoist and the fly V, s and then D V are continued from within (see `sim.ends`).
+    Args:
+        ends: at which V and s are continued from within; None where they are the means over faces there too, which
+            are those of half a cell further in.
     """
     relative = velocity - wind
     normal = mean_normals(cloth, position)
     turning = mean_normal_rates(cloth, position, velocity)
     across = (relative * normal).sum(1, keepdim=True)
     slip = across * normal - relative
-    ends = cloth.mesh.ends
-    across, slip = (_continued(cloth, field, ends.parabola) for field in (across, slip))
+    if ends is not None:
+        across, slip = ends.continued(across), ends.continued(slip)
 
     g0, g1, g2 = shape_gradients(cloth, position)
     v0, v1, v2 = cloth.at_corners(across)
@@ -79,20 +79,7 @@ def momentum_rates(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tenso
     following = ((s0 + s1 + s2) / 3 * (g0 * v0 + g1 * v1 + g2 * v2)).sum(1, keepdim=True)
     spreading = (v0 + v1 + v2) / 3 * (g0 * s0 + g1 * s1 + g2 * s2).sum(1, keepdim=True)
     swept = (cloth.areas / 3)[:, None, None] * (following + spreading / 2)
-    areas = rest_areas(cloth)[:, None, None]
-    rate = (turning * relative).sum(1, keepdim=True) + cloth.shared_out(swept) / areas
-    return areas * _continued(cloth, rate, ends.line)
-
-
-def _continued(cloth: Cloth, field: Tensor, weights: NDArray[np.float64]) -> Tensor:
-    """A field (vertex, …, batch) with its values at the ends from those within."""
-    ends = cloth.mesh.ends
-    if not len(ends.vertices):
-        return field
-    at, within = (torch.as_tensor(index, device=cloth.device) for index in (ends.vertices, ends.within))
-    own = torch.as_tensor(weights, dtype=field.dtype, device=cloth.device)
-    return field.index_copy(0, at, torch.einsum("ek,ek...->e...", own, field[within]))
-
+    return rest_areas(cloth)[:, None, None] * (turning * relative).sum(1, keepdim=True) + cloth.shared_out(swept)
 
 
 def shape_gradients(cloth: Cloth, position: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -40,11 +40,11 @@ template <typename T>
 struct Ends {
   int64_t count, width;
   const int32_t *vertex, *within;  // (count), (count, width)
-  const T *parabola, *line;        // (count, width) weights
+  const T* weight;                 // (count, width)
 
   // In place, for fields of so many numbers a vertex, lanes innermost.
   template <typename V>
-  void continued(T* field, int64_t numbers, const T* weight) const {
+  void continued(T* field, int64_t numbers) const {
     const int64_t stride = numbers * int64_t(sizeof(V) / sizeof(T)), lanes = sizeof(V) / sizeof(T);
     for (int64_t e = 0; e < count; ++e)
       for (int64_t k = 0; k < numbers; ++k) {
@@ -92,8 +92,9 @@ struct Sheet {
     add_at(force, i, scale(at(normals, i), size / vertex_areas[i]));
   }
   // At the vertices, (vertices, lane) in the scratch: rest area times the rate of the velocity across the cloth, followed
-  // along it by the air, without the term of the acceleration (sim/effects/reactive_loading.py); at the ends from within.
-  T* momentum_rates() const {
+  // along it by the air, without the term of the acceleration (sim/effects/reactive_loading.py); what is swept
+  // is continued from within to the ends that are given.
+  T* momentum_rates(const Ends<T>* continued) const {
     // The cloth's velocity across itself and the air's slip along it at the vertices, four numbers each; then what is
     // swept along the faces.
     T *const over = scratch, *const swept = over + 4 * L * vertices;
@@ -107,7 +108,7 @@ struct Sheet {
       put(to, across), put(to + L, slip.x), put(to + 2 * L, slip.y), put(to + 3 * L, slip.z);
       put(swept + L * i, V{});
     }
-    ends->template continued<V>(over, 4, ends->parabola);
+    if (continued) continued->template continued<V>(over, 4);
     for (int64_t e = 0; e < faces; ++e) {
       const int32_t* c = face + 3 * e;
       const T* d = gradients + 6 * e;
@@ -138,10 +139,8 @@ struct Sheet {
     }
     for (int64_t i = 0; i < vertices; ++i) {
       const Vector3<V> relative = sub(at(velocity, i), wind(i));
-      put(swept + L * i, (dot(at(turning, i), relative) + load<V>(swept + L * i)) / vertex_areas[i]);
+      put(swept + L * i, dot(at(turning, i), relative) + load<V>(swept + L * i));
     }
-    ends->template continued<V>(swept, 1, ends->line);
-    for (int64_t i = 0; i < vertices; ++i) put(swept + L * i, load<V>(swept + L * i) * vertex_areas[i]);
     return swept;
   }
 };

@@ -76,7 +76,7 @@ class _Ends(ctypes.Structure):
 
     _fields_ = [
         *((name, ctypes.c_int64) for name in ("count", "width")),
-        *((name, ctypes.c_void_p) for name in ("vertex", "within", "parabola", "line")),
+        *((name, ctypes.c_void_p) for name in ("vertex", "within", "weight")),
     ]
 
 
@@ -448,8 +448,7 @@ def _set_ends(settings: _Ends, cloth: Cloth) -> dict[str, Tensor]:
     tensors = {
         "vertex": torch.tensor(ends.vertices, dtype=torch.int32),
         "within": torch.tensor(ends.within, dtype=torch.int32),
-        "parabola": torch.tensor(ends.parabola, dtype=cloth.dtype),
-        "line": torch.tensor(ends.line, dtype=cloth.dtype),
+        "weight": torch.tensor(ends.weights, dtype=cloth.dtype),
     }
     for name, tensor in tensors.items():
         setattr(settings, name, tensor.data_ptr())

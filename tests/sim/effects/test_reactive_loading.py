@@ -38,52 +38,6 @@ def test_the_load_of_a_travelling_wave_converges_at_second_order(make_system, pl
     assert rates.min() > 1.75
 
 
-def errors_at_the_ends(make_system, plain, columns: int, celerity: float) -> np.ndarray:
-    """(hoist, fly) of the load per area in the two outer rows of vertices, over U² k² A.
-
-    A wave of 0.75 m along a cloth of 1 m, η = A cos(k x − ω t + φ) with ω = c U k, whose load without the term of the acceleration
-    is −m_a (2 U η_xt + U² η_xx) = −m_a (2 c − 1) U² k² η. Root mean square over φ of 0 and π/2, so that no zero of the error
-    is taken for its size.
-    """
-    mesh = grid(width=1.0, height=0.6, columns=columns, rows=columns // 2)
-    system, _ = make_system(mesh, [plain])
-    u, v = mesh.rest.T
-    k = 2 * np.pi / 0.75
-    wind = torch.tensor([U, 0.0, 0.0], dtype=torch.float64)[:, None]
-    squares = np.zeros(len(u))
-    for shift in (0.0, np.pi / 2):
-        height = AMPLITUDE * np.cos(k * u + shift)
-        rate = celerity * U * k * AMPLITUDE * np.sin(k * u + shift)
-        position = torch.tensor(np.stack([u, v, height], axis=1))[..., None]
-        velocity = torch.tensor(np.stack([0 * u, 0 * u, rate], axis=1))[..., None]
-        force = ReactiveLoading(mass=MASS).force(system.cloth, 0.0, position, velocity, wind)
-        expected = -MASS * (2 * celerity - 1) * (U * k) ** 2 * height
-        squares += (force[:, 2, 0].numpy() / mesh.vertex_areas - expected) ** 2 / 2
-    error = np.sqrt(squares) / (MASS * (U * k) ** 2 * AMPLITUDE)
-    cell = 1.0 / columns
-    return np.array([error[np.abs(u - end) < 1.5 * cell].max() for end in (0.0, 1.0)])
-
-
-@pytest.mark.parametrize("celerity", [0.0, 0.6])
-def test_the_load_converges_at_second_order_at_hoist_and_fly(make_system, plain, celerity: float) -> None:
-    errors = np.array([errors_at_the_ends(make_system, plain, columns, celerity) for columns in (20, 40, 80)])
-    assert np.log2(errors[:-1] / errors[1:]).min() >= 1.8
-    assert errors[-1].max() < 0.02
-
-
-def test_on_an_irregular_mesh_the_load_at_the_ends_is_continued_too(make_system, plain, distorted) -> None:
-    """η = κ u²/2 and still: −m_a U² κ, of which a vertex at an end whose faces alone are asked has half."""
-    system, _ = make_system(distorted, [plain])
-    u, v = distorted.rest.T
-    position = torch.tensor(np.stack([u, v, 1e-3 * u**2 / 2], axis=1))[..., None]
-    wind = torch.tensor([U, 0.0, 0.0], dtype=torch.float64)[:, None]
-    force = ReactiveLoading(mass=MASS).force(system.cloth, 0.0, position, torch.zeros_like(position), wind)
-    load = force[:, 2, 0].numpy() / distorted.vertex_areas / (-MASS * U**2 * 1e-3)
-    for end in (0.0, u.max()):
-        at = (np.abs(u - end) < 1e-9) & (v > 0.05) & (v < 0.35)
-        assert abs(load[at].mean() - 1) < 0.2
-
-
 def test_a_rigid_plate_in_steady_translation_feels_no_load(make_system, plain, square, inclined) -> None:
     """Its normal and its velocity relative to the air are constant: D V = 0, at any incidence."""
     system, _ = make_system(square, [plain])
