@@ -1,10 +1,10 @@
 """Fields of a cloth continued from within to its hoist and its fly.
 
-A vertex at the end of a cloth has faces on one side only. A mean over them is that of half a cell further in; a difference of
-such means along the cloth is then half of what it should be beside the end, however small the cells are. What is to be
-differentiated along the cloth is therefore continued to both ends from the vertices within, by a parabola through the
-three next to the end in its row: means within have errors that vary smoothly along the cloth, and so has the parabola, so
-that a difference keeps an error of the second order.
+A vertex at the end of a cloth has faces on one side only. A mean over them is that of half a cell further in; a
+difference of such means along the cloth is then half of what it should be beside the end, however small the cells are.
+What is to be differentiated along the cloth is therefore continued to both ends from the vertices within, by a parabola
+through the three next to the end in its row: means within have errors that vary smoothly along the cloth, and so has
+the parabola, so that a difference keeps an error of the second order.
 
 Where vertices are not in rows, it is by the least weights of the sixteen nearest that are right for all parabolas.
 """

@@ -76,8 +76,8 @@ def errors_at_the_ends(columns: int, *, still: float = 1.0, celerity: float = 0.
     """(hoist, fly) of the load per area in the two outer rows of vertices, over the largest.
 
     A wave η = A cos(k u − ω t + φ) of half the cloth's length, ω = c U k: D V without the acceleration's term is
-    2 U η_xt + U² η_xx = (2 c − 1) U² k² η, whose load the effect's own masses of its cosines give. Root mean square over φ of 0
-    and π/2, so that no zero of the error is taken for its size.
+    2 U η_xt + U² η_xx = (2 c − 1) U² k² η, whose load the effect's masses of its cosines give. Root mean square over
+    φ of 0 and π/2, so that no zero of the error is taken for its size.
 
     Args:
         still: factor on the shape η, and so on U² η_xx; at 0 there is the rate of a flat cloth alone, 2 U η_xt.
