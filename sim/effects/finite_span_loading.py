@@ -19,6 +19,8 @@ height, each multiplied by m(k)/m(k₀) for its own k, and put together again:
 
     −m(k₀) √e F[√e R] n
 
+V and the slip are continued to the hoist and the fly from within before they are differentiated (`sim.ends`).
+
 F is symmetric and the same at all times, so that the Coriolis term does no work within the sheet and the centrifugal
 one is the gradient of an energy, as without it. The first term, the acceleration's, is a mass m(k₀) e of each vertex
 (see `sim.inertia`), of the wave of twice the cloth's length, k₀ = π/L; that of shorter waves is too large, as they are

@@ -20,7 +20,9 @@ For v = η_t e_z, n = e_z − η_x e_x, u = U e_x and small slopes the last term
 Soc. B 179:125, 1971) as Candelier, Boyer and Leroyer put it (J. Fluid Mech. 668:196, 2011) for a sheet that does not
 stretch, ½ V ∇_s·s = −½ κ V². With it the balance of energy closes: in air at rest, what the sheet gives is the change
 of ½ m_a V² over the sheet, and ½ m_a V² s shed across its edge. The first term is the integrator's (see `sim.inertia`),
-the others are a force.
+the others are a force. At the ends of the cloth the means over faces are those of half a cell further in, which keeps
+that balance exactly and is a half of η_xx; continuing them, as `sim.effects.finite_span_loading` does, costs runs here,
+where nothing else bounds short waves (decision 052).
 """
 
 from __future__ import annotations
