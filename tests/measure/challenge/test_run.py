@@ -62,7 +62,14 @@ def test_the_first_set_of_films_that_is_answered_has_all_workers_and_others_one(
                 raise InputError("no flag is found", where="a film", fix="film one")
             return cases.verdict(Conclusion.SUFFICIENT)
 
-        return run(folder, refusing_first, **how | {"workers": IN_THIS_PROCESS})
+        return run(
+            folder,
+            refusing_first,
+            seed=how["seed"],
+            only=how["only"],
+            workers=IN_THIS_PROCESS,
+            progress=how["progress"],
+        )
 
     monkeypatch.setattr(running, "run", judge)
     fitter = ClosingTheLoopOnFilms(folder=tmp_path, workers=2)
