@@ -57,7 +57,7 @@ def make(
     """A challenge in a new folder, which appears whole; the same recipe and seed give the same bytes on one machine.
 
     One that was stopped goes on when the same is asked for again: until it is whole it lies beside the folder, in
-    `.flagdata-HASH.making`, batch by batch.
+    `.flagdata-HASH.making`, set by set.
 
     Args:
         count: of sets.
@@ -101,9 +101,8 @@ def _make(
 
     waiting: list[tuple[AnswerKey, ...]] = []
     for group in batches(draw(recipe, seed=seed, count=count), recipe.count):
-        kept = _kept(target, group)
-        if kept.is_file():
-            keep(read_json(kept, noun="note of a batch"))
+        if all(_kept(target, key).is_file() for key in group):
+            keep(_published(target, group))
         else:
             waiting.append(group)
     if workers == 1:
@@ -126,21 +125,26 @@ def _make(
     )
 
 
-def _kept(target: ChallengeFolder, keys: Sequence[AnswerKey]) -> Path:
-    """What was published of a batch, written once all of its sets are."""
-    return target.path / "batches" / f"{keys[0].name}.json"
+def _kept(target: ChallengeFolder, key: AnswerKey) -> Path:
+    """What is to be published of a set, written once the set is."""
+    return target.path / "kept" / f"{key.name}.json"
+
+
+def _published(target: ChallengeFolder, keys: Sequence[AnswerKey]) -> dict[str, dict[str, str]]:
+    """Of sets that are written."""
+    return {key.name: read_json(_kept(target, key), noun="note of a set") for key in keys}
 
 
 def _made(
     target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]
 ) -> dict[str, dict[str, str]]:
-    """Simulate a batch and write its sets; what is published of each. What a stopped one left of them is replaced."""
-    for key in keys:
-        shutil.rmtree(target.data(key.name), ignore_errors=True)
+    """Simulate a batch and write those of its sets that are not yet; what is published of each."""
     made = simulate(recipe, seed, keys)
-    entries = {key.name: _write(target, recipe, seed, key, made[key.name]) for key in keys}
-    files.write_json(_kept(target, keys), entries)
-    return entries
+    for key in keys:
+        if not _kept(target, key).is_file():
+            shutil.rmtree(target.data(key.name), ignore_errors=True)  # what a stopped one left
+            files.write_json(_kept(target, key), _write(target, recipe, seed, key, made[key.name]))
+    return _published(target, keys)
 
 
 def _write(
