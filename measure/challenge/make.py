@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, replace
@@ -14,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.documents import read_json
-from flagdata.errors import FlagdataError
-from flagdata.outputs import check_folder, fresh_folder
+from flagdata.outputs import removed, resumed_folder
 from flagdata.provenance import code_version, recipe_hash
 from flagdata.rng import stream
 from measure.challenge import folder as files
@@ -68,18 +66,9 @@ def make(
         ConflictError: something is there.
         FlagdataError: a flag diverged, with weak effects too.
     """
-    check_folder(path)
     asked = {"recipe": asdict(recipe), "seed": seed, "sets": count, "code": code_version(), "folder": path.name}
-    making = ChallengeFolder(path.absolute().parent / f".flagdata-{recipe_hash(asked)[:16]}.making")
-    try:
-        _make(making, recipe, seed=seed, count=count, workers=workers, progress=progress)
-        with fresh_folder(path) as whole:
-            for part in (making.path / "sets", making.path / "sealed", making.public):
-                part.rename(whole / part.name)
-    except FlagdataError:
-        shutil.rmtree(making.path, ignore_errors=True)
-        raise
-    shutil.rmtree(making.path)
+    with resumed_folder(path, key=recipe_hash(asked), parts=("sets", "sealed", "challenge.json")) as making:
+        _make(ChallengeFolder(making), recipe, seed=seed, count=count, workers=workers, progress=progress)
     return ChallengeFolder(path)
 
 
@@ -142,7 +131,7 @@ def _made(
     made = simulate(recipe, seed, keys)
     for key in keys:
         if not _kept(target, key).is_file():
-            shutil.rmtree(target.data(key.name), ignore_errors=True)  # what a stopped one left
+            removed(target.data(key.name))
             files.write_json(_kept(target, key), _write(target, recipe, seed, key, made[key.name]))
     return _published(target, keys)
 
