@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
+from sim.ends import Ends, ends_of
 
 # Twice the area over the squared longest edge; an equilateral triangle has 0.87. Below this it is a sliver on which
 # shape derivatives lose half the digits of float32.
@@ -144,6 +145,11 @@ class Mesh:
         forward = np.stack([self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()], axis=1)
         pairs, counts = np.unique(np.sort(forward, axis=1), axis=0, return_counts=True)
         return np.unique(pairs[counts == 1])
+
+    @cached_property
+    def ends(self) -> Ends:
+        """Vertices at u's least and largest, and what fields are continued to them from."""
+        return ends_of(self.rest)
 
     @cached_property
     def hinge_lengths(self) -> NDArray[np.float64]:

@@ -168,7 +168,10 @@ class Batch:
         """What differs from a calibration's simulations, whose hash is older."""
         found: dict[str, object] = {}
         if self.effects:
-            found["effects"] = [[one.name, dict(one.shapes), own.tolist()] for one, own in self.effects]
+            found["effects"] = [
+                [one.name, dict(one.shapes), own.tolist(), *([one.revision] if one.revision > 1 else [])]
+                for one, own in self.effects
+            ]
         if self.until is not None:
             found["until"] = self.until
         if self.discretisation is not None:

@@ -46,7 +46,7 @@ def challenge() -> None:
 )
 @json_option
 def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json: bool) -> None:
-    """Draw keys, simulate, and write sealed data sets into a new folder."""
+    """Draw keys, simulate, and write sealed data sets into a new folder; one that was stopped goes on."""
     from flagdata.workload import announced
     from measure.challenge.make import make as make_challenge
     from measure.challenge.make import workload
@@ -125,7 +125,7 @@ def bank(
     type=click.IntRange(min=1),
     default=1,
     show_default=True,
-    help="Number of sets that are judged at a time; of films, processes that simulate.",
+    help="Number of sets that are judged at a time; of films, processes that simulate the first one too.",
 )
 @click.option(
     "--bank",
@@ -140,18 +140,16 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
     from measure.challenge.filing import filed
     from measure.challenge.fitter import ClosingTheLoop, ClosingTheLoopOnFilms
     from measure.challenge.folder import ChallengeFolder
-    from measure.challenge.run import Fitter
     from measure.challenge.run import run as run_challenge
+    from measure.challenge.run import run_films
     from measure.films.command import workload
     from measure.loop.run import Options
     from measure.nulls.workload import of_recordings
 
     target = ChallengeFolder(folder)
     waiting = [name for name in target.chosen(only) if not filed(target, name)]
-    fitter: Fitter = ClosingTheLoop(bank=bank)
+    films = ClosingTheLoopOnFilms(folder=bank or user_cache() / "calibrate", workers=workers)
     if target.filmed:
-        # One after another: what the first one simulates, by all workers, is what the others take.
-        fitter = films = ClosingTheLoopOnFilms(folder=bank or user_cache() / "calibrate", workers=workers)
         for name in waiting[:1]:
             given = target.films(name)
             lasting = [float(log.times[-1]) for _, log in given.recordings.values()]
@@ -175,9 +173,11 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
             # What it says stays in the file: who watches a run should not learn to read it.
             say(f"{filing.name} filed after {filing.seconds:.0f} s{' (refused)' if filing.verdict is None else ''}")
 
-        filings = run_challenge(
-            target, fitter, seed=seed, only=only, workers=1 if target.filmed else workers, progress=report
-        )
+        if target.filmed:
+            filings = run_films(target, films, seed=seed, only=only, progress=report)
+        else:
+            bound = ClosingTheLoop(bank=bank)
+            filings = run_challenge(target, bound, seed=seed, only=only, workers=workers, progress=report)
     if as_json:
         rows = [{"set": f.name, "seconds": f.seconds, "refusal": f.refusal} for f in filings]
         document("challenge-run", {"folder": str(folder), "filed": rows})

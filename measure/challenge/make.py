@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import replace
+from dataclasses import asdict, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.outputs import fresh_folder
-from flagdata.provenance import code_version
+from flagdata.documents import read_json
+from flagdata.outputs import removed, resumed_folder
+from flagdata.provenance import code_version, recipe_hash
 from flagdata.rng import stream
 from measure.challenge import folder as files
 from measure.challenge.answer_key import AnswerKey, seal
@@ -53,17 +54,21 @@ def make(
 ) -> ChallengeFolder:
     """A challenge in a new folder, which appears whole; the same recipe and seed give the same bytes on one machine.
 
+    One that was stopped goes on when the same is asked for again: until it is whole it lies beside the folder, in
+    `.flagdata-HASH.making`, set by set.
+
     Args:
         count: of sets.
-        workers: batches that are simulated at a time, each in a process of its own.
-        progress: called with the number of sets that were written.
+        workers: batches that are simulated, and filmed, at a time, each in a process of its own.
+        progress: called with the number of sets that were written or found.
 
     Raises:
         ConflictError: something is there.
         FlagdataError: a flag diverged, with weak effects too.
     """
-    with fresh_folder(path) as scratch:
-        _make(ChallengeFolder(scratch), recipe, seed=seed, count=count, workers=workers, progress=progress)
+    asked = {"recipe": asdict(recipe), "seed": seed, "sets": count, "code": code_version(), "folder": path.name}
+    with resumed_folder(path, key=recipe_hash(asked), parts=("sets", "sealed", "challenge.json")) as making:
+        _make(ChallengeFolder(making), recipe, seed=seed, count=count, workers=workers, progress=progress)
     return ChallengeFolder(path)
 
 
@@ -76,24 +81,26 @@ def _make(
     workers: int,
     progress: Callable[[int], object] | None,
 ) -> None:
-    keys = draw(recipe, seed=seed, count=count)
-    entries: dict[str, Any] = {}
+    entries: dict[str, dict[str, str]] = {}
 
-    def write(simulated: dict[str, SimulatedSet]) -> None:
-        by_name = {key.name: key for key in keys}
-        for name, made in simulated.items():
-            entries[name] = _write(target, recipe, seed, by_name[name], made)
+    def keep(made: dict[str, dict[str, str]]) -> None:
+        entries.update(made)
         if progress is not None:
-            progress(len(simulated))
+            progress(len(made))
 
-    groups = batches(keys, recipe.count)
+    waiting: list[tuple[AnswerKey, ...]] = []
+    for group in batches(draw(recipe, seed=seed, count=count), recipe.count):
+        if all(_kept(target, key).is_file() for key in group):
+            keep(_published(target, group))
+        else:
+            waiting.append(group)
     if workers == 1:
-        for group in groups:
-            write(simulate(recipe, seed, group))
+        for group in waiting:
+            keep(_made(target, recipe, seed, group))
     else:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=single_threaded) as pool:
-            for done in as_completed([pool.submit(simulate, recipe, seed, group) for group in groups]):
-                write(done.result())
+            for done in as_completed([pool.submit(_made, target, recipe, seed, group) for group in waiting]):
+                keep(done.result())
     files.write_json(target.path / "sealed" / "seed.json", {"seed": seed, "title": recipe.title, "sets": count})
     files.write_json(
         target.public,
@@ -105,6 +112,28 @@ def _make(
             "sets": {name: entries[name] for name in sorted(entries)},
         },
     )
+
+
+def _kept(target: ChallengeFolder, key: AnswerKey) -> Path:
+    """What is to be published of a set, written once the set is."""
+    return target.path / "kept" / f"{key.name}.json"
+
+
+def _published(target: ChallengeFolder, keys: Sequence[AnswerKey]) -> dict[str, dict[str, str]]:
+    """Of sets that are written."""
+    return {key.name: read_json(_kept(target, key), noun="note of a set") for key in keys}
+
+
+def _made(
+    target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]
+) -> dict[str, dict[str, str]]:
+    """Simulate a batch and write those of its sets that are not yet; what is published of each."""
+    made = simulate(recipe, seed, keys)
+    for key in keys:
+        if not _kept(target, key).is_file():
+            removed(target.data(key.name))
+            files.write_json(_kept(target, key), _write(target, recipe, seed, key, made[key.name]))
+    return _published(target, keys)
 
 
 def _write(

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from importlib.abc import MetaPathFinder
 from multiprocessing import get_context
 from types import ModuleType
@@ -20,6 +21,8 @@ from measure.workers import single_threaded
 
 if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
+
+    from measure.challenge.fitter import ClosingTheLoopOnFilms
 
 IN_THIS_PROCESS = 0
 _APART = (
@@ -91,6 +94,26 @@ def run(
                 failures.append(future)
     for future in failures:
         future.result()  # raises the first; all that could be filed is
+    return done
+
+
+def run_films(
+    folder: ChallengeFolder,
+    fitter: ClosingTheLoopOnFilms,
+    *,
+    seed: int,
+    only: Sequence[str] = (),
+    progress: Callable[[Filing], object] | None = None,
+) -> list[Filing]:
+    """As `run`, of films: by all of the fitter's workers the first set that is answered, whose simulations all others
+    take, then as many sets at a time, each read and judged by one process."""
+    waiting = [name for name in folder.chosen(tuple(only)) if not filed(folder, name)]
+    done: list[Filing] = []
+    while waiting and not any(one.verdict for one in done):
+        done += run(folder, fitter, seed=seed, only=(waiting.pop(0),), progress=progress)
+    if waiting:
+        single = replace(fitter, workers=1)
+        done += run(folder, single, seed=seed, only=waiting, workers=fitter.workers, progress=progress)
     return done
 
 

@@ -83,6 +83,11 @@ class EffectColumn(StepColumn):
     def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         return self.described.unit
 
+    @property
+    def revision(self) -> int:
+        """See `Effect`."""
+        return EFFECTS[self.effect].revision
+
     def system(self, system: System, state: State) -> tuple[System, State]:
         return self.strengthened(self.step, system, state)
 

@@ -41,9 +41,10 @@ from sim.integrate.split import SplitEuler
 WINDS = 4
 """Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What experiments leave
 differs by their numerics more than by the cloth, and only kinds count in the test, so that each has one cloth."""
-_VERSION = 5
+_VERSION = 6
 """Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by its logarithm;
-3: sensitivities of how cloth bends in double precision; 4: what recordings settle at; 5: whether cloths are carried."""
+3: sensitivities of how cloth bends in double precision; 4: what recordings settle at; 5: whether cloths are carried;
+6: the inertia of air at the ends of a cloth."""
 _SEGMENTS = (
     "recording",
     "r",

@@ -8,6 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import torch
 from torch import Tensor
@@ -24,7 +25,13 @@ from sim.wind import Wind
 
 
 class Effect(Parametrised, ABC):
-    """Something that acts on cloth and that the base model lacks."""
+    """Something that acts on cloth and that the base model lacks.
+
+    Attributes:
+        revision: raised where the same strengths act otherwise than before, so that what was simulated is made anew.
+    """
+
+    revision: ClassVar[int] = 1
 
     @abstractmethod
     def apply(self, system: System, state: State) -> tuple[System, State]:

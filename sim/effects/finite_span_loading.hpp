@@ -12,7 +12,7 @@ struct FiniteSpanLoading {
 
   template <typename V>
   static void act(const V* number, const Sheet<V>& sheet, Real<V>* force) {
-    const Real<V>* rate = sheet.momentum_rates();
+    const Real<V>* rate = sheet.momentum_rates(sheet.ends);
     const V *mass = number, *gain = number + 1;
     V sum[ALONG * ACROSS], along[ALONG], across[ACROSS];
     for (V& one : sum) one = V{};

@@ -19,6 +19,8 @@ height, each multiplied by m(k)/m(k₀) for its own k, and put together again:
 
     −m(k₀) √e F[√e R] n
 
+V and the slip are continued to the hoist and the fly from within before they are differentiated (`sim.ends`).
+
 F is symmetric and the same at all times, so that the Coriolis term does no work within the sheet and the centrifugal
 one is the gradient of an energy, as without it. The first term, the acceleration's, is a mass m(k₀) e of each vertex
 (see `sim.inertia`), of the wave of twice the cloth's length, k₀ = π/L; that of shorter waves is too large, as they are
@@ -28,7 +30,7 @@ carried too slowly.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import torch
@@ -61,6 +63,7 @@ class FiniteSpanLoading(ForceEffect):
         density: ρ of the air.
     """
 
+    revision: ClassVar[int] = 2  # the ends continued from within
     share: Annotated[
         Value,
         strength(
@@ -85,7 +88,7 @@ class FiniteSpanLoading(ForceEffect):
 
         modes, gains = real(cosines(cloth.mesh)), real(relative_masses(cloth.mesh))
         root = real(np.sqrt(profile_over_height(cloth.mesh)))[:, None]
-        rates = momentum_rates(cloth, position, velocity, wind)[:, 0]
+        rates = momentum_rates(cloth, position, velocity, wind, ends=cloth.mesh.ends)[:, 0]
         smooth = modes @ (gains[:, None] * (modes.T @ (root * rates)))
         size = self._longest(cloth.mesh) * rest_areas(cloth)[:, None] * root * smooth
         return -size.unsqueeze(1) * mean_normals(cloth, position)

@@ -20,7 +20,9 @@ For v = η_t e_z, n = e_z − η_x e_x, u = U e_x and small slopes the last term
 Soc. B 179:125, 1971) as Candelier, Boyer and Leroyer put it (J. Fluid Mech. 668:196, 2011) for a sheet that does not
 stretch, ½ V ∇_s·s = −½ κ V². With it the balance of energy closes: in air at rest, what the sheet gives is the change
 of ½ m_a V² over the sheet, and ½ m_a V² s shed across its edge. The first term is the integrator's (see `sim.inertia`),
-the others are a force.
+the others are a force. At the ends of the cloth the means over faces are those of half a cell further in, which keeps
+that balance exactly and is a half of η_xx; continuing them, as `sim.effects.finite_span_loading` does, costs runs here,
+where nothing else bounds short waves (decision 052).
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ from torch import Tensor
 from sim.cloth import Cloth
 from sim.effects.added_mass import AddedMass, MassPerArea
 from sim.effects.effect import ForceEffect
+from sim.ends import Ends
 from sim.inertia import mean_normal_rates, mean_normals, rest_areas
 from sim.state import State
 from sim.system import System
@@ -55,13 +58,22 @@ class ReactiveLoading(ForceEffect):
         return -self.mass * momentum_rates(cloth, position, velocity, wind) * mean_normals(cloth, position)
 
 
-def momentum_rates(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-    """A vertex's rest area times D V without the acceleration's term (see above): (vertex, 1, batch) [m³/s²]."""
+def momentum_rates(
+    cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor, *, ends: Ends | None = None
+) -> Tensor:
+    """A vertex's rest area times D V without the acceleration's term (see above): (vertex, 1, batch) [m³/s²].
+
+    Args:
+        ends: at which V and s are continued from within; None where they are the means over faces there too, which
+            are those of half a cell further in.
+    """
     relative = velocity - wind
     normal = mean_normals(cloth, position)
     turning = mean_normal_rates(cloth, position, velocity)
     across = (relative * normal).sum(1, keepdim=True)
     slip = across * normal - relative
+    if ends is not None:
+        across, slip = ends.continued(across), ends.continued(slip)
 
     g0, g1, g2 = shape_gradients(cloth, position)
     v0, v1, v2 = cloth.at_corners(across)

@@ -150,7 +150,7 @@ class Acting {
     if (!sheets_) return;
     turn(x, level);
     scratch_.resize(7 * L * p.vertices);
-    Sheet<V> sheet = {p.vertices, p.faces, p.face, p.gradients, p.areas, p.vertex_areas, x, level,
+    Sheet<V> sheet = {p.vertices, p.faces, p.face, p.gradients, p.areas, p.vertex_areas, &p.ends, x, level,
                             flows_ ? air_.data() : reinterpret_cast<const T*>(&wind), !flows_, normals_.data(),
                             turning_.data(), scratch_.data(), nullptr};
     each<SheetForce>([&](const Effect<T>& effect, auto act) {

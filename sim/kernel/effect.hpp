@@ -35,6 +35,27 @@ struct Hinge {
   Real<V> elapsed;     // since then [s]: what is remembered is to be brought up to date where this is not 0
 };
 
+// Vertices at the hoist and the fly, and what fields are continued to them from (sim/ends.py). Field by field as in fused.py.
+template <typename T>
+struct Ends {
+  int64_t count, width;
+  const int32_t *vertex, *within;  // (count), (count, width)
+  const T* weight;                 // (count, width)
+
+  // In place, for fields of so many numbers a vertex, lanes innermost.
+  template <typename V>
+  void continued(T* field, int64_t numbers) const {
+    const int64_t stride = numbers * int64_t(sizeof(V) / sizeof(T)), lanes = sizeof(V) / sizeof(T);
+    for (int64_t e = 0; e < count; ++e)
+      for (int64_t k = 0; k < numbers; ++k) {
+        V sum = V{};
+        for (int64_t d = 0; d < width; ++d)
+          sum += weight[e * width + d] * load<V>(field + stride * within[e * width + d] + lanes * k);
+        std::memcpy(field + stride * vertex[e] + lanes * k, &sum, sizeof sum);
+      }
+  }
+};
+
 // The cloth's vertices and faces. Fields are (vertex, 3, lane), and (vertex, lane) where they are scalar.
 template <typename V>
 struct Sheet {
@@ -45,6 +66,7 @@ struct Sheet {
   const T* gradients;      // (faces, 2, 3)
   const T* areas;          // (faces)
   const T* vertex_areas;   // (vertices)
+  const Ends<T>* ends;
   const T *position, *velocity;
   const T* air;            // the wind at the vertices, or one of all vertices where `uniform`
   bool uniform;
@@ -70,8 +92,9 @@ struct Sheet {
     add_at(force, i, scale(at(normals, i), size / vertex_areas[i]));
   }
   // At the vertices, (vertices, lane) in the scratch: rest area times the rate of the velocity across the cloth, followed
-  // along it by the air, without the term of the acceleration (sim/effects/reactive_loading.py).
-  T* momentum_rates() const {
+  // along it by the air, without the term of the acceleration (sim/effects/reactive_loading.py); what is swept
+  // is continued from within to the ends that are given.
+  T* momentum_rates(const Ends<T>* continued) const {
     // The cloth's velocity across itself and the air's slip along it at the vertices, four numbers each; then what is
     // swept along the faces.
     T *const over = scratch, *const swept = over + 4 * L * vertices;
@@ -85,6 +108,7 @@ struct Sheet {
       put(to, across), put(to + L, slip.x), put(to + 2 * L, slip.y), put(to + 3 * L, slip.z);
       put(swept + L * i, V{});
     }
+    if (continued) continued->template continued<V>(over, 4);
     for (int64_t e = 0; e < faces; ++e) {
       const int32_t* c = face + 3 * e;
       const T* d = gradients + 6 * e;

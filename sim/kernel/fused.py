@@ -14,6 +14,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from sim.cloth import Cloth
 from sim.compiler import library
 from sim.contact import Contact, layers
 from sim.kernel.acting import Acting, Entry, acting
@@ -70,6 +71,15 @@ class _Contact(ctypes.Structure):
     ]
 
 
+class _Ends(ctypes.Structure):
+    """Mirrors `Ends` of effect.hpp field by field."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("count", "width")),
+        *((name, ctypes.c_void_p) for name in ("vertex", "within", "weight")),
+    ]
+
+
 class _Problem(ctypes.Structure):
     """Mirrors `Problem` of problem.hpp field by field."""
 
@@ -87,6 +97,7 @@ class _Problem(ctypes.Structure):
         ("sweep_weights", ctypes.c_void_p),
         ("arms", ctypes.c_void_p),
         ("vertex_areas", ctypes.c_void_p),
+        ("ends", _Ends),
         *((name, ctypes.c_void_p) for name in _BLOCKED),
         ("effects", ctypes.c_int64),
         ("effect", ctypes.POINTER(Entry)),
@@ -223,6 +234,7 @@ class Kernel:
         problem.counts[:] = cloth.grid.counts
         for name, tensor in tensors.items():
             setattr(problem, name, tensor.data_ptr() if tensor.numel() else None)
+        tensors |= _set_ends(problem.ends, cloth)
         if system.contact is not None:
             tensors |= _set_contact(problem.contact, system, system.contact, tensors["face"], lanes)
         if system.limits is not None:
@@ -427,6 +439,20 @@ class Kernel:
         function.restype = None
         passed = [ctypes.c_void_p(a.data_ptr()) if isinstance(a, Tensor) else a for a in arguments]
         function(ctypes.byref(problem), ctypes.c_int64(self.blocks), *passed)
+
+
+def _set_ends(settings: _Ends, cloth: Cloth) -> dict[str, Tensor]:
+    """Fill in the cloth's ends; the tensors that are pointed to are returned, to be kept alive."""
+    ends = cloth.mesh.ends
+    settings.count, settings.width = ends.within.shape
+    tensors = {
+        "vertex": torch.tensor(ends.vertices, dtype=torch.int32),
+        "within": torch.tensor(ends.within, dtype=torch.int32),
+        "weight": torch.tensor(ends.weights, dtype=cloth.dtype),
+    }
+    for name, tensor in tensors.items():
+        setattr(settings, name, tensor.data_ptr())
+    return {f"ends_{name}": tensor for name, tensor in tensors.items()}
 
 
 def _set_contact(settings: _Contact, system: System, contact: Contact, face: Tensor, width: int) -> dict[str, Tensor]:

@@ -42,6 +42,7 @@ struct Problem {
   const T* sweep_weights;  // (sweeps) of Chebyshev's recurrence, 1 for a plain sweep
   const T* arms;           // (faces, 3, 2)
   const T* vertex_areas;   // (vertices)
+  Ends<T> ends;
   // One block's share of each of the following is contiguous, lanes innermost.
   const T* mass;          // (blocks, vertices, L)
   const T* inverse_mass;  // (blocks, vertices, L): 0 where held rigidly

@@ -95,6 +95,17 @@ def test_the_recipe_of_the_catalog_has_the_sets_that_are_asked_for() -> None:
     assert len(set(alone)) == 16  # each effect at both of its strengths
 
 
+@pytest.mark.parametrize(("name", "nulls", "ones"), [("films-3", 14, 16), ("films-long", 4, 12)])
+def test_sheets_that_are_to_come_have_what_films_show(name: str, nulls: int, ones: int) -> None:
+    keys = draw(load(name), seed=1, count=nulls + ones)
+    kinds = [one.kind for one in keys]
+    assert [kinds.count(kind) for kind in (Kind.NULL, Kind.ONE)] == [nulls, ones]
+    acting = [(one.effects[0].effect, abs(one.effects[0].value)) for one in keys if one.kind is Kind.ONE]
+    assert len(set(acting)) == 11  # of six effects, added mass at its strong one alone
+    assert not {"full-hoist", "shear"} & {effect for effect, _ in acting}
+    assert ("added-mass", 0.15) not in acting
+
+
 @pytest.mark.parametrize(
     ("said", "among", "wrong"),
     [

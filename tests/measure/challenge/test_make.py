@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,13 +14,14 @@ import pytest
 from flagdata.errors import ConflictError, CorruptError, InputError, UnknownNameError
 from flagdata.provenance import file_hash
 from flagdata.rng import stream
+from measure.challenge import make as making
 from measure.challenge.answer_key import AnswerKey, opened, seal
 from measure.challenge.classes import class_of
 from measure.challenge.design import composition, draw
 from measure.challenge.folder import ChallengeFolder
 from measure.challenge.meshes import layout, mesh_of, seen
-from measure.challenge.recipe import CHALLENGES, Kind, load, parse
-from measure.challenge.simulation import batches
+from measure.challenge.recipe import CHALLENGES, ChallengeRecipe, Kind, load, parse
+from measure.challenge.simulation import SimulatedSet, batches
 from tests.measure.challenge import cases
 from tests.measure.challenge.cases import TINY
 
@@ -30,6 +32,46 @@ def tree(folder: Path) -> dict[str, str]:
 
 def test_the_same_seed_gives_the_same_bytes(tiny_source: Path, make_tiny, tmp_path: Path) -> None:
     assert tree(make_tiny(tmp_path / "again").path) == tree(tiny_source)
+
+
+def test_one_that_was_stopped_goes_on_with_the_batches_that_it_lacks(
+    tiny_source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulated: list[int] = []
+    one_by_one = lambda keys, recordings: [(key,) for key in keys]  # noqa: E731
+    monkeypatch.setattr(making, "batches", one_by_one)
+    plain = making.simulate
+
+    def counted(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) -> dict[str, SimulatedSet]:
+        if len(simulated) == 2:
+            raise KeyboardInterrupt
+        simulated.append(len(keys))
+        return plain(recipe, seed, keys)
+
+    monkeypatch.setattr(making, "simulate", counted)
+    recipe = parse(TINY, where="tiny")
+    with pytest.raises(KeyboardInterrupt):
+        making.make(tmp_path / "tiny", recipe, seed=3, count=4)
+    assert not (tmp_path / "tiny").exists()
+    again: list[int] = []
+    monkeypatch.setattr(making, "simulate", lambda r, seed, keys: again.append(len(keys)) or plain(r, seed, keys))
+    found: list[int] = []
+    made = making.make(tmp_path / "tiny", recipe, seed=3, count=4, progress=found.append)
+    assert (simulated, again, sum(found)) == ([1, 1], [1, 1], 4)
+    assert [path.name for path in tmp_path.iterdir()] == ["tiny"]
+    for name in made.names():
+        made.seal(name)
+        made.checked(name)
+
+
+def test_a_challenge_that_cannot_be_made_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def diverging(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) -> dict[str, SimulatedSet]:
+        raise InputError("the cloth diverged", where="set-001", fix="narrow the recipe's ranges")
+
+    monkeypatch.setattr(making, "simulate", diverging)
+    with pytest.raises(InputError, match="diverged"):
+        making.make(tmp_path / "tiny", parse(TINY, where="tiny"), seed=3, count=4)
+    assert not list(tmp_path.iterdir())
 
 
 def test_another_seed_gives_other_sets(tiny_source: Path, make_tiny, tmp_path: Path) -> None:
@@ -209,5 +251,5 @@ def test_strengths_that_are_fixed_beforehand_are_dealt_out_evenly() -> None:
 
 
 def test_the_catalogs_recipes_parse() -> None:
-    assert CHALLENGES.names() == ("films", "inertia", "registered", "standard", "strong")
-    assert [load(name).count for name in CHALLENGES.names()] == [3] * 5
+    assert CHALLENGES.names() == ("films", "films-3", "films-long", "inertia", "registered", "standard", "strong")
+    assert [load(name).count for name in CHALLENGES.names()] == [3] * 7

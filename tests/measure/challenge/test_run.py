@@ -6,16 +6,19 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from flagdata.errors import ConflictError, CorruptError, InputError, RefusedError, UnknownNameError
 from measure.challenge import filing as filings
+from measure.challenge import run as running
 from measure.challenge.answer_key import AnswerKey
 from measure.challenge.filing import Filing, verdict_json
+from measure.challenge.fitter import ClosingTheLoopOnFilms
 from measure.challenge.folder import ChallengeFolder
 from measure.challenge.recipe import Kind
-from measure.challenge.run import IN_THIS_PROCESS, run
+from measure.challenge.run import IN_THIS_PROCESS, run, run_films
 from measure.challenge.score import score
 from measure.observe.trajectory import Experiment
 from measure.verdict.record import Conclusion, Verdict
@@ -44,6 +47,36 @@ def test_every_set_is_judged_once_with_a_seed_of_its_own(tiny: ChallengeFolder, 
     assert [f.name for f in first + rest] == ["set-002", "set-001", "set-003", "set-004"]
     assert len(set(satisfied.seeds)) == 4
     assert run(tiny, satisfied, seed=5, workers=IN_THIS_PROCESS) == []
+
+
+def test_the_first_set_of_films_that_is_answered_has_all_workers_and_others_one(
+    tiny: ChallengeFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[tuple[str, ...], int, int]] = []
+
+    def judge(folder: ChallengeFolder, fitter: ClosingTheLoopOnFilms, **how: Any) -> list[Filing]:
+        asked.append((tuple(how["only"]), how.get("workers", 1), fitter.workers))
+
+        def refusing_first(given: Any, seed: int) -> Verdict:
+            if len(asked) == 1:
+                raise InputError("no flag is found", where="a film", fix="film one")
+            return cases.verdict(Conclusion.SUFFICIENT)
+
+        return run(
+            folder,
+            refusing_first,
+            seed=how["seed"],
+            only=how["only"],
+            workers=IN_THIS_PROCESS,
+            progress=how["progress"],
+        )
+
+    monkeypatch.setattr(running, "run", judge)
+    fitter = ClosingTheLoopOnFilms(folder=tmp_path, workers=2)
+    done = run_films(tiny, fitter, seed=5)
+    assert [one.verdict is None for one in done] == [True, False, False, False]
+    assert asked == [(("set-001",), 1, 2), (("set-002",), 1, 2), (("set-003", "set-004"), 2, 1)]
+    assert run_films(tiny, fitter, seed=5) == []
 
 
 def test_the_seed_of_a_set_does_not_depend_on_which_others_are_judged(tiny: ChallengeFolder, satisfied) -> None:
