@@ -194,14 +194,14 @@ class Batch:
                     )
         return found
 
-    def positions(self, mesh: Mesh) -> Floats:
-        """(frame, vertex, 3, flag) [m] of the film's frames."""
+    def positions(self, mesh: Mesh, *, rate: float = RATE) -> Floats:
+        """(frame, vertex, 3, flag) [m] of the film's frames, `rate` a second [Hz]."""
         system, state, integrator = self._assembled(mesh)
         frames: list[Floats] = []
         with torch.no_grad():
-            for frame in range(round((SETTLE + self._simulated) * RATE)):
-                state = integrator.advance(system, state, 1 / RATE)
-                if frame >= round(SETTLE * RATE):
+            for frame in range(round((SETTLE + self._simulated) * rate)):
+                state = integrator.advance(system, state, 1 / rate)
+                if frame >= round(SETTLE * rate):
                     frames.append(state.position.double().numpy().copy())
         return np.stack(frames)
 

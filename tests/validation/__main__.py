@@ -21,6 +21,7 @@ VALIDATIONS = {
     "hanging-cloth": "tests.validation.hanging_cloth",
     "flips": "tests.validation.flips",
     "hostile": "tests.validation.hostile",
+    "looks": "tests.validation.looks",
     "lake-in-a-bucket": "tests.validation.lake_in_a_bucket",
     "loop-on-films": "tests.validation.loop_on_films",
     "measure-windows": "tests.validation.measure_windows",
