@@ -47,14 +47,14 @@ from tests.validation.looks_refilmed import Look, refilmed
 from tests.validation.loop_on_films import log
 
 SEED = 20261128
-LOOKS = 16
+LOOKS = 12
 FILMS = 2
 """Of a look."""
 SECONDS = 10.0
 """Of a film [s]."""
 AGAIN = 5.0
 """Of the film of a fitted flag [s]."""
-BY_CYCLES = 10
+BY_CYCLES = 8
 """Films by Cycles, of other looks."""
 CYCLES_SECONDS = 5.0
 """Of each [s]."""
