@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from flagdata.errors import InputError, RefusedError
 from flagdata.stated import parse
 from flagdata.tables import Range
 from measure.calibrate import calibrate as module
+from measure.calibrate import pixels
 from measure.calibrate.calibrate import Calibration, Options, calibrate
 from measure.calibrate.design import Design
 from measure.calibrate.observed import Observed
@@ -23,6 +25,7 @@ from measure.calibrate.simulation import OBSERVED, Flag
 from measure.calibrate.wind import Log
 from measure.ends import Bound
 from tests.measure.calibrate.conftest import readings
+from tests.validation.looks import share, vtk
 
 _AZIMUTH = Uncertain(
     name="azimuth", unit="rad", prior=Normal(mean=math.radians(70), sigma=math.radians(7)), source="stated"
@@ -273,18 +276,30 @@ def test_ten_seconds_are_enough_beside_ten_others_and_not_alone() -> None:
 
 
 def test_pixels_err_by_the_film_and_by_the_window() -> None:
-    # Errors of windows of variance P σ², of the film of (1 − P) σ²: Var a = σ² (1 − P + P/n), Var b = P σ²/Σ(x − x̄)².
+    # Errors of windows of variance (1 − L) σ², of the film of L σ²: Var a = σ² (L + (1 − L)/n), Var b = (1 − L) σ²/Σ(x − x̄)².
     film = replace(_observed(0.2), sigma=np.full(len(OBSERVED), 0.03))
     drawn = film.pixels(4000, seed=1) / 0.03
     relative = np.log(film.speed) - np.log(film.speed).mean()
-    wanted = [0.6 + 0.4 / 48, 0.4 / np.square(relative).sum()]
-    assert np.square(drawn).mean(axis=(0, 2)) == pytest.approx(wanted, rel=0.03)
+    passing = 1 - pixels.LASTING
+    wanted = [pixels.LASTING + passing / 48, passing / np.square(relative).sum()]
+    assert np.square(drawn).mean(axis=0) == pytest.approx(np.array(wanted), rel=0.08)
     of_pair = np.corrcoef(drawn[:, 0, OBSERVED.index("extension")], drawn[:, 0, OBSERVED.index("area")])[0, 1]
     assert of_pair == pytest.approx(0.77, abs=0.02)
     assert (_observed(0.2).pixels(3, seed=1) == 0).all()
 
 
-def test_two_films_of_a_flag_err_alike_but_for_what_passes() -> None:
+@pytest.mark.parametrize("name", ["frequency", "area"])
+def test_two_films_of_a_flag_err_alike_but_for_what_passes(name: str) -> None:
+    """Films of two minutes: areas are off by the same in both, frequencies by what a window's chance leaves."""
+    place = OBSERVED.index(name)
     one, other = (replace(_observed(0.2), sigma=np.full(len(OBSERVED), 0.03), name=name) for name in ("a", "b"))
-    both = [film.pixels(4000, seed=1)[:, 0, 0] for film in (one, other)]
-    assert np.corrcoef(*both)[0, 1] == pytest.approx(0.6 / (0.6 + 0.4 / 48), abs=0.01)
+    both = [film.pixels(4000, seed=1)[:, 0, place] for film in (one, other)]
+    lasting = pixels.LASTING[place]
+    assert np.corrcoef(*both)[0, 1] == pytest.approx(lasting / (lasting + (1 - lasting) / 48), abs=0.01)
+
+
+def test_the_shares_are_those_of_films_by_another_renderer() -> None:
+    """The table is what the sheet has; a share that was made up would differ from it."""
+    sheet = json.loads((Path(__file__).resolve().parents[3] / "docs" / "results" / "validate-observables.json").read_text(encoding="utf-8"))
+    found = share(vtk(sheet["result"]["films"]))
+    assert found == pytest.approx(pixels.LASTING, abs=0.006)
