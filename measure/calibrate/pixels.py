@@ -1,9 +1,9 @@
 """What errors of pixels add to a film's summaries: draws of them.
 
-A part of an observable's error is the flag's look, its colours, background and view, and the same in all its windows and
-recordings; the rest differs from window to window. How large that part is differs by observable: an area is off by the
-same amount in every window, a frequency by another one in each. Errors of observables that are read from the same outline
-are correlated. All is from films whose geometry is known (`python -m tests.validation looks`).
+A part of an observable's error is the flag's look, its colours, background and view, and the same in all its windows
+and recordings; the rest differs from window to window. How large that part is differs by observable: an area is off by
+the same amount in every window, a frequency by another one in each. Errors of observables that are read from the same
+outline are correlated. All is from films whose geometry is known (`python -m tests.validation looks`).
 """
 
 from __future__ import annotations

@@ -10,10 +10,10 @@ two windows each of the films by VTK of `docs/results/validate-observables.json`
 
 *Filmed once more.* A flag as a fit might leave it (weight ± 6 %, bending and damping by a factor of e^0.5, another
 fabric, the view ± 5° and ± 3°, 12 columns, other turbulence) is drawn in the film's own colours before the film's own
-background, and read in the same way; its mean error is taken off. The first attempt takes it off whole; the second by a
-factor for each observable, from 0 to 1, by least squares on the raster renderer's films. Both are judged on films of other
-looks by Cycles: the correction is used if the mean over the observables of the logarithm of the variance of the films'
-mean errors, after over before, is below 0 by twice its standard error (jackknife over films).
+background, and read in the same way; its mean error is taken off. The first attempt takes it off whole; the second by
+a factor for each observable, from 0 to 1, by least squares on the raster renderer's films. Both are judged on films of
+other looks by Cycles: the correction is used if the mean over the observables of the logarithm of the variance of the
+films' mean errors, after over before, is below 0 by twice its standard error (jackknife over films).
 
 `python -m tests.validation looks`; films that were read are kept in FLAGDATA_LOOKS, by default a new folder, and a run
 that was stopped goes on. FLAGDATA_LOOKS_COUNT takes fewer looks, FLAGDATA_LOOKS_CYCLES fewer films by Cycles, "0"
@@ -37,6 +37,7 @@ from torch import Tensor
 from flagdata.rng import child_seed, stream
 from measure.calibrate.prior import CLOTH, FABRIC, NUISANCES, Floats, draws
 from measure.calibrate.simulation import COLUMNS, OBSERVED, Batch, Flag
+from measure.observables import OBSERVABLES
 from sim.assets import Assets
 from sim.mesh import Mesh
 from sim.render import Meshes, RenderParameters
@@ -59,6 +60,7 @@ BY_CYCLES = 8
 CYCLES_SECONDS = 5.0
 """Of each [s]."""
 FLAG = Flag(length=1.5, height=1.0)
+SIGMA = np.array([OBSERVABLES[name].sigma for name in OBSERVED])
 _WINDS = ((4.0, 6.2), (5.0, 7.8))
 """Means of the winds of a look's films, for even and odd looks [m/s]."""
 _FINE = 20
@@ -195,7 +197,7 @@ def vtk(films: Sequence[Mapping[str, Any]]) -> list[Floats]:
 
 
 def split(films: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """(observable,) variance of what lasts in a film and of what passes, by the analysis of variance of unequal groups."""
+    """(observable,) variance of what lasts in a film and of what passes: analysis of variance of unequal groups."""
     lasting, passing = np.full(len(OBSERVED), np.nan), np.full(len(OBSERVED), np.nan)
     for k in range(len(OBSERVED)):
         groups = [own[np.isfinite(own[:, k]), k] for own in films]
@@ -224,13 +226,47 @@ def interval(films: Sequence[Any], statistic: Callable[[Sequence[Any]], Floats],
 
 
 def common(some: Sequence[Mapping[str, Any]]) -> Floats:
-    """(observable,) covariance of the mean errors of the two films of a look, over the looks that have both: the
-    variance of what is common to them."""
-    means = {(row["look"], row["film"]): np.nanmean(np.array(row["errors"], float), axis=0) for row in some if row["errors"]}
-    both = [number for number in {look for look, _ in means} if (number, 0) in means and (number, 1) in means]
-    pairs = np.array([[means[number, 0], means[number, 1]] for number in both])
-    away = pairs - np.nanmean(pairs, axis=(0, 1))
-    return np.nansum(away[:, 0] * away[:, 1], axis=0) / (len(both) - 1)
+    """(observable,) share of what lasts in a film that is common to both films of its look: their covariance over the
+    variance of what lasts, clipped to 0 to 1."""
+    pairs = paired(some)
+    away = pairs - pairs.mean(axis=(0, 1))
+    together = (away[:, 0] * away[:, 1]).sum(axis=0) / (len(pairs) - 0.5)
+    lasting, _ = split(arrays(some, "errors"))
+    return np.clip(together / np.maximum(lasting, 1e-12), 0.0, 1.0)
+
+
+def common_of_all(some: Sequence[Mapping[str, Any]]) -> float:
+    """The same of all observables together: the sum of the covariances over the sum of the variances of what lasts,
+    each in units of the observable's sigma."""
+    pairs = paired(some) / SIGMA
+    away = pairs - pairs.mean(axis=(0, 1))
+    together = (away[:, 0] * away[:, 1]).sum(axis=0) / (len(pairs) - 0.5)
+    lasting, _ = split([one / SIGMA for one in arrays(some, "errors")])
+    return float(together.sum() / np.maximum(lasting, 0.0).sum())
+
+
+def paired(some: Sequence[Mapping[str, Any]]) -> Floats:
+    """(look, 2, observable) mean errors of the films of looks, both of which show all."""
+    means = {}
+    for row in some:
+        if row["errors"] is not None and np.isfinite(own := np.array(row["errors"], float)).any(axis=0).all():
+            means[row["look"], row["film"]] = np.nanmean(own, axis=0)
+    both = sorted({number for number, _ in means if (number, 0) in means and (number, 1) in means})
+    return np.array([[means[number, 0], means[number, 1]] for number in both])
+
+
+def of_looks(some: Sequence[Mapping[str, Any]], statistic: Callable[[Sequence[Any]], Any]) -> Any:
+    """(2, …) 90 % of a statistic of films by a bootstrap of looks."""
+    groups: dict[int, list[Mapping[str, Any]]] = {}
+    for row in some:
+        groups.setdefault(row["look"], []).append(row)
+    each = list(groups.values())
+
+    def of(chosen: Sequence[Any]) -> Any:
+        again = [{**row, "look": number} for number, own in enumerate(chosen) for row in own]
+        return statistic(again)
+
+    return interval(each, of, SEED)
 
 
 def correlated(films: Sequence[Floats]) -> Floats:
@@ -240,12 +276,16 @@ def correlated(films: Sequence[Floats]) -> Floats:
 
 
 def means_of(some: Sequence[Mapping[str, Any]]) -> tuple[Floats, Floats]:
-    """(film, observable) mean errors of films and of their fitted flags', of those that have both."""
-    both = [row for row in some if row["errors"] is not None and row["again"] is not None]
-    errors = np.array([np.nanmean(np.array(row["errors"], float), axis=0) for row in both])
-    again = np.array([np.nanmean(np.array(row["again"], float), axis=0) for row in both])
-    whole = np.isfinite(errors).all(axis=1) & np.isfinite(again).all(axis=1)
-    return errors[whole], again[whole]
+    """(film, observable) mean errors of films and of their fitted flags', of those that show all in both."""
+    errors, again = [], []
+    for row in some:
+        if row["errors"] is None or row["again"] is None:
+            continue
+        own, other = (np.array(row[key], float) for key in ("errors", "again"))
+        if all(np.isfinite(one).any(axis=0).all() for one in (own, other)):
+            errors.append(np.nanmean(own, axis=0))
+            again.append(np.nanmean(other, axis=0))
+    return np.array(errors), np.array(again)
 
 
 def factors(errors: Floats, again: Floats) -> Floats:
@@ -277,7 +317,8 @@ def summary(
 ) -> dict[str, Any]:
     """All that is reported."""
     found: dict[str, Any] = {"observables": list(OBSERVED), "shares": {}}
-    for name, films in (("raster", arrays(own, "errors")), ("VTK", vtk(by_vtk)), ("Cycles", arrays(by_cycles, "errors"))):
+    sources = {"raster": arrays(own, "errors"), "VTK": vtk(by_vtk), "Cycles": arrays(by_cycles, "errors")}
+    for name, films in sources.items():
         if len(films) < 4:
             continue
         lasting, passing = split(films)
@@ -292,17 +333,76 @@ def summary(
             "correlation": correlated(films).tolist(),
         }
     found["common"] = common(own).tolist()
+    found["common_of_all"] = [common_of_all(own), *of_looks(own, common_of_all).tolist()]
     errors, again = means_of(own)
     by_least_squares = factors(errors, again)
     found["factors"] = by_least_squares.tolist()
     ones = np.ones(len(OBSERVED))
-    found["corrected"] = {"raster, whole": judged(errors, again, ones), "raster, by factors": judged(errors, again, by_least_squares)}
+    found["corrected"] = {
+        "raster, whole": judged(errors, again, ones),
+        "raster, by factors": judged(errors, again, by_least_squares),
+    }
     if len(by_cycles) > 3:
         errors, again = means_of(by_cycles)
-        found["corrected"] |= {"Cycles, whole": judged(errors, again, ones), "Cycles, by factors": judged(errors, again, by_least_squares)}
+        found["corrected"] |= {
+            "Cycles, whole": judged(errors, again, ones),
+            "Cycles, by factors": judged(errors, again, by_least_squares),
+        }
     return {**found, "films": [*own, *by_cycles]}
 
 
 def page(sheet: Mapping[str, Any]) -> str:
     """The figures for people."""
-    return "# Looks\n" + json.dumps({k: v for k, v in sheet.items() if k != "films"}, indent=1)
+    lines = [
+        "# Looks: what lasts of the errors of films' observables",
+        "",
+        "Pixels less geometry, split into what lasts in a film and what passes from window to window.",
+        "Standard deviations are in the observables' units, shares with 90 % by a bootstrap of films.",
+        "`python -m tests.validation looks` makes it.",
+        "",
+    ]
+    for name, own in sheet["shares"].items():
+        lines += [f"## Films by {name}", "", f"{own['films']} films.", "", *_shares(sheet["observables"], own), ""]
+    middle, low, high = sheet["common_of_all"]
+    lines += [
+        "## Two films of one look",
+        "",
+        "The raster renderer's; each look was filmed in two winds and two lights: share of what lasts in a film that",
+        f"is common to both. Of all observables together it is {middle:.2f} ({low:.2f} to {high:.2f}).",
+        "",
+        _row(sheet["observables"]),
+        _row(["---"] * len(sheet["observables"])),
+        _row([f"{one:.2f}" for one in sheet["common"]]),
+        "",
+        "## A fitted flag filmed once, and its error taken off",
+        "",
+        "Variance of films' mean errors, after over before, and the mean of its logarithm over the observables.",
+        f"The factors are {', '.join(f'{one:.2f}' for one in sheet['factors'])}, of the raster renderer's films.",
+        "",
+        _row(["films, taken off", "films", *sheet["observables"], "mean of the logarithm"]),
+        _row(["---"] * (len(sheet["observables"]) + 3)),
+    ]
+    for name, own in sheet["corrected"].items():
+        ratios = [f"{one:.2f}" for one in own["ratio"]]
+        lines.append(_row([name, str(own["films"]), *ratios, f"{own['mean_log']:+.2f} ± {own['error']:.2f}"]))
+    lines += ["", "Correlation of the fitted flag's mean error with the film's:", ""]
+    lines += [_row(["films", *sheet["observables"]]), _row(["---"] * (len(sheet["observables"]) + 1))]
+    for name, own in sheet["corrected"].items():
+        if name.endswith("whole"):
+            lines.append(_row([name.partition(",")[0], *(f"{one:+.2f}" for one in own["correlation"])]))
+    return "\n".join(lines) + "\n"
+
+
+def _shares(names: Sequence[str], own: Mapping[str, Any]) -> list[str]:
+    lines = [_row(["observable", "bias", "lasts", "passes", "share that lasts", "90 %"]), _row(["---"] * 6)]
+    for k, name in enumerate(names):
+        low, high = own["interval"][k]
+        values = (own["bias"][k], own["lasting"][k], own["passing"][k])
+        lines.append(
+            _row([name, *(f"{one:.3f}" for one in values), f"{own['share'][k]:.2f}", f"{low:.2f} to {high:.2f}"])
+        )
+    return lines
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"

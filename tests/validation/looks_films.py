@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from PIL import Image
 from torch import Tensor
 
 from flagdata.errors import FlagdataError
 from flagdata.film_array import Frames
 from flagdata.record.video import decode
-from flagdata.rng import child_seed, stream
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED, Flag
 from measure.estimate.conditioned import ConditionedFilm
@@ -104,7 +102,7 @@ class Filmed:
 
 
 def look(seed: int, *, light: int) -> RenderParameters:
-    """A look that is drawn: cloth, background and view of one seed, the sun, the exposure and the shutter of another."""
+    """A look that is drawn: all of one seed, but for the sun and the sky, which are of another."""
     own, other = (prior.named("outdoor").draw(one, Assets()) for one in (seed, light))
     shown = {
         name: getattr(other, name)

@@ -4,6 +4,7 @@ background, and read as the film is; what its reading is off by is what the film
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import cv2
@@ -106,7 +107,7 @@ def refilmed(look: Look, positions: Floats, mesh: Mesh, flag: Flag, place: Place
     zeta = seen.put(zeta, positions, int(hoist[0]), flag.length)
     zeta = replace(zeta, sun_azimuth=math.remainder(zeta.camera_angle + math.pi, 2 * math.pi))
     meshes = meshes_of(positions, mesh)
-    zeta = _aimed(zeta, lambda one: places(meshes, one)[:, [hoist[0], hoist[-1]]].mean(axis=0), look.hoist)
+    zeta = aimed(zeta, lambda one: places(meshes, one)[:, [hoist[0], hoist[-1]]].mean(axis=0), look.hoist)
     raster = Raster(assets=own)
     with torch.no_grad():
         few = meshes.part(0, min(_LEVEL, len(meshes)))
@@ -118,7 +119,7 @@ def refilmed(look: Look, positions: Floats, mesh: Mesh, flag: Flag, place: Place
     return read(noisy, places(meshes, zeta), mesh, flag)
 
 
-def _aimed(zeta: RenderParameters, ends, wanted: Floats) -> RenderParameters:
+def aimed(zeta: RenderParameters, ends: Callable[[RenderParameters], Floats], wanted: Floats) -> RenderParameters:
     """With the hoist's ends where they are wanted [px], by the angle of view and the picture's place."""
     for _ in range(2):
         now = ends(zeta)

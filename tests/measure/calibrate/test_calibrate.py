@@ -276,7 +276,8 @@ def test_ten_seconds_are_enough_beside_ten_others_and_not_alone() -> None:
 
 
 def test_pixels_err_by_the_film_and_by_the_window() -> None:
-    # Errors of windows of variance (1 − L) σ², of the film of L σ²: Var a = σ² (L + (1 − L)/n), Var b = (1 − L) σ²/Σ(x − x̄)².
+    # Errors of windows of variance (1 − L) σ², of the film of L σ²:
+    # Var a = σ² (L + (1 − L)/n), Var b = (1 − L) σ²/Σ(x − x̄)².
     film = replace(_observed(0.2), sigma=np.full(len(OBSERVED), 0.03))
     drawn = film.pixels(4000, seed=1) / 0.03
     relative = np.log(film.speed) - np.log(film.speed).mean()
@@ -300,6 +301,7 @@ def test_two_films_of_a_flag_err_alike_but_for_what_passes(name: str) -> None:
 
 def test_the_shares_are_those_of_films_by_another_renderer() -> None:
     """The table is what the sheet has; a share that was made up would differ from it."""
-    sheet = json.loads((Path(__file__).resolve().parents[3] / "docs" / "results" / "validate-observables.json").read_text(encoding="utf-8"))
+    results = Path(__file__).resolve().parents[3] / "docs" / "results"
+    sheet = json.loads((results / "validate-observables.json").read_text(encoding="utf-8"))
     found = share(vtk(sheet["result"]["films"]))
     assert found == pytest.approx(pixels.LASTING, abs=0.006)
