@@ -1,9 +1,10 @@
 """What errors of pixels add to a film's summaries: draws of them.
 
-A part of an observable's error is the flag's look, its colours, background and view, and the same in all its windows
-and recordings; the rest differs from window to window. How large that part is differs by observable: an area is off by
-the same amount in every window, a frequency by another one in each. Errors of observables that are read from the same
-outline are correlated. All is from films whose geometry is known (`python -m tests.validation looks`).
+A part of an observable's error lasts: it is the same in all windows of a film. How large that part is differs by
+observable: an area is off by the same amount in every window, a frequency by another one in each. Of what lasts in a
+film a part is the flag's look, its colours, background and view, and the same in all recordings of it; the rest is the
+film's, whose wind bends the flag otherwise and whose light is another. Errors of observables that are read from the
+same outline are correlated. All is from films whose geometry is known (`python -m tests.validation looks`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ from measure.calibrate.summary import Projection
 LASTING = np.array([0.70, 0.93, 0.79, 0.31, 0.57, 0.31, 0.56, 0.97])
 """(observable of `simulation.OBSERVED`) share of the variance that lasts: of 118 windows of 64 films by VTK, whose
 deviation is `Observable.sigma` (docs/results/validate-looks.md)."""
+COMMON = 0.4
+"""Share of what lasts in a film that is the same in all recordings of the flag: of two films each of twelve looks, of
+all observables together."""
 LASTING_TOGETHER = {
     ("extension", "area"): 0.77,
     ("frequency", "bandwidth"): 0.85,
@@ -41,7 +45,8 @@ def drawn(projection: Projection, windows: int, count: int, *, name: str, seed: 
     """
     size = len(OBSERVED)
     passing = stream(seed, "pixels", "passing", name).standard_normal((count, windows, size)) @ _PASSING.T
-    lasting = stream(seed, "pixels", "lasting").standard_normal((count, size)) @ _LASTING.T
+    look, film = (stream(seed, "pixels", "lasting", *own).standard_normal((count, size)) for own in ((), (name,)))
+    lasting = (np.sqrt(COMMON) * look + np.sqrt(1 - COMMON) * film) @ _LASTING.T
     found = projection.of(np.sqrt(1 - LASTING) * passing)
     found[:, 0] += np.sqrt(LASTING) * lasting
     return found
