@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from measure.calibrate import pixels
+from measure.calibrate.simulation import OBSERVED
 from measure.observables import OBSERVABLES, Observable
 from tests.validation.power import reference_table, table
 
@@ -19,6 +21,13 @@ def test_every_observable_is_on_the_page(name: str) -> None:
     found: Observable = OBSERVABLES[name]
     row = f"| {name} | {found.unit} | {found.meaning} | {found.bias:+.3f} | {found.sigma:.3f} | {found.blind} |"
     assert row in PAGE.read_text(encoding="utf-8").splitlines()
+
+
+def test_the_shares_that_last_are_those_that_are_drawn() -> None:
+    shares = " | ".join(f"{one:.2f}" for one in pixels.LASTING)
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    assert f"| | {' | '.join(OBSERVED)} |" in lines
+    assert f"| share of the variance that lasts | {shares} |" in lines
 
 
 def test_the_maps_of_effects_are_those_of_their_sheet() -> None:
