@@ -63,6 +63,8 @@ FLAG = Flag(length=1.5, height=1.0)
 SIGMA = np.array([OBSERVABLES[name].sigma for name in OBSERVED])
 _WINDS = ((4.0, 6.2), (5.0, 7.8))
 """Means of the winds of a look's films, for even and odd looks [m/s]."""
+_FEWEST = 4
+"""Films of a renderer below which nothing is reported of it."""
 _FINE = 20
 """Columns of the mesh of flags that are filmed."""
 _VTK = Path(__file__).resolve().parents[2] / "docs" / "results" / "validate-observables.json"
@@ -178,14 +180,14 @@ def arrays(some: Sequence[Mapping[str, Any]], key: str) -> list[Floats]:
 
 
 def vtk(films: Sequence[Mapping[str, Any]]) -> list[Floats]:
-    """Errors of the films by VTK; films of one window among them."""
+    """Errors of the films by VTK, the product's bias taken off; films of one window among them."""
     found = []
     for row in films:
         own = [
             [
                 math.nan
                 if None in (window["values"][name]["pixels"], window["values"][name]["geometry"])
-                else window["values"][name]["pixels"] - window["values"][name]["geometry"]
+                else window["values"][name]["pixels"] - window["values"][name]["geometry"] - OBSERVABLES[name].bias
                 for name in OBSERVED
             ]
             for window in row["windows"]
@@ -210,6 +212,12 @@ def split(films: Sequence[Floats]) -> tuple[Floats, Floats]:
         lasting[k] = (between - within) / ((total - np.square(sizes).sum() / total) / (count - 1))
         passing[k] = within
     return lasting, passing
+
+
+def _means(films: Sequence[Floats]) -> Floats:
+    """(observable,) mean over films of their mean errors."""
+    each = [[own[np.isfinite(own[:, k]), k] for own in films] for k in range(len(OBSERVED))]
+    return np.array([np.mean([own.mean() for own in some if len(own)]) for some in each])
 
 
 def share(films: Sequence[Floats]) -> Floats:
@@ -319,13 +327,14 @@ def summary(
     found: dict[str, Any] = {"observables": list(OBSERVED), "shares": {}}
     sources = {"raster": arrays(own, "errors"), "VTK": vtk(by_vtk), "Cycles": arrays(by_cycles, "errors")}
     for name, films in sources.items():
-        if len(films) < 4:
+        films = [one for one in films if np.isfinite(one).any()]
+        if len(films) < _FEWEST:
             continue
         lasting, passing = split(films)
         ends = interval(films, share, SEED)
         found["shares"][name] = {
             "films": len(films),
-            "bias": np.mean([np.nanmean(one, axis=0) for one in films], axis=0).tolist(),
+            "mean": _means(films).tolist(),
             "lasting": np.sqrt(np.maximum(lasting, 0)).tolist(),
             "passing": np.sqrt(passing).tolist(),
             "share": share(films).tolist(),
@@ -342,7 +351,7 @@ def summary(
         "raster, whole": judged(errors, again, ones),
         "raster, by factors": judged(errors, again, by_least_squares),
     }
-    if len(by_cycles) > 3:
+    if len(by_cycles) >= _FEWEST:
         errors, again = means_of(by_cycles)
         found["corrected"] |= {
             "Cycles, whole": judged(errors, again, ones),
@@ -356,7 +365,7 @@ def page(sheet: Mapping[str, Any]) -> str:
     lines = [
         "# Looks: what lasts of the errors of films' observables",
         "",
-        "Pixels less geometry, split into what lasts in a film and what passes from window to window.",
+        "Pixels less geometry, less the bias, split into what lasts in a film and what passes from window to window.",
         "Standard deviations are in the observables' units, shares with 90 % by a bootstrap of films.",
         "`python -m tests.validation looks` makes it.",
         "",
@@ -368,7 +377,7 @@ def page(sheet: Mapping[str, Any]) -> str:
         "## Two films of one look",
         "",
         "The raster renderer's; each look was filmed in two winds and two lights: share of what lasts in a film that",
-        f"is common to both. Of all observables together it is {middle:.2f} ({low:.2f} to {high:.2f}).",
+        f"is common to both. Of all observables together it is {middle:.2f} (90 %: {low:.2f} to {high:.2f}).",
         "",
         _row(sheet["observables"]),
         _row(["---"] * len(sheet["observables"])),
@@ -394,10 +403,10 @@ def page(sheet: Mapping[str, Any]) -> str:
 
 
 def _shares(names: Sequence[str], own: Mapping[str, Any]) -> list[str]:
-    lines = [_row(["observable", "bias", "lasts", "passes", "share that lasts", "90 %"]), _row(["---"] * 6)]
+    lines = [_row(["observable", "mean", "lasts", "passes", "share that lasts", "90 %"]), _row(["---"] * 6)]
     for k, name in enumerate(names):
         low, high = own["interval"][k]
-        values = (own["bias"][k], own["lasting"][k], own["passing"][k])
+        values = (own["mean"][k], own["lasting"][k], own["passing"][k])
         lines.append(
             _row([name, *(f"{one:.3f}" for one in values), f"{own['share'][k]:.2f}", f"{low:.2f} to {high:.2f}"])
         )
