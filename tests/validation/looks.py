@@ -217,7 +217,7 @@ def split(films: Sequence[Floats]) -> tuple[Floats, Floats]:
 def _means(films: Sequence[Floats]) -> Floats:
     """(observable,) mean over films of their mean errors."""
     each = [[own[np.isfinite(own[:, k]), k] for own in films] for k in range(len(OBSERVED))]
-    return np.array([np.mean([own.mean() for own in some if len(own)]) for some in each])
+    return np.array([float(np.mean([own.mean() for own in some if len(own)])) for some in each])
 
 
 def share(films: Sequence[Floats]) -> Floats:

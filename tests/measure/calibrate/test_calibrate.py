@@ -297,7 +297,9 @@ def test_two_films_of_a_flag_err_alike_as_far_as_its_look_goes(name: str) -> Non
     both = [film.pixels(4000, seed=1)[:, 0, place] for film in (one, other)]
     lasting = pixels.LASTING[place]
     wanted = pixels.COMMON * lasting / (lasting + (1 - lasting) / 48)
-    assert np.corrcoef(*both)[0, 1] == pytest.approx(wanted, abs=0.05)  # three standard errors of 4,000 draws
+    assert np.corrcoef(both[0], both[1])[0, 1] == pytest.approx(
+        wanted, abs=0.05
+    )  # three standard errors of 4,000 draws
 
 
 def test_the_shares_are_those_of_films_by_another_renderer() -> None:
