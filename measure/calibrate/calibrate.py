@@ -17,10 +17,11 @@ from flagdata.rng import child_seed, stream
 from measure.calibrate import numerics
 from measure.calibrate.design import FAR, Design, simulated
 from measure.calibrate.emulator import Emulator, informative
+from measure.calibrate.fabric import Fabric
 from measure.calibrate.leaving_out import usable
 from measure.calibrate.observed import Observed, check_in_all, constant_wind
 from measure.calibrate.posterior import Posterior, Sight, posterior, weighed
-from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats, Uncertain
+from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, FABRIC, NUISANCES, Floats, Uncertain
 from measure.calibrate.scatter import TAKEN_APART
 from measure.calibrate.simulation import OBSERVED, Flag
 from measure.calibrate.summary import shown
@@ -51,6 +52,7 @@ class Options:
         simulations: for each recording.
         level: of the intervals.
         seed: of all draws.
+        material: what the flag is stated to be made of; None for any fabric.
     """
 
     flag: Flag
@@ -60,6 +62,7 @@ class Options:
     simulations: int = 128
     level: float = 0.9
     seed: int = 0
+    material: Fabric | None = None
 
     def recipe(self) -> dict[str, Any]:
         """JSON values."""
@@ -72,6 +75,7 @@ class Options:
             "simulations": self.simulations,
             "level": self.level,
             "seed": self.seed,
+            **({} if self.material is None else {"material": self.material.name}),
         }
 
 
@@ -320,6 +324,7 @@ def designs_of(recordings: Sequence[Observed], options: Options) -> list[Design]
             distance=options.distance,
             recording=name,
             place=name if one.place is None else one.place,
+            fabric=FABRIC if options.material is None else options.material.drawn,
         )
         for one, name in zip(recordings, names, strict=True)
     ]

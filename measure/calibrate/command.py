@@ -70,6 +70,11 @@ if TYPE_CHECKING:
     help="From the camera to the flag [m].",
 )
 @click.option(
+    "--material",
+    metavar="NAME",
+    help="What the flag is made of, as in woven-polyester, knit or camel-ponte-roma; by default any fabric.",
+)
+@click.option(
     "--crop", metavar="X,Y,W,H", help="Region of films in which the flag is [px]; by default the whole picture."
 )
 @click.option(
@@ -137,6 +142,7 @@ def calibrate(
     azimuth: Stated | None,
     elevation: Stated | None,
     distance: float,
+    material: str | None,
     crop: str | None,
     flag: int | None,
     log: str | None,
@@ -186,6 +192,7 @@ def calibrate(
     from measure.calibrate.artifact import artifact, keep
     from measure.calibrate.calibrate import Options
     from measure.calibrate.calibrate import calibrate as calibrated
+    from measure.calibrate.fabric import fabric
     from measure.calibrate.filmed import Sources
     from measure.calibrate.known import known
     from measure.calibrate.page import page
@@ -202,6 +209,7 @@ def calibrate(
         lake.check_writable()
     size = parse_size(flag_size)
     reading = Reading(crop=box_of(crop), flag=flag, aspect=size.aspect)
+    made_of = None if material is None else fabric(material, where="--material")
     weighable = None
     if only != "anemometer":
         weighable = Sources.open(
@@ -235,6 +243,7 @@ def calibrate(
         simulations=simulations,
         level=level,
         seed=seed,
+        material=made_of,
     )
     with progress(None, label="observe", unit="window") as advance:
         gathered = weighable.read(size, advance=advance)
@@ -276,6 +285,7 @@ _OF_WEIGHT = (
     "azimuth",
     "elevation",
     "distance",
+    "material",
     "log",
     "offset",
     "simulations",

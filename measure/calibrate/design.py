@@ -26,6 +26,7 @@ from measure.calibrate.prior import (
     ELEVATION,
     FABRIC,
     NUISANCES,
+    STRETCHING,
     Floats,
     Uncertain,
     clock_error,
@@ -54,6 +55,7 @@ class Design:
         recording: what recordings of one cloth differ by: their simulations are of the same cloths, each recording's in
             turbulence of its own.
         place: the same of places and anemometers, which recordings may share.
+        fabric: which measured tables the cloths have.
     """
 
     flag: Flag
@@ -66,13 +68,18 @@ class Design:
     distance: float = FAR
     recording: str = ""
     place: str = ""
+    fabric: Uncertain = FABRIC
+
+    @property
+    def cloth(self) -> tuple[Uncertain, ...]:
+        """What differs among the cloths."""
+        return (*CLOTH, STRETCHING, self.fabric)
 
     def quantities(self) -> tuple[Uncertain, ...]:
         """What differs among the simulations."""
         known = self.log.distance is not None
         return (
-            *CLOTH,
-            *FABRIC,
+            *self.cloth,
             *NUISANCES,
             self.azimuth,
             self.elevation,
@@ -87,7 +94,7 @@ class Design:
         order = stream(own, "calibrate", "order").permutation(self.count)
         there = draws(self.quantities(), self.count, seed=own, name="design")
         drawn = {name: values[order] for name, values in there.items()}
-        drawn |= draws((*CLOTH, *FABRIC), self.count, seed=self.seed, name="cloths")
+        drawn |= draws(self.cloth, self.count, seed=self.seed, name="cloths")
         if self.log.distance is not None:
             drawn[DISTANCE.name] = np.full(self.count, self.log.distance)
         order = np.argsort(drawn["damping"], kind="stable")

@@ -13,6 +13,7 @@ from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from flagdata.stated import Stated
 from measure.calibrate.calibrate import Options as Calibrating
+from measure.calibrate.fabric import fabric
 from measure.calibrate.filmed import Sources
 from measure.calibrate.known import known
 from measure.calibrate.prior import AZIMUTH, ELEVATION
@@ -42,6 +43,7 @@ def close_films(
     lake: Lake | None,
     branch: str,
     name: str | None,
+    material: str | None,
     level: float | None,
     nulls: int | None,
     seed: int,
@@ -50,6 +52,7 @@ def close_films(
     """Judge recordings of one flag.
 
     Args:
+        material: what the flag is made of; None for any fabric.
         nulls: kinds of numerics.
 
     Raises:
@@ -72,6 +75,7 @@ def close_films(
             distance=given.distance,
             simulations=given.simulations,
             seed=seed,
+            material=None if material is None else fabric(material, where="--material"),
         ),
         area_weight=None if given.area_weight is None else weight(given.area_weight),
         level=CRITERIA.level if level is None else level,

@@ -44,7 +44,6 @@ OF_MARKERS = (
     "sensor",
     "zone",
     "accept",
-    "material",
     "density_uncertainty",
     "size",
     "pins",

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flagdata.rng import child_seed, stream
 from measure.calibrate.design import Design
 from measure.calibrate.discretisation import LITTLE, Discretisation
-from measure.calibrate.prior import CLOTH, FABRIC, Floats, draws
+from measure.calibrate.prior import CLOTH, Floats, draws
 from measure.calibrate.simulation import Batch
 from measure.films.library import Weighable
 from measure.observables.observable import WINDOW
@@ -101,7 +101,7 @@ def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed:
         places: for each recording the first one of its place.
     """
     count = kinds * TOGETHER
-    cloths = draws((*CLOTH, *FABRIC), count, seed=seed, name="null cloths")
+    cloths = draws(designs[0].cloth, count, seed=seed, name="null cloths")
     found = []
     for number, design in zip(places, designs, strict=True):
         own = {

@@ -9,7 +9,8 @@ alone, among several, as a part, or wrongly.
 
 `python -m tests.validation loop-on-films`; the simulations are kept in FLAGDATA_LOOP_ON_FILMS, by default a new folder.
 FLAGDATA_LOOP_ON_FILMS_EFFECTS names the effects that are weighed and that act, _KINDS is how many kinds of numerics
-null experiments have, and _RECORDINGS which of the two recordings are used, as in "1": all by default.
+null experiments have, _RECORDINGS which of the two recordings are used, as in "1" (all by default), and _SIMULATIONS
+how many flags of the base model are simulated for each.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ SEED = 20261127
 MEANS = (4.0, 6.5)  # m/s
 DURATION = 30.0  # s
 KINDS = int(os.environ.get("FLAGDATA_LOOP_ON_FILMS_KINDS", "20"))
+SIMULATIONS = int(os.environ.get("FLAGDATA_LOOP_ON_FILMS_SIMULATIONS", "128"))
 LEVEL = 0.05
 _BEFORE = 64.0  # s
 _INTENSITY, _LENGTH, _RATE = 0.18, 50.0, 10.0  # 1, m, Hz
@@ -83,7 +85,14 @@ def effects() -> tuple[Weighable, ...]:
 def designs() -> list[Design]:
     """Of both recordings."""
     return [
-        Design(flag=FLAG, log=log(mean).cut(0.0, DURATION), duration=DURATION, azimuth=AZIMUTH, seed=SEED)
+        Design(
+            flag=FLAG,
+            log=log(mean).cut(0.0, DURATION),
+            duration=DURATION,
+            azimuth=AZIMUTH,
+            count=SIMULATIONS,
+            seed=SEED,
+        )
         for mean in MEANS
     ]
 
@@ -169,6 +178,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return {
         "recordings": list(chosen()),
         "kinds": KINDS,
+        "simulations": SIMULATIONS,
         "effects": [one.name for one in effects()],
         **_summary(rows),
         "rows": rows,

@@ -98,6 +98,7 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
         (("--flag-size", "1.5x1.0", "--area-weight", "0"), "give one above 0"),
         (("--flag-size", "1.5x1.0", "--crop", "0,0,9,9"), "a table of observables has no pictures"),
         (("--flag-size", "1.5x1.0", "--nulls", "2"), "kinds"),
+        (("--flag-size", "1.5x1.0", "--material", "bunting"), "woven-polyester, woven-cotton"),
         (("--flag-size", "1.5x1.0", "--suspect", "lifft"), "did you mean 'lift'"),
         (("--flag-size", "1.5x1.0", "--suspect", "vertical-wind"), "vertical-wind+ or vertical-wind-"),
         (("--flag-size", "1.5x1.0", "--start", "40s"), "s of film with a log beside them"),
