@@ -1,13 +1,13 @@
-"""Of which fabric a flag is, as a user states it: which measured tables of bending and stretching its simulations draw.
+"""Of which fabric a flag is, as a user states it: which measured tables of bending and stretching are drawn for it.
 
-The tables are the ten of Wang, O'Brien and Ramamoorthi (ACM TOG 30(4):71, 2011). What each is made of is in the list that
-their authors publish beside them (Berkeley Garment Library, README of its materials). That list states fibres and not how
-a cloth is made; woven are denim, by its name, and cloths as stiff as it (at rest, 200 N/m or more along warp and weft);
-knit are rib, interlock, ponte roma, swim and sweat, by their names, and a cloth as compliant (below 100 N/m in one
-direction). `pink-ribbon-brown` lies between and is in neither.
+The tables are the ten of Wang, O'Brien and Ramamoorthi (ACM TOG 30(4):71, 2011). What each is made of is in the list
+that their authors publish beside them (Berkeley Garment Library, README of its materials). The list states fibres and
+not how a cloth is made. Woven are denim, by its name, and cloths as stiff as it (at rest, 200 N/m or more along warp
+and weft); knit are rib, interlock, ponte roma, swim and sweat, by their names, and a cloth as compliant (below 100 N/m
+in one direction). `pink-ribbon-brown` lies between and is in neither.
 
-Nobody has published such tables of a flag's bunting, so that a class is the nearest that was measured. Of nylon one knit
-swimsuit was measured, while flags of nylon are woven: their class is that of all woven cloths.
+Nobody has published such tables of a flag's bunting, so that a class is the nearest that was measured. Of nylon one
+knit swimsuit was measured, while flags of nylon are woven: their class is that of all woven cloths.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ CLASSES = {
     "knit-cotton": ("gray-interlock", "ivory-rib-knit"),
 }
 """Name → those of `TABLES` that a cloth of it may have. Fibres: denim 99 % cotton; royal target 65 % cotton, 35 %
-polyester; white dots, tango 100 % polyester; navy 96 % polyester; camel 60 % polyester, 40 % rayon; ivory 95 % cotton; gray
-interlock 60 % cotton, 40 % polyester; white swim 87 % nylon."""
+polyester; white dots, tango 100 % polyester; navy 96 % polyester; camel 60 % polyester, 40 % rayon; ivory 95 % cotton;
+gray interlock 60 % cotton, 40 % polyester; white swim 87 % nylon."""
 
 
 @dataclass(frozen=True, kw_only=True)

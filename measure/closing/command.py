@@ -69,8 +69,8 @@ _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "
 )
 @click.option(
     "--material",
-    help="Nominal material, a name of the catalog; by default the one that the source states. Of films: what the flag is "
-    "made of, as in woven-polyester, knit or camel-ponte-roma; by default any fabric.",
+    help="Nominal material, a name of the catalog; by default the one that the source states. Of films: what the flag "
+    "is made of, as in woven-polyester, knit or camel-ponte-roma; by default any fabric.",
 )
 @click.option(
     "--density-uncertainty",

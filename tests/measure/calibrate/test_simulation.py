@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from measure.calibrate.design import Design, simulated
-from measure.calibrate.prior import Floats
 from measure.calibrate.fabric import TABLES
+from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED, Batch, Flag, cloth, mean_bending
 from measure.calibrate.wind import Log
 from sim.integrate.implicit import BackwardEuler
