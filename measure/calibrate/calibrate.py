@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
-from measure.calibrate import numerics
-from measure.calibrate.design import FAR, Design, simulated
+from measure.calibrate.design import FAR, Design, read, simulated
 from measure.calibrate.emulator import Emulator, informative
 from measure.calibrate.fabric import Fabric
 from measure.calibrate.leaving_out import usable
+from measure.calibrate.numerics import Correction, Finer
 from measure.calibrate.observed import Observed, check_in_all, constant_wind
 from measure.calibrate.posterior import Posterior, Sight, posterior, weighed
 from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, FABRIC, NUISANCES, Floats, Uncertain
@@ -294,11 +294,33 @@ def calibrate(
         InputError: see `Observed` and `designs_of`.
         RefusedError: see `answered`.
     """
-    made: list[tuple[Observed, Mapping[str, Floats], Floats]] = []
+    made: list[tuple[Observed, Mapping[str, Floats], Floats, Correction]] = []
     for one, design in zip(recordings, designs_of(recordings, options), strict=True):
         readings = simulated(design, folder=folder, workers=workers, advance=advance)
-        made.append((one, design.values(), readings))
+        correction = corrected(design, readings, folder=folder, workers=workers, advance=advance)
+        made.append((one, design.values(), readings, correction))
     return answered(made, options, left_out=left_out)
+
+
+def corrected(
+    design: Design,
+    readings: Floats,
+    *,
+    folder: Path,
+    workers: int = 1,
+    advance: Callable[[int], object] | None = None,
+) -> Correction:
+    """How far a design's simulations lie from those of a finer mesh.
+
+    Args:
+        readings: (simulation, window, observable) of the design's.
+
+    Raises:
+        CorruptError: a kept batch that cannot be read.
+    """
+    finer = Finer.of(design)
+    fine = read(finer.batches, folder=folder, workers=workers, advance=advance)[:, 0]
+    return finer.correction(fine, readings)
 
 
 def designs_of(recordings: Sequence[Observed], options: Options) -> list[Design]:
@@ -366,13 +388,14 @@ class _Simulated:
 
 
 def answered(
-    simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]],
+    simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats, Correction]],
     options: Options,
     *,
     left_out: Sequence[Finding] = (),
 ) -> Calibration:
-    """The answer from recordings, each with its simulations' values, name → (simulation,), and their readings
-    (simulation, window, observable). Those whose simulations do not show what they show are left out.
+    """The answer from recordings, each with its simulations' values, name → (simulation,), their readings (simulation,
+    window, observable), and how far these lie from those of a finer mesh. Those whose simulations do not show what they
+    show are left out.
 
     Args:
         left_out: a warning for each recording that is not among them.
@@ -382,9 +405,9 @@ def answered(
         InputError: too little is left.
     """
 
-    def seen(one: tuple[Observed, Mapping[str, Floats], Floats]) -> tuple[_Simulated, Sight]:
-        observed, values, readings = one
-        summaries = with_errors(observed, readings, seed=options.seed)
+    def seen(one: tuple[Observed, Mapping[str, Floats], Floats, Correction]) -> tuple[_Simulated, Sight]:
+        observed, values, readings, correction = one
+        summaries = with_errors(observed, readings, correction, seed=options.seed)
         looked = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
         used = informative(values, summaries, looked, name=observed.name)
         own = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
@@ -418,13 +441,10 @@ def answered(
     return replace(calibration, findings=findings)
 
 
-def with_errors(observed: Observed, readings: Floats, *, seed: int) -> Floats:
+def with_errors(observed: Observed, readings: Floats, correction: Correction, *, seed: int) -> Floats:
     """(simulation, summary) of readings (simulation, window, observable) with errors of numerics and of pixels."""
-    summaries = observed.projection.of(readings)
-    size = summaries.shape[1]
-    drawn = stream(seed, "calibrate", "numerics").standard_normal(summaries.shape)
-    coarse = numerics.SIGMA[:size] * drawn + numerics.BIAS[:size]
-    return (summaries + coarse + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
+    summaries = correction.of(observed.projection.of(readings), seed=seed)
+    return (summaries + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
 
 
 def quantity(about: Uncertain, draws: Floats, level: float) -> Quantity:

@@ -195,6 +195,7 @@ def calibrate(
     from measure.calibrate.fabric import fabric
     from measure.calibrate.filmed import Sources
     from measure.calibrate.known import known
+    from measure.calibrate.numerics import FLAGS, effort
     from measure.calibrate.page import page
     from measure.calibrate.prior import AZIMUTH, ELEVATION
     from measure.calibrate.simulation import Flag
@@ -248,8 +249,9 @@ def calibrate(
     with progress(None, label="observe", unit="window") as advance:
         gathered = weighable.read(size, advance=advance)
     observed, parents = gathered.recordings, gathered.parents
-    say(announced(simulations * sum(one.duration for one in observed), workers=workers))
-    with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
+    work = sum(simulations * one.duration + effort(one.duration) for one in observed)
+    say(announced(work, workers=workers))
+    with progress((simulations + FLAGS) * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
             observed,
             options,

@@ -16,6 +16,7 @@ from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.fabric import fabric
 from measure.calibrate.filmed import Sources
 from measure.calibrate.known import known
+from measure.calibrate.numerics import effort
 from measure.calibrate.prior import AZIMUTH, ELEVATION
 from measure.calibrate.simulation import Flag
 from measure.calibrate.workload import announced
@@ -121,14 +122,15 @@ def close_films(
 
 
 def workload(durations: Sequence[float], options: Options) -> float:
-    """Seconds of all flags that are simulated: of the base model, with each effect, and of the null experiments.
+    """Seconds of all flags that are simulated: of the base model, finer, with each effect, and of null experiments.
 
     Args:
         durations: of the recordings [s].
     """
     each = options.calibration.simulations + TOGETHER * options.kinds
     paired = PAIRS * len(weighable(options.calibration.flag)) * len(durations)
-    return each * sum(durations) + paired * lasting(len(durations))
+    finer = sum(effort(duration) for duration in durations)
+    return each * sum(durations) + finer + paired * lasting(len(durations))
 
 
 def weight(stated: Stated) -> tuple[float, float]:

@@ -31,7 +31,7 @@ from measure.films.judge import Judged, judge
 from measure.films.library import Suspicion, Weighable, weighable
 from measure.films.score_test import score
 from measure.films.sensitivity import SEEN, sensitivity
-from measure.films.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, sight
+from measure.films.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, sights_of
 from measure.films.statement import stated
 from measure.films.unseen import compared
 from measure.films.weigh import Weighing, directions, expected, fitted, hypothesis, misfits, weigh
@@ -167,12 +167,7 @@ def solve(
     simulations = gathered(
         recordings, options.calibration, effects, kinds=options.kinds, folder=folder, workers=workers, stage=stage
     )
-    sights = tuple(
-        sight(one, design, base, own)
-        for one, design, base, own in zip(
-            recordings, simulations.designs, simulations.base, simulations.pairs, strict=True
-        )
-    )
+    sights = sights_of(recordings, simulations)
     effects = tuple(one for one in effects if all(one.name in own.model.responses for own in sights))
     null, kinds = of_nulls(sights, recordings, simulations, options.area_weight, seed=seed)
     model = of_base(sights, recordings, simulations, options.area_weight, seed=seed)
