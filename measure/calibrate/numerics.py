@@ -87,8 +87,8 @@ class Finer:
 
     @classmethod
     def of(cls, design: Design) -> Finer:
-        """Those of the longest steps, as cloths that hardly damp would cost ten times as much."""
-        places = design.damped()
+        """Of the cloths that damp as much as the step does: those that hardly damp would cost ten times as much."""
+        places = np.flatnonzero(design.values()["damping"] >= (FINE.step or 0.0))
         chosen = stream(design.seed, "calibrate", "finer").choice(places, min(FLAGS, len(places)), replace=False)
         own = np.sort(chosen)
         parts = [own[first : first + TOGETHER] for first in range(0, len(own), TOGETHER)]

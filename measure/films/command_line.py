@@ -142,7 +142,7 @@ def film_options(command: _Command) -> _Command:
         click.option(
             "--simulations",
             type=click.IntRange(min=64),
-            default=128,
+            default=64,
             show_default=True,
             help="Of films: simulated flags of the base model for each recording.",
         ),

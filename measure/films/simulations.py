@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
 from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.calibrate import designs_of, with_errors
 from measure.calibrate.design import Design, read
 from measure.calibrate.emulator import Emulator, informative
+from measure.calibrate.leaving_out import usable
 from measure.calibrate.numerics import Correction, Finer
-from measure.calibrate.observed import Observed
+from measure.calibrate.observed import Observed, check_in_all
 from measure.calibrate.prior import Floats
 from measure.calibrate.sights import first_of
 from measure.calibrate.simulation import OBSERVED
@@ -48,6 +50,17 @@ class Simulations:
     kinds: NDArray[np.int64]
     weights: Floats
     corrections: tuple[Correction, ...]
+
+    def of(self, places: Sequence[int]) -> Simulations:
+        """Those of some recordings."""
+        return replace(
+            self,
+            designs=tuple(self.designs[place] for place in places),
+            base=tuple(self.base[place] for place in places),
+            pairs=tuple(self.pairs[place] for place in places),
+            nulls=tuple(self.nulls[place] for place in places),
+            corrections=tuple(self.corrections[place] for place in places),
+        )
 
 
 def gathered(
@@ -106,6 +119,29 @@ def gathered(
         weights=np.concatenate([batch.values["area_weight"] for batch in null[0]]),
         corrections=tuple(one.correction(own, coarse) for one, own, coarse in zip(finer, fine, base, strict=True)),
     )
+
+
+def shown_by(
+    recordings: Sequence[Observed], simulations: Simulations
+) -> tuple[tuple[Observed, ...], Simulations, tuple[Sight, ...], tuple[Finding, ...]]:
+    """The recordings whose simulations show what they show, their simulations and models, and a warning for each other
+    recording.
+
+    Raises:
+        InputError: too little is left.
+        RefusedError: simulations show nothing of any recording, see `Emulator.fit`.
+    """
+
+    def seen(place: int) -> tuple[int, Sight]:
+        (own,) = sights_of([recordings[place]], simulations.of([place]))
+        return place, own
+
+    both, left_out = usable(range(len(recordings)), seen, name=lambda place: recordings[place].name)
+    places = [place for place, _ in both]
+    kept = tuple(recordings[place] for place in places)
+    where = ", ".join(one.name for one in kept)
+    check_in_all(sum(one.duration for one in kept), where=where, left_out=left_out)
+    return kept, simulations.of(places), tuple(own for _, own in both), left_out
 
 
 def sights_of(
