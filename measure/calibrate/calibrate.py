@@ -14,18 +14,19 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
-from measure.calibrate.design import FAR, Design, read, simulated
+from measure.calibrate.design import FAR, Design, simulated
 from measure.calibrate.emulator import Emulator, informative
 from measure.calibrate.fabric import Fabric
-from measure.calibrate.leaving_out import usable
-from measure.calibrate.numerics import Correction, Finer
+from measure.calibrate.leaving_out import LEFT_OUT, usable
+from measure.calibrate.numerics import Correction, corrected
 from measure.calibrate.observed import Observed, check_in_all, constant_wind
 from measure.calibrate.posterior import Posterior, Sight, posterior, weighed
 from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, FABRIC, NUISANCES, Floats, Uncertain
 from measure.calibrate.scatter import TAKEN_APART
 from measure.calibrate.simulation import OBSERVED, Flag
-from measure.calibrate.summary import shown
+from measure.calibrate.summary import LEAST_IN_ALL, shown
 from measure.ends import PILED, WITHIN, Bound, Span, span
+from measure.observables.observable import WINDOW
 
 ANSWER = 4
 """Raised when the same recordings and options get another answer."""
@@ -37,6 +38,10 @@ _CHECKED = 48
 _UNLIKE = 0.01
 """Tail probability of a recording's summary among those that the answer predicts below which the weight is withheld: of
 recordings that are as the model has them one in a hundred."""
+_LOOK = (
+    "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, --elevation and "
+    "--distance; flagdata close-loop looks for what is missing"
+)
 _APART = 2.0
 """σ from which on a summary is named as what is unlike."""
 
@@ -302,27 +307,6 @@ def calibrate(
     return answered(made, options, left_out=left_out)
 
 
-def corrected(
-    design: Design,
-    readings: Floats,
-    *,
-    folder: Path,
-    workers: int = 1,
-    advance: Callable[[int], object] | None = None,
-) -> Correction:
-    """How far a design's simulations lie from those of a finer mesh.
-
-    Args:
-        readings: (simulation, window, observable) of the design's.
-
-    Raises:
-        CorruptError: a kept batch that cannot be read.
-    """
-    finer = Finer.of(design)
-    fine = read(finer.batches, folder=folder, workers=workers, advance=advance)[:, 0]
-    return finer.correction(fine, readings)
-
-
 def designs_of(recordings: Sequence[Observed], options: Options) -> list[Design]:
     """What is simulated for each of several recordings of one cloth.
 
@@ -413,14 +397,36 @@ def answered(
         own = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
         return own, own.sight(options)
 
-    both, unlike = usable(simulations, seen, name=lambda one: one[0].name)
-    left_out = (*left_out, *unlike)
-    made, sights = [own for own, _ in both], [own for _, own in both]
+    both, unshown = usable(simulations, seen, name=lambda one: one[0].name)
+    left_out = (*left_out, *unshown)
     check_in_all(
-        sum(one.observed.duration for one in made),
-        where=", ".join(one.observed.name for one in made),
+        sum(one.observed.duration for one, _ in both),
+        where=", ".join(one.observed.name for one, _ in both),
         left_out=left_out,
     )
+    found = _answered(both, options, left_out=left_out)
+    return _without_unlike(found, both, options, left_out=left_out)
+
+
+def _without_unlike(
+    found: Calibration, both: Sequence[tuple[_Simulated, Sight]], options: Options, *, left_out: Sequence[Finding]
+) -> Calibration:
+    """The answer of those recordings that simulated flags look like, if there are such; otherwise the answer as it is,
+    which then is withheld with the reason."""
+    unlike = [one for one in found.recordings if one.unlike is not None]
+    like = [own for own, one in zip(both, found.recordings, strict=True) if one.unlike is None]
+    if not unlike or sum(own.observed.duration for own, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
+        return found
+    warned = [Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(one), fix=_LOOK) for one in unlike]
+    again = _answered(like, options, left_out=(*left_out, *warned))
+    return found if again.withheld is not None else again
+
+
+def _answered(
+    both: Sequence[tuple[_Simulated, Sight]], options: Options, *, left_out: Sequence[Finding]
+) -> Calibration:
+    """The answer from recordings whose simulations show what they show."""
+    made, sights = [own for own, _ in both], [own for _, own in both]
     found = posterior(sights, [one.observed.summary for one in made], seed=options.seed)
     fitted = tuple(
         _fitted(one, sight, found, place, options) for place, (one, sight) in enumerate(zip(made, sights, strict=True))
@@ -538,16 +544,8 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     for one in calibration.recordings:
         found.extend(one.observed.findings)
         if one.unlike is not None:
-            what = (
-                f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth "
-                "may not be separated from what is behind it, or its size, attachment or place be another than stated, "
-                "or something may act on it that the model lacks. The weight is withheld"
-            )
-            fix = (
-                "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, "
-                "--elevation and --distance; flagdata close-loop looks for what is missing"
-            )
-            found.append(Finding(kind="unlike-simulations", severity=Severity.WARNING, what=what, fix=fix))
+            what = f"{_unlike(one)}. The weight is withheld"
+            found.append(Finding(kind="unlike-simulations", severity=Severity.WARNING, what=what, fix=_LOOK))
         if one.failed > 0.1 * calibration.options.simulations:
             what = f"{one.failed} of {calibration.options.simulations} simulations of {one.observed.name} were left out"
             found.append(Finding(kind="failed-simulations", severity=Severity.WARNING, what=what))
@@ -567,6 +565,15 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
         what = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
         found.append(Finding(kind="not-determined", severity=Severity.NOTE, what=what))
     return tuple(found)
+
+
+def _unlike(one: Fitted) -> str:
+    """What is unlike about a recording, and what may be the cause."""
+    return (
+        f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth may not be "
+        "separated from what is behind it, or its size, attachment or place be another than stated, or something may "
+        "act on it that the model lacks"
+    )
 
 
 def _leaning(calibration: Calibration) -> list[Finding]:

@@ -9,13 +9,15 @@ once (`python -m tests.validation weighed`, sixteen flags on a mesh of 18 column
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.rng import stream
-from measure.calibrate.design import Design
+from measure.calibrate.design import Design, read
 from measure.calibrate.discretisation import Discretisation
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import Batch
@@ -119,3 +121,24 @@ class Finer:
         told = count >= FEWEST
         first = np.where(told, mean, MEASURED.mean[0]), np.where(told, np.sqrt(variance), MEASURED.sigma[0])
         return Correction(mean=np.stack([first[0], MEASURED.mean[1]]), sigma=np.stack([first[1], MEASURED.sigma[1]]))
+
+
+def corrected(
+    design: Design,
+    readings: Floats,
+    *,
+    folder: Path,
+    workers: int = 1,
+    advance: Callable[[int], object] | None = None,
+) -> Correction:
+    """How far a design's simulations lie from those of a finer mesh.
+
+    Args:
+        readings: (simulation, window, observable) of the design's.
+
+    Raises:
+        CorruptError: a kept batch that cannot be read.
+    """
+    finer = Finer.of(design)
+    fine = read(finer.batches, folder=folder, workers=workers, advance=advance)[:, 0]
+    return finer.correction(fine, readings)

@@ -43,7 +43,7 @@ HOIST_BULGE = Observable(
     blind="cloth that bulges to the other side of the pole, and a pole that hides the gap",
     pixels=hoist_bulge,
     geometry=hoist_bulge,
-    bias=0.0,
-    sigma=0.01,
+    bias=0.001,
+    sigma=0.003,
     counted_in="length",
 )

@@ -101,14 +101,6 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "calibrate/fabric.py",
-        "give one of {known}",
-        f"calibrate t.csv {SIZED} --material bunting",
-        (f"calibrate t.csv {SIZED} --material knit-polyester",),
-        files={"t.csv": GUSTY},
-        shows=WEIGHED,
-    ),
-    Case(
         "calibrate/filmed.py",
         "give them to flagdata observe",
         f"calibrate t.csv {SIZED} --crop 0,0,9,9",
