@@ -114,6 +114,26 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_written(
     assert not (tmp_path / "out").exists()
 
 
+def test_one_recording_that_cannot_be_used_is_left_out_and_the_stated_fabric_is_simulated(
+    tmp_path: Path, cheap: list[int], few: None
+) -> None:
+    """One of three is too short: the verdict is that of the two others, and the page names it."""
+    good = [table(tmp_path / f"{mean}.csv", mean=mean) for mean in (4.0, 6.5)]
+    short = table(tmp_path / "short.csv", mean=5.0)
+    short.write_text("\n".join(short.read_text().splitlines()[:4]) + "\n")
+    out = tmp_path / "out"
+    given = ("--flag-size", "1.5x1.0", "--azimuth", "70±7", "--material", "woven-cotton", "--out", out, "--json")
+    done = run(*good, short, *given)
+    assert done.exit_code == 0, done.output
+    verdict = json.loads(done.stdout)
+    (left,) = [one for one in verdict["findings"] if one[0] == "left-out"]
+    assert left[1].startswith(f"{short} is left out: ")
+    assert "short.csv is left out" in (out / "report.html").read_text()
+    options = verdict["provenance"]["options"]
+    assert (options["material"], options["simulations"]) == ("woven-cotton", 64)
+    assert 'name = "11oz-black-denim"' in (out / "base.toml").read_text()
+
+
 def test_options_of_films_are_refused_beside_markers(tmp_path: Path) -> None:
     path = tmp_path / "tracks.csv"
     path.write_text("frame,marker,u,v,x,y,z\n0,a,0,0,0,0,0\n")
