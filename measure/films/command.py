@@ -33,6 +33,9 @@ from measure.films.models import models
 from measure.films.run import Options, solve, verdict_of
 from measure.verdict.criteria import CRITERIA
 
+_FEW, _MANY = 64, 128
+"""Simulations of the base model for each recording, of one or two and of more."""
+_TWO = 2
 _RELATIVE = 0.01
 """Standard uncertainty of a weight that is stated without one, as a share."""
 
@@ -74,7 +77,7 @@ def close_films(
             azimuth=AZIMUTH if given.azimuth is None else known(AZIMUTH, given.azimuth, where="--azimuth"),
             elevation=ELEVATION if given.elevation is None else known(ELEVATION, given.elevation, where="--elevation"),
             distance=given.distance,
-            simulations=given.simulations,
+            simulations=given.simulations or simulations_of(len(sources)),
             seed=seed,
             material=None if material is None else fabric(material, where="--material"),
         ),
@@ -119,6 +122,11 @@ def close_films(
         reading=reading.recipe(),
         parents=gathered.parents,
     )
+
+
+def simulations_of(recordings: int) -> int:
+    """Of the base model for each of so many recordings: as many as the covariance of all their summaries asks for."""
+    return _FEW if recordings <= _TWO else _MANY
 
 
 def workload(durations: Sequence[float], options: Options) -> float:

@@ -70,7 +70,7 @@ class Given:
     flag: int | None
     first: float
     last: float | None
-    simulations: int
+    simulations: int | None
     cache: Path | None
     log: str | None
     clock_offset: Stated | None
@@ -142,8 +142,7 @@ def film_options(command: _Command) -> _Command:
         click.option(
             "--simulations",
             type=click.IntRange(min=64),
-            default=64,
-            show_default=True,
+            show_default="64, from three recordings on 128",
             help="Of films: simulated flags of the base model for each recording.",
         ),
         click.option(

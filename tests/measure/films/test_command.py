@@ -16,6 +16,7 @@ from flagdata.schema import Kind
 from measure.calibrate.simulation import OBSERVED
 from measure.closing.command import close_loop
 from measure.films import library
+from measure.films.command import simulations_of
 from measure.films.sources import films_among
 from measure.loop.run import Options as LoopOptions
 from measure.observables.observable import WINDOW
@@ -130,7 +131,8 @@ def test_one_recording_that_cannot_be_used_is_left_out_and_the_stated_fabric_is_
     assert left[1].startswith(f"{short} is left out: ")
     assert "short.csv is left out" in (out / "report.html").read_text()
     options = verdict["provenance"]["options"]
-    assert (options["material"], options["simulations"]) == ("woven-cotton", 64)
+    assert (options["material"], options["simulations"]) == ("woven-cotton", 128)
+    assert [simulations_of(count) for count in (1, 2, 3, 9)] == [64, 64, 128, 128]
     assert 'name = "11oz-black-denim"' in (out / "base.toml").read_text()
 
 
