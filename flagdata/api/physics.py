@@ -229,6 +229,7 @@ def calibrate(
     end: float | None = None,
     crop: tuple[int, int, int, int] | None = None,
     flag: int | None = None,
+    material: str | None = None,
     log: str | None = None,
     offset: float | tuple[float, float] | str | Stated | None = None,
     simulations: int = 128,
@@ -260,6 +261,7 @@ def calibrate(
         distance: of the camera from the flag [m]; None for 15 m.
         start, end: part of each recording [s].
         crop, flag: of films, as for `measure`.
+        material: what the flag is made of, as in "woven-polyester", "knit" or "camel-ponte-roma"; None for any fabric.
         log, offset: of a table without wind: a log of the lake, and what is added to the table's clock to reach the
             log's [s].
         simulations: for each recording.
@@ -275,6 +277,7 @@ def calibrate(
         InputError: a table that cannot be used, or a log that does not cover it.
         NotFoundError: no such recording or lake.
         RefusedError: no flag is found in a film.
+        UnknownNameError: a material like which no cloth was measured.
         UsageError: options that do not fit.
     """
     several = [recordings] if isinstance(recordings, Mapping | Path | str) else list(recordings)
@@ -290,6 +293,7 @@ def calibrate(
         end=end,
         crop=crop,
         flag=flag,
+        material=material,
         log=log,
         offset=offset,
         simulations=simulations,

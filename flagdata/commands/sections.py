@@ -34,7 +34,7 @@ SECTIONS: dict[str, dict[str, str]] = {
         "What is written": "parquet_path zarr_path picture_path as_json",
     },
     "calibrate": {
-        "The flag and the camera": "flag_size attachment azimuth elevation distance crop flag first last",
+        "The flag and the camera": "flag_size attachment azimuth elevation distance material crop flag first last",
         "A log beside tables": "log offset",
         "How it is done": "only model name simulations workers cache level seed",
         "What is written": "report as_json",

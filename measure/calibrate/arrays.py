@@ -18,6 +18,7 @@ from flagdata.stated import Stated
 from measure.calibrate.calibrate import Calibration, Options, calibrate
 from measure.calibrate.columns import TIME, Columns, known_columns
 from measure.calibrate.design import FAR
+from measure.calibrate.fabric import fabric
 from measure.calibrate.filmed import Opened, Sources, opened
 from measure.calibrate.known import known
 from measure.calibrate.observed import Observed, cut
@@ -43,6 +44,7 @@ def calibrated(
     end: float | None,
     crop: tuple[int, int, int, int] | None,
     flag: int | None,
+    material: str | None,
     log: str | None,
     offset: Number | None,
     simulations: int,
@@ -73,6 +75,7 @@ def calibrated(
         simulations=simulations,
         level=level,
         seed=seed,
+        material=None if material is None else fabric(material, where="material"),
     )
 
     def name(numbered: tuple[int, Arrays | Path | str]) -> str:

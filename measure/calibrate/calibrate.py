@@ -14,17 +14,19 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
-from measure.calibrate import numerics
 from measure.calibrate.design import FAR, Design, simulated
 from measure.calibrate.emulator import Emulator, informative
-from measure.calibrate.leaving_out import usable
+from measure.calibrate.fabric import Fabric
+from measure.calibrate.leaving_out import LEFT_OUT, usable
+from measure.calibrate.numerics import Correction, corrected
 from measure.calibrate.observed import Observed, check_in_all, constant_wind
 from measure.calibrate.posterior import Posterior, Sight, posterior, weighed
-from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats, Uncertain
+from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, FABRIC, NUISANCES, Floats, Uncertain
 from measure.calibrate.scatter import TAKEN_APART
 from measure.calibrate.simulation import OBSERVED, Flag
-from measure.calibrate.summary import shown
+from measure.calibrate.summary import LEAST_IN_ALL, shown
 from measure.ends import PILED, WITHIN, Bound, Span, span
+from measure.observables.observable import WINDOW
 
 ANSWER = 4
 """Raised when the same recordings and options get another answer."""
@@ -36,6 +38,10 @@ _CHECKED = 48
 _UNLIKE = 0.01
 """Tail probability of a recording's summary among those that the answer predicts below which the weight is withheld: of
 recordings that are as the model has them one in a hundred."""
+_LOOK = (
+    "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, --elevation and "
+    "--distance; flagdata close-loop looks for what is missing"
+)
 _APART = 2.0
 """σ from which on a summary is named as what is unlike."""
 
@@ -51,6 +57,7 @@ class Options:
         simulations: for each recording.
         level: of the intervals.
         seed: of all draws.
+        material: what the flag is stated to be made of; None for any fabric.
     """
 
     flag: Flag
@@ -60,6 +67,7 @@ class Options:
     simulations: int = 128
     level: float = 0.9
     seed: int = 0
+    material: Fabric | None = None
 
     def recipe(self) -> dict[str, Any]:
         """JSON values."""
@@ -72,6 +80,7 @@ class Options:
             "simulations": self.simulations,
             "level": self.level,
             "seed": self.seed,
+            **({} if self.material is None else {"material": self.material.name}),
         }
 
 
@@ -290,10 +299,11 @@ def calibrate(
         InputError: see `Observed` and `designs_of`.
         RefusedError: see `answered`.
     """
-    made: list[tuple[Observed, Mapping[str, Floats], Floats]] = []
+    made: list[tuple[Observed, Mapping[str, Floats], Floats, Correction]] = []
     for one, design in zip(recordings, designs_of(recordings, options), strict=True):
         readings = simulated(design, folder=folder, workers=workers, advance=advance)
-        made.append((one, design.values(), readings))
+        correction = corrected(design, readings, folder=folder, workers=workers, advance=advance)
+        made.append((one, design.values(), readings, correction))
     return answered(made, options, left_out=left_out)
 
 
@@ -320,6 +330,7 @@ def designs_of(recordings: Sequence[Observed], options: Options) -> list[Design]
             distance=options.distance,
             recording=name,
             place=name if one.place is None else one.place,
+            fabric=FABRIC if options.material is None else options.material.drawn,
         )
         for one, name in zip(recordings, names, strict=True)
     ]
@@ -361,13 +372,14 @@ class _Simulated:
 
 
 def answered(
-    simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]],
+    simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats, Correction]],
     options: Options,
     *,
     left_out: Sequence[Finding] = (),
 ) -> Calibration:
-    """The answer from recordings, each with its simulations' values, name → (simulation,), and their readings
-    (simulation, window, observable). Those whose simulations do not show what they show are left out.
+    """The answer from recordings, each with its simulations' values, name → (simulation,), their readings (simulation,
+    window, observable), and how far these lie from those of a finer mesh. Those whose simulations do not show what they
+    show are left out.
 
     Args:
         left_out: a warning for each recording that is not among them.
@@ -377,22 +389,44 @@ def answered(
         InputError: too little is left.
     """
 
-    def seen(one: tuple[Observed, Mapping[str, Floats], Floats]) -> tuple[_Simulated, Sight]:
-        observed, values, readings = one
-        summaries = with_errors(observed, readings, seed=options.seed)
+    def seen(one: tuple[Observed, Mapping[str, Floats], Floats, Correction]) -> tuple[_Simulated, Sight]:
+        observed, values, readings, correction = one
+        summaries = with_errors(observed, readings, correction, seed=options.seed)
         looked = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
         used = informative(values, summaries, looked, name=observed.name)
         own = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
         return own, own.sight(options)
 
-    both, unlike = usable(simulations, seen, name=lambda one: one[0].name)
-    left_out = (*left_out, *unlike)
-    made, sights = [own for own, _ in both], [own for _, own in both]
+    both, unshown = usable(simulations, seen, name=lambda one: one[0].name)
+    left_out = (*left_out, *unshown)
     check_in_all(
-        sum(one.observed.duration for one in made),
-        where=", ".join(one.observed.name for one in made),
+        sum(one.observed.duration for one, _ in both),
+        where=", ".join(one.observed.name for one, _ in both),
         left_out=left_out,
     )
+    found = _answered(both, options, left_out=left_out)
+    return _without_unlike(found, both, options, left_out=left_out)
+
+
+def _without_unlike(
+    found: Calibration, both: Sequence[tuple[_Simulated, Sight]], options: Options, *, left_out: Sequence[Finding]
+) -> Calibration:
+    """The answer of those recordings that simulated flags look like, if there are such; otherwise the answer as it is,
+    which then is withheld with the reason."""
+    unlike = [one for one in found.recordings if one.unlike is not None]
+    like = [own for own, one in zip(both, found.recordings, strict=True) if one.unlike is None]
+    if not unlike or sum(own.observed.duration for own, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
+        return found
+    warned = [Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(one), fix=_LOOK) for one in unlike]
+    again = _answered(like, options, left_out=(*left_out, *warned))
+    return found if again.withheld is not None else again
+
+
+def _answered(
+    both: Sequence[tuple[_Simulated, Sight]], options: Options, *, left_out: Sequence[Finding]
+) -> Calibration:
+    """The answer from recordings whose simulations show what they show."""
+    made, sights = [own for own, _ in both], [own for _, own in both]
     found = posterior(sights, [one.observed.summary for one in made], seed=options.seed)
     fitted = tuple(
         _fitted(one, sight, found, place, options) for place, (one, sight) in enumerate(zip(made, sights, strict=True))
@@ -413,13 +447,10 @@ def answered(
     return replace(calibration, findings=findings)
 
 
-def with_errors(observed: Observed, readings: Floats, *, seed: int) -> Floats:
+def with_errors(observed: Observed, readings: Floats, correction: Correction, *, seed: int) -> Floats:
     """(simulation, summary) of readings (simulation, window, observable) with errors of numerics and of pixels."""
-    summaries = observed.projection.of(readings)
-    size = summaries.shape[1]
-    drawn = stream(seed, "calibrate", "numerics").standard_normal(summaries.shape)
-    coarse = numerics.SIGMA[:size] * drawn + numerics.BIAS[:size]
-    return (summaries + coarse + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
+    summaries = correction.of(observed.projection.of(readings), seed=seed)
+    return (summaries + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
 
 
 def quantity(about: Uncertain, draws: Floats, level: float) -> Quantity:
@@ -513,16 +544,8 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     for one in calibration.recordings:
         found.extend(one.observed.findings)
         if one.unlike is not None:
-            what = (
-                f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth "
-                "may not be separated from what is behind it, or its size, attachment or place be another than stated, "
-                "or something may act on it that the model lacks. The weight is withheld"
-            )
-            fix = (
-                "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, "
-                "--elevation and --distance; flagdata close-loop looks for what is missing"
-            )
-            found.append(Finding(kind="unlike-simulations", severity=Severity.WARNING, what=what, fix=fix))
+            what = f"{_unlike(one)}. The weight is withheld"
+            found.append(Finding(kind="unlike-simulations", severity=Severity.WARNING, what=what, fix=_LOOK))
         if one.failed > 0.1 * calibration.options.simulations:
             what = f"{one.failed} of {calibration.options.simulations} simulations of {one.observed.name} were left out"
             found.append(Finding(kind="failed-simulations", severity=Severity.WARNING, what=what))
@@ -542,6 +565,15 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
         what = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
         found.append(Finding(kind="not-determined", severity=Severity.NOTE, what=what))
     return tuple(found)
+
+
+def _unlike(one: Fitted) -> str:
+    """What is unlike about a recording, and what may be the cause."""
+    return (
+        f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth may not be "
+        "separated from what is behind it, or its size, attachment or place be another than stated, or something may "
+        "act on it that the model lacks"
+    )
 
 
 def _leaning(calibration: Calibration) -> list[Finding]:

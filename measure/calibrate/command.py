@@ -70,6 +70,11 @@ if TYPE_CHECKING:
     help="From the camera to the flag [m].",
 )
 @click.option(
+    "--material",
+    metavar="NAME",
+    help="What the flag is made of, as in woven-polyester, knit or camel-ponte-roma; by default any fabric.",
+)
+@click.option(
     "--crop", metavar="X,Y,W,H", help="Region of films in which the flag is [px]; by default the whole picture."
 )
 @click.option(
@@ -137,6 +142,7 @@ def calibrate(
     azimuth: Stated | None,
     elevation: Stated | None,
     distance: float,
+    material: str | None,
     crop: str | None,
     flag: int | None,
     log: str | None,
@@ -186,8 +192,10 @@ def calibrate(
     from measure.calibrate.artifact import artifact, keep
     from measure.calibrate.calibrate import Options
     from measure.calibrate.calibrate import calibrate as calibrated
+    from measure.calibrate.fabric import fabric
     from measure.calibrate.filmed import Sources
     from measure.calibrate.known import known
+    from measure.calibrate.numerics import FLAGS, effort
     from measure.calibrate.page import page
     from measure.calibrate.prior import AZIMUTH, ELEVATION
     from measure.calibrate.simulation import Flag
@@ -202,6 +210,7 @@ def calibrate(
         lake.check_writable()
     size = parse_size(flag_size)
     reading = Reading(crop=box_of(crop), flag=flag, aspect=size.aspect)
+    made_of = None if material is None else fabric(material, where="--material")
     weighable = None
     if only != "anemometer":
         weighable = Sources.open(
@@ -235,12 +244,14 @@ def calibrate(
         simulations=simulations,
         level=level,
         seed=seed,
+        material=made_of,
     )
     with progress(None, label="observe", unit="window") as advance:
         gathered = weighable.read(size, advance=advance)
     observed, parents = gathered.recordings, gathered.parents
-    say(announced(simulations * sum(one.duration for one in observed), workers=workers))
-    with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
+    work = sum(simulations * one.duration + effort(one.duration) for one in observed)
+    say(announced(work, workers=workers))
+    with progress((simulations + FLAGS) * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
             observed,
             options,
@@ -276,6 +287,7 @@ _OF_WEIGHT = (
     "azimuth",
     "elevation",
     "distance",
+    "material",
     "log",
     "offset",
     "simulations",

@@ -13,6 +13,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flagdata.arrays import read_arrays
 from flagdata.errors import CorruptError
@@ -26,6 +27,7 @@ from measure.calibrate.prior import (
     ELEVATION,
     FABRIC,
     NUISANCES,
+    STRETCHING,
     Floats,
     Uncertain,
     clock_error,
@@ -54,6 +56,7 @@ class Design:
         recording: what recordings of one cloth differ by: their simulations are of the same cloths, each recording's in
             turbulence of its own.
         place: the same of places and anemometers, which recordings may share.
+        fabric: which measured tables the cloths have.
     """
 
     flag: Flag
@@ -66,13 +69,18 @@ class Design:
     distance: float = FAR
     recording: str = ""
     place: str = ""
+    fabric: Uncertain = FABRIC
+
+    @property
+    def cloth(self) -> tuple[Uncertain, ...]:
+        """What differs among the cloths."""
+        return (*CLOTH, STRETCHING, self.fabric)
 
     def quantities(self) -> tuple[Uncertain, ...]:
         """What differs among the simulations."""
         known = self.log.distance is not None
         return (
-            *CLOTH,
-            *FABRIC,
+            *self.cloth,
             *NUISANCES,
             self.azimuth,
             self.elevation,
@@ -87,7 +95,7 @@ class Design:
         order = stream(own, "calibrate", "order").permutation(self.count)
         there = draws(self.quantities(), self.count, seed=own, name="design")
         drawn = {name: values[order] for name, values in there.items()}
-        drawn |= draws((*CLOTH, *FABRIC), self.count, seed=self.seed, name="cloths")
+        drawn |= draws(self.cloth, self.count, seed=self.seed, name="cloths")
         if self.log.distance is not None:
             drawn[DISTANCE.name] = np.full(self.count, self.log.distance)
         order = np.argsort(drawn["damping"], kind="stable")
@@ -95,23 +103,30 @@ class Design:
 
     def batches(self) -> list[Batch]:
         """In the order of `values`."""
-        values = self.values()
-        places = np.stack([values["azimuth"], values["elevation"], np.full(self.count, self.distance)], axis=1)
-        shared = {name: own for name, own in values.items() if name not in ("azimuth", "elevation")}
         return [
-            Batch(
-                flag=self.flag,
-                log=self.log,
-                duration=self.duration,
-                values={name: own[first : first + BATCH] for name, own in shared.items()},
-                places=places[first : first + BATCH, None],
-                seeds=tuple(
-                    child_seed(self.seed, "calibrate", "flag", self.recording, place)
-                    for place in range(first, min(first + BATCH, self.count))
-                ),
-            )
+            self.batch(np.arange(first, min(first + BATCH, self.count), dtype=np.int64))
             for first in range(0, self.count, BATCH)
         ]
+
+    def batch(self, which: NDArray[np.int64]) -> Batch:
+        """Some of the simulations, by their places in `values`."""
+        values = {name: own[which] for name, own in self.values().items()}
+        view = [values.pop("azimuth"), values.pop("elevation"), np.full(len(which), self.distance)]
+        return Batch(
+            flag=self.flag,
+            log=self.log,
+            duration=self.duration,
+            values=values,
+            places=np.stack(view, axis=1)[:, None],
+            seeds=tuple(child_seed(self.seed, "calibrate", "flag", self.recording, int(place)) for place in which),
+        )
+
+    def damped(self) -> NDArray[np.int64]:
+        """Places of the simulations in the longest steps that the design has."""
+        own = self.batches()
+        steps = [batch.step or 0.0 for batch in own]
+        sizes = [len(batch.seeds) for batch in own]
+        return np.flatnonzero(np.repeat(np.array(steps) == max(steps), sizes))
 
 
 def simulated(

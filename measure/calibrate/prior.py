@@ -49,6 +49,28 @@ class Normal:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Among:
+    """Some of so many equal parts of [0, 1), each as probable.
+
+    Attributes:
+        places: of the parts.
+        count: of all parts.
+    """
+
+    places: tuple[int, ...]
+    count: int
+
+    def at(self, share: Floats) -> Floats:
+        """Values of shares in [0, 1)."""
+        whole = np.minimum(share, np.nextafter(1.0, 0.0)) * len(self.places)
+        part = whole.astype(np.int64)
+        return (np.array(self.places)[part] + whole - part) / self.count
+
+    def as_dict(self) -> dict[str, int | list[int]]:
+        return {"places": list(self.places), "count": self.count}
+
+
+@dataclass(frozen=True, kw_only=True)
 class Uncertain:
     """One quantity.
 
@@ -63,7 +85,7 @@ class Uncertain:
 
     name: str
     unit: str
-    prior: Range | Normal
+    prior: Range | Normal | Among
     source: str
     limits: tuple[float, float] = (-math.inf, math.inf)
 
@@ -72,16 +94,17 @@ class Uncertain:
         """The prior of an angle in words."""
         if isinstance(self.prior, Normal):
             return f"{math.degrees(self.prior.mean):.3g} ± {math.degrees(self.prior.sigma):.2g}°"
-        return f"{math.degrees(self.prior.low):.3g} to {math.degrees(self.prior.high):.3g}°"
+        low, high = self.ends or (-math.inf, math.inf)
+        return f"{math.degrees(low):.3g} to {math.degrees(high):.3g}°"
 
     @property
     def ends(self) -> tuple[float, float] | None:
-        """Of the prior; None of a normal one."""
-        return None if isinstance(self.prior, Normal) else (self.prior.low, self.prior.high)
+        """Of the prior; None of one that is no range."""
+        return (self.prior.low, self.prior.high) if isinstance(self.prior, Range) else None
 
     def at(self, share: Floats) -> Floats:
         """Values of shares in [0, 1)."""
-        if isinstance(self.prior, Normal):
+        if not isinstance(self.prior, Range):
             return self.prior.at(share)
         low, high = self.prior.low, self.prior.high
         if self.prior.scale is Scale.LOG:
@@ -120,19 +143,17 @@ CLOTH = (
     ),
 )
 """What is sought."""
-FABRIC = (
-    Uncertain(
-        name="stretching",
-        unit="1",
-        prior=_log(0.5, 2.0),
-        source="factor on the table of the fabric that a simulation draws, as nulls of verdicts vary it",
-    ),
-    Uncertain(
-        name="fabric",
-        unit="1",
-        prior=Range(low=0.0, high=1.0),
-        source="place in the list of the fabrics that Wang et al. 2011 measured, none of which is a flag's",
-    ),
+STRETCHING = Uncertain(
+    name="stretching",
+    unit="1",
+    prior=_log(0.5, 2.0),
+    source="factor on the table of the fabric that a simulation draws, as nulls of verdicts vary it",
+)
+FABRIC = Uncertain(
+    name="fabric",
+    unit="1",
+    prior=Range(low=0.0, high=1.0),
+    source="place in the list of the fabrics that Wang et al. 2011 measured, none of which is a flag's",
 )
 """What a cloth is beside, the same in all recordings of it: left to the scatter."""
 NUISANCES = (

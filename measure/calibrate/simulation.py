@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from flagdata.rng import child_seed, stream
 from measure.calibrate.discretisation import Discretisation
+from measure.calibrate.fabric import TABLES
 from measure.calibrate.prior import Floats
 from measure.calibrate.wind import RATE as WIND_RATE
 from measure.calibrate.wind import Log, blown
@@ -37,20 +38,6 @@ from sim.scene import Scene, assemble
 from sim.state import State
 from sim.system import System
 
-FABRICS = (
-    "11oz-black-denim",
-    "camel-ponte-roma",
-    "gray-interlock",
-    "ivory-rib-knit",
-    "navy-sparkle-sweat",
-    "pink-ribbon-brown",
-    "royal-target",
-    "tango-red-jet-set",
-    "white-dots-on-blk",
-    "white-swim-solid",
-)
-"""Whose tables are multiplied: the measured ones of Wang et al. 2011. Each simulation draws one, since a flag's fabric
-is not stated."""
 COLUMNS = 12
 RATE = 12.5
 """Frames of a simulation [Hz]: a flag of a metre flutters at 1 to 3 Hz, and drawing silhouettes costs as much as they
@@ -234,7 +221,7 @@ class Batch:
             own["bending"],
             max(own["damping"] - damped, 0.0),
             stretching=own["stretching"],
-            fabric=FABRICS[int(own["fabric"] * len(FABRICS))],
+            fabric=TABLES[int(own["fabric"] * len(TABLES))],
         )
 
     def _wind(self, system: System) -> SegmentWind:

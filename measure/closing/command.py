@@ -67,7 +67,11 @@ _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "
 @click.option(
     "--accept", metavar="HASH", help="Confirms how a log without a recipe is read, by the hash of its refusal."
 )
-@click.option("--material", help="Nominal material, a name of the catalog; by default the one that the source states.")
+@click.option(
+    "--material",
+    help="Nominal material, a name of the catalog; by default the one that the source states. Of films: what the flag "
+    "is made of, as in woven-polyester, knit or camel-ponte-roma; by default any fabric.",
+)
 @click.option(
     "--density-uncertainty",
     type=click.FloatRange(0, 1, min_open=True),
@@ -258,6 +262,7 @@ def close_loop(
             lake=lake,
             branch=branch,
             name=names["films"],
+            material=material,
             level=level,
             nulls=nulls,
             seed=seed,

@@ -13,8 +13,10 @@ from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from flagdata.stated import Stated
 from measure.calibrate.calibrate import Options as Calibrating
+from measure.calibrate.fabric import fabric
 from measure.calibrate.filmed import Sources
 from measure.calibrate.known import known
+from measure.calibrate.numerics import effort
 from measure.calibrate.prior import AZIMUTH, ELEVATION
 from measure.calibrate.simulation import Flag
 from measure.calibrate.workload import announced
@@ -31,6 +33,9 @@ from measure.films.models import models
 from measure.films.run import Options, solve, verdict_of
 from measure.verdict.criteria import CRITERIA
 
+_FEW, _MANY = 64, 128
+"""Simulations of the base model for each recording, of one or two and of more."""
+_TWO = 2
 _RELATIVE = 0.01
 """Standard uncertainty of a weight that is stated without one, as a share."""
 
@@ -42,6 +47,7 @@ def close_films(
     lake: Lake | None,
     branch: str,
     name: str | None,
+    material: str | None,
     level: float | None,
     nulls: int | None,
     seed: int,
@@ -50,6 +56,7 @@ def close_films(
     """Judge recordings of one flag.
 
     Args:
+        material: what the flag is made of; None for any fabric.
         nulls: kinds of numerics.
 
     Raises:
@@ -70,8 +77,9 @@ def close_films(
             azimuth=AZIMUTH if given.azimuth is None else known(AZIMUTH, given.azimuth, where="--azimuth"),
             elevation=ELEVATION if given.elevation is None else known(ELEVATION, given.elevation, where="--elevation"),
             distance=given.distance,
-            simulations=given.simulations,
+            simulations=given.simulations or simulations_of(len(sources)),
             seed=seed,
+            material=None if material is None else fabric(material, where="--material"),
         ),
         area_weight=None if given.area_weight is None else weight(given.area_weight),
         level=CRITERIA.level if level is None else level,
@@ -116,15 +124,21 @@ def close_films(
     )
 
 
+def simulations_of(recordings: int) -> int:
+    """Of the base model for each of so many recordings: as many as the covariance of all their summaries asks for."""
+    return _FEW if recordings <= _TWO else _MANY
+
+
 def workload(durations: Sequence[float], options: Options) -> float:
-    """Seconds of all flags that are simulated: of the base model, with each effect, and of the null experiments.
+    """Seconds of all flags that are simulated: of the base model, finer, with each effect, and of null experiments.
 
     Args:
         durations: of the recordings [s].
     """
     each = options.calibration.simulations + TOGETHER * options.kinds
     paired = PAIRS * len(weighable(options.calibration.flag)) * len(durations)
-    return each * sum(durations) + paired * lasting(len(durations))
+    finer = sum(effort(duration) for duration in durations)
+    return each * sum(durations) + finer + paired * lasting(len(durations))
 
 
 def weight(stated: Stated) -> tuple[float, float]:

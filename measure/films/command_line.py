@@ -44,7 +44,6 @@ OF_MARKERS = (
     "sensor",
     "zone",
     "accept",
-    "material",
     "density_uncertainty",
     "size",
     "pins",
@@ -71,7 +70,7 @@ class Given:
     flag: int | None
     first: float
     last: float | None
-    simulations: int
+    simulations: int | None
     cache: Path | None
     log: str | None
     clock_offset: Stated | None
@@ -143,8 +142,7 @@ def film_options(command: _Command) -> _Command:
         click.option(
             "--simulations",
             type=click.IntRange(min=64),
-            default=128,
-            show_default=True,
+            show_default="64, from three recordings on 128",
             help="Of films: simulated flags of the base model for each recording.",
         ),
         click.option(

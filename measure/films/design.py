@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flagdata.rng import child_seed, stream
 from measure.calibrate.design import Design
 from measure.calibrate.discretisation import LITTLE, Discretisation
-from measure.calibrate.prior import CLOTH, FABRIC, Floats, draws
+from measure.calibrate.prior import CLOTH, Floats, draws
 from measure.calibrate.simulation import Batch
 from measure.films.library import Weighable
 from measure.observables.observable import WINDOW
@@ -63,29 +63,18 @@ def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
     Args:
         until: part of the film that is simulated [s].
     """
-    own = design.batches()
-    size = len(own[0].seeds)
-    steps = [batch.step or 0.0 for batch in own]
-    candidates = np.concatenate(
-        [place * size + np.arange(len(batch.seeds)) for place, batch in enumerate(own) if steps[place] == max(steps)]
-    )
+    candidates = design.damped()
     rng = stream(design.seed, "films", "pairs", effect.name)
     count = min(PAIRS, len(candidates))
     places = np.sort(rng.choice(candidates, count, replace=False))
     shares = (rng.permutation(count) + rng.random(count)) / count
     strengths = effect.prior.at(shares)
-    first, values = own[0], design.values()
-    seen = np.stack([values["azimuth"], values["elevation"], np.full(design.count, design.distance)], axis=1)
-    seeds = [seed for batch in own for seed in batch.seeds]
     batches = []
     for begin in range(0, count, TOGETHER):
         part = places[begin : begin + TOGETHER]
         batches.append(
             replace(
-                first,
-                values={name: values[name][part] for name in first.values},
-                places=seen[part][:, None],
-                seeds=tuple(seeds[place] for place in part),
+                design.batch(part),
                 until=min(until, design.duration),
                 effects=((effect.column, strengths[begin : begin + TOGETHER]),),
             )
@@ -101,7 +90,7 @@ def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed:
         places: for each recording the first one of its place.
     """
     count = kinds * TOGETHER
-    cloths = draws((*CLOTH, *FABRIC), count, seed=seed, name="null cloths")
+    cloths = draws(designs[0].cloth, count, seed=seed, name="null cloths")
     found = []
     for number, design in zip(places, designs, strict=True):
         own = {

@@ -12,7 +12,7 @@ from measure.verdict.record import Candidate, Verdict
 from sim.material import named
 
 FABRIC = "camel-ponte-roma"
-"""Whose tables are multiplied: of which cloth a filmed flag is, is not known."""
+"""Whose tables are multiplied where it is not stated of which fabric a flag is."""
 _STEP = 4e-3
 _FRAMES, _RATE = 100, 25.0
 _ROUGH = 1e-3
@@ -34,6 +34,7 @@ def models(verdict: Verdict, outcome: Outcome, *, name: str) -> tuple[NamedModel
 def _content(verdict: Verdict, outcome: Outcome, title: str, effects: Sequence[Candidate]) -> Mapping[str, Any]:
     calibration, own = outcome.options.calibration, fitted(verdict, effects)
     speeds = [float(one.speed.mean()) for one in outcome.recordings]
+    fabric = FABRIC if calibration.material is None else calibration.material.tables[0]
     speed: Any = speeds[0] if min(speeds) == max(speeds) else {"low": min(speeds), "high": max(speeds)}
     return {
         "title": title,
@@ -51,9 +52,9 @@ def _content(verdict: Verdict, outcome: Outcome, title: str, effects: Sequence[C
         "integrator": {"name": "implicit", "step": _STEP},
         "time": {"settle": SETTLE, "frames": _FRAMES, "rate": _RATE},
         "material": {
-            "name": FABRIC,
+            "name": fabric,
             "density": own["area_weight"],
-            "bending-factor": own["bending"] / mean_bending(named(FABRIC)),
+            "bending-factor": own["bending"] / mean_bending(named(fabric)),
             "damping": max(own["damping"] - _STEP, 0.0),
         },
         **acted(effects),

@@ -25,13 +25,14 @@ from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.observed import Observed, constant_wind
 from measure.calibrate.prior import CLOTH, Floats
 from measure.calibrate.scatter import TAKEN_APART
+from measure.ends import Bound, span
 from measure.films.departures import Departure, departures, root_mean_square
 from measure.films.evidence import Fit, Sight, quantiles
 from measure.films.judge import Judged, judge
 from measure.films.library import Suspicion, Weighable, weighable
 from measure.films.score_test import score
 from measure.films.sensitivity import SEEN, sensitivity
-from measure.films.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, sight
+from measure.films.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, shown_by
 from measure.films.statement import stated
 from measure.films.unseen import compared
 from measure.films.weigh import Weighing, directions, expected, fitted, hypothesis, misfits, weigh
@@ -39,6 +40,9 @@ from measure.forecasting.setting import Stage
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.record import Candidate, Estimate, NullTest, Parameter, Power, Verdict
+
+_EVEN = 1000
+"""Draws of a posterior that are taken evenly from importance samples."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +110,7 @@ class Outcome:
         departures: of the observables from the base model, the farthest first.
         sensitivity: (effect,) standard errors by which each moves the recordings where it is strong.
         together: whether what is unknown of the cloth was taken as the same in all recordings.
+        left_out: a warning for each recording whose simulations do not show what it shows.
     """
 
     options: Options
@@ -119,12 +124,14 @@ class Outcome:
     departures: tuple[Departure, ...]
     sensitivity: Floats
     together: bool
+    left_out: tuple[Finding, ...] = ()
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """On the recordings."""
         own = (finding for one in self.recordings for finding in one.findings)
-        return (*constant_wind(self.recordings), *own, *([] if self.together else [TAKEN_APART]))
+        apart = [] if self.together else [TAKEN_APART]
+        return (*self.left_out, *constant_wind(self.recordings), *own, *apart)
 
 
 def close_loop(
@@ -167,12 +174,7 @@ def solve(
     simulations = gathered(
         recordings, options.calibration, effects, kinds=options.kinds, folder=folder, workers=workers, stage=stage
     )
-    sights = tuple(
-        sight(one, design, base, own)
-        for one, design, base, own in zip(
-            recordings, simulations.designs, simulations.base, simulations.pairs, strict=True
-        )
-    )
+    recordings, simulations, sights, left_out = shown_by(recordings, simulations)
     effects = tuple(one for one in effects if all(one.name in own.model.responses for own in sights))
     null, kinds = of_nulls(sights, recordings, simulations, options.area_weight, seed=seed)
     model = of_base(sights, recordings, simulations, options.area_weight, seed=seed)
@@ -190,7 +192,8 @@ def solve(
         best = first, fitted(sights, seen, first, seed=seed)
     return Outcome(
         options=options,
-        recordings=tuple(recordings),
+        recordings=recordings,
+        left_out=left_out,
         simulations=simulations,
         sights=sights,
         weighing=own,
@@ -320,11 +323,14 @@ def _marginal(values: Floats, weights: Floats, unit: str) -> tuple[Estimate, flo
     return Estimate(value=middle, low=low, high=high, unit=unit, level=CRITERIA.interval), sigma
 
 
-def strength_of(outcome: Outcome, effect: Weighable, fit: Fit) -> Estimate:
-    """A strength, its interval widened by what meshes and cloths do to effects, as on trajectories."""
-    strengths = effect.prior.at(ndtr(fit.scores[0][:, -1]))  # the last coordinate
+def strength_of(effect: Weighable, fit: Fit) -> Estimate:
+    """A strength, its interval widened by what meshes and cloths do to effects, as on trajectories; a bound where the
+    posterior leans on an end of what is assumed of it (`measure.ends`)."""
+    shares = ndtr(fit.scores[0][:, -1])  # the last coordinate
+    strengths, whole = effect.prior.at(shares), float(np.exp(CRITERIA.reach * CRITERIA.strength_factor))
     found, _ = _marginal(strengths, fit.weights[0], effect.column.unit)
-    whole = np.exp(CRITERIA.reach * CRITERIA.strength_factor)
+    if (bound := _bound(effect, strengths, shares, fit.weights[0], whole=whole)) is not None:
+        return bound
     value, size, null = found.value, abs(found.value), effect.column.described.null
     inward, outward = size * (1 - 1 / whole), size * (whole - 1)
     below, above = (inward, outward) if value > 0 else (outward, inward)
@@ -334,6 +340,41 @@ def strength_of(outcome: Outcome, effect: Weighable, fit: Fit) -> Estimate:
         high=null + value + float(np.hypot(above, found.high - value)),
         unit=found.unit,
         level=found.level,
+    )
+
+
+def _bound(effect: Weighable, strengths: Floats, shares: Floats, weights: Floats, *, whole: float) -> Estimate | None:
+    """A strength that is known on one side only; None of one with two ends.
+
+    Args:
+        strengths, shares: (n,) of it beyond null, and their places in its prior, of importance samples.
+        weights: (n,) of them, of sum 1.
+        whole: factor by which a strength may be off.
+    """
+    even = (np.arange(_EVEN) + 0.5) / _EVEN
+    drawn = np.minimum(np.searchsorted(np.cumsum(weights), even), len(weights) - 1)
+    found = span(
+        strengths[drawn],
+        shares[drawn],
+        level=CRITERIA.interval,
+        limits=(0.0, np.inf) if effect.low > 0 else (-np.inf, np.inf),
+        assumed=(effect.low, effect.high),
+    )
+    if found.bound is None:
+        return None
+    least = found.bound is Bound.LEAST
+    end = found.high if found.bound is Bound.MOST else found.low if least else float(np.median(strengths[drawn]))
+    # A bound gives way by the factor: upwards where it is one from above, and towards zero where it holds a size.
+    wider = end / whole if (end > 0) == least else end * whole
+    null = effect.column.described.null
+    ends = {Bound.LEAST: (wider, found.high), Bound.MOST: (found.low, wider)}.get(found.bound, (found.low, found.high))
+    return Estimate(
+        value=null + (end if found.bound is Bound.NOTHING else wider),
+        low=null + ends[0],
+        high=null + ends[1],
+        unit=effect.column.unit,
+        level=found.level,
+        bound=found.bound.value,
     )
 
 
@@ -348,7 +389,7 @@ def _ranking(outcome: Outcome) -> tuple[Candidate, ...]:
             Candidate(
                 effect=effect.column.effect,
                 parameter=effect.column.parameter,
-                strength=strength_of(outcome, effect, fit),
+                strength=strength_of(effect, fit),
                 z=float(judged.scored.z[place]),
                 p_value=float(judged.scored.alone[place]),
                 p_family=float(judged.scored.family[place]),

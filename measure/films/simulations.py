@@ -9,12 +9,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
 from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.calibrate import designs_of, with_errors
 from measure.calibrate.design import Design, read
 from measure.calibrate.emulator import Emulator, informative
-from measure.calibrate.observed import Observed
+from measure.calibrate.leaving_out import usable
+from measure.calibrate.numerics import Correction, Finer
+from measure.calibrate.observed import Observed, check_in_all
 from measure.calibrate.prior import Floats
 from measure.calibrate.sights import first_of
 from measure.calibrate.simulation import OBSERVED
@@ -37,6 +40,7 @@ class Simulations:
         nulls: for each recording (null, window, observable).
         kinds: (null,) of numerics.
         weights: (null,) their area weights [kg/m²].
+        corrections: for each recording how far the base model's lie from those of a finer mesh.
     """
 
     designs: tuple[Design, ...]
@@ -45,6 +49,18 @@ class Simulations:
     nulls: tuple[Floats, ...]
     kinds: NDArray[np.int64]
     weights: Floats
+    corrections: tuple[Correction, ...]
+
+    def of(self, places: Sequence[int]) -> Simulations:
+        """Those of some recordings."""
+        return replace(
+            self,
+            designs=tuple(self.designs[place] for place in places),
+            base=tuple(self.base[place] for place in places),
+            pairs=tuple(self.pairs[place] for place in places),
+            nulls=tuple(self.nulls[place] for place in places),
+            corrections=tuple(self.corrections[place] for place in places),
+        )
 
 
 def gathered(
@@ -86,6 +102,8 @@ def gathered(
     base = [
         all_of(f"base model, {one.name}", design.batches()) for one, design in zip(recordings, designs, strict=True)
     ]
+    finer = [Finer.of(design) for design in designs]
+    fine = [all_of(f"finer meshes, {one.name}", list(own.batches)) for one, own in zip(recordings, finer, strict=True)]
     beside = []
     for one, own in zip(recordings, made, strict=True):
         found = all_of(f"effects, {one.name}", [batch for each in own for batch in each.batches])
@@ -99,6 +117,53 @@ def gathered(
         nulls=tuple(read_nulls),
         kinds=np.repeat(np.arange(kinds), TOGETHER),
         weights=np.concatenate([batch.values["area_weight"] for batch in null[0]]),
+        corrections=tuple(one.correction(own, coarse) for one, own, coarse in zip(finer, fine, base, strict=True)),
+    )
+
+
+def shown_by(
+    recordings: Sequence[Observed], simulations: Simulations
+) -> tuple[tuple[Observed, ...], Simulations, tuple[Sight, ...], tuple[Finding, ...]]:
+    """The recordings whose simulations show what they show, their simulations and models, and a warning for each other
+    recording.
+
+    Raises:
+        InputError: too little is left.
+        RefusedError: simulations show nothing of any recording, see `Emulator.fit`.
+    """
+
+    def seen(place: int) -> tuple[int, Sight]:
+        (own,) = sights_of([recordings[place]], simulations.of([place]))
+        return place, own
+
+    both, left_out = usable(range(len(recordings)), seen, name=lambda place: recordings[place].name)
+    places = [place for place, _ in both]
+    kept = tuple(recordings[place] for place in places)
+    where = ", ".join(one.name for one in kept)
+    check_in_all(sum(one.duration for one in kept), where=where, left_out=left_out)
+    return kept, simulations.of(places), tuple(own for _, own in both), left_out
+
+
+def sights_of(
+    recordings: Sequence[Observed], simulations: Simulations, *, windows: Sequence[slice] | None = None
+) -> tuple[Sight, ...]:
+    """Each recording's model; as `sight`.
+
+    Args:
+        windows: of each recording a part; None for all of them.
+    """
+    parts = [None] * len(recordings) if windows is None else windows
+    return tuple(
+        sight(*one, windows=part)
+        for *one, part in zip(
+            recordings,
+            simulations.designs,
+            simulations.base,
+            simulations.pairs,
+            simulations.corrections,
+            parts,
+            strict=True,
+        )
     )
 
 
@@ -107,6 +172,7 @@ def sight(
     design: Design,
     base: Floats,
     own: Sequence[tuple[Pairs, Floats]],
+    correction: Correction,
     *,
     windows: slice | None = None,
 ) -> Sight:
@@ -115,13 +181,14 @@ def sight(
     Args:
         base: (simulation, window, observable) of the base model.
         own: of each effect the pairs that were simulated, and their readings.
+        correction: of the base model's.
         windows: a part of it, of which means alone are modelled; None for all of it.
 
     Raises:
         RefusedError: as `Emulator.fit`.
     """
     seen = observed if windows is None else part_of(observed, windows)
-    summaries = with_errors(seen, base if windows is None else base[:, windows], seed=design.seed)
+    summaries = with_errors(seen, base if windows is None else base[:, windows], correction, seed=design.seed)
     changes = seen.projection.changes
     values = design.values()
     looked = np.tile(shown(seen.readings), 1 + changes)
@@ -197,10 +264,16 @@ def of_nulls(
     *,
     seed: int,
 ) -> tuple[Experiments, NDArray[np.int64]]:
-    """Null experiments with errors of pixels and of the scale, those that show all, and their kinds of numerics."""
+    """Null experiments with errors of pixels and of the scale, those that show all, and their kinds of numerics. Their
+    meshes are about as coarse as the fit's, and are as far from a finer one."""
     found = []
-    for one, own, seen in zip(sights, recordings, simulations.nulls, strict=True):
-        summaries = own.projection.of(seen) + own.pixels(len(seen), seed=child_seed(seed, "films", "nulls"))
+    for one, own, seen, correction in zip(sights, recordings, simulations.nulls, simulations.corrections, strict=True):
+        summaries = own.projection.of(seen)
+        summaries = (
+            summaries
+            + correction.mean[: summaries.shape[1]]
+            + own.pixels(len(seen), seed=child_seed(seed, "films", "nulls"))
+        )
         found.append(summaries.reshape(len(seen), -1)[:, one.model.used])
     whole = np.all([np.isfinite(own).all(axis=1) for own in found], axis=0)
     made = Experiments(summaries=tuple(own[whole] for own in found))
@@ -218,8 +291,10 @@ def of_base(
     """The base model's simulations with errors of numerics, of pixels and of the scale, those that show all. A cloth is
     the same in all recordings."""
     found = [
-        with_errors(own, base, seed=design.seed)[:, one.model.used]
-        for one, own, base, design in zip(sights, recordings, simulations.base, simulations.designs, strict=True)
+        with_errors(own, base, correction, seed=design.seed)[:, one.model.used]
+        for one, own, base, design, correction in zip(
+            sights, recordings, simulations.base, simulations.designs, simulations.corrections, strict=True
+        )
     ]
     whole = np.all([np.isfinite(own).all(axis=1) for own in found], axis=0)
     made = Experiments(summaries=tuple(own[whole] for own in found))

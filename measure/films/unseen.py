@@ -21,7 +21,7 @@ from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.summary import LEAST_WINDOWS
 from measure.films.evidence import Sight
 from measure.films.library import Weighable
-from measure.films.simulations import Simulations, of_recordings, part_of, sight
+from measure.films.simulations import Simulations, of_recordings, part_of, sights_of
 from measure.films.weigh import fitted, hypothesis
 from measure.observables import OBSERVABLES
 from measure.verdict.criteria import CRITERIA
@@ -105,14 +105,13 @@ def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[tu
     short, or that are rows of a table against wind, whose windows are the same."""
     if min(len(one.readings) for one in recordings) < 2 * LEAST_WINDOWS or any(one.place for one in recordings):
         return ()
-    sides: list[list[tuple[Sight, Observed]]] = [[], []]
-    for one, design, base, own in zip(
-        recordings, simulations.designs, simulations.base, simulations.pairs, strict=True
-    ):
-        middle = len(one.readings) // 2
-        for side, windows in zip(sides, (slice(0, middle), slice(middle, None)), strict=True):
-            side.append((sight(one, design, base, own, windows=windows), part_of(one, windows)))
-    return tuple(tuple(side) for side in sides)
+    middles = [len(one.readings) // 2 for one in recordings]
+    sides = []
+    for halves in ([slice(0, middle) for middle in middles], [slice(middle, None) for middle in middles]):
+        models = sights_of(recordings, simulations, windows=halves)
+        parts = [part_of(one, windows) for one, windows in zip(recordings, halves, strict=True)]
+        sides.append(tuple(zip(models, parts, strict=True)))
+    return tuple(sides)
 
 
 def _left_out(recordings: Sequence[Observed], sights: Sequence[Sight]) -> list[_Task]:

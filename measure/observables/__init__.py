@@ -40,6 +40,7 @@ OBSERVABLES = Registry(
         "wave-length": "measure.observables.wave_length:WAVE_LENGTH",
         "area": "measure.observables.area:AREA",
         "asymmetry": "measure.observables.asymmetry:ASYMMETRY",
+        "hoist-bulge": "measure.observables.hoist_bulge:HOIST_BULGE",
     },
 )
 """Name → `Observable`."""

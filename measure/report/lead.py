@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from measure.loop.selection import heterogeneous
 from measure.report.sentences import (
@@ -10,6 +11,7 @@ from measure.report.sentences import (
     contradicted,
     erring_text,
     heading,
+    joined,
     listed,
     named_candidates,
     readable,
@@ -87,13 +89,13 @@ def _found(verdict: Verdict) -> str:
     """What was found, without the evidence."""
     if verdict.conclusion is Conclusion.OUTSIDE or not verdict.named:
         return "The base model lacks something that no effect of the library explains"
-    named = named_candidates(verdict) or [c for c in verdict.ranking if not c.why_not]
+    named = _by_effect(named_candidates(verdict) or [c for c in verdict.ranking if not c.why_not])
     whole = explained(verdict)
     explains = "removes" if erring(verdict) else "explains"
     if verdict.conclusion is Conclusion.ONE_OF:
         either = " or ".join(shortened([_sized(verdict, one) for one in named]))
         does = f"{explains} {whole}" if whole else f"{explains} what the base model lacks"
-        return f"Adding one of {either} {does}; these recordings do not decide which"
+        return f"Adding {'one of ' if len(named) > 1 else ''}{either} {does}; these recordings do not decide which"
     added = listed([_sized(verdict, one) for one in named])
     if verdict.conclusion is Conclusion.PARTLY:
         does = f"{explains} {whole}, not all that is missing" if whole else f"{explains} a part of what is missing"
@@ -101,7 +103,20 @@ def _found(verdict: Verdict) -> str:
     return f"Adding {added} {explains} {whole or 'what the base model lacks'}"
 
 
-def _sized(verdict: Verdict, candidate: Candidate) -> str:
+def _by_effect(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
+    """Those of one effect together: several strengths of it are one effect."""
+    found: dict[str, list[Candidate]] = {}
+    for one in candidates:
+        found.setdefault(one.effect, []).append(one)
+    return list(found.values())
+
+
+def _sized(verdict: Verdict, candidates: Sequence[Candidate]) -> str:
+    """An effect with its strength, or its strengths."""
+    if len(candidates) > 1:
+        each = [f"{readable(one.parameter)} {with_level(one.strength)}" for one in candidates]
+        return f"{candidates[0].effect} ({joined(each, verdict)})"
+    (candidate,) = candidates
     several = sum(c.effect == candidate.effect for c in verdict.ranking) > 1
     what = "" if several else f"{readable(candidate.parameter)} "
     return f"{candidate_title(verdict, candidate)} ({what}{with_level(candidate.strength)})"

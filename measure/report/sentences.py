@@ -32,10 +32,15 @@ def heading(verdict: Verdict) -> str:
         Conclusion.SUFFICIENT: f"No effect needed: {_suffices(verdict)}",
         Conclusion.UNDECIDED: "Not decided: the base model is not rejected, and not shown to suffice either",
         Conclusion.EFFECT: f"The base model lacked {named}",
-        Conclusion.ONE_OF: f"The base model lacked one of {either}: these recordings do not decide which",
+        Conclusion.ONE_OF: f"The base model lacked {_one_of(verdict)}{either}: these recordings do not decide which",
         Conclusion.PARTLY: f"Partly explained: {partly}",
         Conclusion.OUTSIDE: "The base model lacks something that no effect of the library explains",
     }[verdict.conclusion]
+
+
+def _one_of(verdict: Verdict) -> str:
+    """Empty where all that may be meant are strengths of one effect."""
+    return "one of " if len(titles(verdict)) > 1 else ""
 
 
 def _suffices(verdict: Verdict) -> str:
@@ -268,8 +273,8 @@ def common_level(estimates: Iterable[Estimate]) -> str:
 
 
 def titles(verdict: Verdict) -> tuple[str, ...]:
-    """What the verdict names, in its order; an effect of which several parameters were weighed with its parameter, and
-    the air's density and holes in the cloth by what they have in common."""
+    """What the verdict names, in its order: each effect once, with those of its parameters that act where several were
+    weighed, and the air's density and holes in the cloth by what they have in common."""
     found: list[str] = []
     pressure = [name for name in verdict.named if name in ("air-density", "porosity")]
     for name in verdict.named:
@@ -279,8 +284,14 @@ def titles(verdict: Verdict) -> tuple[str, ...]:
             continue
         own = [c for c in verdict.ranking if c.effect == name]
         acting = [c for c in own if not c.why_not]
-        found += [title(c.effect, c.parameter) for c in acting] if acting and len(own) > 1 else [name]
+        which = joined([readable(c.parameter) for c in acting], verdict)
+        found.append(f"{name} ({which})" if acting and len(own) > 1 else name)
     return tuple(found)
+
+
+def joined(parts: Sequence[str], verdict: Verdict) -> str:
+    """Strengths of one effect: `lean and sway` that act together, `lean or sway` of which one may."""
+    return " or ".join(parts) if verdict.conclusion is Conclusion.ONE_OF else listed(parts)
 
 
 def title(effect: str, parameter: str) -> str:

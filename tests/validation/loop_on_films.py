@@ -9,7 +9,8 @@ alone, among several, as a part, or wrongly.
 
 `python -m tests.validation loop-on-films`; the simulations are kept in FLAGDATA_LOOP_ON_FILMS, by default a new folder.
 FLAGDATA_LOOP_ON_FILMS_EFFECTS names the effects that are weighed and that act, _KINDS is how many kinds of numerics
-null experiments have, and _RECORDINGS which of the two recordings are used, as in "1": all by default.
+null experiments have, _RECORDINGS which of the two recordings are used, as in "1" (all by default), and _SIMULATIONS
+how many flags of the base model are simulated for each.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from numpy.typing import NDArray
 from flagdata.rng import child_seed, stream
 from measure.calibrate.design import Design, read
 from measure.calibrate.discretisation import Discretisation
+from measure.calibrate.numerics import Finer
 from measure.calibrate.observed import Observed
 from measure.calibrate.prior import Floats, Normal, Uncertain
 from measure.calibrate.simulation import Batch, Flag
@@ -38,7 +40,7 @@ from measure.films.evidence import Experiments
 from measure.films.judge import Judged, judge
 from measure.films.library import Weighable, weighable
 from measure.films.score_test import score
-from measure.films.simulations import Simulations, of_base, of_nulls, sight
+from measure.films.simulations import Simulations, of_base, of_nulls, sights_of
 from measure.films.weigh import Weighing, directions, weigh
 from sim.effects.anemometer_lag import AnemometerLag
 from sim.wind.spectral import VonKarman
@@ -47,6 +49,7 @@ SEED = 20261127
 MEANS = (4.0, 6.5)  # m/s
 DURATION = 30.0  # s
 KINDS = int(os.environ.get("FLAGDATA_LOOP_ON_FILMS_KINDS", "20"))
+SIMULATIONS = int(os.environ.get("FLAGDATA_LOOP_ON_FILMS_SIMULATIONS", "128"))
 LEVEL = 0.05
 _BEFORE = 64.0  # s
 _INTENSITY, _LENGTH, _RATE = 0.18, 50.0, 10.0  # 1, m, Hz
@@ -83,7 +86,14 @@ def effects() -> tuple[Weighable, ...]:
 def designs() -> list[Design]:
     """Of both recordings."""
     return [
-        Design(flag=FLAG, log=log(mean).cut(0.0, DURATION), duration=DURATION, azimuth=AZIMUTH, seed=SEED)
+        Design(
+            flag=FLAG,
+            log=log(mean).cut(0.0, DURATION),
+            duration=DURATION,
+            azimuth=AZIMUTH,
+            count=SIMULATIONS,
+            seed=SEED,
+        )
         for mean in MEANS
     ]
 
@@ -117,14 +127,17 @@ def simulations(folder: Path) -> Simulations:
     def seen(batches: Sequence[Batch]) -> Floats:
         return read(batches, folder=folder, workers=workers)[:, 0]
 
+    finer = [Finer.of(own[place]) for place in chosen()]
+    base = tuple(seen(own[place].batches()) for place in chosen())
     made = [[pairs(design, effect, until=lasting(len(own))) for effect in effects()] for design in own]
     return Simulations(
         designs=tuple(own[place] for place in chosen()),
-        base=tuple(seen(own[place].batches()) for place in chosen()),
+        base=base,
         pairs=tuple(tuple((pair, seen(pair.batches)) for pair in made[place]) for place in chosen()),
         nulls=tuple(seen(null[place]) for place in chosen()),
         kinds=np.repeat(np.arange(KINDS), TOGETHER),
         weights=np.concatenate([batch.values["area_weight"] for batch in null[0]]),
+        corrections=tuple(one.correction(seen(one.batches), coarse) for one, coarse in zip(finer, base, strict=True)),
     )
 
 
@@ -137,10 +150,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         Observed(name=f"{MEANS[place]:g} m/s", source="", readings=np.nanmean(base, axis=0), log=design.log)
         for place, base, design in zip(chosen(), made.base, made.designs, strict=True)
     ]
-    sights = [
-        sight(one, design, base, own)
-        for one, design, base, own in zip(recordings, made.designs, made.base, made.pairs, strict=True)
-    ]
+    sights = sights_of(recordings, made)
     null, kinds = of_nulls(sights, recordings, made, None, seed=SEED)
     base = of_base(sights, recordings, made, None, seed=SEED)
     weighed, along = weigh(sights, null, effects(), seed=SEED), directions(sights, effects(), None)
@@ -169,6 +179,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return {
         "recordings": list(chosen()),
         "kinds": KINDS,
+        "simulations": SIMULATIONS,
         "effects": [one.name for one in effects()],
         **_summary(rows),
         "rows": rows,

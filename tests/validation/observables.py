@@ -119,7 +119,7 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     for name in OBSERVABLES:
         films, apart, unseen = [], [], 0
         for row in rows:
-            own = [one["values"][name] for one in row["windows"] if one is not None]
+            own = [one["values"][name] for one in row["windows"] if one is not None and name in one["values"]]
             unseen += len(row["windows"]) - len(own)
             both = [one["pixels"] - one["geometry"] for one in own if None not in (one["pixels"], one["geometry"])]
             unseen += sum(one["pixels"] is None for one in own)
@@ -179,7 +179,7 @@ def page(sheet: Mapping[str, Any]) -> str:
 def _cell(row: Mapping[str, Any], name: str) -> str:
     if "refused" in row:
         return f"refused: {row['refused']}"
-    own = [one["values"][name] for one in row["windows"] if one is not None]
+    own = [one["values"][name] for one in row["windows"] if one is not None and name in one["values"]]
     shown = [f"{one['pixels']:.3f} ({one['geometry']:.3f})" for one in own if one["pixels"] is not None]
     return ", ".join(shown) or "not shown"
 

@@ -208,21 +208,28 @@ def page(sheet: Mapping[str, Any]) -> str:
 def table(sheet: Mapping[str, Any]) -> list[str]:
     """Lines of the library's map, as in the sheet and in docs/method/films.md: effects that more observables show
     clearly come first."""
-    lines = ["| effect, strength | " + " | ".join(OBSERVABLES) + " |", "|---" * (1 + len(OBSERVABLES)) + "|"]
+    seen = _seen(sheet["map"])
+    lines = ["| effect, strength | " + " | ".join(seen) + " |", "|---" * (1 + len(seen)) + "|"]
     for name, of in sorted(sheet["map"].items(), key=lambda one: -clear(one[1])):
         strengths = ", ".join(f"{value:.3g}" for value in sheet["strengths"][name].values())
-        cells = [" / ".join(_cell(own[observable], _TOLD) for own in of.values()) for observable in OBSERVABLES]
+        cells = [" / ".join(_cell(own[observable], _TOLD) for own in of.values()) for observable in seen]
         lines.append(f"| {name}, {strengths} | " + " | ".join(cells) + " |")
     return lines
 
 
 def reference_table(sheet: Mapping[str, Any]) -> list[str]:
     """Lines of the reference simulator's map, as in the sheet and in docs/method/films.md."""
-    lines = ["| what acted | " + " | ".join(OBSERVABLES) + " |", "|---" * (1 + len(OBSERVABLES)) + "|"]
+    seen = _seen(sheet["reference"])
+    lines = ["| what acted | " + " | ".join(seen) + " |", "|---" * (1 + len(seen)) + "|"]
     for name, of in sheet["reference"].items():
-        cells = [" / ".join(_cell(of[wind][one], _SHORT) for wind in sorted(of)) for one in OBSERVABLES]
+        cells = [" / ".join(_cell(of[wind][one], _SHORT) for wind in sorted(of)) for one in seen]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return lines
+
+
+def _seen(maps: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> list[str]:
+    """The observables of a map, which may be older than some."""
+    return [one for one in OBSERVABLES if all(one in own for of in maps.values() for own in of.values())]
 
 
 def clear(of: Mapping[str, Mapping[str, float | None]]) -> int:

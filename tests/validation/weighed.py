@@ -44,6 +44,7 @@ from numpy.typing import NDArray
 from flagdata.rng import stream
 from measure.calibrate.calibrate import Options, answered
 from measure.calibrate.design import Design, simulated
+from measure.calibrate.numerics import MEASURED
 from measure.calibrate.observed import Observed
 from measure.calibrate.prior import Floats, Normal, Uncertain
 from measure.calibrate.simulation import BATCH, OBSERVED, RATE, Flag, windows
@@ -332,7 +333,7 @@ def weigh(
     """
     own, stated = of
     one = Observed(name=name, source="", readings=found, log=own.log, sigma=sigma)
-    answer = answered([(one, own.values(), base)], stated)
+    answer = answered([(one, own.values(), base, MEASURED)], stated)
     (fitted,), weight = answer.recordings, answer.weight
     low, high = weight.span.ends()
     return {

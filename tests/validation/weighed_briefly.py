@@ -28,6 +28,7 @@ from flagdata.rng import stream
 from measure.calibrate.calibrate import Options, with_errors
 from measure.calibrate.design import simulated
 from measure.calibrate.emulator import Emulator, informative
+from measure.calibrate.numerics import MEASURED
 from measure.calibrate.observed import Observed
 from measure.calibrate.posterior import Sight, weighed
 from measure.calibrate.prior import Floats
@@ -124,7 +125,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         lambda: np.stack([large.readings(p, truth) for p, truth in zip(positions, some, strict=True)]),
     )
     rows, blank = [], Observed(name="", source="", readings=seen[0], log=own.log)
-    summaries = with_errors(blank, base, seed=SEED)
+    summaries = with_errors(blank, base, MEASURED, seed=SEED)
     shown = informative(own.values(), summaries, np.ones(summaries.shape[1], dtype=bool), name="briefly")
     emulator = Emulator.fit(own.values(), summaries, shown, name="briefly")
     observed = blank.projection.of(seen).reshape(len(seen), -1)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flagdata
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, UnknownNameError, UsageError
 from measure.calibrate import arrays
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.tables import of_table
@@ -51,6 +51,12 @@ def test_arrays_are_the_table_of_the_same_numbers(tmp_path: Path) -> None:
 def test_columns_that_make_no_table_are_refused(columns: dict, match: str) -> None:
     with pytest.raises(InputError, match=match):
         flagdata.calibrate(columns, flag_size=(1.5, 1.0))
+
+
+def test_a_material_of_which_none_was_measured_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match="no cloth like 'silk'") as refused:
+        flagdata.calibrate(COLUMNS, flag_size=(1.5, 1.0), material="silk")
+    assert refused.value.where == "material"
 
 
 def test_an_azimuth_is_given_as_on_the_command_line() -> None:

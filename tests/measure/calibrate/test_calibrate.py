@@ -117,6 +117,21 @@ def test_the_weight_of_a_flag_that_no_simulation_looks_like_is_withheld(plain: C
 
 
 @pytest.mark.usefixtures("cheap")
+def test_a_recording_unlike_all_simulations_is_left_out_and_the_others_weigh_the_flag() -> None:
+    """A wrong crop, say: the weight is that of the others, and the reason is given."""
+    good = [_observed(0.17), _observed(0.17, seed=10)]
+    strange = np.array(_observed(0.17, seed=11).readings)
+    strange[:, 3] += 1.0
+    found = _found(*good, Observed(name="strange", source="x", readings=strange, log=good[0].log))
+    assert found.withheld is None
+    assert found.weight.value == pytest.approx(0.17, rel=0.1)
+    assert len(found.recordings) == len(found.places) == 2
+    (left,) = [one for one in found.findings if one.kind == "left-out"]
+    assert left.what.startswith("no simulated flag looks like strange (p = ")
+    assert "frequency" in left.what.partition("too large")[0]
+
+
+@pytest.mark.usefixtures("cheap")
 @pytest.mark.parametrize(
     ("true", "words", "side", "end"),
     [(0.045, "at most 0.0", Bound.MOST, "0.05"), (0.5, "at least 0.4", Bound.LEAST, "0.45")],

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from measure.calibrate.design import Design, simulated
+from measure.calibrate.fabric import TABLES
 from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import FABRICS, OBSERVED, Batch, Flag, cloth, mean_bending
+from measure.calibrate.simulation import OBSERVED, Batch, Flag, cloth, mean_bending
 from measure.calibrate.wind import Log
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import Symplectic
@@ -63,7 +64,7 @@ def test_simulations_draw_their_fabrics() -> None:
     design = Design(flag=Flag(length=1.5, height=1.0), log=_LOG, duration=5.0, count=32, seed=1)
     scenes = [one for batch in design.batches() for one in batch._scenes(design.flag.mesh(4), damped=0.0)]
     drawn = [scene.material.name for scene in scenes]
-    assert {drawn.count(name) for name in FABRICS} <= {2, 3, 4, 5}  # of 32 each of ten evenly: a Sobol sequence
+    assert {drawn.count(name) for name in TABLES} <= {2, 3, 4, 5}  # of 32 each of ten evenly: a Sobol sequence
 
 
 def test_recordings_of_a_flag_are_simulated_with_the_same_cloths_in_places_of_their_own() -> None:

@@ -16,6 +16,7 @@ from flagdata.schema import Kind
 from measure.calibrate.simulation import OBSERVED
 from measure.closing.command import close_loop
 from measure.films import library
+from measure.films.command import simulations_of
 from measure.films.sources import films_among
 from measure.loop.run import Options as LoopOptions
 from measure.observables.observable import WINDOW
@@ -98,6 +99,7 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
         (("--flag-size", "1.5x1.0", "--area-weight", "0"), "give one above 0"),
         (("--flag-size", "1.5x1.0", "--crop", "0,0,9,9"), "a table of observables has no pictures"),
         (("--flag-size", "1.5x1.0", "--nulls", "2"), "kinds"),
+        (("--flag-size", "1.5x1.0", "--material", "bunting"), "woven-polyester, woven-cotton"),
         (("--flag-size", "1.5x1.0", "--suspect", "lifft"), "did you mean 'lift'"),
         (("--flag-size", "1.5x1.0", "--suspect", "vertical-wind"), "vertical-wind+ or vertical-wind-"),
         (("--flag-size", "1.5x1.0", "--start", "40s"), "s of film with a log beside them"),
@@ -111,6 +113,27 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_written(
     error = done.exception
     assert said in f"{error} {getattr(error, 'where', '')} {getattr(error, 'fix', '')} {done.output}"
     assert not (tmp_path / "out").exists()
+
+
+def test_one_recording_that_cannot_be_used_is_left_out_and_the_stated_fabric_is_simulated(
+    tmp_path: Path, cheap: list[int], few: None
+) -> None:
+    """One of three is too short: the verdict is that of the two others, and the page names it."""
+    good = [table(tmp_path / f"{mean}.csv", mean=mean) for mean in (4.0, 6.5)]
+    short = table(tmp_path / "short.csv", mean=5.0)
+    short.write_text("\n".join(short.read_text().splitlines()[:4]) + "\n")
+    out = tmp_path / "out"
+    given = ("--flag-size", "1.5x1.0", "--azimuth", "70±7", "--material", "woven-cotton", "--out", out, "--json")
+    done = run(*good, short, *given)
+    assert done.exit_code == 0, done.output
+    verdict = json.loads(done.stdout)
+    (left,) = [one for one in verdict["findings"] if one[0] == "left-out"]
+    assert left[1].startswith(f"{short} is left out: ")
+    assert "short.csv is left out" in (out / "report.html").read_text()
+    options = verdict["provenance"]["options"]
+    assert (options["material"], options["simulations"]) == ("woven-cotton", 128)
+    assert [simulations_of(count) for count in (1, 2, 3, 9)] == [64, 64, 128, 128]
+    assert 'name = "11oz-black-denim"' in (out / "base.toml").read_text()
 
 
 def test_options_of_films_are_refused_beside_markers(tmp_path: Path) -> None:

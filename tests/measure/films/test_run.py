@@ -6,15 +6,24 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.special import ndtri
 
-from flagdata.errors import UsageError
+from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 from measure.calibrate.observed import Observed
-from measure.films.run import close_loop, solve, verdict_of
-from measure.verdict.record import Conclusion, Verdict
+from measure.calibrate.prior import Floats
+from measure.calibrate.simulation import Batch
+from measure.films import simulations
+from measure.films.evidence import Fit
+from measure.films.library import weighable
+from measure.films.run import close_loop, solve, strength_of, verdict_of
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.quantity import with_level
+from measure.verdict.record import Conclusion, Estimate, Verdict
 from tests.measure.films.conftest import ALIKE, EFFECTS, options, recording, simulate_cheaply
 
 DRAG = {"tangential-linear-drag.coefficient": 0.9}
@@ -158,3 +167,58 @@ def test_what_was_merely_noted_on_a_film_is_no_doubt_beside_the_verdict(cheap: l
     outcome = solve(seen, options(), folder=tmp_path)
     assert {finding.kind for finding in outcome.findings} >= {"camera-still", "camera-lost"}
     assert {kind for kind, _ in verdict_of(outcome).findings} == {"camera-lost"}
+
+
+def test_a_strength_beyond_what_is_assumed_is_a_bound(cheap: list[int], tmp_path: Path) -> None:
+    """A drag of 3 where 1.5 is assumed at most: what is known is that it is large."""
+    found = close_loop(both({"tangential-linear-drag.coefficient": 3.0}), options(), folder=tmp_path)
+    strength = found.ranking[0].strength
+    assert found.named == ("tangential-linear-drag",)
+    assert strength.bound == "at-least"
+    assert 0.5 < strength.value == strength.low < 1.5
+    assert strength.high == math.inf
+    assert strength.level == pytest.approx(0.95)
+    assert "at least" in found.words
+
+
+def test_a_strength_of_two_signs_leans_on_either_end() -> None:
+    shear = next(one for one in weighable(options().calibration.flag) if one.name == "shear.exponent")  # −0.3 to 0.8
+    null, factor = shear.column.described.null, np.exp(CRITERIA.reach * CRITERIA.strength_factor)
+
+    def at(*shares: float) -> Estimate:
+        scores = ndtri(np.array(shares))[None, :, None]
+        none, even = np.zeros(1), np.full((1, len(shares)), 1 / len(shares))
+        return strength_of(shear, Fit(evidence=none, misfit=none, scores=scores, weights=even))
+
+    high, low = at(*np.linspace(0.7, 0.999, 300)), at(*np.linspace(0.001, 0.2, 300))
+    middle, either = at(*np.linspace(0.4, 0.6, 300)), at(*([0.01, 0.5, 0.99] * 100))
+    assert (high.bound, high.high) == ("at-least", math.inf)
+    assert high.value == pytest.approx(null + (-0.3 + 1.1 * 0.715) / factor, rel=0.01)
+    assert (low.bound, low.low) == ("at-most", -math.inf)
+    assert low.value == pytest.approx(null + (-0.3 + 1.1 * 0.19) / factor, rel=0.01)
+    assert middle.bound is None
+    assert either.bound == "nothing"
+    assert with_level(either) == "not determined"
+
+
+def test_a_recording_whose_simulations_show_something_else_is_left_out_with_the_reason(
+    cheap: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The verdict is that of the others, and says so."""
+    usual = simulations.read
+
+    def read(batches: list[Batch], **given: Any) -> Floats:
+        """Of the third recording's flags none is seen."""
+        found = usual(batches, **given)
+        return np.full_like(found, np.nan) if batches[0].log.speed.mean() > 8 else found
+
+    monkeypatch.setattr(simulations, "read", read)
+    recordings = [*both(DRAG), replace(recording(mean=9.0, seed=6), name="dusk")]
+    found = close_loop(recordings, options(), folder=tmp_path)
+    kind, said = found.findings[0]
+    assert kind == "left-out"
+    assert said.startswith("dusk is left out: 0 of 128 simulations show what the film shows")
+    assert found.named == ("tangential-linear-drag",)
+    assert {one.frames for one in found.comparisons if "recordings left out" in one.what} == {40}
+    with pytest.raises(RefusedError, match="0 of 128 simulations"):
+        close_loop(recordings[2:], options(), folder=tmp_path)

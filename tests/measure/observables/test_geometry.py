@@ -120,3 +120,18 @@ def test_every_observable_is_the_same_from_the_other_side_and_at_another_rate(na
     behind = value(name, motion, view=View(azimuth=-SIDE_ON.azimuth))
     assert behind == pytest.approx(plain, rel=0.03, abs=0.02)
     assert value(name, motion, rate=50.0) == pytest.approx(plain, rel=0.03, abs=0.02)
+
+
+@pytest.mark.parametrize(("sag", "expected"), [(0.0, 0.0), (0.15, 0.15), (0.3, 0.3), (-0.15, 0.0)])
+def test_cloth_that_departs_from_the_pole_between_its_corners_is_its_bulge(sag: float, expected: float) -> None:
+    """A parabola of a depth [m] between two held corners; what bulges to the pole's other side counts as on it."""
+
+    def held(u: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, ...]:
+        return u + sag * (1 - (2 * v / HEIGHT) ** 2) * (1 - u / LENGTH), 0 * u, v
+
+    mean = 1 - 0.9**2 / 3  # of the parabola over the middle 90 % of the hoist
+    assert value("hoist-bulge", held) == pytest.approx(expected * mean / LENGTH, abs=1 / 240)
+
+
+def test_a_hoist_that_is_held_along_its_length_has_no_bulge() -> None:
+    assert value("hoist-bulge", hinged(lambda t: 0.3 + 0.1 * math.sin(9 * t))) == pytest.approx(0.0, abs=1 / 240)

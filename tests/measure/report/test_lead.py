@@ -8,6 +8,7 @@ import pytest
 
 from measure.report.lead import evidence, explained, lead, p_text
 from measure.report.page import page
+from measure.verdict.quantity import with_level
 from measure.verdict.record import Conclusion
 from tests.measure.report.pages import parsed
 from tests.measure.report.verdicts import about, verdict
@@ -39,6 +40,20 @@ def test_an_effect_is_named_with_its_size_its_share_of_the_error_and_one_p() -> 
     assert f" explains {explained(whole)}; " in said
     assert said.endswith("moderate evidence that something was missing, p = 0.024, could be up to 0.070.")
     assert said.count("p = ") == 1
+
+
+@pytest.mark.parametrize(("conclusion", "word"), [(Conclusion.EFFECT, "and"), (Conclusion.ONE_OF, "or")])
+def test_several_strengths_of_one_effect_are_one_effect(conclusion: Conclusion, word: str) -> None:
+    """Of six candidates, two are of one effect: the first three effects are named, and not "2 more" of them."""
+    whole = verdict(conclusion)
+    lean, sway, *others = (replace(one, why_not="") for one in whole.ranking[:5])
+    lean, sway = (replace(one, effect="tilted-pole", parameter=name) for one, name in ((lean, "lean"), (sway, "sway")))
+    few = replace(whole, ranking=(lean, sway), named=("tilted-pole",))
+    sizes = [with_level(one.strength) for one in (lean, sway)]
+    assert lead(few).startswith(f"Adding tilted-pole (lean {sizes[0]} {word} sway {sizes[1]}) ")
+    several = replace(whole, ranking=(lean, *others, sway), named=("tilted-pole", *(one.effect for one in others)))
+    assert lead(several).count("tilted-pole") == 1
+    assert "more" not in lead(several).split("explains")[0]
 
 
 def test_what_is_explained_is_pooled_over_what_lies_above_the_floor() -> None:

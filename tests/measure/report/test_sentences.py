@@ -61,7 +61,11 @@ def test_of_two_strengths_of_one_effect_the_one_that_acts_is_named() -> None:
     assert sentences.heading(whole) == "The base model lacked tilted-pole (lean angle)"
     assert "  not tilted-pole (sway): far behind" in words(whole).splitlines()
     both = replace(whole, conclusion=Conclusion.ONE_OF, ranking=(lean, replace(sway, why_not=""), *whole.ranking[2:]))
-    assert titles(both) == ("tilted-pole (lean angle)", "tilted-pole (sway)")
+    assert titles(both) == ("tilted-pole (lean angle or sway)",)
+    assert titles(replace(both, conclusion=Conclusion.EFFECT)) == ("tilted-pole (lean angle and sway)",)
+    said = "The base model lacked tilted-pole (lean angle or sway): these recordings do not decide which"
+    assert sentences.heading(both) == said
+    assert "  not tilted-pole" not in words(both)
 
 
 def test_of_many_effects_of_which_one_is_missing_the_first_three_are_named_and_the_others_counted() -> None:
