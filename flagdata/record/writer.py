@@ -423,8 +423,8 @@ class RecordWriter:
         self._writer.add_metadata(name, dict(values))
 
     def _means(self, aligned: WindSeries) -> None:
-        means = average(aligned, MEAN_PERIOD)
-        self._messages(TOPIC_WIND_1HZ, messages.WindMean, means(means), means.time, means.time)
+        averaged = average(aligned, MEAN_PERIOD)
+        self._messages(TOPIC_WIND_1HZ, messages.WindMean, means(averaged), averaged.time, averaged.time)
 
     def _check_order(self, log_time: int, publish_time: int) -> None:
         if self._last_frame is not None and (log_time <= self._last_frame[0] or publish_time <= self._last_frame[1]):
