@@ -11,7 +11,8 @@ from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.calibrate.prior import Floats
 from measure.films.evidence import Experiments, Fit, Hypothesis, Sight
-from measure.films.library import Suspicion, Weighable
+from measure.films.library import Weighable
+from measure.forecasting.strengths import Suspicion
 from measure.films.score_test import Directions
 
 
