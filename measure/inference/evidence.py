@@ -197,7 +197,7 @@ class Evidence(Rows):
         return pulls[: self.columns]
 
     def moved(self, column: int, coefficient: float) -> Evidence:
-        """What it would be if a column acted with a coefficient as well: r and moments moved by their response to it."""
+        """What it would be if a column acted with a coefficient as well: r and moments move by their response."""
         along = self.curvature[:, :, column]
         return replace(
             self,

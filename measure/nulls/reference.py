@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -20,6 +20,7 @@ from measure.inference.fluctuation import fluctuation
 from measure.inference.growth import power
 from measure.inference.random_effect import NullModel, Nulls
 from measure.nulls.conformal import GroupedConformal, kinds_needed
+from measure.nulls.directions import APPEARS, NOTHING, Move, Moved, directed, moves, pulled, shares_of, standardised
 from measure.probes.lines import Line, Lines, strongest
 from measure.probes.rows import Rows
 from measure.verdict.criteria import CRITERIA
@@ -132,14 +133,20 @@ class NullBank:
         """
         plain: list[_Found] = []
         beside_gusts: list[_Found] = []
+        moved: dict[Move, list[_Found]] = {move: [] for move in moves(self.columns)}
         for kept in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
             evidence = Evidence.of(kept.outside.statistics, kept.outside.speeds, kept.model.under(prior))
             for chosen in {tuple(sorted(group.tolist())): group for group in kept.groups}.values():
                 picked, own = evidence.select(chosen), kept.outside.select(chosen[:1])
                 plain.append(_Found.of(picked, self.columns, own))
                 beside_gusts.append(_Found.of(picked.freed(self.columns.index(GUSTS)), self.columns, own))
+            first = kept.groups[0]
+            picked, own = evidence.select(first), kept.outside.select(first[:1])
+            for move, found in moved.items():
+                found.append(_Found.of(picked.moved(move.column, APPEARS * move.strength), self.columns, own))
         beside = Reference.of(_Found.joined(beside_gusts), noise)
-        return Reference.of(_Found.joined(plain), noise, beside_gusts=beside)
+        joined = {move: _Found.joined(found) for move, found in moved.items()}
+        return Reference.of(_Found.joined(plain), noise, beside_gusts=beside, moved=joined)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -148,6 +155,7 @@ class _Found(Rows):
 
     Attributes:
         shares: (group, column) of `unscaled`.
+        pulls: (group, column, part) of `pulled`.
         left: (group,) what the base model leaves.
         gained: (group,) best held-out gains.
         swings: (group, part) of the wind's course, of no part where it is not looked at.
@@ -160,6 +168,7 @@ class _Found(Rows):
     """
 
     shares: Floats
+    pulls: Floats
     left: Floats
     gained: Floats
     swings: Floats
@@ -184,6 +193,7 @@ class _Found(Rows):
         swing, settles = (np.zeros(0) if own is None else own for own in (evidence.swing, evidence.settles))
         return cls(
             shares=unscaled(evidence, columns)[None],
+            pulls=pulled(evidence)[None],
             left=np.array([evidence.fit(()).left]),
             gained=np.array([best_gain(evidence, without=_uncounted(columns))]),
             swings=swing[None],
@@ -205,6 +215,8 @@ class _Usual:
     width: Floats
     lines: Lines | None
     powers: Floats
+    pull: Floats
+    pull_width: Floats
 
     @classmethod
     def of(cls, found: _Found) -> _Usual:
@@ -213,11 +225,17 @@ class _Usual:
         roots = _roots(found, lines, powers)
         return cls(
             powers=powers,
-            spread=np.maximum(found.shares.mean(axis=0), _NOTHING),
+            spread=np.maximum(found.shares.mean(axis=0), NOTHING),
             centre=roots.mean(axis=0),
-            width=np.maximum(roots.std(axis=0), np.cbrt(_NOTHING)),
+            width=np.maximum(roots.std(axis=0), np.cbrt(NOTHING)),
             lines=lines,
+            pull=found.pulls.mean(axis=0),
+            pull_width=found.pulls.std(axis=0),
         )
+
+    def pulled(self, found: _Found) -> Floats:
+        """(group, column, part) how far each column pulls more than it does in nulls, in their standard deviations."""
+        return standardised(found.pulls, self.pull, self.pull_width)
 
     def far(self, found: _Found) -> Floats:
         """(group, column + 2 to 11) how far groups are from their mean, in their standard deviations."""
@@ -270,7 +288,12 @@ class Reference:
         lines: of the nulls; None where spectra are not looked at.
         powers: (part,) of the damping by which swings grow.
         damping: of the data, the logarithm of its ratio to the nominal one.
+        pulled: (group, column, part) of `pulled`, standardised as `far` is.
+        pull, pull_width: (column, part) mean and standard deviation of the same, of nulls as noisy as the data.
         beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
+        moved: nulls on which effects act, as far as their linear response says and appears.
+        suspected: column and sign of the effect that was suspected beforehand, along which alone is tested; None to
+            test along all.
     """
 
     scaled: Floats
@@ -280,14 +303,29 @@ class Reference:
     deviations: Floats
     centre: Floats
     width: Floats
+    pulled: Floats
+    pull: Floats
+    pull_width: Floats
     lines: Lines | None = None
     powers: Floats = field(default_factory=lambda: np.zeros(0))
     damping: float = 0.0
     beside_gusts: Reference | None = None
+    moved: tuple[Moved, ...] = ()
+    suspected: tuple[int, int] | None = None
 
     @classmethod
-    def of(cls, found: _Found, noise: float, *, beside_gusts: Reference | None = None) -> Reference:
+    def of(
+        cls,
+        found: _Found,
+        noise: float,
+        *,
+        beside_gusts: Reference | None = None,
+        moved: Mapping[Move, _Found] | None = None,
+    ) -> Reference:
         """For data of some noise [m].
+
+        Args:
+            moved: of one group a kind, on which each effect acts.
 
         Raises:
             InputError: no nulls of such noise.
@@ -303,6 +341,9 @@ class Reference:
             )
         usual = _Usual.of(found.select(similar))
         scaled, far = np.empty_like(found.shares), np.empty((len(kinds), len(usual.centre)))
+        pulls, acting = np.empty_like(found.pulls), dict(moved or {})
+        farthest: dict[Move, list[float]] = {move: [] for move in acting}
+        along: dict[Move, list[float]] = {move: [] for move in acting}
         for kind in np.unique(kinds):
             own = kinds == kind
             near = np.abs(found.noise - found.noise[own][0]) <= CRITERIA.alike_noise
@@ -310,6 +351,11 @@ class Reference:
                 near &= ~own
             others = _Usual.of(found.select(near))
             scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
+            pulls[own] = others.pulled(found.select(own))
+            for move, acted in acting.items():
+                one = acted.select(acted.kinds == kind)
+                farthest[move].append(float(others.far(one).max()))
+                along[move].append(float(directed(others.pulled(one), move.column, move.sign)[0]))
         return cls(
             scaled=scaled,
             spread=usual.spread,
@@ -318,9 +364,15 @@ class Reference:
             deviations=found.deviations,
             centre=usual.centre,
             width=usual.width,
+            pulled=pulls,
+            pull=usual.pull,
+            pull_width=usual.pull_width,
             lines=usual.lines,
             powers=usual.powers,
             beside_gusts=beside_gusts,
+            moved=tuple(
+                Moved(move=move, farthest=np.array(farthest[move]), along=np.array(along[move])) for move in acting
+            ),
         )
 
     def at(self, calibration: Calibration) -> Reference:
@@ -352,6 +404,38 @@ class Reference:
                 GroupedConformal(null=np.abs(own), kinds=self.kinds).quantile(CRITERIA.interval)
                 for own in self.deviations.T
             ]
+        )
+
+    def along(self, column: int, sign: int) -> Reference:
+        """That tests along one effect alone, which was suspected beforehand."""
+        return replace(self, suspected=(column, sign))
+
+    @cached_property
+    def test(self) -> GroupedConformal:
+        """That of the base model: along all, or along the suspected effect."""
+        if self.suspected is None:
+            return self.conformal
+        return GroupedConformal(null=directed(self.pulled, *self.suspected), kinds=self.kinds)
+
+    def tested(self, evidence: Evidence, columns: tuple[str, ...]) -> float:
+        """The statistic of data that the base model is tested by."""
+        if self.suspected is None:
+            return self.farthest(evidence, columns)
+        return float(directed(standardised(pulled(evidence), self.pull, self.pull_width)[None], *self.suspected)[0])
+
+    def power(self, level: float) -> tuple[tuple[Move, float], ...]:
+        """Effects that are tested for, each with the share of nulls beyond the critical value once it acts on them at
+        its expected strength: on average of both signs, where it may have either, but of the suspected one alone."""
+        critical = self.test.critical(level)
+        if critical is None:
+            return ()
+        if self.suspected is not None:
+            own = [one for one in self.moved if (one.move.column, one.move.sign) == self.suspected]
+            return tuple((one.move, float((one.along > critical).mean())) for one in own)
+        shares = {one.move: float((one.farthest > critical).mean()) for one in self.moved}
+        upward = [move for move in shares if move.sign > 0]
+        return tuple(
+            (up, float(np.mean([share for move, share in shares.items() if move.column == up.column]))) for up in upward
         )
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
@@ -437,10 +521,6 @@ class Reference:
         return (np.cbrt(values) - self.centre[columns]) / self.width[columns]
 
 
-_NOTHING = 1e-6
-"""Mean share below which a column is unobservable: that of the columns that are always fitted."""
-
-
 def _uncounted(columns: tuple[str, ...]) -> list[int]:
     """Columns whose held-out gains do not count in the test: what a log may be off by within its tolerance gains on
     recordings whose own log was not fitted."""
@@ -456,12 +536,8 @@ def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int]
     """
     drops, left = evidence.drops(beside), evidence.fit(beside).left
     gusts = fluctuation(evidence, columns.index(GUSTS), beside).likelihood
-    found = np.append(_shares(drops, left), max(gusts, 0.0))
+    found = np.append(shares_of(drops, left), max(gusts, 0.0))
     if evidence.turning is None:
         return found
     drops, left = evidence.turning.drops(beside), evidence.turning.fit(beside).left
-    return np.concatenate([found, _shares(drops, left), [left]])
-
-
-def _shares(drops: Floats, left: float) -> Floats:
-    return drops / np.maximum(left - drops, 1e-9)
+    return np.concatenate([found, shares_of(drops, left), [left]])

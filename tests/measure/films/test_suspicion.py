@@ -10,10 +10,10 @@ import pytest
 from flagdata.errors import UnknownNameError, UsageError
 from measure.calibrate.simulation import Flag
 from measure.films.library import weighable
-from measure.forecasting.strengths import Suspicion
 from measure.films.page import page
 from measure.films.run import close_loop, solve, verdict_of
 from measure.films.words import words
+from measure.forecasting.strengths import Suspicion
 from measure.verdict.record import Conclusion
 from tests.measure.films.conftest import options, recording
 
@@ -64,7 +64,9 @@ def test_it_is_tested_alone_and_the_page_and_the_words_say_that_it_was_stated_be
     recordings = [recording(mean=mean, seed=6, effects={"lift.coefficient": 4.0}) for mean in (4.0, 6.5)]
     found = {}
     for text in ("lift", "tangential-linear-drag"):
-        outcome = solve(recordings, replace(options(), suspected=Suspicion.parse(text, weighable(FLAG))), folder=tmp_path)
+        outcome = solve(
+            recordings, replace(options(), suspected=Suspicion.parse(text, weighable(FLAG))), folder=tmp_path
+        )
         found[text] = verdict_of(outcome)
         for said in (" ".join(words(found[text]).split()), page(found[text], outcome)):
             assert f"along {text}+ alone, suspected before the recordings were looked at" in said
