@@ -46,21 +46,6 @@ class Move:
         return 1 if self.strength > 0 else -1
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Moved:
-    """What the test finds in nulls on which an effect acts, one group a kind.
-
-    Attributes:
-        move: the effect.
-        farthest: (kind,) how far the farthest statistic is.
-        along: (kind,) how far the effect's own direction is, see `directed`.
-    """
-
-    move: Move
-    farthest: Floats
-    along: Floats
-
-
 def moves(columns: tuple[str, ...]) -> list[Move]:
     """Of all effects that are weighed, at their expected strengths of each sign that they may have."""
     return [

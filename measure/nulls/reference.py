@@ -20,7 +20,7 @@ from measure.inference.fluctuation import fluctuation
 from measure.inference.growth import power
 from measure.inference.random_effect import NullModel, Nulls
 from measure.nulls.conformal import GroupedConformal, kinds_needed
-from measure.nulls.directions import APPEARS, NOTHING, Move, Moved, directed, moves, pulled, shares_of, standardised
+from measure.nulls.directions import APPEARS, NOTHING, Move, directed, moves, pulled, shares_of, standardised
 from measure.probes.lines import Line, Lines, strongest
 from measure.probes.rows import Rows
 from measure.verdict.criteria import CRITERIA
@@ -133,7 +133,7 @@ class NullBank:
         """
         plain: list[_Found] = []
         beside_gusts: list[_Found] = []
-        moved: dict[Move, list[_Found]] = {move: [] for move in moves(self.columns)}
+        groups: list[_Group] = []
         for kept in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
             evidence = Evidence.of(kept.outside.statistics, kept.outside.speeds, kept.model.under(prior))
             for chosen in {tuple(sorted(group.tolist())): group for group in kept.groups}.values():
@@ -141,12 +141,17 @@ class NullBank:
                 plain.append(_Found.of(picked, self.columns, own))
                 beside_gusts.append(_Found.of(picked.freed(self.columns.index(GUSTS)), self.columns, own))
             first = kept.groups[0]
-            picked, own = evidence.select(first), kept.outside.select(first[:1])
-            for move, found in moved.items():
-                found.append(_Found.of(picked.moved(move.column, APPEARS * move.strength), self.columns, own))
+            groups.append(_Group(evidence=evidence.select(first), own=kept.outside.select(first[:1])))
         beside = Reference.of(_Found.joined(beside_gusts), noise)
-        joined = {move: _Found.joined(found) for move, found in moved.items()}
-        return Reference.of(_Found.joined(plain), noise, beside_gusts=beside, moved=joined)
+        return Reference.of(_Found.joined(plain), noise, beside_gusts=beside, columns=self.columns, groups=groups)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Group:
+    """The evidence of one null group, by a null model without its kind, and one segment of it."""
+
+    evidence: Evidence
+    own: Nulls
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -233,9 +238,9 @@ class _Usual:
             pull_width=found.pulls.std(axis=0),
         )
 
-    def pulled(self, found: _Found) -> Floats:
+    def pulled(self, pulls: Floats) -> Floats:
         """(group, column, part) how far each column pulls more than it does in nulls, in their standard deviations."""
-        return standardised(found.pulls, self.pull, self.pull_width)
+        return standardised(pulls, self.pull, self.pull_width)
 
     def far(self, found: _Found) -> Floats:
         """(group, column + 2 to 11) how far groups are from their mean, in their standard deviations."""
@@ -291,7 +296,9 @@ class Reference:
         pulled: (group, column, part) of `pulled`, standardised as `far` is.
         pull, pull_width: (column, part) mean and standard deviation of the same, of nulls as noisy as the data.
         beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
-        moved: nulls on which effects act, as far as their linear response says and appears.
+        columns: names of the columns; of one from a bank.
+        groups: one of each kind; of one from a bank.
+        usual: kind → what is usual in the other kinds' nulls.
         suspected: column and sign of the effect that was suspected beforehand, along which alone is tested; None to
             test along all.
     """
@@ -310,7 +317,9 @@ class Reference:
     powers: Floats = field(default_factory=lambda: np.zeros(0))
     damping: float = 0.0
     beside_gusts: Reference | None = None
-    moved: tuple[Moved, ...] = ()
+    columns: tuple[str, ...] = ()
+    groups: tuple[_Group, ...] = ()
+    usual: Mapping[int, _Usual] = field(default_factory=dict)
     suspected: tuple[int, int] | None = None
 
     @classmethod
@@ -320,12 +329,13 @@ class Reference:
         noise: float,
         *,
         beside_gusts: Reference | None = None,
-        moved: Mapping[Move, _Found] | None = None,
+        columns: tuple[str, ...] = (),
+        groups: Sequence[_Group] = (),
     ) -> Reference:
         """For data of some noise [m].
 
         Args:
-            moved: of one group a kind, on which each effect acts.
+            groups: one of each kind.
 
         Raises:
             InputError: no nulls of such noise.
@@ -341,9 +351,7 @@ class Reference:
             )
         usual = _Usual.of(found.select(similar))
         scaled, far = np.empty_like(found.shares), np.empty((len(kinds), len(usual.centre)))
-        pulls, acting = np.empty_like(found.pulls), dict(moved or {})
-        farthest: dict[Move, list[float]] = {move: [] for move in acting}
-        along: dict[Move, list[float]] = {move: [] for move in acting}
+        pulls, apart = np.empty_like(found.pulls), dict[int, _Usual]()
         for kind in np.unique(kinds):
             own = kinds == kind
             near = np.abs(found.noise - found.noise[own][0]) <= CRITERIA.alike_noise
@@ -351,11 +359,8 @@ class Reference:
                 near &= ~own
             others = _Usual.of(found.select(near))
             scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
-            pulls[own] = others.pulled(found.select(own))
-            for move, acted in acting.items():
-                one = acted.select(acted.kinds == kind)
-                farthest[move].append(float(others.far(one).max()))
-                along[move].append(float(directed(others.pulled(one), move.column, move.sign)[0]))
+            pulls[own] = others.pulled(found.pulls[own])
+            apart[int(kind)] = others
         return cls(
             scaled=scaled,
             spread=usual.spread,
@@ -370,9 +375,9 @@ class Reference:
             lines=usual.lines,
             powers=usual.powers,
             beside_gusts=beside_gusts,
-            moved=tuple(
-                Moved(move=move, farthest=np.array(farthest[move]), along=np.array(along[move])) for move in acting
-            ),
+            columns=columns,
+            groups=tuple(groups),
+            usual=apart,
         )
 
     def at(self, calibration: Calibration) -> Reference:
@@ -429,14 +434,28 @@ class Reference:
         critical = self.test.critical(level)
         if critical is None:
             return ()
-        if self.suspected is not None:
-            own = [one for one in self.moved if (one.move.column, one.move.sign) == self.suspected]
-            return tuple((one.move, float((one.along > critical).mean())) for one in own)
-        shares = {one.move: float((one.farthest > critical).mean()) for one in self.moved}
-        upward = [move for move in shares if move.sign > 0]
-        return tuple(
-            (up, float(np.mean([share for move, share in shares.items() if move.column == up.column]))) for up in upward
-        )
+        shares = {move: float((found > critical).mean()) for move, found in self._acting.items()}
+        each: dict[int, list[Move]] = {}
+        for move in shares:
+            each.setdefault(move.column, []).append(move)
+        return tuple((own[0], float(np.mean([shares[move] for move in own]))) for own in each.values())
+
+    @cached_property
+    def _acting(self) -> dict[Move, Floats]:
+        """Effects that are tested for → (group,) the statistic of nulls on which each acts, as far as appears."""
+        found: dict[Move, Floats] = {}
+        for move in moves(self.columns):
+            if self.suspected is None or (move.column, move.sign) == self.suspected:
+                acted = [own.evidence.moved(move.column, APPEARS * move.strength) for own in self.groups]
+                found[move] = np.array([self._found(one, own.own) for one, own in zip(acted, self.groups, strict=True)])
+        return found
+
+    def _found(self, evidence: Evidence, own: Nulls) -> float:
+        """The test's statistic of a null group."""
+        usual = self.usual[int(own.numerics[0])]
+        if self.suspected is None:
+            return float(usual.far(_Found.of(evidence, self.columns, own)).max())
+        return float(directed(usual.pulled(pulled(evidence)[None]), *self.suspected)[0])
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
         """(column,) of data, as `scaled` has them, where some columns are fitted already."""
