@@ -15,14 +15,15 @@ from measure.inference.random_effect import NullModel
 from measure.loop.run import _suspected  # pyright: ignore[reportPrivateUsage]
 from measure.loop.selection import judge
 from measure.nulls.reference import Reference
+from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Conclusion
 from tests.measure.loop.drawn_statistics import drawn, made, named, seen, strengths
 
 LEVEL = 0.05
 LIFT = names().index("lift.coefficient")
 WIND = names().index("vertical-wind.inclination")
-WEAK = 0.12
-"""Of the expected strength: where one test in two sees a lift."""
+WEAK = 0.25
+"""Of the expected strength: where most tests along a lift alone see one, and hardly any along all."""
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,7 @@ def looked() -> tuple[NullModel, Reference]:
 def test_a_suspected_effect_is_seen_where_it_is_weaker_and_its_opposite_never(
     null: NullModel, reference: Reference
 ) -> None:
-    """Twenty experiments: as often as along all 39 columns or oftener, and five times more in all."""
+    """Twenty experiments, five of which or more are seen by the one and not by the other."""
     alone, opposite = reference.along(LIFT, 1), reference.along(LIFT, -1)
     counted = {"all": 0, "alone": 0, "opposite": 0}
     for seed in range(20):
@@ -100,10 +101,10 @@ def test_an_effect_that_acts_moves_evidence_as_it_does_statistics(looked: tuple[
 
 def test_pulls_have_the_sign_of_the_coefficient_and_the_size_of_the_drop(null: NullModel) -> None:
     for strength in (1.0, -1.0):
-        data = seen(null, {"vertical-wind.inclination": strength})
+        data = seen(null, {"lift.coefficient": strength})
         pulls = data.pulls()
         np.testing.assert_allclose(pulls**2, data.drops(), rtol=1e-12)
-        assert np.sign(pulls[WIND]) == np.sign(data.fit([WIND]).of(WIND)[0]) == strength
+        assert np.sign(pulls[LIFT]) == np.sign(data.fit([LIFT]).of(LIFT)[0]) == strength
 
 
 def test_power_is_that_of_what_is_tested_for(null: NullModel, reference: Reference) -> None:
@@ -112,7 +113,7 @@ def test_power_is_that_of_what_is_tested_for(null: NullModel, reference: Referen
     assert all(0 <= share <= 1 for _, share in every_one)
     ((move, alone),) = reference.along(LIFT, 1).power(LEVEL)
     assert (move.name, move.sign) == ("lift.coefficient", 1)
-    assert alone >= dict((own.name, share) for own, share in every_one)["lift.coefficient"]
+    assert alone >= {own.name: share for own, share in every_one}["lift.coefficient"]
     ((down, _),) = reference.along(WIND, -1).power(LEVEL)
     assert down.strength == -next(one.expected for one in on_markers() if one.name == "vertical-wind.inclination")
     assert reference.power(1 / 60) == ()
@@ -123,19 +124,20 @@ def test_power_is_that_of_what_is_tested_for(null: NullModel, reference: Referen
 def test_a_base_model_that_is_not_rejected_is_undecided_where_little_would_have_been_seen(
     null: NullModel, reference: Reference
 ) -> None:
-    data = seen(null, {}, seed=4)
-    plain = judge(data, reference, level=LEVEL)
-    assert plain.p_value > 2 * LEVEL
-    assert np.mean([share for _, share in plain.power]) > 0.3
-    assert (plain.conclusion, plain.open) == (Conclusion.SUFFICIENT, ())
-    strict = judge(data, reference, level=1 / 50)
-    assert np.mean([share for _, share in strict.power]) < 0.3
-    assert strict.conclusion is Conclusion.UNDECIDED
-    assert "with a chance of" in strict.open[-1]
+    quiet = max((seen(null, {}, seed=seed) for seed in range(8)), key=lambda own: -reference.farthest(own, names()))
+    concluded = set()
+    for level in (0.05, 0.4):
+        found = judge(quiet, reference, level=level)
+        assert found.p_value > 2 * level
+        enough = float(np.mean([share for _, share in found.power])) >= CRITERIA.least_power
+        assert found.conclusion is (Conclusion.SUFFICIENT if enough else Conclusion.UNDECIDED)
+        assert ("with a chance of" in "".join(found.open)) is not enough
+        concluded.add(found.conclusion)
+    assert len(concluded) == 2
 
 
 def test_p_near_the_level_is_undecided(null: NullModel, reference: Reference) -> None:
-    near = [seen(null, {}, seed=seed) for seed in range(60)]
+    near = [seen(null, {"lift.coefficient": WEAK}, seed=seed) for seed in range(30)]
     found = [judge(data, reference, level=LEVEL) for data in near]
     close = [own for own in found if LEVEL < own.p_value <= 2 * LEVEL]
     assert close
