@@ -19,6 +19,7 @@ from measure.closing.close import close_loop
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.regressors import columns, fields
 from measure.forecasting.setting import Design, Setting
+from measure.forecasting.strengths import Suspicion, on_markers
 from measure.inference.evidence import Fit
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop import run
@@ -129,6 +130,16 @@ def test_a_null_needs_no_effect(plain: Experiment, bank: Path) -> None:
     assert verdict.conclusion in NOT_REJECTED
     assert not verdict.named
     assert not verdict.comparisons
+    assert [one.share for one in verdict.power] == sorted((one.share for one in verdict.power), reverse=True)
+    assert len(verdict.power) == len(on_markers())
+
+
+def test_a_suspicion_is_tested_alone_and_said_to_have_been_stated_before(plain: Experiment, bank: Path) -> None:
+    suspicion = Suspicion.parse("lift", on_markers())
+    verdict = close_loop(plain, Options(bank=bank, level=0.1, suspected=suspicion))
+    assert (verdict.test.suspected, verdict.conclusion in NOT_REJECTED) == ("lift+", True)
+    assert [one.effect for one in verdict.power] == ["lift"]
+    assert "along lift+ alone, suspected before the recordings were looked at" in " ".join(words(verdict).split())
 
 
 def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Verdict) -> None:
