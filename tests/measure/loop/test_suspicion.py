@@ -137,7 +137,7 @@ def test_a_base_model_that_is_not_rejected_is_undecided_where_little_would_have_
 
 
 def test_p_near_the_level_is_undecided(null: NullModel, reference: Reference) -> None:
-    near = [seen(null, {"lift.coefficient": WEAK}, seed=seed) for seed in range(30)]
+    near = [seen(null, {"lift.coefficient": share}, seed=seed) for share in (0.3, 0.33) for seed in range(12)]
     found = [judge(data, reference, level=LEVEL) for data in near]
     close = [own for own in found if LEVEL < own.p_value <= 2 * LEVEL]
     assert close

@@ -21,6 +21,7 @@ METHOD = {
     "forecasting/model": {"_SHARE"},
     "forecasting/observer": {"WIDEST", "_JOINT"},
     "forecasting/regressors": {"_MODES", "_MOTIONS"},
+    "forecasting/strengths": {"_RANGES", "_SLACK"},
     "forecasting/segments": {"HORIZON", "_SEGMENT", "_SHORTEST", "_WARM_UP"},
     "probes/course": {"ALONG", "LEFT", "_WINDOW"},
     "probes/lines": {"REDUCED", "STROUHAL", "_POINTS", "_NEAR", "_EDGE"},
@@ -33,7 +34,8 @@ METHOD = {
     "nulls/conformal": {"MOST_KINDS"},
     "nulls/free_run": {"_COPIES"},
     "nulls/stiffness": {"_STRETCHING", "_APART"},
-    "nulls/reference": {"_GROUPS", "_NOTHING"},
+    "nulls/directions": {"APPEARS", "NOTHING"},
+    "nulls/reference": {"_GROUPS"},
     "nulls/simulation": {
         "SETTLE",
         "_FINER",
