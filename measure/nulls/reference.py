@@ -21,6 +21,7 @@ from measure.inference.growth import power
 from measure.inference.random_effect import NullModel, Nulls
 from measure.nulls.conformal import GroupedConformal, kinds_needed
 from measure.nulls.directions import APPEARS, NOTHING, Move, directed, moves, pulled, shares_of, standardised
+from measure.nulls.tails import as_normal, freedom
 from measure.probes.lines import Line, Lines, strongest
 from measure.probes.rows import Rows
 from measure.verdict.criteria import CRITERIA
@@ -220,6 +221,7 @@ class _Usual:
     width: Floats
     lines: Lines | None
     powers: Floats
+    degrees: Floats
     pull: Floats
     pull_width: Floats
 
@@ -234,6 +236,7 @@ class _Usual:
             centre=roots.mean(axis=0),
             width=np.maximum(roots.std(axis=0), np.cbrt(NOTHING)),
             lines=lines,
+            degrees=freedom(roots),
             pull=found.pulls.mean(axis=0),
             pull_width=found.pulls.std(axis=0),
         )
@@ -243,8 +246,8 @@ class _Usual:
         return standardised(pulls, self.pull, self.pull_width)
 
     def far(self, found: _Found) -> Floats:
-        """(group, column + 2 to 11) how far groups are from their mean, in their standard deviations."""
-        far = (_roots(found, self.lines, self.powers) - self.centre) / self.width
+        """(group, column + 2 to 11) how far groups are from their mean, in deviations by each one's own tail."""
+        far = as_normal((_roots(found, self.lines, self.powers) - self.centre) / self.width, self.degrees)
         begin = found.shares.shape[1] + 2
         either = slice(begin, begin + found.swings.shape[1] + found.settled.shape[1])
         far[:, either] = np.abs(far[:, either])
@@ -268,7 +271,8 @@ class Reference:
 
     Some columns are near their mean in all nulls, others are far from it in some. The tests compare how far from the
     nulls' mean each cube root is, in their standard deviations: that of a variable like χ², of whatever freedom, is
-    nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left,
+    nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931); one whose tail is heavier is brought to
+    the normal deviate that is as rare (see `tails`). With the columns they weigh what is left,
     the same of moments about the pole, and the most prominent line of the errors' spectra, where these are looked at.
     What the calibrated parameters and the directions of the numerics take in of an effect shows on winds that they were
     not fitted to: so they weigh the best held-out gain as well.
@@ -290,6 +294,7 @@ class Reference:
         deviations: (group, theta) of the calibrated parameters from those that the nulls were simulated with, in
             standard errors as Σ has them.
         centre, width: (column + 2 to 11,) mean and standard deviation of the same, of nulls as noisy as the data.
+        degrees: (column + 2 to 11,) of freedom of their tails, see `measure.nulls.tails`.
         lines: of the nulls; None where spectra are not looked at.
         powers: (part,) of the damping by which swings grow.
         damping: of the data, the logarithm of its ratio to the nominal one.
@@ -310,6 +315,7 @@ class Reference:
     deviations: Floats
     centre: Floats
     width: Floats
+    degrees: Floats
     pulled: Floats
     pull: Floats
     pull_width: Floats
@@ -357,7 +363,7 @@ class Reference:
             near = np.abs(found.noise - found.noise[own][0]) <= CRITERIA.alike_noise
             if len(np.unique(kinds[near & ~own])) >= CRITERIA.fewest_kinds:  # else no others have such noise
                 near &= ~own
-            others = _Usual.of(found.select(near))
+            others = replace(_Usual.of(found.select(near)), degrees=usual.degrees)
             scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
             pulls[own] = others.pulled(found.pulls[own])
             apart[int(kind)] = others
@@ -369,6 +375,7 @@ class Reference:
             deviations=found.deviations,
             centre=usual.centre,
             width=usual.width,
+            degrees=usual.degrees,
             pulled=pulls,
             pull=usual.pull,
             pull_width=usual.pull_width,
@@ -502,7 +509,7 @@ class Reference:
         if len(self.centre[own]) != len(found):
             raise UsageError("courses of the data alone", where="reference", fix="look at them in the nulls as well")
         damped = found * np.exp(-self.damping * self.powers)
-        return float(np.abs((damped - self.centre[own]) / self.width[own]).max())
+        return float(np.abs(self._by_tail(damped, own)).max())
 
     def settles(self, evidence: Evidence) -> Floats | None:
         """(quantity,) how far each of data lies that recordings settle at; None where they are not looked at.
@@ -519,7 +526,7 @@ class Reference:
             raise UsageError(
                 "settled quantities of the data alone", where="reference", fix="look at them in the nulls as well"
             )
-        return np.abs((found - self.centre[own]) / self.width[own])
+        return np.abs(self._by_tail(found, own))
 
     def line(self, evidence: Evidence) -> Line | None:
         """The most prominent one of data; None where spectra are not looked at.
@@ -533,11 +540,16 @@ class Reference:
             raise UsageError(
                 "spectra of the nulls or of the data alone", where="reference", fix="look at lines in both or in none"
             )
-        return self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
+        line = self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
+        return replace(line, far=float(as_normal(np.array(line.far), self.degrees[-1])))
 
     def _far(self, values: Floats | float, columns: int | slice) -> Floats:
         """How far shares, what is left or the best gain lie, as `far` has it."""
-        return (np.cbrt(values) - self.centre[columns]) / self.width[columns]
+        return self._by_tail(np.cbrt(values), columns)
+
+    def _by_tail(self, values: Floats | float, columns: int | slice) -> Floats:
+        """The same of roots as they are."""
+        return as_normal((values - self.centre[columns]) / self.width[columns], self.degrees[columns])
 
 
 def _uncounted(columns: tuple[str, ...]) -> list[int]:

@@ -47,6 +47,7 @@ METHOD = {
         "_HALVINGS",
         "_GENTLE",
     },
+    "nulls/tails": {"_NORMAL"},
     "nulls/tracks": {"_TURN", "_WEIGHTS", "_HALVINGS"},
     "nulls/winds": {"_STEADY", "_EVERY"},
     "loop/gauss_newton": {"ROUNDS", "_FEW", "_HALVINGS", "STAYS", "_LONGEST", "_TRIED"},
