@@ -44,7 +44,7 @@ SECTIONS: dict[str, dict[str, str]] = {
         "simulations cache",
         "Markers and meshes": "recipe_path material density_uncertainty size pins rate unit up noise",
         "The wind beside markers": "winds axis north offset sensor zone accept",
-        "The test": "level nulls most_nulls bank seed workers",
+        "The test": "level suspect nulls most_nulls bank seed workers",
     },
 }
 """Command → title of a section → the parameters in it. Options that no section names come last."""

@@ -104,6 +104,8 @@ def answer_of(
         "nulls": None if options.bank is not None else [options.nulls, options.most_nulls],
         "bank": bank,
     }
+    if options.suspected is not None:  # results that were kept before keep their identity
+        recipe["suspected"] = options.suspected.words
     return Answer(
         name=name,
         verdict=verdict,

@@ -98,6 +98,12 @@ _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "
 @film_options
 @null_options(level="Significance level of the global test; 0.05 by default.")
 @click.option(
+    "--suspect",
+    metavar="EFFECT[+|-]",
+    help="An effect that was suspected before the recordings were looked at, as in lift or vertical-wind-; it alone "
+    "is tested for, in that direction, and seen where it is weaker.",
+)
+@click.option(
     "--most-nulls",
     type=click.IntRange(min=1),
     default=320,
@@ -143,6 +149,7 @@ def close_loop(
     up: str,
     noise: float | None,
     nulls: int | None,
+    suspect: str | None,
     most_nulls: int,
     bank: Path | None,
     level: float | None,
@@ -179,6 +186,7 @@ def close_loop(
     from measure.closing.output import FILES, JOINT, KINDS, deliver, deliver_joint
     from measure.closing.sources import Reading, read
     from measure.films.sources import films_among
+    from measure.forecasting.strengths import Suspicion, on_markers
     from measure.loop.run import Options
     from measure.nulls.workload import of_recordings
     from measure.observe import Setup, observe
@@ -218,6 +226,7 @@ def close_loop(
             bank=bank,
             most_nulls=most_nulls,
             workers=workers or len(os.sched_getaffinity(0)),
+            suspected=None if suspect is None else Suspicion.parse(suspect, on_markers()),
             **said,
         )
         setup = _setup(Setup() if recipe is None else recipe.setup, material, density_uncertainty, size, pins)
@@ -265,6 +274,7 @@ def close_loop(
             material=material,
             level=level,
             nulls=nulls,
+            suspect=suspect,
             seed=seed,
             workers=workers,
         )

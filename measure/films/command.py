@@ -28,9 +28,10 @@ from measure.estimate.source import Reading, box_of
 from measure.films.artifacts import answer_of
 from measure.films.command_line import Given
 from measure.films.design import PAIRS, TOGETHER, lasting
-from measure.films.library import Suspicion, weighable
+from measure.films.library import weighable
 from measure.films.models import models
 from measure.films.run import Options, solve, verdict_of
+from measure.forecasting.strengths import Suspicion
 from measure.verdict.criteria import CRITERIA
 
 _FEW, _MANY = 64, 128
@@ -50,6 +51,7 @@ def close_films(
     material: str | None,
     level: float | None,
     nulls: int | None,
+    suspect: str | None,
     seed: int,
     workers: int | None,
 ) -> Answer:
@@ -58,6 +60,7 @@ def close_films(
     Args:
         material: what the flag is made of; None for any fabric.
         nulls: kinds of numerics.
+        suspect: an effect that was suspected before the recordings were looked at, with its sign.
 
     Raises:
         FlagdataError: sources that cannot be judged; nothing is written then.
@@ -84,7 +87,7 @@ def close_films(
         area_weight=None if given.area_weight is None else weight(given.area_weight),
         level=CRITERIA.level if level is None else level,
         kinds=CRITERIA.film_kinds if nulls is None else nulls,
-        suspected=None if given.suspect is None else Suspicion.parse(given.suspect, flag),
+        suspected=None if suspect is None else Suspicion.parse(suspect, weighable(flag)),
     )
     reading = Reading(crop=box_of(given.crop), flag=given.flag, aspect=size.aspect)
     opened = Sources.open(

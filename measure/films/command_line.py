@@ -33,7 +33,6 @@ OF_FILMS = (
     "cache",
     "log",
     "clock_offset",
-    "suspect",
 )
 OF_MARKERS = (
     "recipe_path",
@@ -58,7 +57,7 @@ OF_MARKERS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Given:
-    """What the command line says of films; see `flagdata calibrate` for all but `area_weight` and `suspect`."""
+    """What the command line says of films; see `flagdata calibrate` for all but `area_weight`."""
 
     flag_size: str | None
     attachment: str
@@ -74,7 +73,6 @@ class Given:
     cache: Path | None
     log: str | None
     clock_offset: Stated | None
-    suspect: str | None
 
 
 def film_options(command: _Command) -> _Command:
@@ -150,12 +148,6 @@ def film_options(command: _Command) -> _Command:
             type=LocalPath(),
             metavar="FOLDER",
             help="Of films: where simulations are kept; by default the user's cache folder.",
-        ),
-        click.option(
-            "--suspect",
-            metavar="EFFECT[+|-]",
-            help="Of films: an effect that was suspected before they were looked at, as in lift or "
-            "vertical-wind-; it alone is tested for, in that direction, and seen where it is weaker.",
         ),
     )
 

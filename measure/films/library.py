@@ -1,41 +1,21 @@
-"""Which effects of the library are weighed on a film, and how strong they may be.
-
-The strengths are a prior: log-uniform where an effect has one sign, from what a minute of film hardly shows to beyond
-what is expected in the field; uniform where it has two. They were fixed before any verdict on a film was made,
-that of `finite-span-loading` later, from its prior, before any was made with it.
-Not weighed: a wind that is turned from its log, which a film cannot separate from the view's azimuth; internal damping,
-which is calibrated; gusts, since turbulence beyond the log is drawn for all simulations.
-"""
+"""Which effects of the library are weighed on a film, and how strong they may be."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
 
-from flagdata.errors import UnknownNameError, UsageError
 from flagdata.tables import Range, Scale
 from measure.calibrate.prior import Uncertain
 from measure.calibrate.simulation import Flag
-from measure.forecasting.regressors import EffectColumn, library
+from measure.forecasting.strengths import Strengths, every
+
+_HOIST = "full-hoist.stiffness"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Weighable:
-    """An effect with the strengths that it may have.
-
-    Attributes:
-        column: which strength of which effect.
-        low, high: of the strength beyond its null value, in its unit.
-    """
-
-    column: EffectColumn
-    low: float
-    high: float
-
-    @property
-    def name(self) -> str:
-        """effect.parameter."""
-        return self.column.name
+class Weighable(Strengths):
+    """An effect with the prior of its strength."""
 
     @cached_property
     def prior(self) -> Uncertain:
@@ -49,85 +29,10 @@ class Weighable:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Suspicion:
-    """An effect that is suspected before recordings are looked at.
-
-    Attributes:
-        name: effect.parameter.
-        sign: 1 for more of it, −1 for less.
-        words: as the user gave it, with the sign.
-    """
-
-    name: str
-    sign: int
-    words: str
-
-    @classmethod
-    def parse(cls, text: str, flag: Flag) -> Suspicion:
-        """From `lift`, `vertical-wind-` or `tilted-pole.lean+`.
-
-        Raises:
-            UnknownNameError: no effect that is weighed for the flag.
-            UsageError: an effect of several strengths, or of two signs without one, or one that has no such sign.
-        """
-        sign = {"+": 1, "-": -1}.get(text[-1:], 0)
-        wanted = text[:-1] if sign else text
-        weighed = {one.name: one for one in weighable(flag)}
-        found = [own for name, own in weighed.items() if wanted in (name, own.column.effect)]
-        if not found:
-            effects = dict.fromkeys(own.column.effect for own in weighed.values())
-            raise UnknownNameError.of("effect", wanted, [*effects, *weighed], where=WHERE)
-        if len(found) > 1:
-            each = " or ".join(one.name for one in found)
-            raise UsageError(f"{wanted} has several strengths", where=WHERE, fix=f"suspect one of them: {each}")
-        (one,) = found
-        if one.low > 0 and sign < 0:
-            raise UsageError(f"{wanted} cannot be less than none", where=WHERE, fix=f"give {wanted} without the sign")
-        if one.low < 0 and not sign:
-            raise UsageError(
-                f"{wanted} may be above or below {one.column.described.null:g}",
-                where=WHERE,
-                fix=f"give the sign that is suspected, {wanted}+ or {wanted}-",
-            )
-        sign = sign or 1
-        return cls(name=one.name, sign=sign, words=f"{wanted}{'+' if sign > 0 else '-'}")
-
-
-WHERE = "--suspect"
-"""Where a suspicion is given."""
-_RANGES: dict[str, tuple[float, float]] = {
-    "power-law-drag.exponent": (-0.5, 0.8),
-    "tangential-linear-drag.coefficient": (0.03, 1.5),
-    "tangential-quadratic-drag.coefficient": (0.006, 0.3),
-    "lift.coefficient": (0.3, 8.0),
-    "added-mass.mass": (0.03, 0.6),
-    "reactive-loading.mass": (0.03, 0.6),
-    "air-density.change": (-0.4, 0.8),
-    "permeability.permeability": (1e-3, 5e-2),
-    "hem-mass.line_density": (4e-3, 8e-2),
-    "hem-stiffness.ratio": (3.0, 60.0),
-    "vertical-wind.inclination": (-0.4, 0.4),
-    "shear.exponent": (-0.3, 0.8),
-    "pole-wake.share": (0.2, 1.5),
-    "hysteresis.couple": (5e-5, 2e-3),
-    "rest-curvature.curvature": (-6.0, 6.0),
-    "full-hoist.stiffness": (30.0, 2e4),
-    "tilted-pole.lean": (-0.4, 0.6),
-    "tilted-pole.sway": (-0.25, 0.25),
-    "wet-mass.uptake": (0.05, 1.0),
-    "slack.length": (0.01, 0.15),
-    "finite-span-loading.share": (0.05, 1.2),
-}
-_SLACK = EffectColumn(effect="slack", parameter="length", step=0.02)
-_HOIST = "full-hoist.stiffness"
-
-
 def weighable(flag: Flag) -> tuple[Weighable, ...]:
     """The effects that are weighed for a flag: one that is held along its hoist cannot be held more."""
-    columns = {column.name: column for column in (*library(), _SLACK)}
     return tuple(
-        Weighable(column=columns[name], low=low, high=high)
-        for name, (low, high) in _RANGES.items()
-        if flag.attachment == "corners" or name != _HOIST
+        Weighable(column=one.column, low=one.low, high=one.high)
+        for one in every()
+        if flag.attachment == "corners" or one.name != _HOIST
     )

@@ -42,8 +42,6 @@ def page(verdict: Verdict, outcome: Outcome) -> str:
         "level": level_of(verdict),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
         "null": figures.null_distribution(verdict.test),
-        "power": sentences.power_mean(verdict),
-        "shares": sorted(verdict.power, key=lambda one: -one.share),
         "whole": outcome.judged.scored.whole,
         "title": lambda c: sentences.candidate_title(verdict, c),
         "recordings": [

@@ -29,7 +29,7 @@ from measure.ends import Bound, span
 from measure.films.departures import Departure, departures, root_mean_square
 from measure.films.evidence import Fit, Sight, quantiles
 from measure.films.judge import Judged, judge
-from measure.films.library import Suspicion, Weighable, weighable
+from measure.films.library import Weighable, weighable
 from measure.films.score_test import score
 from measure.films.sensitivity import SEEN, sensitivity
 from measure.films.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, shown_by
@@ -37,6 +37,7 @@ from measure.films.statement import stated
 from measure.films.unseen import compared
 from measure.films.weigh import Weighing, directions, expected, fitted, hypothesis, misfits, weigh
 from measure.forecasting.setting import Stage
+from measure.forecasting.strengths import Suspicion
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.record import Candidate, Estimate, NullTest, Parameter, Power, Verdict

@@ -11,8 +11,9 @@ from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.calibrate.prior import Floats
 from measure.films.evidence import Experiments, Fit, Hypothesis, Sight
-from measure.films.library import Suspicion, Weighable
+from measure.films.library import Weighable
 from measure.films.score_test import Directions
+from measure.forecasting.strengths import Suspicion
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

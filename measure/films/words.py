@@ -42,6 +42,8 @@ def error_text(comparison: Comparison, after: str) -> str:
 
 def _items(verdict: Verdict) -> Iterator[tuple[str, str]]:
     yield "", sentences.heading(verdict)
+    if power := sentences.power_mean(verdict):
+        yield "", f"{power}."
     yield "", verdict.words
     yield "test", " ".join([sentences.test_sentence(verdict), sentences.test_remark(verdict.test)]).strip()
     if power := sentences.power_text(verdict):

@@ -183,14 +183,28 @@ class Evidence(Rows):
 
     def drops(self, beside: Chosen = ()) -> Floats:
         """(column,) how much each column, added to the nuisances and to some more, lowers the squared distance."""
+        return np.square(self.pulls(beside))
+
+    def pulls(self, beside: Chosen = ()) -> Floats:
+        """(column,) the roots of `drops`, each with the sign of the column's coefficient."""
         active = [*self.nuisance, *beside]
         curvature, score, _ = self._total()
         solved = np.linalg.solve(curvature[np.ix_(active, active)], np.c_[curvature[active], score[active]])
         own = np.diag(curvature) - np.einsum("ai,ai->i", curvature[active], solved[:, :-1])
         slope = score - curvature[active].T @ solved[:, -1]
-        drops = slope**2 / np.maximum(own, np.maximum(1e-9 * np.diag(curvature), np.finfo(np.float64).tiny))
-        drops[active] = 0.0
-        return drops[: self.columns]
+        pulls = slope / np.sqrt(np.maximum(own, np.maximum(1e-9 * np.diag(curvature), _TINY)))
+        pulls[active] = 0.0
+        return pulls[: self.columns]
+
+    def moved(self, column: int, coefficient: float) -> Evidence:
+        """What it would be if a column acted with a coefficient as well: r and moments move by their response."""
+        along = self.curvature[:, :, column]
+        return replace(
+            self,
+            score=self.score + coefficient * along,
+            energy=self.energy + 2 * coefficient * self.score[:, column] + coefficient**2 * along[:, column],
+            turning=None if self.turning is None else self.turning.moved(column, coefficient),
+        )
 
     def with_one_more(self, active: Chosen, columns: Chosen) -> tuple[Floats, Floats, Floats]:
         """How a fit of some columns moves with one more, for each of others: (column,) its coefficients, (all, column)

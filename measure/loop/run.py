@@ -16,13 +16,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.errors import UsageError
+from flagdata.errors import InputError, UsageError
 from flagdata.provenance import code_version
 from flagdata.rng import child_seed
 from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.model import Model
-from measure.forecasting.regressors import columns, names
+from measure.forecasting.regressors import EffectColumn, columns, names
 from measure.forecasting.setting import Setting, Stage
+from measure.forecasting.strengths import WHERE, Suspicion
 from measure.inference.evidence import Evidence, Fit
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.corrective_field import Mode, corrective_field
@@ -56,7 +57,7 @@ from measure.probes.statistics import Projection, Statistics, projected
 from measure.probes.wind_log import lags
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
-from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
+from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Power, Verdict
 
 Floats = NDArray[np.float64]
 _FLOOR_COPIES = 4
@@ -70,12 +71,15 @@ class Options(plan.NullOptions):
 
     Attributes:
         most_nulls: up to so many are simulated where p is near the level; without effect where a bank is given.
+        suspected: the effect with its sign that was suspected before the recordings were looked at, along which alone
+            is tested; None to test along all.
 
     Raises:
         UsageError: values that make no sense, or a level that so many nulls cannot test.
     """
 
     most_nulls: int = 2 * plan.FEWEST_NULLS
+    suspected: Suspicion | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -133,7 +137,7 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
         setting = setting.moved(late)
         found, projection = _looked_at(setting)
     report("sensitivities", 1, 1)
-    nominal = setting
+    nominal, suspected = setting, _suspected(found, options.suspected)
 
     def tested(nulls: int) -> tuple[Setting, Fits, NullBank, Reference]:
         bank = plan.bank_for(nominal, options, nulls=nulls, stage=report)
@@ -144,7 +148,8 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
         fitted, fits = _calibrated(nominal, _fits(nominal, found, projection, bank), bank)
         fits = _settling(fitted, fits, options.seed)
         report("base model", 1, 1)
-        return fitted, fits, bank, reference.at(fitted.calibration)
+        reference = reference.at(fitted.calibration)
+        return fitted, fits, bank, reference if suspected is None else reference.along(*suspected)
 
     nulls = plan.first_round(options)
     setting, fits, bank, reference = tested(nulls)
@@ -171,10 +176,26 @@ def _more(options: Options, nulls: int, reference: Reference, evidence: Evidence
     """How many nulls to go on with after so many; None where those decide, or are given as a bank."""
     if options.bank is not None:
         return None
-    statistic = reference.farthest(evidence, names())
-    return plan.more_nulls(
-        nulls, options.nulls, options.most_nulls, reference.conformal, statistic, level=options.level
-    )
+    statistic = reference.tested(evidence, names())
+    return plan.more_nulls(nulls, options.nulls, options.most_nulls, reference.test, statistic, level=options.level)
+
+
+def _suspected(found: Statistics, suspected: Suspicion | None) -> tuple[int, int] | None:
+    """Column and sign of an effect that is suspected; None where none is.
+
+    Raises:
+        InputError: the cloth cannot have it as it is held, or in its wind.
+    """
+    if suspected is None:
+        return None
+    place = names().index(suspected.name)
+    if not found.response[:, place, place].any():
+        raise InputError(
+            f"{suspected.name} moves nothing of this cloth as it is held and in its wind",
+            where=WHERE,
+            fix="suspect another effect, or leave it out",
+        )
+    return place, suspected.sign
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -362,6 +383,8 @@ def _outcome(
             *_direction(judgement),
         ),
         ranking=_ranking(solved, larger),
+        power=_power(judgement),
+        open=judgement.open,
         comparisons=trial.comparisons,
         apart=trial.control,
         residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
@@ -401,7 +424,7 @@ def _direction(judgement: Judgement) -> tuple[Parameter, ...]:
 
 def _test(solved: Solved, bank: NullBank, options: Options) -> NullTest:
     """The global test of the base model, and whether other nulls could decide it otherwise."""
-    conformal, judgement = solved.reference.conformal, solved.judgement
+    conformal, judgement = solved.reference.test, solved.judgement
     low, high = conformal.interval(judgement.statistic, level=CRITERIA.interval)
     undecided = low <= options.level <= high and conformal.tests(options.level)
     more = conformal.settling(judgement.statistic, at=options.level, level=CRITERIA.interval) if undecided else None
@@ -415,6 +438,22 @@ def _test(solved: Solved, bank: NullBank, options: Options) -> NullTest:
         nulls=bank.words,
         open=undecided,
         settling=more,
+        suspected="" if options.suspected is None else options.suspected.words,
+    )
+
+
+def _power(judgement: Judgement) -> tuple[Power, ...]:
+    """Of each effect that was tested for, the surest first."""
+    known = {column.name: column for column in columns() if isinstance(column, EffectColumn)}
+    return tuple(
+        Power(
+            effect=known[move.name].effect,
+            parameter=known[move.name].parameter,
+            strength=move.strength,
+            unit=known[move.name].unit,
+            share=share,
+        )
+        for move, share in sorted(judgement.power, key=lambda own: -own[1])
     )
 
 

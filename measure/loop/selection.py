@@ -23,10 +23,12 @@ from measure.inference.fluctuation import fluctuation, fluctuation_gains
 from measure.loop.refit import Refit
 from measure.loop.set_up import HOIST, SetUp, beyond_tolerance, turned
 from measure.loop.validation import total_error
+from measure.nulls.directions import Move
 from measure.nulls.reference import GUSTS, Reference
 from measure.probes.course import ALONG, Variation
 from measure.probes.lines import Line
 from measure.verdict.criteria import CRITERIA
+from measure.verdict.decided import undecided
 from measure.verdict.quantity import number
 from measure.verdict.record import Candidate, Conclusion, Estimate
 from sim.effects import EFFECTS
@@ -93,6 +95,8 @@ class Judgement:
         direction: by how much the wind is turned from where its logs have it, counter-clockwise [rad]; None in still
             air.
         departed: columns of what the recordings show of the set-up against what was declared.
+        power: of each effect that is tested for, at its expected strength.
+        open: why the base model is neither rejected nor said to suffice, sentences; empty where it is.
     """
 
     conclusion: Conclusion
@@ -105,6 +109,8 @@ class Judgement:
     course: Variation | None = None
     direction: Estimate | None = None
     departed: tuple[int, ...] = ()
+    power: tuple[tuple[Move, float], ...] = ()
+    open: tuple[str, ...] = ()
 
 
 def judge(
@@ -125,8 +131,8 @@ def judge(
     """
     known = refits or {}
     statistics = reference.statistics(evidence, names())
-    statistic = reference.farthest(evidence, names())
-    p_value = reference.conformal.p(statistic)
+    statistic = reference.tested(evidence, names())
+    p_value, power = reference.test.p(statistic), reference.power(level)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
     # Nothing is known along an effect that the cloth cannot have as it is held.
     effects = [(i, c) for i, c in effects if evidence.curvature[:, i, i].sum() > 0]
@@ -149,7 +155,9 @@ def judge(
     first = known.get((departed or ranking)[0].column)
     left = evidence if first is None else first.evidence
 
-    def judgement(conclusion: Conclusion, named: Sequence[Weighed], why: str = "") -> Judgement:
+    def judgement(
+        conclusion: Conclusion, named: Sequence[Weighed], why: str = "", reasons: tuple[str, ...] = ()
+    ) -> Judgement:
         taken = {w.column for w in named}
         reasoned = [
             replace(w, candidate=replace(w.candidate, why_not=_reason(ranking[0], w, why) * (w.column not in taken)))
@@ -166,9 +174,11 @@ def judge(
             course=_blown(left, reference, level),
             direction=direction,
             departed=tuple(w.column for w in departed),
+            power=power,
+            open=reasons,
         )
 
-    if not reference.conformal.tests(level):
+    if not reference.test.tests(level):
         return judgement(Conclusion.UNTESTED, (), "there are too few kinds of numerics to test the base model")
     if departed:
         rest = "the recordings show that the set-up is another than the declared one, and nothing else is needed"
@@ -184,7 +194,11 @@ def judge(
             return judgement(Conclusion.EFFECT, (*departed, second))
         return judgement(Conclusion.PARTLY, departed)
     if p_value > level:
-        return judgement(Conclusion.SUFFICIENT, (), "the base model is not rejected")
+        why, shares = "the base model is not rejected", [share for _, share in power]
+        reasons = undecided(p_value, level=level, departure=_departure(evidence, reference), power=shares)
+        return judgement(Conclusion.UNDECIDED if reasons else Conclusion.SUFFICIENT, (), why, reasons)
+    if reference.suspected is not None and not confident:
+        confident = [w for w in ranking if w.column == reference.suspected[0] and w.admissible]
     passing = [w for w in confident if w.passes(level)]
     if passing:
         return judgement(Conclusion.EFFECT if len(passing) == 1 else Conclusion.ONE_OF, passing)
@@ -196,6 +210,13 @@ def judge(
         ranking = [pulsating if w.column == GUST_COLUMN else w for w in ranking]
         return judgement(Conclusion.EFFECT if pulsating.candidate.leftover > level else Conclusion.PARTLY, [pulsating])
     return judgement(Conclusion.PARTLY, confident[:1]) if confident else judgement(Conclusion.OUTSIDE, ())
+
+
+def _departure(evidence: Evidence, reference: Reference) -> float:
+    """Root mean square departure of what recordings settle at from the base model run freely, in nulls' scatters; 0
+    where it is not looked at."""
+    settles = reference.settles(evidence)
+    return 0.0 if settles is None else float(np.sqrt(np.square(settles).mean()))
 
 
 def _within(weighed: Weighed, direction: Estimate, tolerance: float) -> Weighed:

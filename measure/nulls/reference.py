@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -20,6 +20,8 @@ from measure.inference.fluctuation import fluctuation
 from measure.inference.growth import power
 from measure.inference.random_effect import NullModel, Nulls
 from measure.nulls.conformal import GroupedConformal, kinds_needed
+from measure.nulls.directions import APPEARS, NOTHING, Move, directed, moves, pulled, shares_of, standardised
+from measure.nulls.tails import as_normal, freedom
 from measure.probes.lines import Line, Lines, strongest
 from measure.probes.rows import Rows
 from measure.verdict.criteria import CRITERIA
@@ -132,14 +134,25 @@ class NullBank:
         """
         plain: list[_Found] = []
         beside_gusts: list[_Found] = []
+        groups: list[_Group] = []
         for kept in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
             evidence = Evidence.of(kept.outside.statistics, kept.outside.speeds, kept.model.under(prior))
             for chosen in {tuple(sorted(group.tolist())): group for group in kept.groups}.values():
                 picked, own = evidence.select(chosen), kept.outside.select(chosen[:1])
                 plain.append(_Found.of(picked, self.columns, own))
                 beside_gusts.append(_Found.of(picked.freed(self.columns.index(GUSTS)), self.columns, own))
+            first = kept.groups[0]
+            groups.append(_Group(evidence=evidence.select(first), own=kept.outside.select(first[:1])))
         beside = Reference.of(_Found.joined(beside_gusts), noise)
-        return Reference.of(_Found.joined(plain), noise, beside_gusts=beside)
+        return Reference.of(_Found.joined(plain), noise, beside_gusts=beside, columns=self.columns, groups=groups)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Group:
+    """The evidence of one null group, by a null model without its kind, and one segment of it."""
+
+    evidence: Evidence
+    own: Nulls
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -148,6 +161,7 @@ class _Found(Rows):
 
     Attributes:
         shares: (group, column) of `unscaled`.
+        pulls: (group, column, part) of `pulled`.
         left: (group,) what the base model leaves.
         gained: (group,) best held-out gains.
         swings: (group, part) of the wind's course, of no part where it is not looked at.
@@ -160,6 +174,7 @@ class _Found(Rows):
     """
 
     shares: Floats
+    pulls: Floats
     left: Floats
     gained: Floats
     swings: Floats
@@ -184,6 +199,7 @@ class _Found(Rows):
         swing, settles = (np.zeros(0) if own is None else own for own in (evidence.swing, evidence.settles))
         return cls(
             shares=unscaled(evidence, columns)[None],
+            pulls=pulled(evidence)[None],
             left=np.array([evidence.fit(()).left]),
             gained=np.array([best_gain(evidence, without=_uncounted(columns))]),
             swings=swing[None],
@@ -205,6 +221,9 @@ class _Usual:
     width: Floats
     lines: Lines | None
     powers: Floats
+    degrees: Floats
+    pull: Floats
+    pull_width: Floats
 
     @classmethod
     def of(cls, found: _Found) -> _Usual:
@@ -213,15 +232,22 @@ class _Usual:
         roots = _roots(found, lines, powers)
         return cls(
             powers=powers,
-            spread=np.maximum(found.shares.mean(axis=0), _NOTHING),
+            spread=np.maximum(found.shares.mean(axis=0), NOTHING),
             centre=roots.mean(axis=0),
-            width=np.maximum(roots.std(axis=0), np.cbrt(_NOTHING)),
+            width=np.maximum(roots.std(axis=0), np.cbrt(NOTHING)),
             lines=lines,
+            degrees=freedom(roots),
+            pull=found.pulls.mean(axis=0),
+            pull_width=found.pulls.std(axis=0),
         )
 
+    def pulled(self, pulls: Floats) -> Floats:
+        """(group, column, part) how far each column pulls more than it does in nulls, in their standard deviations."""
+        return standardised(pulls, self.pull, self.pull_width)
+
     def far(self, found: _Found) -> Floats:
-        """(group, column + 2 to 11) how far groups are from their mean, in their standard deviations."""
-        far = (_roots(found, self.lines, self.powers) - self.centre) / self.width
+        """(group, column + 2 to 11) how far groups are from their mean, in deviations by each one's own tail."""
+        far = as_normal((_roots(found, self.lines, self.powers) - self.centre) / self.width, self.degrees)
         begin = found.shares.shape[1] + 2
         either = slice(begin, begin + found.swings.shape[1] + found.settled.shape[1])
         far[:, either] = np.abs(far[:, either])
@@ -245,7 +271,8 @@ class Reference:
 
     Some columns are near their mean in all nulls, others are far from it in some. The tests compare how far from the
     nulls' mean each cube root is, in their standard deviations: that of a variable like χ², of whatever freedom, is
-    nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931). With the columns they weigh what is left,
+    nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931); one whose tail is heavier is brought to
+    the normal deviate that is as rare (see `tails`). With the columns they weigh what is left,
     the same of moments about the pole, and the most prominent line of the errors' spectra, where these are looked at.
     What the calibrated parameters and the directions of the numerics take in of an effect shows on winds that they were
     not fitted to: so they weigh the best held-out gain as well.
@@ -267,10 +294,18 @@ class Reference:
         deviations: (group, theta) of the calibrated parameters from those that the nulls were simulated with, in
             standard errors as Σ has them.
         centre, width: (column + 2 to 11,) mean and standard deviation of the same, of nulls as noisy as the data.
+        degrees: (column + 2 to 11,) of freedom of their tails, see `measure.nulls.tails`.
         lines: of the nulls; None where spectra are not looked at.
         powers: (part,) of the damping by which swings grow.
         damping: of the data, the logarithm of its ratio to the nominal one.
+        pulled: (group, column, part) of `pulled`, standardised as `far` is.
+        pull, pull_width: (column, part) mean and standard deviation of the same, of nulls as noisy as the data.
         beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
+        columns: names of the columns; of one from a bank.
+        groups: one of each kind; of one from a bank.
+        usual: kind → what is usual in the other kinds' nulls.
+        suspected: column and sign of the effect that was suspected beforehand, along which alone is tested; None to
+            test along all.
     """
 
     scaled: Floats
@@ -280,14 +315,33 @@ class Reference:
     deviations: Floats
     centre: Floats
     width: Floats
+    degrees: Floats
+    pulled: Floats
+    pull: Floats
+    pull_width: Floats
     lines: Lines | None = None
     powers: Floats = field(default_factory=lambda: np.zeros(0))
     damping: float = 0.0
     beside_gusts: Reference | None = None
+    columns: tuple[str, ...] = ()
+    groups: tuple[_Group, ...] = ()
+    usual: Mapping[int, _Usual] = field(default_factory=dict)
+    suspected: tuple[int, int] | None = None
 
     @classmethod
-    def of(cls, found: _Found, noise: float, *, beside_gusts: Reference | None = None) -> Reference:
+    def of(
+        cls,
+        found: _Found,
+        noise: float,
+        *,
+        beside_gusts: Reference | None = None,
+        columns: tuple[str, ...] = (),
+        groups: Sequence[_Group] = (),
+    ) -> Reference:
         """For data of some noise [m].
+
+        Args:
+            groups: one of each kind.
 
         Raises:
             InputError: no nulls of such noise.
@@ -303,13 +357,16 @@ class Reference:
             )
         usual = _Usual.of(found.select(similar))
         scaled, far = np.empty_like(found.shares), np.empty((len(kinds), len(usual.centre)))
+        pulls, apart = np.empty_like(found.pulls), dict[int, _Usual]()
         for kind in np.unique(kinds):
             own = kinds == kind
             near = np.abs(found.noise - found.noise[own][0]) <= CRITERIA.alike_noise
             if len(np.unique(kinds[near & ~own])) >= CRITERIA.fewest_kinds:  # else no others have such noise
                 near &= ~own
-            others = _Usual.of(found.select(near))
+            others = replace(_Usual.of(found.select(near)), degrees=usual.degrees)
             scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
+            pulls[own] = others.pulled(found.pulls[own])
+            apart[int(kind)] = others
         return cls(
             scaled=scaled,
             spread=usual.spread,
@@ -318,9 +375,16 @@ class Reference:
             deviations=found.deviations,
             centre=usual.centre,
             width=usual.width,
+            degrees=usual.degrees,
+            pulled=pulls,
+            pull=usual.pull,
+            pull_width=usual.pull_width,
             lines=usual.lines,
             powers=usual.powers,
             beside_gusts=beside_gusts,
+            columns=columns,
+            groups=tuple(groups),
+            usual=apart,
         )
 
     def at(self, calibration: Calibration) -> Reference:
@@ -353,6 +417,52 @@ class Reference:
                 for own in self.deviations.T
             ]
         )
+
+    def along(self, column: int, sign: int) -> Reference:
+        """That tests along one effect alone, which was suspected beforehand."""
+        return replace(self, suspected=(column, sign))
+
+    @cached_property
+    def test(self) -> GroupedConformal:
+        """That of the base model: along all, or along the suspected effect."""
+        if self.suspected is None:
+            return self.conformal
+        return GroupedConformal(null=directed(self.pulled, *self.suspected), kinds=self.kinds)
+
+    def tested(self, evidence: Evidence, columns: tuple[str, ...]) -> float:
+        """The statistic of data that the base model is tested by."""
+        if self.suspected is None:
+            return self.farthest(evidence, columns)
+        return float(directed(standardised(pulled(evidence), self.pull, self.pull_width)[None], *self.suspected)[0])
+
+    def power(self, level: float) -> tuple[tuple[Move, float], ...]:
+        """Effects that are tested for, each with the share of nulls beyond the critical value once it acts on them at
+        its expected strength: on average of both signs, where it may have either, but of the suspected one alone."""
+        critical = self.test.critical(level)
+        if critical is None:
+            return ()
+        shares = {move: float((found > critical).mean()) for move, found in self._acting.items()}
+        each: dict[int, list[Move]] = {}
+        for move in shares:
+            each.setdefault(move.column, []).append(move)
+        return tuple((own[0], float(np.mean([shares[move] for move in own]))) for own in each.values())
+
+    @cached_property
+    def _acting(self) -> dict[Move, Floats]:
+        """Effects that are tested for → (group,) the statistic of nulls on which each acts, as far as appears."""
+        found: dict[Move, Floats] = {}
+        for move in moves(self.columns):
+            if self.suspected is None or (move.column, move.sign) == self.suspected:
+                acted = [own.evidence.moved(move.column, APPEARS * move.strength) for own in self.groups]
+                found[move] = np.array([self._found(one, own.own) for one, own in zip(acted, self.groups, strict=True)])
+        return found
+
+    def _found(self, evidence: Evidence, own: Nulls) -> float:
+        """The test's statistic of a null group."""
+        usual = self.usual[int(own.numerics[0])]
+        if self.suspected is None:
+            return float(usual.far(_Found.of(evidence, self.columns, own)).max())
+        return float(directed(usual.pulled(pulled(evidence)[None]), *self.suspected)[0])
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
         """(column,) of data, as `scaled` has them, where some columns are fitted already."""
@@ -399,7 +509,7 @@ class Reference:
         if len(self.centre[own]) != len(found):
             raise UsageError("courses of the data alone", where="reference", fix="look at them in the nulls as well")
         damped = found * np.exp(-self.damping * self.powers)
-        return float(np.abs((damped - self.centre[own]) / self.width[own]).max())
+        return float(np.abs(self._by_tail(damped, own)).max())
 
     def settles(self, evidence: Evidence) -> Floats | None:
         """(quantity,) how far each of data lies that recordings settle at; None where they are not looked at.
@@ -416,7 +526,7 @@ class Reference:
             raise UsageError(
                 "settled quantities of the data alone", where="reference", fix="look at them in the nulls as well"
             )
-        return np.abs((found - self.centre[own]) / self.width[own])
+        return np.abs(self._by_tail(found, own))
 
     def line(self, evidence: Evidence) -> Line | None:
         """The most prominent one of data; None where spectra are not looked at.
@@ -430,15 +540,16 @@ class Reference:
             raise UsageError(
                 "spectra of the nulls or of the data alone", where="reference", fix="look at lines in both or in none"
             )
-        return self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
+        line = self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
+        return replace(line, far=float(as_normal(np.array(line.far), self.degrees[-1])))
 
     def _far(self, values: Floats | float, columns: int | slice) -> Floats:
         """How far shares, what is left or the best gain lie, as `far` has it."""
-        return (np.cbrt(values) - self.centre[columns]) / self.width[columns]
+        return self._by_tail(np.cbrt(values), columns)
 
-
-_NOTHING = 1e-6
-"""Mean share below which a column is unobservable: that of the columns that are always fitted."""
+    def _by_tail(self, values: Floats | float, columns: int | slice) -> Floats:
+        """The same of roots as they are."""
+        return as_normal((values - self.centre[columns]) / self.width[columns], self.degrees[columns])
 
 
 def _uncounted(columns: tuple[str, ...]) -> list[int]:
@@ -456,12 +567,8 @@ def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int]
     """
     drops, left = evidence.drops(beside), evidence.fit(beside).left
     gusts = fluctuation(evidence, columns.index(GUSTS), beside).likelihood
-    found = np.append(_shares(drops, left), max(gusts, 0.0))
+    found = np.append(shares_of(drops, left), max(gusts, 0.0))
     if evidence.turning is None:
         return found
     drops, left = evidence.turning.drops(beside), evidence.turning.fit(beside).left
-    return np.concatenate([found, _shares(drops, left), [left]])
-
-
-def _shares(drops: Floats, left: float) -> Floats:
-    return drops / np.maximum(left - drops, 1e-9)
+    return np.concatenate([found, shares_of(drops, left), [left]])

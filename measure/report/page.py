@@ -94,6 +94,7 @@ def opening(verdict: Verdict) -> dict[str, Any]:
             *sentences.reduction_warnings(verdict),
             *(text for _, text in verdict.findings),
         ],
+        "power": sentences.power_mean(verdict),
         "glossary": GLOSSARY,
     }
 

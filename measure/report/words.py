@@ -35,9 +35,13 @@ def words(verdict: Verdict) -> str:
 
 def _parts(verdict: Verdict) -> Iterator[list[str]]:
     yield [sentences.heading(verdict)]
+    if power := sentences.power_mean(verdict):
+        yield _wrapped(f"{power}.")
     yield [*_wrapped(verdict.words), ""]
     remark = sentences.test_remark(verdict.test)
     yield _item("test", " ".join([sentences.test_sentence(verdict), remark]).strip())
+    if power := sentences.power_text(verdict):
+        yield _item("power", power)
     for candidate in sentences.named_candidates(verdict):
         yield _item(sentences.candidate_title(verdict, candidate), _weighed(candidate))
     for comparison in verdict.comparisons:

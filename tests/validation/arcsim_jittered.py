@@ -167,10 +167,10 @@ def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
 
 
 def _right(verdict: Verdict, truth: Truth) -> bool:
-    """Whether it names what acted, alone or as one of several, or nothing where nothing did. A parameter of the base
-    model that is not the nominal cloth's is no effect."""
+    """Whether it names what acted, alone or as one of several, or nothing where nothing did, whether
+    that is decided or not. A parameter of the base model that is not the nominal cloth's is no effect."""
     if not truth.effect:
-        return verdict.conclusion is Conclusion.SUFFICIENT
+        return verdict.conclusion in (Conclusion.SUFFICIENT, Conclusion.UNDECIDED)
     return verdict.conclusion in (Conclusion.EFFECT, Conclusion.ONE_OF) and truth.effect in verdict.named
 
 

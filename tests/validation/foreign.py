@@ -32,6 +32,7 @@ from measure.nulls import bank as banks
 from measure.observe import Observed
 from measure.observe.recipe import load, read
 from measure.shares import Share
+from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.record import Conclusion, Estimate
 from tests.validation.environments import MUJOCO
 from tests.validation.mujoco.experiments import NOISE, NOMINAL, NOTHING, SPEEDS, UNDECLARED, Truth, draw, write
@@ -154,8 +155,11 @@ def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str
 
 
 def grade(truth: Truth, said: Conclusion, named: Sequence[str]) -> str:
-    """right: the effect alone, or none where none acts; class: another of its class; among: one of several; wrong."""
+    """right: the effect alone, or none where none acts; class: another of its class; among: one of several; undecided:
+    nothing is decided; wrong."""
     effect, outside = truth.undeclared.effect, truth.undeclared is not NOTHING and truth.undeclared.damping is None
+    if said is Conclusion.UNDECIDED:
+        return "undecided"
     if not effect:
         right = {Conclusion.OUTSIDE, Conclusion.PARTLY} if outside else {Conclusion.SUFFICIENT}
         return "right" if said in right else "wrong"
@@ -189,6 +193,7 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "right": Share.of(row["grade"] == "right" for row in acting).as_dict(),
         "right_or_among": Share.of(row["grade"] in ("right", "among") for row in acting).as_dict(),
         "missed": Share.of(missed(row) for row in acting).as_dict(),
+        "undecided": Share.of(row["grade"] == "undecided" for row in judged).as_dict(),
         "wrong": Share.of(row["grade"] == "wrong" and not missed(row) for row in acting).as_dict(),
         "covered": {name: Share.of(own[name]["covers"] for own in intervals).as_dict() for name in _COVERED},
         "covered_of_nulls": {
@@ -198,8 +203,8 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def missed(row: Mapping[str, Any]) -> bool:
-    """Whether something acted and no effect is needed."""
-    return row["grade"] == "wrong" and row["said"] == Conclusion.SUFFICIENT.value
+    """Whether something acted and the base model is not rejected."""
+    return row["grade"] in ("wrong", "undecided") and row["said"] in [own.value for own in NOT_REJECTED]
 
 
 def page(found: Mapping[str, Any]) -> str:
@@ -216,6 +221,7 @@ def page(found: Mapping[str, Any]) -> str:
                 ("effects named rightly, or among several", "right_or_among"),
                 ("effects not detected", "missed"),
                 ("effects misnamed", "wrong"),
+                ("verdicts that are not decided", "undecided"),
             )
         ),
         *(_share(f"90 % intervals of {name} that cover", found["covered"][name]) for name in _COVERED),

@@ -78,6 +78,9 @@ def test_a_hem_weighs_its_line_density_times_the_circumference() -> None:
     [
         ("", Conclusion.SUFFICIENT, (), "right"),
         ("", Conclusion.OUTSIDE, (), "wrong"),
+        ("", Conclusion.UNDECIDED, (), "undecided"),
+        ("pressure", Conclusion.UNDECIDED, (), "undecided"),
+        ("magnus", Conclusion.UNDECIDED, (), "undecided"),
         ("pressure", Conclusion.EFFECT, ("air-density",), "right"),
         ("pressure", Conclusion.ONE_OF, ("lift", "air-density"), "among"),
         ("pressure", Conclusion.PARTLY, ("air-density",), "partly"),

@@ -15,9 +15,9 @@ from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
 from measure.calibrate.simulation import OBSERVED
 from measure.closing.command import close_loop
-from measure.films import library
 from measure.films.command import simulations_of
 from measure.films.sources import films_among
+from measure.forecasting import strengths
 from measure.loop.run import Options as LoopOptions
 from measure.observables.observable import WINDOW
 from measure.observe.trajectory import Experiment
@@ -47,8 +47,8 @@ def run(*arguments: str | Path) -> Result:
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three effects are weighed."""
-    kept = {name: own for name, own in library._RANGES.items() if name in EFFECTS}
-    monkeypatch.setattr(library, "_RANGES", kept)
+    kept = {name: own for name, own in strengths._RANGES.items() if name in EFFECTS}
+    monkeypatch.setattr(strengths, "_RANGES", kept)
 
 
 def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], few: None) -> None:

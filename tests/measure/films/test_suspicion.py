@@ -9,10 +9,11 @@ import pytest
 
 from flagdata.errors import UnknownNameError, UsageError
 from measure.calibrate.simulation import Flag
-from measure.films.library import Suspicion
+from measure.films.library import weighable
 from measure.films.page import page
 from measure.films.run import close_loop, solve, verdict_of
 from measure.films.words import words
+from measure.forecasting.strengths import Suspicion
 from measure.verdict.record import Conclusion
 from tests.measure.films.conftest import options, recording
 
@@ -30,7 +31,7 @@ FLAG = Flag(length=1.5, height=1.0)
     ],
 )
 def test_a_suspicion_is_an_effect_and_a_sign(text: str, name: str, sign: int, said: str) -> None:
-    assert Suspicion.parse(text, FLAG) == Suspicion(name=name, sign=sign, words=said)
+    assert Suspicion.parse(text, weighable(FLAG)) == Suspicion(name=name, sign=sign, words=said)
 
 
 @pytest.mark.parametrize(
@@ -46,15 +47,15 @@ def test_a_suspicion_is_an_effect_and_a_sign(text: str, name: str, sign: int, sa
 )
 def test_what_is_no_such_effect_is_refused_with_what_is(text: str, kind: type[UsageError], fix: str) -> None:
     with pytest.raises(kind) as refused:
-        Suspicion.parse(text, FLAG)
+        Suspicion.parse(text, weighable(FLAG))
     assert refused.value.where == "--suspect"
     assert fix in (refused.value.fix or "")
 
 
 def test_an_effect_that_a_flag_cannot_have_is_no_suspicion() -> None:
-    assert Suspicion.parse("full-hoist", FLAG).sign == 1
+    assert Suspicion.parse("full-hoist", weighable(FLAG)).sign == 1
     with pytest.raises(UnknownNameError):
-        Suspicion.parse("full-hoist", replace(FLAG, attachment="hoist"))
+        Suspicion.parse("full-hoist", weighable(replace(FLAG, attachment="hoist")))
 
 
 def test_it_is_tested_alone_and_the_page_and_the_words_say_that_it_was_stated_before(
@@ -63,7 +64,9 @@ def test_it_is_tested_alone_and_the_page_and_the_words_say_that_it_was_stated_be
     recordings = [recording(mean=mean, seed=6, effects={"lift.coefficient": 4.0}) for mean in (4.0, 6.5)]
     found = {}
     for text in ("lift", "tangential-linear-drag"):
-        outcome = solve(recordings, replace(options(), suspected=Suspicion.parse(text, FLAG)), folder=tmp_path)
+        outcome = solve(
+            recordings, replace(options(), suspected=Suspicion.parse(text, weighable(FLAG))), folder=tmp_path
+        )
         found[text] = verdict_of(outcome)
         for said in (" ".join(words(found[text]).split()), page(found[text], outcome)):
             assert f"along {text}+ alone, suspected before the recordings were looked at" in said

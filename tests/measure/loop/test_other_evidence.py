@@ -15,6 +15,7 @@ from measure.loop.selection import (
     judge,
 )
 from measure.nulls.reference import NullBank, Reference
+from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.record import Conclusion
 from tests.measure.loop.drawn_statistics import SEGMENTS, SHED, Acting, judged, made, named, pulses, seen, slow
 
@@ -27,8 +28,8 @@ def test_what_moments_alone_show_rejects_and_counts_in_what_an_effect_leaves() -
     def found(acting: Acting, moments: Acting) -> Judgement:
         return judge(seen(null, acting, moments=moments), reference, level=0.02)
 
-    assert found({}, {}).conclusion is Conclusion.SUFFICIENT
-    assert found({}, drag).conclusion is not Conclusion.SUFFICIENT
+    assert found({}, {}).conclusion in NOT_REJECTED
+    assert found({}, drag).conclusion not in NOT_REJECTED
     assert (found(lift, lift).conclusion, named(found(lift, lift))) == (Conclusion.EFFECT, list(lift))
     assert (found(lift, lift | drag).conclusion, named(found(lift, lift | drag))) == (Conclusion.PARTLY, list(lift))
 
@@ -76,8 +77,8 @@ def test_a_course_alone_rejects_the_base_model(blowing: tuple[NullModel, Referen
     calm, windy = (
         judge(seen(null, {}, course=c), reference, level=0.02) for c in (np.zeros((3 * SEGMENTS, 10, 3)), pulses(0.3))
     )
-    assert calm.conclusion is Conclusion.SUFFICIENT
-    assert windy.conclusion is not Conclusion.SUFFICIENT
+    assert calm.conclusion in NOT_REJECTED
+    assert windy.conclusion not in NOT_REJECTED
     assert windy.statistic > calm.statistic
 
 
@@ -117,7 +118,7 @@ def test_what_recordings_settle_at_rejects_alone_and_counts_in_what_is_left() ->
         evidence = seen(null, {})
         return judge(replace(evidence, settled=np.full((12, 2), [0.0, off])), reference, level=0.02)
 
-    assert found(0.05).conclusion is Conclusion.SUFFICIENT
+    assert found(0.05).conclusion in NOT_REJECTED
     # The mean of three recordings is 0.06 in nulls.
     assert found(-1.0).conclusion is Conclusion.OUTSIDE
     plain = judge(seen(null, {}), reference, level=0.02)

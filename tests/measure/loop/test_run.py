@@ -19,6 +19,7 @@ from measure.closing.close import close_loop
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.regressors import columns, fields
 from measure.forecasting.setting import Design, Setting
+from measure.forecasting.strengths import Suspicion, on_markers
 from measure.inference.evidence import Fit
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop import run
@@ -32,6 +33,7 @@ from measure.report.document import as_document, from_document
 from measure.report.lead import lead
 from measure.report.page import page
 from measure.report.words import words
+from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.quantity import number
 from measure.verdict.record import Conclusion, Verdict
 from sim.cloth import Cloth
@@ -125,13 +127,23 @@ def test_a_stored_bank_says_what_its_nulls_were_made_with(specimen: Specimen, ba
 
 def test_a_null_needs_no_effect(plain: Experiment, bank: Path) -> None:
     verdict = close_loop(plain, Options(bank=bank, level=0.1))
-    assert verdict.conclusion is Conclusion.SUFFICIENT
+    assert verdict.conclusion in NOT_REJECTED
     assert not verdict.named
     assert not verdict.comparisons
+    assert [one.share for one in verdict.power] == sorted((one.share for one in verdict.power), reverse=True)
+    assert len(verdict.power) == len(on_markers())
+
+
+def test_a_suspicion_is_tested_alone_and_said_to_have_been_stated_before(plain: Experiment, bank: Path) -> None:
+    suspicion = Suspicion.parse("lift", on_markers())
+    verdict = close_loop(plain, Options(bank=bank, level=0.1, suspected=suspicion))
+    assert (verdict.test.suspected, verdict.conclusion in NOT_REJECTED) == ("lift+", True)
+    assert [one.effect for one in verdict.power] == ["lift"]
+    assert "along lift+ alone, suspected before the recordings were looked at" in " ".join(words(verdict).split())
 
 
 def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Verdict) -> None:
-    assert dragged.conclusion is not Conclusion.SUFFICIENT
+    assert dragged.conclusion not in NOT_REJECTED
     assert dragged.named[:1] == ("tangential-linear-drag",)
     slow, fast, late = dragged.comparisons
     for comparison in (fast, late):

@@ -11,6 +11,7 @@ from measure.report import sentences
 from measure.report.lead import lead
 from measure.report.page import page
 from measure.report.sentences import error_warnings, heading, power_text
+from measure.report.words import words
 from measure.verdict.decided import NOT_REJECTED, erring, undecided
 from measure.verdict.record import Conclusion, Power, Verdict
 from tests.measure.report.verdicts import about, verdict
@@ -118,3 +119,25 @@ def test_a_suspicion_is_reported_as_stated_beforehand_and_flags_are_counted_as_w
     assert "it would be 0.34" in said
     assert counted.least == 1 / 153
     assert "suspected" not in sentences.test_sentence(whole)
+
+
+def test_the_power_stands_before_the_verdicts_sentence_and_in_a_table() -> None:
+    shown = (Power(effect="lift", parameter="coefficient", strength=2.3, unit="1", share=0.9),)
+    whole = replace(verdict(Conclusion.SUFFICIENT), power=shown)
+    said, html = words(whole), page(whole)
+    mean = "An effect of the strength that is expected of it would be seen with a chance of 0.90 on average."
+    for text, sentence in ((" ".join(said.split()), whole.words), (html, f"<h1>{lead(whole)}</h1>")):
+        assert 0 <= text.index(mean) < text.index(sentence)
+    assert "What would have been seen" in html
+    assert "lift (coefficient) 2.3 with 0.90" in " ".join(said.split())
+    without = verdict(Conclusion.SUFFICIENT)
+    assert "would be seen with a chance" not in words(without) + page(without)
+
+
+def test_a_page_of_markers_says_that_a_suspicion_was_stated_beforehand() -> None:
+    whole = verdict(Conclusion.EFFECT)
+    assert "stated beforehand" not in page(whole)
+    whole = replace(whole, test=replace(whole.test, suspected="lift+"))
+    for text in (page(whole), " ".join(words(whole).split())):
+        assert "along lift+ alone, suspected before the recordings were looked at" in text
+    assert "stated beforehand" in page(whole)

@@ -1,0 +1,135 @@
+"""How strong the library's effects may be, and an effect that is suspected before recordings are looked at.
+
+The strengths are a prior: log-uniform where an effect has one sign, from what a minute of film hardly shows to beyond
+what is expected in the field; uniform where it has two. They were fixed before any verdict on a film was made,
+that of `finite-span-loading` later, from its prior, before any was made with it. Verdicts on markers state their power
+at the same strengths.
+Not among them: a wind that is turned from its log, which has a tolerance of its own or looks like another view;
+internal damping, which is calibrated; gusts, whose course is looked at by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flagdata.errors import UnknownNameError, UsageError
+from measure.forecasting.regressors import EffectColumn, library
+
+WHERE = "--suspect"
+"""Where a suspicion is given."""
+_RANGES: dict[str, tuple[float, float]] = {
+    "power-law-drag.exponent": (-0.5, 0.8),
+    "tangential-linear-drag.coefficient": (0.03, 1.5),
+    "tangential-quadratic-drag.coefficient": (0.006, 0.3),
+    "lift.coefficient": (0.3, 8.0),
+    "added-mass.mass": (0.03, 0.6),
+    "reactive-loading.mass": (0.03, 0.6),
+    "air-density.change": (-0.4, 0.8),
+    "permeability.permeability": (1e-3, 5e-2),
+    "hem-mass.line_density": (4e-3, 8e-2),
+    "hem-stiffness.ratio": (3.0, 60.0),
+    "vertical-wind.inclination": (-0.4, 0.4),
+    "shear.exponent": (-0.3, 0.8),
+    "pole-wake.share": (0.2, 1.5),
+    "hysteresis.couple": (5e-5, 2e-3),
+    "rest-curvature.curvature": (-6.0, 6.0),
+    "full-hoist.stiffness": (30.0, 2e4),
+    "tilted-pole.lean": (-0.4, 0.6),
+    "tilted-pole.sway": (-0.25, 0.25),
+    "wet-mass.uptake": (0.05, 1.0),
+    "slack.length": (0.01, 0.15),
+    "finite-span-loading.share": (0.05, 1.2),
+}
+_SLACK = EffectColumn(effect="slack", parameter="length", step=0.02)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Strengths:
+    """An effect with the strengths that it may have.
+
+    Attributes:
+        column: which strength of which effect.
+        low, high: of the strength beyond its null value, in its unit.
+    """
+
+    column: EffectColumn
+    low: float
+    high: float
+
+    @property
+    def name(self) -> str:
+        """effect.parameter."""
+        return self.column.name
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """1 where it can only be stronger, 1 and −1 where it may have either sign."""
+        return (1,) if self.low > 0 else (1, -1)
+
+    @property
+    def expected(self) -> float:
+        """Mean size over the prior."""
+        if self.low > 0:
+            return (self.high - self.low) / math.log(self.high / self.low)
+        return (self.low**2 + self.high**2) / (2 * (self.high - self.low))
+
+
+def every() -> tuple[Strengths, ...]:
+    """Of all effects that have any."""
+    columns = {column.name: column for column in (*library(), _SLACK)}
+    return tuple(Strengths(column=columns[name], low=low, high=high) for name, (low, high) in _RANGES.items())
+
+
+def on_markers() -> tuple[Strengths, ...]:
+    """Of the effects that verdicts on markers weigh."""
+    weighed = {column.name for column in library()}
+    return tuple(one for one in every() if one.name in weighed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suspicion:
+    """An effect that is suspected before recordings are looked at.
+
+    Attributes:
+        name: effect.parameter.
+        sign: 1 for more of it, −1 for less.
+        words: as the user gave it, with the sign.
+    """
+
+    name: str
+    sign: int
+    words: str
+
+    @classmethod
+    def parse(cls, text: str, weighed: Sequence[Strengths]) -> Suspicion:
+        """From `lift`, `vertical-wind-` or `tilted-pole.lean+`.
+
+        Args:
+            weighed: the effects that may be suspected.
+
+        Raises:
+            UnknownNameError: none of them.
+            UsageError: an effect of several strengths, or of two signs without one, or one that has no such sign.
+        """
+        sign = {"+": 1, "-": -1}.get(text[-1:], 0)
+        wanted = text[:-1] if sign else text
+        found = [own for own in weighed if wanted in (own.name, own.column.effect)]
+        if not found:
+            effects = dict.fromkeys(own.column.effect for own in weighed)
+            raise UnknownNameError.of("effect", wanted, [*effects, *(own.name for own in weighed)], where=WHERE)
+        if len(found) > 1:
+            each = " or ".join(one.name for one in found)
+            raise UsageError(f"{wanted} has several strengths", where=WHERE, fix=f"suspect one of them: {each}")
+        (one,) = found
+        if one.low > 0 and sign < 0:
+            raise UsageError(f"{wanted} cannot be less than none", where=WHERE, fix=f"give {wanted} without the sign")
+        if one.low < 0 and not sign:
+            raise UsageError(
+                f"{wanted} may be above or below {one.column.described.null:g}",
+                where=WHERE,
+                fix=f"give the sign that is suspected, {wanted}+ or {wanted}-",
+            )
+        sign = sign or 1
+        return cls(name=one.name, sign=sign, words=f"{wanted}{'+' if sign > 0 else '-'}")
