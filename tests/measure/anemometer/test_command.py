@@ -103,7 +103,7 @@ def test_a_recording_becomes_a_model_by_which_another_film_is_read(
 def test_a_model_whose_network_has_changed_is_refused(lake: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = ("monday", "--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer")
     assert _run(calibrate, *given).exit_code == 0
-    monkeypatch.setattr("measure.film.source.file_hash", lambda _: "another")
+    monkeypatch.setattr("measure.anemometer.network.file_hash", lambda _: "another")
     with pytest.raises(InputError, match="is another one"):
         network("monday-anemometer", lake=Lake.open(lake), at=None)
 
