@@ -27,9 +27,9 @@ from flagdata.errors import RefusedError
 from flagdata.film_array import Frames
 from flagdata.findings import Severity
 from flagdata.rng import stream
-from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.pictures import steps
-from measure.estimate.similarity import FlagSize, sizes
+from measure.film.conditioned import ConditionedFilm
+from measure.film.similarity import FlagSize, sizes
 
 Film = NDArray[np.uint8]
 """(n, HEIGHT, WIDTH, 3), or of another height and width."""

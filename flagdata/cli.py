@@ -58,19 +58,22 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         "wind and cloth from recordings, and simulation",
         {
             "measure": (
-                "measure.estimate.command:measure",
+                "measure.commands.measure:measure",
                 "Measure wind and cloth from a film, with intervals, or refuse.",
             ),
             "observe": (
-                "measure.observables.command:observe",
+                "measure.commands.observe:observe",
                 "Read droop, extension, speed and frequency off a film.",
             ),
             "calibrate": (
-                "measure.calibrate.command:calibrate",
+                "measure.commands.calibrate:calibrate",
                 "Weigh a filmed flag's cloth with the log of the wind.",
             ),
-            "close-loop": ("measure.closing.command:close_loop", "Find what the model of a cloth lacks, and add it."),
-            "propose": ("measure.propose.command:propose", "Propose an effect that the library lacks, and test it."),
+            "close-loop": (
+                "measure.commands.close_loop:close_loop",
+                "Find what the model of a cloth lacks, and add it.",
+            ),
+            "propose": ("measure.commands.propose:propose", "Propose an effect that the library lacks, and test it."),
             "simulate": (
                 "sim.commands:simulate",
                 "Simulate cloth in the wind: mesh sequences from a recipe or a scene.",

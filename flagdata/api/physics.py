@@ -194,7 +194,7 @@ def measure(
         InputError: a file that is no film, or a film that is too short.
     """
     return call(
-        "measure.estimate.run:measured",
+        "measure.commands.measuring:measured",
         source,
         flag_size=flag_size,
         area_weight=area_weight,

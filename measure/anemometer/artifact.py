@@ -13,8 +13,9 @@ from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from measure.anemometer.calibration import ANSWER, Calibrated
 from measure.anemometer.features import VERSION
+from measure.anemometer.network import CALIBRATED
 from measure.anemometer.storage import write
-from measure.estimate.source import CALIBRATED, Reading
+from measure.film.source import Reading
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
 

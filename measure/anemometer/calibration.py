@@ -15,12 +15,13 @@ from flagdata.findings import Finding, Severity
 from flagdata.signals import Sensor
 from measure.anemometer.features import SUMMARY, Features, features_of
 from measure.anemometer.intervals import half_width
+from measure.anemometer.network import Network
 from measure.anemometer.novelty import Familiar
 from measure.anemometer.reading import ReadingModel
 from measure.anemometer.regression import BLOCK, Ridge, blocks_of, validated, with_neighbours
 from measure.calibrate.wind import STEADY, Log
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Network, Subject
+from measure.film.similarity import FlagSize
+from measure.film.source import Subject
 from measure.gate.reasons import REASONS
 
 Floats = NDArray[np.float64]

@@ -11,10 +11,10 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import RefusedError
-from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.joint import WIND
-from measure.estimate.similarity import POWERS, FlagSize, spacing, trained_on
-from measure.estimate.windows import Layout, cut, lay_out
+from measure.film.conditioned import ConditionedFilm
+from measure.film.similarity import POWERS, FlagSize, spacing, trained_on
+from measure.film.windows import Layout, cut, lay_out
 from measure.observables.film import FilmWindow
 from measure.observables.watching import Watcher
 from models.conditioning.repeats import Distinct, TimedFrame

@@ -12,9 +12,10 @@ from flagdata.lake import Lake
 from flagdata.lake.results import Placed
 from measure.anemometer.artifact import keep
 from measure.anemometer.calibration import ENOUGH, LEAST, Calibrated, Recording, calibrated, recorded
+from measure.anemometer.network import network
 from measure.calibrate.leaving_out import usable
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Reading, Subject, network, subjects
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading, Subject, subjects
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from measure.anemometer.features import Features, Place
 from measure.anemometer.novelty import Familiar
 from measure.anemometer.regression import Ridge, with_neighbours
-from measure.estimate.similarity import FlagSize
+from measure.film.similarity import FlagSize
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from measure.anemometer.features import Place
 from measure.anemometer.novelty import Familiar
 from measure.anemometer.reading import ReadingModel
 from measure.anemometer.regression import Ridge
-from measure.estimate.similarity import FlagSize
+from measure.film.similarity import FlagSize
 
 FORMAT = 1
 HEAD = "flagdata_anemometer"

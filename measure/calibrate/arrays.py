@@ -25,8 +25,8 @@ from measure.calibrate.observed import Observed, cut
 from measure.calibrate.prior import AZIMUTH, ELEVATION
 from measure.calibrate.simulation import Flag
 from measure.calibrate.tables import of_columns
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Reading
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading
 
 Arrays = Mapping[str, ArrayLike]
 Number = float | tuple[float, float] | str | Stated

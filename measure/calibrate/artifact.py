@@ -17,7 +17,7 @@ from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from measure.calibrate.calibrate import ANSWER, Calibration
 from measure.calibrate.simulation import OBSERVED, VERSION
-from measure.estimate.source import Reading
+from measure.film.source import Reading
 from measure.observables.artifact import VERSION as READINGS
 from models.conditioning.conditioning import VERSION as CONDITIONED
 

@@ -27,7 +27,7 @@ from flagdata.stated import Stated
 from measure.calibrate.columns import Columns
 from measure.calibrate.prior import Floats
 from measure.calibrate.tables import Beside, instants, rows_of
-from measure.estimate.similarity import FlagSize
+from measure.film.similarity import FlagSize
 
 _FOLLOWS = (
     "outline-speed",

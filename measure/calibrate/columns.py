@@ -21,7 +21,7 @@ from flagdata.plain_text import plain_text
 from flagdata.timebase import NANOSECONDS, parse
 from flagdata.units import spelled, unit
 from measure.calibrate.prior import Floats
-from measure.estimate.similarity import FlagSize
+from measure.film.similarity import FlagSize
 from measure.observables import OBSERVABLES
 
 TIME, WIND, DURATION, COUNT = "time", "wind", "duration", "count"

@@ -20,9 +20,9 @@ from measure.calibrate.observed import LONGEST, Excerpt, Observed, check_duratio
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.tables import of_table
 from measure.calibrate.wind import Log
-from measure.estimate.conditioned import ConditionedFilm
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Reading, Subject, subjects
+from measure.film.conditioned import ConditionedFilm
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading, Subject, subjects
 from measure.observables import OBSERVABLES
 from measure.observables.observable import WINDOW
 from measure.observables.watching import watched

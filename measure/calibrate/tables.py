@@ -28,7 +28,7 @@ from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.summary import LEAST_WINDOWS
 from measure.calibrate.wind import Log
-from measure.estimate.similarity import FlagSize
+from measure.film.similarity import FlagSize
 from measure.observables import OBSERVABLES
 from measure.observables.observable import WINDOW
 

@@ -55,8 +55,8 @@ class Filmed:
         """
         from flagdata.film import CameraFilm
         from measure.calibrate.filmed import Part
-        from measure.estimate.conditioned import ConditionedFilm
-        from measure.estimate.similarity import FlagSize
+        from measure.film.conditioned import ConditionedFilm
+        from measure.film.similarity import FlagSize
 
         size = FlagSize(length=self.flag.length, height=self.flag.height)
         return tuple(

@@ -18,8 +18,8 @@ from measure.estimate.answer import Quantity, quantities
 from measure.estimate.combine import OWN, Dependence, combined, effective
 from measure.estimate.gate import Reason
 from measure.estimate.options import Options
-from measure.estimate.similarity import POWERS, Sizes, scaled_back
-from measure.estimate.windows import Layout
+from measure.film.similarity import POWERS, Sizes, scaled_back
+from measure.film.windows import Layout
 from models.estimator import Estimator
 from models.mixture import Mixture
 from models.restriction import Known, Restricted

@@ -19,8 +19,8 @@ from measure.estimate.combine import OWN, Dependence
 from measure.estimate.gate import Gate, Verdict, verdict
 from measure.estimate.joint import DRAWS, Joint, Look, WindowAnswer
 from measure.estimate.options import Options
-from measure.estimate.similarity import Sizes, sizes, spacing, trained_on
-from measure.estimate.windows import Layout, Window, cut, findings_of, lay_out
+from measure.film.similarity import Sizes, sizes, spacing, trained_on
+from measure.film.windows import Layout, Window, cut, findings_of, lay_out
 from measure.gate.reasons import REASONS
 from models.conditioning.repeats import Distinct
 from models.estimator import Estimator

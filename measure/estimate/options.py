@@ -8,7 +8,7 @@ from typing import Any
 
 from flagdata.errors import UsageError
 from flagdata.stated import Stated
-from measure.estimate.similarity import POWERS, FlagSize, Sizes
+from measure.film.similarity import POWERS, FlagSize, Sizes
 from models.estimator import Estimator
 from models.restriction import Known, usable_aspect
 from models.targets import ASPECT

@@ -10,9 +10,9 @@ from PIL import Image, ImageDraw
 
 from flagdata.pages.pictures import figure_url, still
 from measure.estimate.answer import SHORT
-from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.measuring import Measurement
 from measure.estimate.series import Beside, Spectrum
+from measure.film.conditioned import ConditionedFilm
 
 if TYPE_CHECKING:
     pass

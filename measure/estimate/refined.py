@@ -1,7 +1,7 @@
 """A measurement refined by simulation: `measure.refine` at the flag's own size.
 
 Refinement simulates flags of the size that the models are trained on. The film's frames were taken at the instants at
-which a flag of its own size looks like one of those (`measure.estimate.similarity`), so what is found scales back like
+which a flag of its own size looks like one of those (`measure.film.similarity`), so what is found scales back like
 what the model says: wind by √s, area weight by s, bending stiffness by s⁴.
 """
 
@@ -14,8 +14,8 @@ from pathlib import Path
 from flagdata.errors import UsageError
 from flagdata.stated import Stated
 from measure.estimate.measuring import Measurement
-from measure.estimate.similarity import LOGARITHMS, POWERS
-from measure.estimate.source import Subject
+from measure.film.similarity import LOGARITHMS, POWERS
+from measure.film.source import Subject
 from measure.refine.command import Clip, run
 from measure.refine.refinement import Interval, Refinement
 from models.estimator import Estimator

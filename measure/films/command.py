@@ -23,8 +23,8 @@ from measure.calibrate.workload import announced
 from measure.closing.artifacts import Answer
 from measure.closing.command_line import stage_bars
 from measure.closing.sources import distinct
-from measure.estimate.similarity import parse_size
-from measure.estimate.source import Reading, box_of
+from measure.film.similarity import parse_size
+from measure.film.source import Reading, box_of
 from measure.films.artifacts import answer_of
 from measure.films.command_line import Given
 from measure.films.design import PAIRS, TOGETHER, lasting

@@ -10,7 +10,7 @@ from flagdata.lake.results import Placed
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
-from measure.estimate.source import Subject
+from measure.film.source import Subject
 from measure.observables.table import Table
 from models.conditioning.conditioning import VERSION as CONDITIONED
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import RefusedError
-from measure.estimate.conditioned import ConditionedFilm
-from measure.estimate.similarity import FlagSize
+from measure.film.conditioned import ConditionedFilm
+from measure.film.similarity import FlagSize
 from measure.observables.film import FilmWindow
 from measure.observables.observable import WINDOW
 from models.conditioning.outline import Outliner

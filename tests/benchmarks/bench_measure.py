@@ -22,11 +22,12 @@ from numpy.typing import NDArray
 
 from flagdata.film import Film
 from flagdata.rng import child_seed
+from measure.anemometer.network import Network, gate_beside, network
 from measure.estimate.dependence import of_model
 from measure.estimate.long_films import simulated
 from measure.estimate.measuring import Options, measure
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Network, Reading, gate_beside, network, subjects
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading, subjects
 from measure.refine.command import Clip
 from measure.refine.command import run as refine
 

@@ -19,6 +19,8 @@ FITTING = (
     "measure/loop",
     "measure/report",
     "measure/closing",
+    "measure/commands",
+    "measure/film",
     "measure/propose",
     "measure/observables",
     "measure/calibrate",

@@ -62,8 +62,10 @@ def test_a_measurement_loads_neither_torchs_compiler_nor_what_only_other_command
         "zarr",
     )
     code = (
-        "import sys\nfrom measure.estimate import artifact, command, measuring, series, source\n"
-        "source.network(None, lake=None, at=None)\n"
+        "import sys\nfrom measure.anemometer import network\n"
+        "from measure.commands import measure, measured\n"
+        "from measure.estimate import measuring, series\n"
+        "network.network(None, lake=None, at=None)\n"
         f"print('LOADED', sorted(set({heavy!r}) & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

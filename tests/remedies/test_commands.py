@@ -135,7 +135,7 @@ CASES = [
         ("query --json", OR, "query --csv", OR, "query --arrow a.arrow"),
     ),
     Case(
-        "commands/query.py",
+        "flagdata/cells.py",
         "cast it in the SQL, or write it by --arrow",
         "query --csv --sql 'select interval 3 days as x'",
         (
@@ -165,13 +165,13 @@ CASES = [
         shows="mast",
     ),
     Case(
-        "export/choice.py",
+        "export/plan.py",
         "choose what it holds: --where",
         "export csv --to out",
         ("export csv --to out --where \"kind in ('clip', 'recording', 'wind')\"",),
     ),
     Case(
-        "export/choice.py",
+        "export/plan.py",
         "choose what it holds: --where",
         "export mp4 --to out",
         ("export mp4 --to out --where \"kind in ('camera')\"",),
@@ -218,7 +218,7 @@ def test_two_logs_are_aligned_as_the_remedies_say(user: User) -> None:
         (user.folder / f"{name}.csv").write_text("\n".join(["time,wind_speed (m/s)", *rows, ""]))
         user.succeeds("ingest", f"{name}.csv")
     user.meets(
-        "commands/align_logs.py",
+        "commands/align.py",
         "leave --by out",
         "align",
         "a",

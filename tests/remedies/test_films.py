@@ -120,10 +120,10 @@ def test_pictures_need_a_rate_and_a_start(user: User, pictures: list[Image.Image
 def test_the_rate_of_a_gif_is_given(user: User, pictures: list[Image.Image]) -> None:
     pictures[0].save(user.folder / "a.gif", save_all=True, append_images=pictures[1:], duration=40)
     start = ("--start", "2026-05-01T12:00:00Z")
-    user.meets("camera/gif.py", "if the camera's rate is known, give it", "ingest", "a.gif", *start)
+    user.meets("camera/video.py", "if the camera's rate is known, give it", "ingest", "a.gif", *start)
     user.again("--true-fps", 25)
     pictures[0].save(user.folder / "b.gif", save_all=True, append_images=pictures[1:], duration=0)
-    user.meets("camera/gif.py", "give the rate at which the camera ran", "ingest", "b.gif", *start)
+    user.meets("camera/video.py", "give the rate at which the camera ran", "ingest", "b.gif", *start)
     user.again("--true-fps", 25)
 
 

@@ -69,7 +69,7 @@ def test_hanging_cloth_is_measured_without_simulating_flags(user: User, command:
 
 
 def test_a_size_that_was_not_given_is_given(user: User, command: tuple[str, ...]) -> None:
-    user.meets("estimate/similarity.py", "give --flag-size LENGTHxHEIGHT", *command, "--anyway")
+    user.meets("film/similarity.py", "give --flag-size LENGTHxHEIGHT", *command, "--anyway")
     user.again(*SIZED, shows=WIND)
 
 
@@ -80,7 +80,7 @@ def test_a_weight_that_only_some_sizes_allow_needs_the_size(user: User, command:
 
 def test_a_slow_film_shows_a_flag_that_is_large(user: User, command: tuple[str, ...]) -> None:
     write_video(user.folder / "f.mkv", pictures(60, height=40, width=56), rate=12)
-    user.meets("estimate/similarity.py", "give --flag-size if the ", *command, "--anyway")
+    user.meets("film/similarity.py", "give --flag-size if the ", *command, "--anyway")
     user.again("--flag-size", "9x6", shows=WIND)
 
 
@@ -99,7 +99,7 @@ def test_clips_that_are_all_strange_are_looked_at(user: User, command: tuple[str
     write_video(user.folder / "noise.mkv", noise)
     clip = cut(user, "noise.mkv")
     query = ("measure", "--query", "kind = 'clip'", *command[2:], *SIZED)
-    fix = user.meets("estimate/command.py", "look at one with --report, or at all with --anyway", *query)
+    fix = user.meets("commands/measure.py", "look at one with --report, or at all with --anyway", *query)
     assert "--anyway" in fix
     user.again("--anyway", shows=WIND)
     user.follows("measure", clip, *command[2:], *SIZED, "--report", "page.html", code=3)
@@ -109,7 +109,7 @@ def test_clips_that_are_all_strange_are_looked_at(user: User, command: tuple[str
 def test_several_clips_are_answered_as_json(user: User, command: tuple[str, ...]) -> None:
     clip = cut(user, "f.mkv")
     query = ("measure", "--query", "kind = 'clip'", *command[2:], *SIZED, "--anyway")
-    user.meets("estimate/command.py", "measure one clip by its id, or use --json", *query, "--csv")
+    user.meets("commands/measure.py", "measure one clip by its id, or use --json", *query, "--csv")
     user.follows(*query, "--json", shows=WIND)
     user.succeeds("measure", clip, *command[2:], *SIZED, "--anyway", "--csv", shows=WIND)
 
@@ -126,7 +126,7 @@ def test_one_of_several_flags_is_chosen(user: User, command: tuple[str, ...]) ->
         user.folder / "f.mkv",
         beside(pictures(48, height=40, width=56), pictures(48, height=40, width=56, seed=4)),
     )
-    user.meets("estimate/conditioned.py", "choose another by --flag, as numbered", *command, *SIZED, "--anyway")
+    user.meets("film/conditioned.py", "choose another by --flag, as numbered", *command, *SIZED, "--anyway")
     user.succeeds(*command, *SIZED, "--anyway", "--report", "page.html")
     assert (user.folder / "page.html").exists()
     user.leaves(["--report"])
@@ -135,12 +135,12 @@ def test_one_of_several_flags_is_chosen(user: User, command: tuple[str, ...]) ->
 
 def test_a_flag_that_is_longer_than_its_size_says_is_given_its_size(user: User, command: tuple[str, ...]) -> None:
     given = ("measure", "example:flag", *command[2:], "--anyway")
-    user.meets("estimate/conditioned.py", "check --flag-size: length along the wind", *given, "--flag-size", "1.5x5")
+    user.meets("film/conditioned.py", "check --flag-size: length along the wind", *given, "--flag-size", "1.5x5")
     user.follows(*given, *SIZED, shows=WIND)
 
 
 def test_a_film_of_few_frames_a_second_shows_a_flag_of_its_size(user: User, command: tuple[str, ...]) -> None:
-    user.meets("estimate/similarity.py", "give --flag-size, or fil", *command, "--anyway")
+    user.meets("film/similarity.py", "give --flag-size, or fil", *command, "--anyway")
     user.again(*SIZED, shows=WIND)
 
 

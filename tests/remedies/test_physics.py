@@ -13,7 +13,7 @@ TOO_SHORT = "s of film, a measurement takes"
 STAMPS = "align first mast --by stamps --offset-sigma 0.1"
 CASES = [
     Case(
-        "estimate/command.py",
+        "commands/measure.py",
         "choose one of --json and --csv",
         f"{SHORT} --json --csv",
         (f"{SHORT} --json", OR, f"{SHORT} --csv"),
@@ -21,7 +21,7 @@ CASES = [
         code=1,
     ),
     Case(
-        "estimate/command.py",
+        "commands/measure.py",
         "give --refine N",
         f"{SHORT} --cache c",
         (SHORT, OR, f"{SHORT} --cache c --refine 20 --flag-size 1.5x1"),
@@ -29,16 +29,16 @@ CASES = [
         code=1,
     ),
     Case(
-        "estimate/run.py",
+        "commands/measuring.py",
         "choose one of --area-weight and --material",
         f"{SHORT} --area-weight 0.1 --material x",
         (f"{SHORT} --area-weight 0.1", OR, f"{SHORT} --material camel-ponte-roma"),
         shows=TOO_SHORT,
         code=1,
     ),
-    Case("estimate/source.py", "see flagdata measure --help", "measure", ("measure --help",), shows="--query"),
+    Case("film/source.py", "see flagdata measure --help", "measure", ("measure --help",), shows="--query"),
     Case(
-        "estimate/source.py",
+        "film/source.py",
         "look with flagdata query --where",
         "measure --query \"name = 'mist'\"",
         ("query --where \"name = 'first'\"",),
@@ -88,5 +88,5 @@ def test_a_film_without_a_log_is_aligned_before_it_is_calibrated(user: User) -> 
 def test_a_query_of_clips_needs_a_lake(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("FLAGDATA_LAKE")
     command = ("measure", "--query", "kind = 'clip'")
-    user.meets("estimate/source.py", "name the lake by --lake", *command)
+    user.meets("film/source.py", "name the lake by --lake", *command)
     user.follows(*command, "--lake", "lake", code=1, shows="no clip matches")

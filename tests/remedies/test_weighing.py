@@ -109,7 +109,7 @@ CASES = [
         shows="--crop",
     ),
     Case(
-        "calibrate/command.py",
+        "commands/calibrate.py",
         "or give --only weight",
         f"calibrate t.csv {SIZED} --name x",
         (f"calibrate t.csv {SIZED} --only weight",),
@@ -168,7 +168,7 @@ def test_a_log_of_a_table_is_in_a_lake(user: User, monkeypatch: pytest.MonkeyPat
 @pytest.mark.usefixtures("cheap")
 def test_the_weight_that_was_found_is_given_to_a_measurement(user: User) -> None:
     (user.folder / "t.csv").write_text(GUSTY)
-    said = user.meets("calibrate/command.py", "measure: --area-weight", "calibrate", "t.csv", *SIZED.split())
+    said = user.meets("commands/calibrate.py", "measure: --area-weight", "calibrate", "t.csv", *SIZED.split())
     weight = said.partition("--area-weight ")[2].split()[0]
     user.follows("measure", "second.mp4", "--area-weight", weight, code=1, shows="s of film, a measurement takes")
 

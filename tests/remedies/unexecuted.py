@@ -29,8 +29,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     "a film, real or rendered, whose flag or camera is lost in the whole and found in a part": (
         ("measure/calibrate/filmed.py", "film from a tripod, or c"),
         ("measure/calibrate/observed.py", "look at the film with fl"),
-        ("measure/observables/command.py", "give --crop around one w"),
-        ("measure/estimate/conditioned.py", "choose a part of the fil"),
+        ("measure/commands/observe.py", "give --crop around one w"),
+        ("measure/film/conditioned.py", "choose a part of the fil"),
         ("models/conditioning/conditioning.py", "give --crop around the f"),
     ),
     "a full disk, while inputs are prepared from a data set that was built": (
@@ -137,7 +137,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/view/media.py", "run flagdata verify"),
         ("measure/anemometer/storage.py", "run flagdata verify; cal"),
         ("measure/closing/artifacts.py", "run flagdata verify; clo"),
-        ("measure/estimate/artifact.py", "run flagdata verify; mea"),
+        ("measure/commands/measured.py", "run flagdata verify; mea"),
     ),
 }
 """Reason → module of the remedy, and enough of its words to distinguish it from others of the module."""

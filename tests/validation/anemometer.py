@@ -27,12 +27,13 @@ from flagdata.lake import Lake
 from measure.anemometer.calibration import Recording, calibrated
 from measure.anemometer.features import Features, features_of
 from measure.anemometer.measuring import measured_from
+from measure.anemometer.network import Network, network
 from measure.calibrate.wind import Log
 from measure.estimate.measuring import Measurement
 from measure.estimate.options import Options
 from measure.estimate.series import beside
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Network, Reading, Subject, network, subjects
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading, Subject, subjects
 from sim.datasets.anemometer import air
 from sim.datasets.cast import Cast
 from sim.datasets.reading import load

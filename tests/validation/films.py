@@ -19,12 +19,13 @@ import torch
 
 from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.stated import Stated
+from measure.anemometer.network import Network, gate_beside, network
 from measure.estimate.dependence import of_model
 from measure.estimate.gate import Gate
 from measure.estimate.measuring import Measurement, measure
 from measure.estimate.options import Options
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Network, Reading, gate_beside, network, subjects
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading, subjects
 from measure.gate.reasons import REASONS
 from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE

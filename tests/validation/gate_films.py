@@ -16,10 +16,10 @@ from typing import Any
 import torch
 
 from flagdata.errors import NotFoundError
+from measure.anemometer.network import Network, gate_beside, network
 from measure.estimate.gate import Gate
 from measure.estimate.options import Options
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Network, gate_beside, network
+from measure.film.similarity import FlagSize
 from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE
 from tests.validation.environments import VTK

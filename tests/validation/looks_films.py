@@ -16,8 +16,8 @@ from flagdata.film_array import Frames
 from flagdata.record.video import decode
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED, Flag
-from measure.estimate.conditioned import ConditionedFilm
-from measure.estimate.similarity import FlagSize
+from measure.film.conditioned import ConditionedFilm
+from measure.film.similarity import FlagSize
 from measure.observables import OBSERVABLES, ClothWindow
 from measure.observables.cloth import edges_of
 from measure.observables.film import FilmWindow

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import FlagdataError
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Reading, subjects
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading, subjects
 from measure.observables import OBSERVABLES, ClothWindow, Observable
 from measure.observables.cloth import edges_of
 from measure.observables.watching import watched

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from flagdata.rng import stream
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Reading, subjects
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading, subjects
 from measure.observables import OBSERVABLES
 from measure.observables.watching import watched
 from sim.assets import Assets

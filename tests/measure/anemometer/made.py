@@ -14,8 +14,8 @@ from flagdata.signals import Sensor
 from measure.anemometer.calibration import Calibrated, Recording, calibrated
 from measure.anemometer.features import Features, Place
 from measure.calibrate.wind import Log
-from measure.estimate.similarity import FlagSize
-from measure.estimate.windows import Layout
+from measure.film.similarity import FlagSize
+from measure.film.windows import Layout
 
 SIZE = FlagSize(length=1.5, height=1.0)
 STEP = 1.2

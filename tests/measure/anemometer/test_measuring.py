@@ -22,7 +22,7 @@ from measure.anemometer.storage import read, write
 from measure.estimate.measuring import Measurement
 from measure.estimate.options import Options
 from measure.estimate.series import beside
-from measure.estimate.similarity import FlagSize
+from measure.film.similarity import FlagSize
 from models.targets import TARGETS
 from tests.measure.anemometer.made import SIZE, STEP, features, gusts, model, place
 

@@ -13,7 +13,7 @@ from flagdata.errors import InputError, UnknownNameError, UsageError
 from measure.calibrate import arrays
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.tables import of_table
-from measure.estimate.similarity import FlagSize
+from measure.film.similarity import FlagSize
 from tests.measure.calibrate.conftest import readings
 
 COLUMNS = {

@@ -19,9 +19,9 @@ from flagdata.record import RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
-from measure.calibrate.command import calibrate
 from measure.calibrate.tables import of_table
-from measure.estimate.similarity import FlagSize
+from measure.commands.calibrate import calibrate
+from measure.film.similarity import FlagSize
 from tests.measure.calibrate.conftest import readings
 
 

@@ -13,8 +13,8 @@ from flagdata.findings import Finding, Severity
 from flagdata.signals import Sensor, WindSeries
 from measure.calibrate import filmed
 from measure.calibrate.simulation import OBSERVED
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Reading as Pictures
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading as Pictures
 from measure.observables import Reading
 
 _SIZE = FlagSize(length=1.5, height=1.0)

@@ -16,8 +16,8 @@ from flagdata.record import RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
-from measure.calibrate.command import calibrate
-from measure.observables.command import observe
+from measure.commands.calibrate import calibrate
+from measure.commands.observe import observe
 from tests.measure.observables.shapes import RATE
 from tests.measure.observables.test_pixels import painted
 

@@ -19,7 +19,7 @@ from measure.calibrate.columns import read
 from measure.calibrate.observed import Observed, constant_wind
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.tables import Beside, of_table, rows_of
-from measure.estimate.similarity import FlagSize
+from measure.film.similarity import FlagSize
 
 SIZE = FlagSize(length=2.0, height=0.5)
 START = 1_780_000_000

@@ -18,9 +18,9 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.markers.store import ingest_markers
 from flagdata.lake import Lake
-from measure.closing.command import _setup as setup_of
-from measure.closing.command import with_warnings
 from measure.closing.sources import Reading, read
+from measure.commands.close_loop import _setup as setup_of
+from measure.commands.close_loop import with_warnings
 from measure.observe import Setup, Up
 from measure.verdict.record import Conclusion
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from measure.estimate.artifact import artifact, read, write
-from measure.estimate.conditioned import ConditionedFilm
+from measure.anemometer.network import Network
+from measure.commands.measured import artifact, read, write
 from measure.estimate.series import beside
-from measure.estimate.source import Network, Reading, Subject
+from measure.film.conditioned import ConditionedFilm
+from measure.film.source import Reading, Subject
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even
 from tests.measure.estimate.test_measuring import far, measured

@@ -6,9 +6,9 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+from measure.anemometer.network import gate_beside, network
 from measure.estimate.checked import CheckedGate
 from measure.estimate.gate import FamiliarityGate
-from measure.estimate.source import gate_beside, network
 from measure.gate.storage import write
 from tests.measure.gate.made import learned
 

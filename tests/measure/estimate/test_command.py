@@ -30,7 +30,7 @@ from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
 from flagdata.stated import Stated
 from flagdata.timebase import NANOSECONDS
-from measure.estimate.artifact import read
+from measure.commands.measured import read
 from measure.estimate.material import weight_of
 from measure.estimate.nearest import nearest
 from models.conditioning import conditioned

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import flagdata
 from flagdata.errors import UnknownNameError
 from flagdata.examples import names
-from measure.estimate.command import measure
+from measure.commands.measure import measure
 
 
 def test_the_examples_fit_into_a_package() -> None:

@@ -21,13 +21,13 @@ from flagdata.film_array import Frames
 from flagdata.findings import Severity
 from flagdata.rng import child_seed
 from flagdata.stated import parse
+from measure.commands.measure import _Done, _report
 from measure.ends import Bound
 from measure.estimate.combine import Dependence
-from measure.estimate.command import _Done, _report
 from measure.estimate.gate import Reason, gate_of
 from measure.estimate.measuring import Measurement, Options, measure
 from measure.estimate.series import beside
-from measure.estimate.similarity import FlagSize
+from measure.film.similarity import FlagSize
 from models import estimator
 from models.estimator import Estimator
 from models.learner import Loss

@@ -14,7 +14,7 @@ from flagdata.errors import UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
 from measure.calibrate.simulation import OBSERVED
-from measure.closing.command import close_loop
+from measure.commands.close_loop import close_loop
 from measure.films.command import simulations_of
 from measure.films.sources import films_among
 from measure.forecasting import strengths

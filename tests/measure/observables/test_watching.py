@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from flagdata.cli import main
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
-from measure.estimate.conditioned import ConditionedFilm
-from measure.estimate.similarity import FlagSize
-from measure.observables import command, watching
+from measure.commands import observe as command
+from measure.film.conditioned import ConditionedFilm
+from measure.film.similarity import FlagSize
+from measure.observables import watching
 from measure.observables.watching import watched
 
 SIZE = FlagSize(length=1.5, height=1.0)

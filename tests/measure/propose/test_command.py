@@ -10,11 +10,12 @@ import pytest
 
 from flagdata.cli import main
 from flagdata.errors import InputError
+from measure.commands import propose as command
 from measure.nulls.plan import NullOptions
 from measure.nulls.workload import of_recordings
 from measure.observe import recipe as recipes
 from measure.observe.trajectory import Experiment
-from measure.propose import command, propose
+from measure.propose import propose
 
 
 def test_how_long_it_takes_is_stated_before_it_begins(

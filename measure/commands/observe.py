@@ -79,8 +79,8 @@ def observe(
     from flagdata.lake import Lake
     from flagdata.outputs import check_file, check_folder, fresh_folder, write_file
     from flagdata.pages.pictures import png
-    from measure.estimate.similarity import parse_size
-    from measure.estimate.source import Reading, box_of, subjects
+    from measure.film.similarity import parse_size
+    from measure.film.source import Reading, box_of, subjects
     from measure.observables.artifact import keep
     from measure.observables.picture import picture
     from measure.observables.table import table_of

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from measure.anemometer.making import Made
     from measure.calibrate.calibrate import Calibration
     from measure.estimate.page import Section
-    from measure.estimate.similarity import FlagSize
-    from measure.estimate.source import Reading
+    from measure.film.similarity import FlagSize
+    from measure.film.source import Reading
 
 
 @click.command(cls=LongCommand)
@@ -200,8 +200,8 @@ def calibrate(
     from measure.calibrate.prior import AZIMUTH, ELEVATION
     from measure.calibrate.simulation import Flag
     from measure.calibrate.workload import announced
-    from measure.estimate.similarity import parse_size
-    from measure.estimate.source import Reading, box_of
+    from measure.film.similarity import parse_size
+    from measure.film.source import Reading, box_of
 
     if report is not None:
         check_file(report, command="calibrate")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import RefusedError, UsageError
 from flagdata.rng import stream
-from measure.estimate.similarity import (
+from measure.film.similarity import (
     FlagSize,
     SizePrior,
     parse_size,

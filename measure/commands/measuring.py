@@ -15,12 +15,13 @@ from flagdata.lake import Lake
 from flagdata.measured import Answer, Estimate, Measured, Windows
 from flagdata.stated import Stated
 from measure.anemometer.measuring import measure_by
+from measure.anemometer.network import Network, gate_beside, network
 from measure.estimate.answer import Quantity
 from measure.estimate.dependence import of_model
 from measure.estimate.material import weight_of
 from measure.estimate.measuring import Measurement, Options, measure
-from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Network, Reading, Subject, gate_beside, network, size_of, subjects
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading, Subject, size_of, subjects
 
 
 def run(

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
-from measure.estimate.windows import cut, findings_of, lay_out
+from measure.film.windows import cut, findings_of, lay_out
 from models.conditioning.instants import Interpolator
 from models.conditioning.repeats import Distinct
 

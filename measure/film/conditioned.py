@@ -14,7 +14,7 @@ from flagdata.film import Film
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CropBox
 from flagdata.schema import FRAME_SIZE
-from measure.estimate.cut_off import CutOff
+from measure.film.cut_off import CutOff
 from measure.gate.counted import reasons
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower, conditioning_of

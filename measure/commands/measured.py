@@ -20,9 +20,10 @@ from flagdata.lake.results import Placed
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
+from measure.anemometer.network import Network
 from measure.estimate.measuring import Measurement
 from measure.estimate.series import WIND, Beside
-from measure.estimate.source import Network, Reading, Subject
+from measure.film.source import Reading, Subject
 
 _FORMAT = 1
 _ANSWER = 3

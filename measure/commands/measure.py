@@ -34,9 +34,10 @@ from measure.film_options import film_options
 if TYPE_CHECKING:
     from flagdata.lake import Lake
     from flagdata.stated import Stated
+    from measure.anemometer.network import Network
     from measure.estimate.measuring import Measurement, Options
     from measure.estimate.series import Beside
-    from measure.estimate.source import Network, Reading, Subject
+    from measure.film.source import Reading, Subject
     from measure.refine.refinement import Refinement
 
 
@@ -172,10 +173,11 @@ def measure(
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
     from flagdata.lake import Lake
     from flagdata.outputs import check_file, check_folder
+    from measure.anemometer.network import network
+    from measure.commands.measuring import weight
     from measure.estimate.measuring import Options
-    from measure.estimate.run import weight
-    from measure.estimate.similarity import parse_size
-    from measure.estimate.source import Reading, box_of, network, size_of, subjects
+    from measure.film.similarity import parse_size
+    from measure.film.source import Reading, box_of, size_of, subjects
 
     if report is not None:
         check_file(report, command="measure")
@@ -276,9 +278,9 @@ class _Job:
         """Measure one film; commit and write what is to be shown."""
         from flagdata.lake.results import placed
         from flagdata.outputs import fresh_folder, write_file
-        from measure.estimate.artifact import artifact as artifact_of
-        from measure.estimate.artifact import keep, write
-        from measure.estimate.run import run
+        from measure.commands.measured import artifact as artifact_of
+        from measure.commands.measured import keep, write
+        from measure.commands.measuring import run
         from measure.estimate.series import beside
 
         estimator = self.network.estimator

@@ -1,0 +1,123 @@
+"""The model that measures: a network that comes with the package, lies in a folder or in a lake, or a reading model."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from flagdata.addresses import local_path
+from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.naming import OF_RESULTS, meant
+from flagdata.provenance import digest, file_hash
+from flagdata.schema import Kind
+from measure.anemometer.reading import ReadingModel
+from measure.anemometer.storage import read as read_reading_model
+from measure.estimate.checked import CheckedGate
+from measure.estimate.gate import Gate, gate_of
+from measure.gate import storage
+from models import estimator
+from models.estimator import Estimator
+from models.storage import CARD, WEIGHTS
+
+CALIBRATED = "anemometer"
+"""Key of the recipes of reading models (`measure.anemometer`)."""
+
+
+def gate_beside(found: Network, *, false_alarm: float) -> Gate:
+    """The gate of a network: the calibrated one where it lies in the model's folder, else the distance of summaries.
+
+    Raises:
+        CorruptError: the calibrated one is damaged, or another network's.
+        InputError: the model has neither.
+    """
+    if not (found.folder / storage.GATE).is_file():
+        return gate_of(found.estimator)
+    calibrated = storage.read(found.folder, found.estimator)
+    return CheckedGate(model=found.estimator, calibrated=calibrated, false_alarm=false_alarm)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Network:
+    """The model that measures, and which one it is.
+
+    Attributes:
+        estimator: at work.
+        identity: SHA-256 of its card and weights; of a reading model the id of its artifact.
+        artifact: of the lake; None of a folder or of a model that comes with the package.
+        folder: of its files, where what belongs to it may lie beside them.
+        reading: the reading model that uses its summary; None where the network itself measures.
+    """
+
+    estimator: Estimator
+    identity: str
+    artifact: Artifact | None
+    folder: Path
+    reading: ReadingModel | None = None
+
+    @property
+    def described(self) -> str:
+        """Which one it is, for people."""
+        if self.reading is not None and self.artifact is not None:
+            return f"reading model {self.artifact.name}, {self.identity}, on the network {self.estimator.name}"
+        return f"{self.estimator.name}, SHA-256 {self.identity}"
+
+
+def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
+    """The model of a name.
+
+    Args:
+        name: of a model that comes with the package, a folder, or a network or reading model of the lake by its name or
+            id; None is the package's default.
+
+    Raises:
+        UnknownNameError: none of these.
+        UsageError: several models of the lake.
+        CorruptError: the model is damaged.
+        InputError: a reading model whose network is another one now.
+    """
+    shipped = {path.name for path in estimator.SHIPPED.iterdir() if (path / CARD).is_file()}
+    chosen = name if name is not None else estimator.DEFAULT
+    if (local_path(chosen) / CARD).is_file():
+        return _loaded(Path(chosen), None)
+    if chosen in shipped:
+        return _loaded(estimator.SHIPPED / chosen, None)
+    rows = [] if lake is None else _models(lake, at)
+    same = meant(rows, chosen)
+    if not same or lake is None:
+        raise UnknownNameError.of("model", chosen, shipped | {str(row["name"]) for row in rows}, where="--model")
+    if len(same) > 1:
+        raise UsageError(f"{len(same)} models are called {chosen!r}", where="--model", fix="give the id of one")
+    artifact = lake.artifact(same[0]["artifact"], at=at)
+    folder = lake.object_path(str(artifact.object))
+    return _loaded(folder, artifact) if artifact.kind is Kind.NETWORK else _calibrated(folder, artifact, lake, at)
+
+
+def _models(lake: Lake, at: str | None) -> list[dict[str, Any]]:
+    """Networks and reading models of a lake."""
+    rows = lake.rows({"kind": (Kind.NETWORK, Kind.MEASUREMENT)}, at=at, columns=OF_RESULTS).to_pylist()
+    return [row for row in rows if row["kind"] == Kind.NETWORK or CALIBRATED in json.loads(row["recipe"] or "{}")]
+
+
+def _calibrated(folder: Path, artifact: Artifact, lake: Lake, at: str | None) -> Network:
+    reading = read_reading_model(folder)
+    own = network(reading.network, lake=lake, at=at)
+    if own.identity != reading.identity:
+        raise InputError(
+            f"the network {reading.network!r} is another one than when the flag was calibrated",
+            where=artifact.name,
+            fix="calibrate the flag again",
+        )
+    return replace(own, identity=artifact.id, artifact=artifact, reading=reading)
+
+
+def _loaded(folder: Path, artifact: Artifact | None) -> Network:
+    loaded = estimator.load(folder)
+    return Network(
+        estimator=loaded,
+        identity=digest(f"{file_hash(folder / CARD)} {file_hash(folder / WEIGHTS)}"),
+        artifact=artifact,
+        folder=folder,
+    )
