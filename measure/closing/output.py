@@ -1,22 +1,81 @@
-"""What `flagdata close-loop` leaves: files, artifacts of a lake, and words for the terminal."""
+"""What `flagdata close-loop` leaves: files, artifacts of a lake, and words for the terminal.
+
+The report of a joint answer as one page, which links to the report of each kind beside it.
+
+The contents of a recipe as TOML text: numbers, texts, truth values, lists and tables of them.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 from flagdata.console import document, echo_lines, in_steps, say
+from flagdata.errors import InputError
 from flagdata.lake import Lake
 from flagdata.outputs import write_files
-from measure.closing import toml
+from flagdata.pages.render import render
 from measure.closing.artifacts import Answer, keep
 from measure.closing.joint import Joint
-from measure.closing.joint_page import joint_page
 from measure.report.document import as_document, plain
+from measure.report.page import FILTERS, TONES
+from measure.report.sentences import after_label
+
+
+def dumps(content: Mapping[str, Any]) -> str:
+    """TOML 1.0 of a mapping; plain values come before tables, as the format wants it.
+
+    Raises:
+        InputError: a value that TOML has no form for.
+    """
+    return "\n".join(_lines(content, ())) + "\n"
+
+
+def _lines(content: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
+    lines = [f"{_key(key)} = {_value(v)}" for key, v in content.items() if not isinstance(v, Mapping)]
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            inner = (*path, key)
+            lines += ["", f"[{'.'.join(_key(part) for part in inner)}]", *_lines(value, inner)]
+    return lines
+
+
+def _key(key: str) -> str:
+    bare = key.isascii() and key.replace("-", "").replace("_", "").isalnum()
+    return key if bare else _value(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        if math.isnan(value) or math.isinf(value):
+            return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
+        return repr(value)
+    if isinstance(value, str):
+        # JSON escapes what TOML does, but for DEL.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
+    if isinstance(value, Sequence):
+        return f"[{', '.join(_value(item) for item in value)}]"
+    raise InputError(f"{value!r} has no form in TOML", where="recipe", fix="give numbers, texts, lists or tables")
+
+
+def joint_page(joint: Joint) -> str:
+    """The page, HTML; it lies beside the folders `markers` and `films`."""
+    kinds = [
+        {"name": name, "verdict": own, "after_label": after_label(own) if own.named else ""}
+        for name, own in (("markers", joint.markers), ("films", joint.films))
+    ]
+    values = {"joint": joint, "tone": TONES[joint.conclusion], "kinds": kinds}
+    return render("measure.report", "joint.html.j2", values, filters=FILTERS)
+
 
 FILES = ("report.html", "verdict.json", "base.toml", "model.toml")
 """What is written; the last one only where an effect was found."""
@@ -72,7 +131,7 @@ def _written(answer: Answer, *, out: Path, lake: Lake | None, branch: str) -> di
     """The document of an answer that was written and kept."""
     as_written = as_document(answer.verdict)
     content = json.dumps(as_written, indent=1, allow_nan=False)
-    texts = [answer.page, content + "\n", *(toml.dumps(model.content) for model in answer.models)]
+    texts = [answer.page, content + "\n", *(dumps(model.content) for model in answer.models)]
     write_files(out, dict(zip_longest(FILES, texts)), command="close-loop")
     with in_steps(lambda: f"the report and the models in {out}"):
         kept = None if lake is None else keep(lake, answer, branch=branch)

@@ -1,15 +1,31 @@
-"""`flagdata demo`: the main job end to end on data made on the spot, by the same commands a user types."""
+"""`flagdata demo`: the main job end to end on data made on the spot, by the same commands a user types.
+
+The demonstration's first page: a card a step, and the truth beside what was found.
+"""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 
 import click
 
 from flagdata.console import LocalPath, document, json_option, say
+from flagdata.pages.render import render
+from flagdata.provenance import code_version
+from measure.demo.cards import Card
 from measure.demo.transcript import Transcript
+
+
+def write_index(folder: Path, cards: Sequence[Card], *, seconds: float) -> Path:
+    """Write `index.html` into `folder`; it links to the other pages there."""
+    target = folder / "index.html"
+    values = {"cards": cards, "seconds": seconds, "version": f"flagdata {code_version()}"}
+    target.write_text(render("measure.demo", "index.html.j2", values), encoding="utf-8")
+    return target
+
 
 SCHEMA = "flagdata.demo/1"
 """Of its folder's manifest."""
@@ -69,7 +85,8 @@ def demo(out: Path, seed: int, story: str, as_json: bool) -> None:
     removes exactly what is listed there and is as it was written.
     """
     from flagdata.outputs import fresh_folder
-    from measure.demo.index import write_index
+
+    # FOLD
     from measure.demo.story import field_steps, loop_step, markers_step, weighing_step
 
     chosen = Story(story)

@@ -1,11 +1,17 @@
-"""`flagdata close-loop` on films with logs and on tables of observables: read and judged."""
+"""`flagdata close-loop` on films with logs and on tables of observables: read and judged.
+
+The models of a verdict on films as recipes that `flagdata simulate` runs: the base one, and that with the effect.
+
+A verdict on films as it is kept in the lake.
+"""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from flagdata.caches import user_cache
 from flagdata.console import progress, say
@@ -18,21 +24,118 @@ from measure.calibrate.filmed import Sources
 from measure.calibrate.known import known
 from measure.calibrate.numerics import effort
 from measure.calibrate.prior import AZIMUTH, ELEVATION
-from measure.calibrate.simulation import Flag
+from measure.calibrate.simulation import COLUMNS, SETTLE, VERSION, Flag, mean_bending
 from measure.calibrate.workload import announced
 from measure.closing.artifacts import Answer
 from measure.closing.command_line import stage_bars
+from measure.closing.models import NamedModel, acted, acting, fitted
 from measure.closing.sources import distinct
 from measure.film.similarity import parse_size
 from measure.film.source import Reading, box_of
-from measure.films.artifacts import answer_of
 from measure.films.command_line import Given
 from measure.films.design import PAIRS, TOGETHER, lasting
 from measure.films.library import weighable
-from measure.films.models import models
-from measure.films.run import Options, solve, verdict_of
+from measure.films.page import page
+from measure.films.run import Options, Outcome, solve, verdict_of
+from measure.films.words import words
 from measure.forecasting.strengths import Suspicion
 from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Candidate, Verdict
+from sim.material import named
+
+ANSWER = 3
+"""Raised when the same recordings and options get another answer."""
+
+
+def answer_of(
+    verdict: Verdict,
+    outcome: Outcome,
+    *,
+    name: str,
+    models: tuple[NamedModel, ...],
+    reading: Mapping[str, Any],
+    parents: tuple[str, ...],
+) -> Answer:
+    """That of films and of tables of observables.
+
+    Args:
+        name: what the measurement is called.
+        models: of the verdict.
+        reading: how films were read, JSON values.
+        parents: artifacts that the recordings were read from; none for tables.
+    """
+    recordings = outcome.recordings
+    recipe = {
+        "close-loop-on-films": ANSWER,
+        "simulations": VERSION,
+        "sources": [one.source for one in recordings],
+        "spans": [[one.first, one.duration] for one in recordings],
+        **reading,
+        **outcome.options.recipe(),
+    }
+    return Answer(
+        name=name,
+        verdict=verdict,
+        models=models,
+        effects=acting(verdict)[:1],
+        findings=outcome.findings,
+        page=page(verdict, outcome),
+        words=words(verdict),
+        recipe=recipe,
+        parents=parents,
+        seed=outcome.options.calibration.seed,
+    )
+
+
+FABRIC = "camel-ponte-roma"
+"""Whose tables are multiplied where it is not stated of which fabric a flag is."""
+_STEP = 4e-3
+_FRAMES, _RATE = 100, 25.0
+_ROUGH = 1e-3
+
+
+def models(verdict: Verdict, outcome: Outcome, *, name: str) -> tuple[NamedModel, ...]:
+    """The base model as calibrated and, where an effect is named, the larger one.
+
+    Args:
+        name: that theirs begin with.
+    """
+    made = [NamedModel(name=f"{name}-base", content=_content(verdict, outcome, f"{name}-base", ()))]
+    if effects := acting(verdict)[:1]:
+        larger = f"{name}-{effects[0].effect}"
+        made.append(NamedModel(name=larger, content=_content(verdict, outcome, larger, effects)))
+    return tuple(made)
+
+
+def _content(verdict: Verdict, outcome: Outcome, title: str, effects: Sequence[Candidate]) -> Mapping[str, Any]:
+    calibration, own = outcome.options.calibration, fitted(verdict, effects)
+    speeds = [float(one.speed.mean()) for one in outcome.recordings]
+    fabric = FABRIC if calibration.material is None else calibration.material.tables[0]
+    speed: Any = speeds[0] if min(speeds) == max(speeds) else {"low": min(speeds), "high": max(speeds)}
+    return {
+        "title": title,
+        "seed": calibration.seed,
+        "batch": 1,
+        "scene": {
+            "shape": "flag",
+            "width": calibration.flag.length,
+            "height": calibration.flag.height,
+            "columns": COLUMNS,
+            "attachment": calibration.flag.attachment,
+            "start-noise": _ROUGH,
+        },
+        "wind": {"speed": speed},
+        "integrator": {"name": "implicit", "step": _STEP},
+        "time": {"settle": SETTLE, "frames": _FRAMES, "rate": _RATE},
+        "material": {
+            "name": fabric,
+            "density": own["area_weight"],
+            "bending-factor": own["bending"] / mean_bending(named(fabric)),
+            "damping": max(own["damping"] - _STEP, 0.0),
+        },
+        **acted(effects),
+    }
+
 
 _FEW, _MANY = 64, 128
 """Simulations of the base model for each recording, of one or two and of more."""

@@ -5,6 +5,8 @@
 `recordings` are `measure.calibrate.observed.Observed`, of a film (`measure.calibrate.filmed`), of a table of
 observables, or built directly; `calibration` are the options of `flagdata calibrate`. Simulations are kept in the
 folder by their design: a run that was interrupted goes on, and a second one simulates nothing.
+
+What recordings can show: how far each effect moves them, beyond what cloth, view and anemometer can imitate.
 """
 
 from __future__ import annotations
@@ -27,11 +29,10 @@ from measure.calibrate.prior import CLOTH, Floats
 from measure.calibrate.scatter import TAKEN_APART
 from measure.ends import Bound, span
 from measure.films.departures import Departure, departures, root_mean_square
-from measure.films.evidence import Fit, Sight, quantiles
+from measure.films.evidence import Experiments, Fit, Sight, quantiles
 from measure.films.judge import Judged, judge
 from measure.films.library import Weighable, weighable
 from measure.films.score_test import score
-from measure.films.sensitivity import SEEN, sensitivity
 from measure.films.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, shown_by
 from measure.films.statement import stated
 from measure.films.unseen import compared
@@ -41,6 +42,43 @@ from measure.forecasting.strengths import Suspicion
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.record import Candidate, Estimate, NullTest, Parameter, Power, Verdict
+
+STRONG = 0.9
+"""Share of the prior of strengths at which an effect counts as strong."""
+SEEN = 2.0
+"""Standard errors below which even a strong effect is not seen."""
+_DIFFERENCE = 1e-3
+
+
+def sensitivity(sights: Sequence[Sight], effects: Sequence[Weighable], base: Fit, observed: Experiments) -> Floats:
+    """(effect,) standard errors by which the strong effect moves the summaries, what a change of cloth, view and
+    anemometer makes up for left out.
+
+    Args:
+        base: the base model fitted to the recordings, about whose cloth and view it is found.
+        observed: the recordings.
+    """
+    own = hypothesis(sights, None)
+    at = base.weights[:1] @ base.scores[0]
+    moved = np.concatenate([at, at + _DIFFERENCE * np.eye(at.shape[1])])
+    mean, _, weight = own.predicted(moved)
+    off = observed.repeated(len(moved)).off(weight)
+    slopes = np.concatenate([own.scatter.white @ (mean[1:] - mean[0]).T, (off[1:] - off[0])[None]]) / _DIFFERENCE
+    # What the prior lets them make up for: ridge regression on slopes, the scores' prior being standard normal.
+    left = np.eye(len(slopes)) - slopes @ np.linalg.solve(slopes.T @ slopes + np.eye(slopes.shape[1]), slopes.T)
+    cloth, places, _ = own.values(at)
+    found = []
+    for effect in effects:
+        strength = effect.prior.at(np.array([STRONG]))
+        parts = []
+        for sight, place in zip(sights, places, strict=True):
+            with_it, _ = sight.model.predict({**cloth, **place}, effect.name, strength)
+            without, _ = sight.model.predict({**cloth, **place})
+            parts.append((with_it - without)[0])
+        column = np.concatenate([own.scatter.white @ np.concatenate(parts), [0.0]])
+        found.append(float(np.sqrt(column @ left @ column)))
+    return np.array(found)
+
 
 _EVEN = 1000
 """Draws of a posterior that are taken evenly from importance samples."""

@@ -1,4 +1,11 @@
-"""The image statistics that the gate looks at, and in which direction each is suspicious, by an explicit table."""
+"""The image statistics that the gate looks at, and in which direction each is suspicious, by an explicit table.
+
+Light: how bright a clip is, what contrast it has, and how much of it is noise.
+
+Frames in time: repeated ones, loops, and a motion that stops.
+
+Whether the camera moves: shifts of the picture's rim, where the trained clips show background that stands still.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +15,138 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.gate import camera, exposure, motion, timing
-from measure.gate.clip_statistics import ClipStatistics
+from measure.gate import motion
+from measure.gate.clip_statistics import SIDE, ClipStatistics
+
+_TILE = 28
+"""Side of a tile of the rim [px]; the picture has four by four, twelve of which are its rim."""
+_STEPS = (3, 8, 15, 29)
+"""Frames, after the first, whose shift from it is measured."""
+
+
+def shift(clip: ClipStatistics) -> float:
+    """Common logarithm of the shift of the rim [px]: the largest over frames of the tiles' median.
+
+    A tile's shift is the peak of its phase correlation with the first frame (Kuglin and Hines, 1975). The spectrum is
+    divided by its modulus plus the noise's, so that a tile without texture gives no shift; the peak is refined by a
+    parabola.
+    """
+    found = [_median_shift(clip, frame) for frame in _STEPS if frame < len(clip.gray)]
+    return float(np.log10(max(max(found), 0.01)))
+
+
+def sway(clip: ClipStatistics) -> float:
+    """Common logarithm of the root mean square translation of the rim from one frame to the next [px/frame].
+
+    The translation is that of least squares between slopes and changes (Lucas and Kanade, 1981) over the rim's pixels.
+    """
+    mask = np.ones((SIDE, SIDE), dtype=np.bool_)
+    rim = SIDE // 6
+    mask[rim:-rim, rim:-rim] = False
+    change = np.diff(clip.gray, axis=0)[:, mask]
+    slopes = np.stack([np.asarray(np.gradient(clip.mean, axis=axis))[mask] for axis in (0, 1)])
+    square = slopes @ slopes.T + np.eye(2) * mask.sum() * 0.25
+    moved = np.linalg.solve(square, slopes @ change.T)
+    return float(np.log10(max(float(np.sqrt(np.square(moved).sum(axis=0).mean())), 1e-3)))
+
+
+def _median_shift(clip: ClipStatistics, frame: int) -> float:
+    shifts = []
+    for top in range(0, SIDE, _TILE):
+        for left in range(0, SIDE, _TILE):
+            if top in (0, SIDE - _TILE) or left in (0, SIDE - _TILE):
+                part = (slice(top, top + _TILE), slice(left, left + _TILE))
+                shifts.append(_phase_shift(clip.gray[0][part], clip.gray[frame][part], clip.still))
+    return float(np.hypot(*np.median(shifts, axis=0)))
+
+
+def _phase_shift(one: NDArray[np.float32], other: NDArray[np.float32], noise: float) -> tuple[float, float]:
+    """How far the second picture lies below and right of the first [px]."""
+    hann = np.hanning(_TILE)
+    window = np.outer(hann, hann)
+    first, second = (np.fft.rfft2((picture - picture.mean()) * window) for picture in (one, other))
+    cross = second * np.conj(first)
+    floor = (1.0 + noise**2) * np.square(window).sum()
+    surface = np.fft.irfft2(cross / (np.abs(cross) + floor), s=(_TILE, _TILE))
+    y, x = (int(place) for place in np.unravel_index(surface.argmax(), surface.shape))
+    return _refined(surface[:, x], y), _refined(surface[y], x)
+
+
+def _refined(line: NDArray[np.float64], place: int) -> float:
+    """Place of a periodic line's peak by the parabola through three values, as a signed shift."""
+    before, peak, after = line[place - 1], line[place], line[(place + 1) % len(line)]
+    bend = before - 2 * peak + after
+    fine = place + (0.5 * (before - after) / bend if bend < 0 else 0.0)
+    return fine - len(line) if fine > len(line) / 2 else fine
+
+
+_LEAST = 0.02
+"""Gray levels of mean change that count as none."""
+_SHORTEST_LOOP = 4
+
+
+def held(clip: ClipStatistics) -> float:
+    """Common logarithm of the lower quartile of the changes from frame to frame over their 90 % quantile.
+
+    Near 0 where each frame differs from the last; very low where at least a quarter of them repeat it.
+    """
+    low, high = np.quantile(_changes(clip), (0.25, 0.9))
+    return float(np.log10((low + _LEAST) / (high + _LEAST)))
+
+
+def uneven(clip: ClipStatistics) -> float:
+    """How far each change is from the mean of its neighbours, over the mean change: 0 for smooth motion."""
+    change = _changes(clip)
+    if len(change) < 3:
+        return 0.0
+    middle = 0.5 * (change[2:] + change[:-2])
+    return float(np.abs(change[1:-1] - middle).mean() / (change.mean() + _LEAST))
+
+
+def stopped(clip: ClipStatistics) -> float:
+    """Common logarithm of the mean change over the last third of the clip over that of the whole clip."""
+    change = _changes(clip)
+    return float(np.log10((change[-(len(change) // 3) :].mean() + _LEAST) / (change.mean() + _LEAST)))
+
+
+def loop(clip: ClipStatistics) -> float:
+    """Common logarithm of the smallest mean difference of frames a lag apart over the median lag's.
+
+    Lags are 4 frames to two thirds of the clip. Flutter comes near its shape of a period ago, a loop repeats it.
+    """
+    lags = range(_SHORTEST_LOOP, 2 * len(clip.gray) // 3)
+    pixels = clip.gray[:, clip.moving] if clip.moving.any() else clip.gray.reshape(len(clip.gray), -1)
+    if not lags:
+        return 0.0
+    apart = np.array([np.abs(pixels[lag:] - pixels[:-lag]).mean() for lag in lags])
+    return float(np.log10((apart.min() + _LEAST) / (np.median(apart) + _LEAST)))
+
+
+def _changes(clip: ClipStatistics) -> NDArray[np.float64]:
+    """(n − 1,), mean absolute change from frame to frame over the moving pixels, or over all if none moves."""
+    pixels = clip.gray[:, clip.moving] if clip.moving.any() else clip.gray.reshape(len(clip.gray), -1)
+    return np.abs(np.diff(pixels, axis=0)).mean(axis=1).astype(np.float64)
+
+
+def level(clip: ClipStatistics) -> float:
+    """Mean gray level, 0 to 255."""
+    return float(clip.mean.mean())
+
+
+def highlights(clip: ClipStatistics) -> float:
+    """Gray level below which 99 % of the mean picture lies."""
+    return float(np.quantile(clip.mean, 0.99))
+
+
+def contrast(clip: ClipStatistics) -> float:
+    """Common logarithm of the standard deviation of the mean picture [gray levels]."""
+    return float(np.log10(max(clip.contrast, 1e-2)))
+
+
+def noise(clip: ClipStatistics) -> float:
+    """Common logarithm of the noise's deviation over the contrast of the mean picture."""
+    return float(np.log10(max(clip.still, 1e-2) / max(clip.contrast, 1e-2)))
+
 
 Measure = Callable[[ClipStatistics], float]
 
@@ -40,16 +177,10 @@ class Check:
 
 
 CHECKS: dict[str, Check] = {
-    "level": Check(measure=exposure.level, what="mean gray level of 255", low="too-dark", resolution=5.0),
-    "highlights": Check(
-        measure=exposure.highlights, what="gray level of the brightest 1 %", low="too-dark", resolution=5.0
-    ),
-    "contrast": Check(
-        measure=exposure.contrast, what="contrast [gray levels]", low="too-dark", resolution=0.03, logarithm=True
-    ),
-    "noise": Check(
-        measure=exposure.noise, what="noise over contrast", high="too-dark", resolution=0.05, logarithm=True
-    ),
+    "level": Check(measure=level, what="mean gray level of 255", low="too-dark", resolution=5.0),
+    "highlights": Check(measure=highlights, what="gray level of the brightest 1 %", low="too-dark", resolution=5.0),
+    "contrast": Check(measure=contrast, what="contrast [gray levels]", low="too-dark", resolution=0.03, logarithm=True),
+    "noise": Check(measure=noise, what="noise over contrast", high="too-dark", resolution=0.05, logarithm=True),
     "area": Check(
         measure=motion.area, what="share of the picture that moves", low="no-motion", resolution=0.05, logarithm=True
     ),
@@ -90,41 +221,41 @@ CHECKS: dict[str, Check] = {
         measure=motion.edges_moving, what="share of edges that move", high="moving-camera", resolution=0.03
     ),
     "shift": Check(
-        measure=camera.shift,
+        measure=shift,
         what="shift of the picture's rim [1/112 of its side]",
         high="moving-camera",
         resolution=0.1,
         logarithm=True,
     ),
     "sway": Check(
-        measure=camera.sway,
+        measure=sway,
         what="sway of the picture's rim [1/112 of its side a frame]",
         high="moving-camera",
         resolution=0.1,
         logarithm=True,
     ),
     "held": Check(
-        measure=timing.held,
+        measure=held,
         what="smallest changes of frames over the largest",
         low="low-frame-rate",
         resolution=0.05,
         logarithm=True,
     ),
     "uneven": Check(
-        measure=timing.uneven,
+        measure=uneven,
         what="unevenness of the changes from frame to frame",
         high="low-frame-rate",
         resolution=0.03,
     ),
     "stopped": Check(
-        measure=timing.stopped,
+        measure=stopped,
         what="change in the last third of the clip over all of it",
         low="repeated-frames",
         resolution=0.05,
         logarithm=True,
     ),
     "loop": Check(
-        measure=timing.loop,
+        measure=loop,
         what="difference of the most alike frames over the median",
         low="repeated-frames",
         resolution=0.05,

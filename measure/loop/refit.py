@@ -2,10 +2,18 @@
 
 Strong effects are far from linear: a lift of 1.4 shows as 0.3 where sensitivities are taken at none, and predicts
 unseen recordings worse than nothing.
+
+The misfit across the strengths of an effect: where a likelihood is flat towards an end, a strength is a bound.
+
+A fit begins where least is left and ends where its steps stay, and its standard error is the slope there. Of an effect
+that saturates both say nothing: beyond some stiffness an attached hoist stands still whatever it is, so that a fit ends
+anywhere (decision 041 has 25, 35 and 2e10 N/m² for 17,000). The profile shows it: from some strength on, all leave the
+same.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -14,16 +22,128 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from measure.forecasting.model import Model
+from measure.ends import Bound, Span, of_profile
+from measure.forecasting.calibration import Calibration
+from measure.forecasting.model import Model, errors_of
 from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import columns, names
+from measure.forecasting.regressors import EffectColumn, columns, names
 from measure.forecasting.segments import Segments
 from measure.inference.evidence import Evidence, left_together
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.gauss_newton import DivergedError, Refined, refine
-from measure.loop.profile import Profile, profiled
 from measure.loop.validation import LeftOut, left_out
 from measure.nulls.reference import Reference
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Estimate
+from sim.effects.parameter import Parameter
+
+COUNT = 16
+"""Strengths that are looked at, spaced by factors."""
+BEYOND = 10.0
+"""Factor by which they reach beyond what is expected, and beyond the fit, to either side."""
+_WITHIN_THE_END, _AT_THE_END = 1 - 1e-6, 1 - 1e-5
+"""Shares of the most that an effect may have: where strengths end, so that none is beyond it by rounding, and from
+where on they reach it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Profile:
+    """What models leave across the strengths of an effect, the cloth calibrated anew with each.
+
+    Attributes:
+        column: the effect's.
+        sizes: (n,) ascending, distances of the strength from null.
+        sign: of the strengths beyond null.
+        misfit: (n,) squared distance that is left; infinite where the cloth does not stay one.
+    """
+
+    column: EffectColumn
+    sizes: Floats
+    sign: int
+    misfit: Floats
+
+    def estimate(self, *, larger: float) -> Estimate | None:
+        """The strength as a bound; None where the profile has two ends, and the fit says more, or where strengths of
+        the other sign lie beyond an end.
+
+        What the fit's mesh and a mistold cloth do to an effect is a factor, and widens a bound as it does intervals.
+
+        Args:
+            larger: by how much standard errors are larger than the misfit says.
+        """
+        if not np.isfinite(self.misfit).any():
+            return None
+        found = self.span(larger=larger)
+        described = self.column.described
+        through = found.bound is Bound.MOST and not one_sided(described)
+        if found.bound is None or found.estimated or through:
+            return None
+        whole = math.exp(CRITERIA.reach * CRITERIA.strength_factor)
+        null, unit = described.null, self.column.unit
+        best = float(self.sizes[int(np.argmin(self.misfit))])
+        size = {Bound.LEAST: found.low / whole, Bound.MOST: found.high * whole}.get(found.bound, best)
+        ends = (0.0 if found.bound is not Bound.LEAST else size, size if found.bound is Bound.MOST else found.high)
+        low, high = sorted(null + self.sign * end for end in ends)
+        turned = {Bound.LEAST: Bound.MOST, Bound.MOST: Bound.LEAST}
+        bound = found.bound if self.sign > 0 else turned.get(found.bound, found.bound)
+        return Estimate(
+            value=null + self.sign * size, low=low, high=high, unit=unit, level=found.level, bound=bound.value
+        )
+
+    def span(self, *, larger: float) -> Span:
+        """Of the distance from null, which cannot be less than none; as `estimate`."""
+        described = self.column.described
+        end = described.admissible[1] if self.sign > 0 else -described.admissible[0]
+        farthest = end - self.sign * described.null
+        if self.sizes[-1] > _AT_THE_END * farthest:
+            farthest = float(self.sizes[-1])
+        # In the logarithm, in which strengths are spaced.
+        found = of_profile(
+            np.log(self.sizes),
+            self.misfit,
+            level=CRITERIA.interval,
+            larger=larger,
+            limits=(-math.inf, math.log(farthest)),
+        )
+        return replace(found, low=math.exp(found.low), high=float(np.exp(found.high)))
+
+
+def profiled(
+    forecaster: Forecaster, segments: Segments, whitened: WhitenedMisfit, model: Model, place: int = 0
+) -> Profile:
+    """The misfit of a model across the strengths of one of its effects, the others as they are.
+
+    Args:
+        place: of the effect.
+    """
+    column, coefficient = model.effects[place]
+    sizes, sign = across(column, coefficient)
+    effects = [(*model.effects[:place], (column, sign * float(size)), *model.effects[place + 1 :]) for size in sizes]
+    centre = Calibration().steps_from(model.calibration)
+    left = []
+    for errors in errors_of([replace(model, effects=own) for own in effects], forecaster, segments):
+        finite = bool(errors.isfinite().all())
+        left.append(whitened.of(errors).fit((), centre=centre).left if finite else math.inf)
+    return Profile(column=column, sizes=sizes, sign=sign, misfit=np.array(left))
+
+
+def one_sided(described: Parameter) -> bool:
+    """Whether all strengths that are expected lie on one side of null."""
+    low, high = (end - described.null for end in described.prior)
+    return low * high >= 0
+
+
+def across(column: EffectColumn, coefficient: float) -> tuple[Floats, int]:
+    """(n,) distances from null, ascending, from well below what is expected and what was fitted to well beyond, as far
+    as the effect may have them, and the sign of the strengths."""
+    described = column.described
+    ends, single = [end - described.null for end in described.prior], one_sided(described)
+    sign = int(np.sign(sum(ends) if single or not coefficient else coefficient))
+    expected = sorted(abs(end) for end in ends if end * sign > 0)
+    known = [*(expected if single else expected[-1:]), *([abs(coefficient)] if coefficient * sign > 0 else [])]
+    farthest = abs(described.nearest(described.null + sign * BEYOND * max(known)) - described.null)
+    return np.geomspace(min(known) / BEYOND, _WITHIN_THE_END * farthest, COUNT), sign
+
 
 Floats = NDArray[np.float64]
 

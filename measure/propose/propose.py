@@ -3,10 +3,17 @@
 Errors are projected on directions whose null distribution is known, because errors of the numerics could look like a
 term. The selected model is refitted and tested on data not used before, against control terms of another direction and
 against the numerical floor.
+
+What a proposal may see and what it is tested on: divided before anything is fitted.
+
+Gauss–Newton fits of models to projected errors: linearised again at each estimate until it converges.
+
+Before and after on data that neither the choice of the terms nor the fit of either model used.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,26 +23,170 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from measure.forecasting.calibration import THETA
+from measure.forecasting.calibration import THETA, Calibration
+from measure.forecasting.model import Model
 from measure.forecasting.regressors import Column, EffectColumn, columns
+from measure.forecasting.segments import Segments
 from measure.forecasting.setting import Setting, Stage
 from measure.inference.evidence import Evidence, gains
 from measure.inference.random_effect import NullModel
+from measure.inference.whitened_misfit import WhitenedMisfit
+from measure.loop.gauss_newton import ROUNDS, STAYS, cut
 from measure.loop.selection import estimate
+from measure.loop.validation import LeftOut, a_segment, measured, numerical_floor, paired, root, share_removed
 from measure.nulls import plan
 from measure.nulls.reference import NullBank
 from measure.observe.trajectory import Experiment
 from measure.probes.statistics import Statistics
 from measure.propose.course import course
 from measure.propose.family import Family
-from measure.propose.fit import Fitted, fit
-from measure.propose.outcome import Decision, Outcome, Ranked, Strength
+from measure.propose.outcome import Decision, Outcome, Ranked, Retest, Strength
 from measure.propose.projected import ProjectedSegments, evidence
-from measure.propose.retest import retest
 from measure.propose.search import Step, search, wrong
-from measure.propose.split import data_hash, split
 from measure.propose.terms import MASS, TermColumn
 from sim.effects.field import Flat
+
+_FLOOR_COPIES = 2
+
+
+def retest(
+    setting: Setting,
+    whitened: WhitenedMisfit,
+    seen: NDArray[np.bool_],
+    before: Model,
+    after: Model,
+    *,
+    control: Model | None,
+    control_names: Sequence[str],
+    words: str,
+    seed: int,
+) -> Retest:
+    """Prediction errors of untouched segments by the models, paired by segment, beside what numerics leave.
+
+    Args:
+        whitened: of all segments.
+        seen: (segment,) those that the models were fitted to, and that what is left of the numerics is fitted to.
+        control: the same freedom spent on other terms; None where there are none of another direction.
+        control_names: which.
+        words: which data.
+        seed: of the recordings that the floor is of.
+    """
+
+    def left(model: Model) -> LeftOut:
+        return measured(setting.forecaster, setting.segments, [model], whitened, [~seen])[0]
+
+    first, second, recording = left(before), left(after), setting.recording[~seen]
+    wrong = None if control is None else left(control)
+    _, floor = numerical_floor(setting, np.unique(recording), after, copies=_FLOOR_COPIES, seed=seed)
+    return Retest(
+        what=words,
+        segments=int((~seen).sum()),
+        before=root(first.squared),
+        after=root(second.squared),
+        reduction=paired(first.squared, second.squared),
+        helped=a_segment(first.misfit - second.misfit, recording),
+        floor=root(floor),
+        share=share_removed(first.squared, second.squared, floor),
+        control=None if wrong is None else root(wrong.squared),
+        apart=None if wrong is None else a_segment(wrong.misfit - second.misfit, recording),
+        control_names=tuple(control_names),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """A model with standard errors of its calibrated parameters and strengths, as the null model has them."""
+
+    model: Model
+    errors: tuple[float, ...]
+
+
+def fit(
+    projected: ProjectedSegments,
+    null: NullModel,
+    speeds: Floats,
+    columns: Sequence[EffectColumn],
+    start: Sequence[float],
+) -> Fitted:
+    """Calibrated parameters and strengths, by Gauss and Newton.
+
+    Args:
+        speeds: (segment,) of the wind [m/s].
+        start: steps from the nominal model to begin with: the linear fit there.
+    """
+    model = Model(calibration=Calibration(), effects=tuple((column, 0.0) for column in columns))
+    step, errors = np.array(cut(np.array(start, dtype=np.float64))), np.zeros(len(start))
+    for _ in range(ROUNDS):
+        model = model.moved(tuple(step))
+        step, errors = _step(projected, null, speeds, model)
+        if np.abs(step / errors).max() < STAYS:
+            break
+    return Fitted(model=model.moved(tuple(step)), errors=tuple(float(e) for e in errors))
+
+
+def _step(projected: ProjectedSegments, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
+    """One step of generalised least squares from a model, under the prior about the nominal calibration, and its
+    standard errors."""
+    own = evidence(projected.at(model), speeds, null)
+    found = own.fit(range(len(THETA), own.columns), centre=Calibration().steps_from(model.calibration))
+    value, error = np.array([found.of(column) for column in range(own.columns)]).T
+    return np.array(cut(value)), error
+
+
+_LEAST = 3
+"""Segments on each side: an interval of a mean wants three."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Split:
+    """Segments for choosing and fitting, and segments for the test.
+
+    Attributes:
+        seen: (segment,) whether a proposal is made from it; the others are for its test.
+        words: what the test is on.
+    """
+
+    seen: NDArray[np.bool_]
+    words: str
+
+
+def split(segments: Segments, speeds: NDArray[np.float64]) -> Split:
+    """The last third of every recording is for the test; of three or more, also the whole one of the middle wind.
+
+    Args:
+        speeds: (recording,) of the wind [m/s].
+
+    Raises:
+        InputError: too few segments.
+    """
+    recording = segments.recording
+    seen = np.ones(len(recording), dtype=bool)
+    words = "the last third of each recording"
+    for index in np.unique(recording):
+        own = np.flatnonzero(recording == index)
+        seen[own[-max(1, len(own) // 3) :]] = False
+    if len(speeds) > 2:
+        middle = int(np.argsort(speeds, kind="stable")[len(speeds) // 2])
+        seen[recording == middle] = False
+        words = f"all of the recording at {speeds[middle]:.1f} m/s and the last third of the others"
+    if min(int(seen.sum()), int((~seen).sum())) < _LEAST:
+        raise InputError(
+            f"{int(seen.sum())} segments to propose from and {int((~seen).sum())} to test on",
+            where="propose",
+            fix=f"record for longer, or more recordings: {_LEAST} of each are needed, of up to 2 s",
+        )
+    return Split(seen=seen, words=words)
+
+
+def data_hash(segments: Segments) -> str:
+    """SHA-256 of the markers, positions and wind of segments, hex."""
+    digest = hashlib.sha256(np.ascontiguousarray(segments.markers, dtype="<f8").tobytes())
+    for item in segments.items:
+        times = np.asarray(item.start + np.arange(len(item.positions)) * segments.period, dtype=np.float64)
+        for values in (item.positions, item.wind.at(times)):
+            digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
 
 Floats = NDArray[np.float64]
 

@@ -1,14 +1,100 @@
-"""The refinement's section of a report: a fragment of HTML for any page of `flagdata.pages`."""
+"""The refinement's section of a report: a fragment of HTML for any page of `flagdata.pages`.
+
+Pictures of a refinement, as in the paper's figures: the trace, and the target beside simulated clips.
+"""
 
 from __future__ import annotations
 
-from markupsafe import Markup
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from flagdata.pages.pictures import moving, still
+import numpy as np
+from markupsafe import Markup
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from flagdata.pages.pictures import figure_url, moving, still
 from flagdata.pages.render import render
-from measure.refine.pictures import SIDE, STEPS, frames, trace_picture
+from measure.refine.evaluator import Evaluator
 from measure.refine.refinement import METHOD, Refinement
-from measure.refine.space import QUANTITIES
+from measure.refine.space import QUANTITIES, WIND
+from measure.refine.trace import Trace
+
+STEPS = (0, 10, 20, 40)
+"""Steps that are shown: Runia et al. 2020, figure 8."""
+SIDE = 200  # px of a frame on the page
+_OWN, _TARGET, _OTHER = "#c4622d", "#2b6f8f", "#7a7a7a"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shown:
+    """A simulated frame.
+
+    Attributes:
+        step: evaluations before it; the nearest of those so far is shown.
+        frame: (height, width) uint8; None where its simulation failed.
+        wind: it was simulated with [m/s].
+        distance: of its clip to the target, squared.
+    """
+
+    step: int
+    frame: NDArray[np.uint8] | None
+    wind: float
+    distance: float
+
+
+def frames(trace: Trace, evaluator: Evaluator, *, steps: Sequence[int] = STEPS) -> list[Shown]:
+    """The nearest simulated clip after each of some steps, by its middle frame; steps beyond the trace are left out."""
+    shown = []
+    for step in steps:
+        if step >= len(trace):
+            continue
+        place = trace.incumbent(evaluations=step + 1)
+        point = trace.points[place]
+        made = evaluator.evaluate(point[None], 1)[0]
+        wind = float(evaluator.simulator.space.values(point[None])[0, WIND])
+        shown.append(Shown(step=step, frame=made.frame, wind=wind, distance=float(trace.distances[place])))
+    return shown
+
+
+def trace_picture(refinement: Refinement, clip: int = 0) -> str:
+    """Distance and wind over evaluations, as a PNG in a data URL: the paper's figure 8, intervals, the floor."""
+    trace, target = refinement.traces[clip], refinement.targets[clip]
+    figure = Figure(figsize=(9.5, 3.1), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    number = np.arange(1, len(trace) + 1)
+    left.semilogy(number, trace.distances, ".", color=_OTHER, markersize=4, label="simulated clip")
+    left.semilogy(number, trace.distances[trace.best], color=_OWN, linewidth=1.4, label="nearest so far")
+    left.axhline(refinement.floor, color=_TARGET, linewidth=1.0, linestyle="--", label="noise floor")
+    left.set(xlabel="evaluations", ylabel="squared distance to the target")
+    left.legend(fontsize=8)
+    space = refinement.evaluators[clip].simulator.space
+    right.plot(number, space.values(trace.points)[:, WIND], ".", color=_OTHER, markersize=4, label="evaluated")
+    if clip == 0:
+        count = [r.evaluations for r in refinement.rounds]
+        winds = [r.intervals[0] for r in refinement.rounds]
+        right.fill_between(
+            count,
+            *np.clip([(w.span.low, w.span.high) for w in winds], space.wind.low, space.wind.high).T,
+            color=_OWN,
+            alpha=0.25,
+            linewidth=0,
+            label=f"{refinement.level:.0%} interval",
+        )
+        right.plot(
+            count,
+            [np.nan if w.median is None else w.median for w in winds],
+            color=_OWN,
+            linewidth=1.4,
+            marker="o",
+            markersize=3,
+            label="median",
+        )
+    if "wind_speed" in target.truth:
+        right.axhline(target.truth["wind_speed"], color=_TARGET, linewidth=1.0, linestyle="--", label="true wind")
+    right.set(xlabel="evaluations", ylabel="wind speed [m/s]", ylim=(space.wind.low, space.wind.high))
+    right.legend(fontsize=8)
+    return figure_url(figure, dpi=130)
 
 
 def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:

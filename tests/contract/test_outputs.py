@@ -57,7 +57,7 @@ ALLOWED = {
     "measure/challenge/folder.py": INSIDE,
     "measure/challenge/filming.py": INSIDE,
     "measure/camera.py": INSIDE,
-    "measure/demo/index.py": INSIDE,
+    "measure/demo/command.py": INSIDE,
     "measure/demo/logger.py": INSIDE,
     "measure/demo/recording.py": INSIDE,
     "measure/demo/page.py": INSIDE,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from measure.calibrate import pixels
+from measure.calibrate import observed
 from measure.calibrate.simulation import OBSERVED
 from measure.observables import OBSERVABLES, Observable
 from tests.validation.power import reference_table, table
@@ -24,7 +24,7 @@ def test_every_observable_is_on_the_page(name: str) -> None:
 
 
 def test_the_shares_that_last_are_those_that_are_drawn() -> None:
-    shares = " | ".join(f"{one:.2f}" for one in pixels.LASTING)
+    shares = " | ".join(f"{one:.2f}" for one in observed.LASTING)
     lines = PAGE.read_text(encoding="utf-8").splitlines()
     assert f"| | {' | '.join(OBSERVED)} |" in lines
     assert f"| share of the variance that lasts | {shares} |" in lines

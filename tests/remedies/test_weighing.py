@@ -60,7 +60,7 @@ GAP = "time,wind_speed (m/s),wind_direction (deg)\n" + "".join(
 """A log of three minutes that was interrupted."""
 CASES = [
     Case(
-        "calibrate/beside.py",
+        "calibrate/filmed.py",
         "name a wind artifact: flagdata ls",
         f"calibrate t.csv {SIZED} --log first",
         ("ls --kind wind",),
@@ -68,7 +68,7 @@ CASES = [
         shows="mast",
     ),
     Case(
-        "calibrate/beside.py",
+        "calibrate/filmed.py",
         "state the offset of the clocks",
         f"calibrate t.csv {SIZED} --log mast",
         (JOINED,),
@@ -77,7 +77,7 @@ CASES = [
         code=3,
     ),
     Case(
-        "calibrate/beside.py",
+        "calibrate/filmed.py",
         "or state what is added to the table's clock",
         f"calibrate t.csv {SIZED} --log mast",
         (JOINED,),

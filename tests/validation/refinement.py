@@ -32,9 +32,8 @@ from flagdata.dataset import Source
 from flagdata.rng import child_seed, stream
 from measure.refine import start
 from measure.refine.command import RENDERS, scenes_of, space_of
-from measure.refine.distance import squared
 from measure.refine.evaluator import STAGES, Evaluator
-from measure.refine.procedure import Settings, refine
+from measure.refine.procedure import Settings, refine, squared
 from measure.refine.refinement import Refinement
 from measure.refine.space import DENSITY, DIMENSION, WIND, Space
 from measure.refine.target import Target, as_stated, of_recording

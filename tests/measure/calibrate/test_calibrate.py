@@ -15,7 +15,7 @@ from flagdata.errors import InputError, RefusedError
 from flagdata.stated import parse
 from flagdata.tables import Range
 from measure.calibrate import calibrate as module
-from measure.calibrate import pixels
+from measure.calibrate import observed
 from measure.calibrate.calibrate import Calibration, Options, calibrate
 from measure.calibrate.design import Design
 from measure.calibrate.observed import Observed
@@ -296,8 +296,8 @@ def test_pixels_err_by_the_film_and_by_the_window() -> None:
     film = replace(_observed(0.2), sigma=np.full(len(OBSERVED), 0.03))
     drawn = film.pixels(4000, seed=1) / 0.03
     relative = np.log(film.speed) - np.log(film.speed).mean()
-    passing = 1 - pixels.LASTING
-    wanted = [pixels.LASTING + passing / 48, passing / np.square(relative).sum()]
+    passing = 1 - observed.LASTING
+    wanted = [observed.LASTING + passing / 48, passing / np.square(relative).sum()]
     assert np.square(drawn).mean(axis=0) == pytest.approx(np.array(wanted), rel=0.08)
     of_pair = np.corrcoef(drawn[:, 0, OBSERVED.index("extension")], drawn[:, 0, OBSERVED.index("area")])[0, 1]
     assert of_pair == pytest.approx(0.77, abs=0.02)
@@ -310,8 +310,8 @@ def test_two_films_of_a_flag_err_alike_as_far_as_its_look_goes(name: str) -> Non
     place = OBSERVED.index(name)
     one, other = (replace(_observed(0.2), sigma=np.full(len(OBSERVED), 0.03), name=name) for name in ("a", "b"))
     both = [film.pixels(4000, seed=1)[:, 0, place] for film in (one, other)]
-    lasting = pixels.LASTING[place]
-    wanted = pixels.COMMON * lasting / (lasting + (1 - lasting) / 48)
+    lasting = observed.LASTING[place]
+    wanted = observed.COMMON * lasting / (lasting + (1 - lasting) / 48)
     assert np.corrcoef(both[0], both[1])[0, 1] == pytest.approx(
         wanted, abs=0.05
     )  # three standard errors of 4,000 draws
@@ -322,4 +322,4 @@ def test_the_shares_are_those_of_films_by_another_renderer() -> None:
     results = Path(__file__).resolve().parents[3] / "docs" / "results"
     sheet = json.loads((results / "validate-observables.json").read_text(encoding="utf-8"))
     found = share(vtk(sheet["result"]["films"]))
-    assert found == pytest.approx(pixels.LASTING, abs=0.006)
+    assert found == pytest.approx(observed.LASTING, abs=0.006)

@@ -14,8 +14,8 @@ from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries
 from flagdata.stated import parse
 from flagdata.timebase import NANOSECONDS
-from measure.calibrate.beside import declared, estimated
 from measure.calibrate.columns import read
+from measure.calibrate.filmed import declared, estimated
 from measure.calibrate.observed import Observed, constant_wind
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.tables import Beside, of_table, rows_of

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from measure.closing.joint import Joint, _combined, joined
-from measure.closing.joint_page import joint_page
+from measure.closing.output import joint_page
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Conclusion, Estimate, Parameter, Verdict
 from tests.measure.report.verdicts import verdict

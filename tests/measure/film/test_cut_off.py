@@ -7,8 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.film_array import Frames
-from measure.film.conditioned import ConditionedFilm
-from measure.film.cut_off import CutOff
+from measure.film.conditioned import ConditionedFilm, CutOff
 from tests.measure.estimate.conftest import RATE
 from tests.models.conditioning.test_conditioning import WIDTH, Drawn
 

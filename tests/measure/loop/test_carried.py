@@ -21,7 +21,7 @@ from measure.nulls import plan
 from measure.nulls.simulation import SETTLE, NullBatch
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
 from measure.observe.cloth import model_mesh
-from measure.observe.pins import hold
+from measure.observe.experiment import hold
 from measure.observe.trajectory import AttachmentTrack, Experiment, Specimen
 from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.record import Conclusion

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from measure.forecasting.calibration import THETA, Calibration
-from measure.loop.parameters import parameters
+from measure.loop.run import parameters
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Parameter
 

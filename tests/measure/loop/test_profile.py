@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from measure.forecasting.regressors import EffectColumn
-from measure.loop.profile import BEYOND, Profile, across
+from measure.loop.refit import BEYOND, Profile, across
 from measure.verdict.quantity import estimate_text, with_level
 
 HOIST = EffectColumn(effect="full-hoist", parameter="stiffness", step=20.0)

@@ -8,7 +8,7 @@ import pytest
 from flagdata.errors import InputError
 from measure.observe import Hold
 from measure.observe.cloth import area, model_mesh, outline, rectangle
-from measure.observe.pins import hold
+from measure.observe.experiment import hold
 from sim.mesh import grid
 
 OUTLINES = {

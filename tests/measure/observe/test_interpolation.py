@@ -8,8 +8,7 @@ import pytest
 from flagdata.errors import InputError
 from flagdata.lake.meshes import RaggedMeshSequence
 from measure.observe.interpolation import onto
-from measure.observe.meshes import from_sequence
-from measure.observe.sampling import locate, sample
+from measure.observe.meshes import from_sequence, locate, sample
 from sim.mesh import Mesh, grid
 
 

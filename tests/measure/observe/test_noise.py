@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.observe.noise import estimate, stencils
+from measure.observe.experiment import estimate, stencils
 from tests.measure.observe.flags import flag
 
 

@@ -13,8 +13,7 @@ from flagdata.errors import InputError
 from flagdata.ingest.meshes import read_folder
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe
 from measure.observe.describing import of_arcsim
-from measure.observe.meshes import from_folder
-from measure.observe.sampling import sample
+from measure.observe.meshes import from_folder, sample
 from sim.mesh import grid
 
 pytestmark = pytest.mark.reference

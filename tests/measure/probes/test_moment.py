@@ -12,8 +12,7 @@ from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Trajectory
-from measure.probes.moment import PoleMoment, shares
-from measure.probes.statistics import projected, statistics
+from measure.probes.statistics import PoleMoment, projected, shares, statistics
 
 COLUMNS = (EffectColumn(effect="lift", parameter="coefficient", step=0.3),)
 

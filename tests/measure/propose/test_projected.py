@@ -13,9 +13,8 @@ from measure.forecasting.regressors import Column
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Experiment
 from measure.probes.statistics import statistics
-from measure.propose.projected import ProjectedSegments
+from measure.propose.projected import ProjectedSegments, of_columns
 from measure.propose.propose import made_ready
-from measure.propose.sensitivities import of_columns
 from measure.propose.terms import Term, columns_of
 
 TERMS = columns_of(

@@ -14,7 +14,7 @@ from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Trajectory, WindTrack
 from measure.propose import proposal_log
 from measure.propose.outcome import Decision, Outcome
-from measure.propose.split import data_hash, split
+from measure.propose.propose import data_hash, split
 
 MARKERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
 
