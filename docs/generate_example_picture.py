@@ -18,7 +18,7 @@ import flagdata
 from flagdata.examples import Example
 from flagdata.measured import Measured
 from flagdata.timebase import NANOSECONDS, from_datetime
-from measure.demo.example import START
+from tests.studies.example import START
 
 PICTURE = Path(__file__).with_name("pictures") / "example.webp"
 MOST_BYTES = 600_000

@@ -7,7 +7,6 @@ import logging
 import sys
 import traceback
 from importlib import import_module
-from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -78,7 +77,6 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
                 "sim.commands:simulate",
                 "Simulate cloth in the wind: mesh sequences from a recipe or a scene.",
             ),
-            "challenge": ("measure.challenge.command:challenge", "Benchmark close-loop on blind data sets."),
         },
     ),
     "learn": (
@@ -141,7 +139,6 @@ NAMES: dict[str, tuple[str, str]] = {
     "datasets": ("sim.datasets.reading:DATASETS", "build RECIPE"),
     "training": ("models.training.recipe:TRAININGS", "train RECIPE"),
     "models": ("models.estimator:SHIPPED", "measure --model, calibrate --model"),
-    "challenges": ("measure.challenge.recipe:CHALLENGES", "challenge make --recipe"),
     "exports": ("flagdata.export.plan:FORMATS", "export FORMAT"),
 }
 
@@ -149,31 +146,46 @@ _HELP = "see the command's --help"
 
 
 class LazyGroup(click.Group):
-    """A group whose commands are imported when they are run."""
+    """A group whose commands are imported when they are run.
+
+    Attributes:
+        groups: its commands, as `GROUPS` has those of flagdata.
+        verbs: the same without groups.
+        noun: what one is called in error messages.
+    """
+
+    groups = GROUPS
+    verbs = VERBS
+    noun = "command"
+
+    def __init_subclass__(cls) -> None:
+        cls.verbs = {verb: entry for _, verbs in cls.groups.values() for verb, entry in verbs.items()}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(VERBS)
+        return list(self.verbs)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in VERBS:
+        if cmd_name not in self.verbs:
             return None
-        module, _, attribute = VERBS[cmd_name][0].partition(":")
+        module, _, attribute = self.verbs[cmd_name][0].partition(":")
         return getattr(import_module(module), attribute)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and not args[0].startswith("-") and args[0] not in VERBS:
-            raise UnknownNameError.of("command", args[0], VERBS)
+        if args and not args[0].startswith("-") and args[0] not in self.verbs:
+            raise UnknownNameError.of(self.noun, args[0], self.verbs)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        for group, (title, verbs) in GROUPS.items():
+        for group, (title, verbs) in self.groups.items():
             with formatter.section(f"{group.capitalize()} ({title})"):
                 formatter.write_dl([(verb, about) for verb, (_, about) in verbs.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        verbs = [CompletionItem(verb, help=about) for verb, (_, about) in VERBS.items() if verb.startswith(incomplete)]
+        verbs = [
+            CompletionItem(verb, help=about) for verb, (_, about) in self.verbs.items() if verb.startswith(incomplete)
+        ]
         return [*verbs, *click.Command.shell_complete(self, ctx, incomplete)]
 
 
@@ -186,34 +198,27 @@ class LazyGroup(click.Group):
 @click.pass_context
 def root(context: click.Context, debug: bool, as_json: bool) -> None:
     """Measure the physics of cloth in the wind from video and anemometer logs."""
-    context.call_on_close(lambda: _show_traceback() if debug else None)
+    context.call_on_close(lambda: show_traceback() if debug else None)
     if context.invoked_subcommand is None:
         print_help(context, as_json=as_json)
     elif as_json:
-        context.default_map = {context.invoked_subcommand: _with_json(context, context.invoked_subcommand)}
+        context.default_map = {context.invoked_subcommand: {"as_json": True}}
 
 
-def _with_json(context: click.Context, verb: str) -> dict[str, Any]:
-    """Defaults of a verb with --json, and of the commands below it."""
-    command = root.get_command(context, verb)
-    below = list(command.commands) if isinstance(command, click.Group) else []
-    return {"as_json": True, **{name: {"as_json": True} for name in below}}
-
-
-def _show_traceback() -> None:
+def show_traceback() -> None:
     """Show the traceback of the error that ends the command, if one does."""
     if sys.exc_info()[0] not in (None, SystemExit, click.exceptions.Exit):
         echo_lines(traceback.format_exc(), aside=True)
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 1 failed, 2 usage, 3 refused: the data fail a quality check."""
+def main(arguments: list[str] | None = None, *, command: click.Group = root, name: str = "flagdata") -> None:
+    """Run a command line and exit: 0 done, 1 failed, 2 usage, 3 refused: the data fail a quality check."""
     given = sys.argv[1:] if arguments is None else arguments
     log = logging.getLogger("flagdata")
     if not any(isinstance(handler, Aside) for handler in log.handlers):
         log.addHandler(Aside())
     try:
-        outcome = root.main(args=given, prog_name="flagdata", standalone_mode=False)
+        outcome = command.main(args=given, prog_name=name, standalone_mode=False)
     except click.ClickException as error:
         if "--json" in given:
             document("error", {"kind": UsageError.kind, "what": error.format_message(), "where": None, "fix": _HELP})

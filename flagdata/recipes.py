@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -60,9 +61,13 @@ class Shelf:
     folder: str
     noun: str
 
+    def place(self) -> Traversable:
+        """The folder in which the files of the catalog are."""
+        return files("catalogs") / self.folder
+
     def names(self) -> tuple[str, ...]:
         """Recipes of the catalog, sorted."""
-        entries = (entry.name for entry in (files("catalogs") / self.folder).iterdir())
+        entries = (entry.name for entry in self.place().iterdir())
         return tuple(sorted(name.removesuffix(_SUFFIX) for name in entries if name.endswith(_SUFFIX)))
 
     def titles(self) -> dict[str, str]:
@@ -82,7 +87,7 @@ class Shelf:
         known = self.names()
         if name not in known:
             raise UnknownNameError.of(self.noun, name, known, where=where)
-        data = (files("catalogs") / self.folder / f"{name}{_SUFFIX}").read_bytes()
+        data = (self.place() / f"{name}{_SUFFIX}").read_bytes()
         return Found(name=name, data=data, folder=Path(), where=f"{self.noun} {name!r}")
 
     def find(self, source: str) -> Found:

@@ -1,7 +1,7 @@
 """Films of simulated flags and the logs beside them, which come with the package, with the truth of each.
 
 A folder each, with a film, a log, and `example.toml`, which states the flag, the clocks and what was simulated.
-`python -m measure.demo.example` makes them from their seeds.
+`python -m tests.studies example` makes them from their seeds.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ def null_options(*, level: str) -> Callable[[_Command], _Command]:
         click.option(
             "--bank",
             type=LocalPath(exists=True),
-            help="Folder of such simulations that were made before, by `flagdata challenge bank`.",
+            help="Folder of such simulations that were made before, by the study `challenge bank` of a checkout.",
         ),
         click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), help=level),
         click.option(

@@ -17,7 +17,7 @@ from flagdata.stated import Stated
 from measure.anemometer.measuring import measure_by
 from measure.anemometer.network import Network, gate_beside, network
 from measure.estimate.answer import Quantity
-from measure.estimate.dependence import of_model
+from measure.estimate.combine import of_model
 from measure.estimate.material import weight_of
 from measure.estimate.measuring import Measurement, Options, measure
 from measure.film.similarity import FlagSize

@@ -28,12 +28,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from flagdata.errors import InputError
+from flagdata.errors import CorruptError, InputError
+
+if TYPE_CHECKING:
+    from models.estimator import Estimator
 
 OWN = frozenset({"wind_speed"})
 """Targets of which each window has its own; all others are one cloth's."""
@@ -65,6 +69,27 @@ UNKNOWN = Dependence(
     cloth=1.0,
     source="not measured for this model, so that windows count as repetitions of one and narrow no interval",
 )
+CARD_KEY = "window_correlation"
+"""Where a model's card states its `Dependence`."""
+
+
+def of_model(model: Estimator) -> Dependence:
+    """Read how alike windows err from a model's card; `UNKNOWN` where it does not say.
+
+    Raises:
+        CorruptError: the entry is damaged.
+    """
+    entry: Any = model.card.get(CARD_KEY)
+    if entry is None:
+        return UNKNOWN
+    try:
+        return Dependence(wind=float(entry["wind"]), cloth=float(entry["cloth"]), source=str(entry["source"]))
+    except (KeyError, TypeError, ValueError, InputError) as error:
+        raise CorruptError(
+            f"the card's {CARD_KEY} cannot be used: {error}",
+            where=f"model {model.name!r}",
+            fix="measure it anew, in a checkout of flagdata: python -m tests.studies dependence",
+        ) from None
 
 
 def effective(count: int, correlation: float) -> float:

@@ -124,7 +124,7 @@ def gate_of(model: Estimator) -> Gate:
         raise InputError(
             "the network has no data on its training clips, so it cannot be checked whether it applies to this film",
             where=f"model {model.name!r}",
-            fix="ship it by python -m models.shipping, which stores its training clips",
+            fix="ship it, in a checkout of flagdata: python -m tests.studies shipping stores its training clips",
         )
     return FamiliarityGate(cloud=model.cloud)
 

@@ -80,6 +80,6 @@ def _cloud(model: Estimator) -> Familiarity:
         raise InputError(
             "the model keeps no summaries of its training clips",
             where=f"model {model.name!r}",
-            fix="ship it by python -m models.shipping, which keeps them",
+            fix="ship it, in a checkout of flagdata: python -m tests.studies shipping keeps them",
         )
     return model.cloud

@@ -52,7 +52,7 @@ def read(folder: Path, model: Estimator) -> Gate:
     """
     path = folder / GATE
     arrays = {name: value.numpy() for name, value in read_tensors(path).items()}
-    again = "calibrate it anew: python -m measure.gate.prepare"
+    again = "calibrate it anew, in a checkout of flagdata: python -m tests.studies gate"
     missing = {*_DIRECT, "tail_start", "tail_excess", "network"} - arrays.keys()
     if missing or len(arrays["tail_start"]) != len(SCORES):
         raise CorruptError("the gate does not fit this version", where=str(path), fix=again)

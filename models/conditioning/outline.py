@@ -2,7 +2,7 @@
 
 Both are found by a small network that sees each picture beside what the film shows all the time
 (`models.conditioning.mask_network`). It was trained on films of simulated flags, whose silhouettes are known
-(`measure.masks`).
+(`python -m tests.studies masks`).
 """
 
 from __future__ import annotations

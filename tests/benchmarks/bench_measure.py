@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from flagdata.film import Film
 from flagdata.rng import child_seed
 from measure.anemometer.network import Network, gate_beside, network
-from measure.estimate.dependence import of_model
-from measure.estimate.long_films import simulated
+from measure.estimate.combine import of_model
 from measure.estimate.measuring import Options, measure
 from measure.film.similarity import FlagSize
 from measure.film.source import Reading, subjects
 from measure.refine.command import Clip
 from measure.refine.command import run as refine
+from tests.studies.long_films import simulated
 
 _RATE = 25
 _WINDOWS = 6

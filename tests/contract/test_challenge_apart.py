@@ -1,11 +1,11 @@
-"""The fitted code cannot know what challenges are made of: neither by import nor while it runs."""
+"""The fitted code cannot know what challenges are made of: neither by import nor while it runs, nor is it shipped."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 
-from tests.contract.imports import ROOT, imported_from, modules
+from tests.contract.imports import PACKAGES, ROOT, imported_from, modules
 
 FITTING = (
     "sim",
@@ -29,13 +29,13 @@ FITTING = (
 MODULES = modules(*FITTING)
 
 
-def test_what_fits_imports_nothing_of_challenges() -> None:
+def test_what_is_shipped_imports_nothing_of_challenges_nor_of_other_tests() -> None:
     """Not even as text that could be imported."""
     offenders = [
         str(path.relative_to(ROOT))
-        for path in MODULES
-        if any(name.startswith("measure.challenge") for name in imported_from(path))
-        or "measure.challenge" in path.read_text(encoding="utf-8")
+        for path in modules(*PACKAGES)
+        if any(name.partition(".")[0] == "tests" for name in imported_from(path))
+        or "tests.studies.challenge" in path.read_text(encoding="utf-8")
     ]
     assert offenders == []
 
@@ -50,7 +50,7 @@ def test_what_fits_needs_no_challenge_and_a_run_loads_nothing_that_makes_one() -
         "import sys, importlib\n"
         "class Barrier:\n"
         "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name.startswith('measure.challenge'):\n"
+        "        if name.startswith('tests.studies.challenge'):\n"
         "            raise ImportError(name)\n"
         "sys.meta_path.insert(0, Barrier())\n"
         f"for name in {names!r}:\n"
@@ -58,14 +58,14 @@ def test_what_fits_needs_no_challenge_and_a_run_loads_nothing_that_makes_one() -
         "from sim.effects import EFFECTS\n"
         "[EFFECTS[name] for name in EFFECTS]\n"
         "def loaded():\n"
-        "    return sorted(name for name in sys.modules if name.startswith('measure.challenge'))\n"
+        "    return sorted(name for name in sys.modules if name.startswith('tests.studies.challenge'))\n"
         "print(loaded())\n"
         "del sys.meta_path[0]\n"
-        "import measure.challenge.run, measure.challenge.filing, measure.challenge.fitter\n"
+        "import tests.studies.challenge.run, tests.studies.challenge.filing, tests.studies.challenge.fitter\n"
         "print(loaded())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     fitting, running = done.stdout.splitlines()
     assert fitting == "[]"
     makers = ("outside", "design", "filming", "simulation", "answer_key")
-    assert not [name for name in makers if f"measure.challenge.{name}" in running]
+    assert not [name for name in makers if f"tests.studies.challenge.{name}" in running]

@@ -18,7 +18,6 @@ STAGES = (
     "report",
     "closing",
     "propose",
-    "challenge",
 )
 """Each may import those before it."""
 BARE = {"verdict": set[str](), "observe": set[str]()}

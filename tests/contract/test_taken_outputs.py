@@ -26,10 +26,6 @@ CASES: dict[str, tuple[tuple[str, ...], str]] = {
     "close-loop --out": (("close-loop", "nowhere.csv", "--lake", "nowhere", "--out", "{out}"), "model.toml"),
     "propose --out, log": (("propose", "nowhere.toml", "--out", "{out}"), "proposal/proposals.json"),
     "propose --out, effect": (("propose", "nowhere.toml", "--out", "{out}"), "proposal/pyproject.toml"),
-    "challenge make": (("challenge", "make", "{out}", "--seed", "1"), "mine"),
-    "challenge bank": (("challenge", "bank", "{out}", "--seed", "1"), "mine"),
-    "challenge score --out": (("challenge", "score", "nowhere", "--out", "{out}"), "challenge-score.png"),
-    "challenge score --history": (("challenge", "score", "nowhere", "--history", "{out}/a.csv"), "a.csv"),
     "build --card": (("build", "flagsim-small", "--lake", "{out}/lake", "--card", "{out}/a.html"), "a.html"),
     "demo --out": (("demo", "--out", "{out}"), "mine"),
     "train --run": (("train", "flow", "--lake", "nowhere", "--run", "{out}"), "mine"),
@@ -47,7 +43,7 @@ def test_a_taken_output_is_refused_first_and_kept(
     (out / taken).write_text("mine")
     monkeypatch.chdir(tmp_path)
     code, error = refusal([argument.format(out=out) for argument in arguments], capsys)
-    assert (code, error["kind"]) == (1, "corrupt" if taken.endswith(("proposals.json", ".csv")) else "conflict")
+    assert (code, error["kind"]) == (1, "corrupt" if taken.endswith("proposals.json") else "conflict")
     assert str(out) in f"{error['what']} {error['where']}"
     assert error["fix"]
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == [out / taken]

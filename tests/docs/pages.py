@@ -16,11 +16,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from string import Template
 
+import click
 import pytest
 
-from flagdata.cli import main
+from flagdata.cli import main, root
+from tests.studies.__main__ import studies
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOOR = "python -m tests.studies"
 _ASSIGNED = re.compile(r"(\w+)=\$\((.+) \| tail -1\)")
 
 
@@ -69,18 +72,20 @@ class Shell:
         elif verb == "export":
             self.patch.setenv(*arguments[0].split("=", 1))
         elif verb == "flagdata":
-            return self._flagdata(command, arguments)
+            return self._program(command, arguments, root)
+        elif [verb, *arguments[:2]] == DOOR.split():
+            return self._program(command, arguments[2:], studies)
         else:
             subprocess.run([verb, *arguments], check=True)
         return ""
 
-    def _flagdata(self, command: str, arguments: list[str]) -> str:
+    def _program(self, command: str, arguments: list[str], group: click.Group) -> str:
         out, err = io.StringIO(), io.StringIO()
         with (
             pytest.raises(SystemExit) as ended,
             contextlib.redirect_stdout(out),
             contextlib.redirect_stderr(err),
         ):
-            main(arguments)
+            main(arguments, command=group)
         assert ended.value.code == 0, f"{command}\nended with {ended.value.code}\n{out.getvalue()}{err.getvalue()}"
         return out.getvalue()

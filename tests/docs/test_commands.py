@@ -8,11 +8,28 @@ import click
 import pytest
 
 from docs.generate_cli import commands
-from tests.docs.pages import DOCS
+from tests.docs.pages import DOCS, DOOR
+from tests.studies.__main__ import studies
 
-COMMANDS = dict(commands())
+RECORDS = ("decisions/", "results/")
+"""Pages that say what was typed at their time: `flagdata challenge` was a command until it became a study."""
+
+
+def of_studies(start: str) -> dict[str, click.Command]:
+    """The studies that are click commands, and what is below them, by what is typed after `start`."""
+    found: dict[str, click.Command] = {}
+    for name in (name for name, (target, _) in studies.verbs.items() if ":" in target):
+        command = found[f"{start} {name}"] = studies.get_command(click.Context(studies), name)
+        below = command.commands if isinstance(command, click.Group) else {}
+        found |= {f"{start} {name} {verb}": one for verb, one in below.items()}
+    return found
+
+
+COMMANDS = {**dict(commands()), **of_studies(DOOR)}
+BEFORE = {name: command for name, command in of_studies("flagdata").items() if "challenge" in name}
 PAGES = sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md") if path.name != "cli.md")
-SPAN = re.compile(r"^\$ (?:\w+=\$\()?(flagdata .+)$|`(flagdata [a-z][^`]+)`", re.MULTILINE)
+PROGRAM = rf"(?:flagdata|{re.escape(DOOR)})"
+SPAN = re.compile(rf"^\$ (?:\w+=\$\()?({PROGRAM} .+)$|`({PROGRAM} [a-z][^`]+)`", re.MULTILINE)
 OPTION = re.compile(r"(?<![\w-])(--[a-z][a-z-]*|-[a-z])(?=[\s=,);]|$)")
 
 
@@ -22,21 +39,21 @@ def named(page: str) -> list[str]:
     return [" ".join((line or quoted).split()) for line, quoted in SPAN.findall(text)]
 
 
-def called(command: str) -> click.Command | None:
+def called(command: str, page: str) -> click.Command | None:
     """The command of a line, or `None` where no word of it is one."""
-    words = command.split()
-    return COMMANDS.get(" ".join(words[:3])) or COMMANDS.get(" ".join(words[:2]))
+    known, words = {**COMMANDS, **(BEFORE if page.startswith(RECORDS) else {})}, command.split()
+    return next((known[start] for n in (5, 4, 3, 2) if (start := " ".join(words[:n])) in known), None)
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if named(page)])
 def test_every_command_and_option_that_a_page_names_exists(page: str) -> None:
     wrong = []
     for line in named(page):
-        command = called(line)
+        command = called(line, page)
         if command is None:
             wrong.append(line)
             continue
         known = {"--help"} | {word for one in command.params for word in (*one.opts, *one.secondary_opts)}
         typed = re.split(r" [|>&#;] ?| && ", re.sub(r"\"[^\"]*\"|'[^']*'", "TEXT", line))[0]
-        wrong += [f"{line}: {option}" for option in OPTION.findall(typed) if option not in known]
+        wrong += [f"{line}: {option}" for option in OPTION.findall(typed.removeprefix(DOOR)) if option not in known]
     assert wrong == []

@@ -21,7 +21,7 @@ def test_a_name_is_the_file_of_that_name_in_the_catalog() -> None:
 
 
 def test_every_file_of_a_folder_has_a_name_and_can_be_found_by_it() -> None:
-    for folder in ("challenges", "datasets", "materials", "renders", "scenes", "sensors"):
+    for folder in ("datasets", "materials", "renders", "scenes", "sensors"):
         shelf = Shelf(folder=folder, noun="recipe")
         stems = sorted(path.stem for path in (ROOT / "catalogs" / folder).glob("*.toml"))
         assert list(shelf.names()) == stems

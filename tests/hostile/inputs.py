@@ -17,13 +17,13 @@ from hypothesis import strategies as st
 
 from flagdata.lake import Lake
 from flagdata.provenance import file_hash
-from measure.challenge.filing import Filing, file, note_opening, read
-from measure.challenge.folder import ChallengeFolder, data_hash, read_set, write_set
 from tests.compat.make_lake import write_record
 from tests.damage import damaged, damages, edited, edits
 from tests.hostile.campaign import Subject, command
 from tests.hostile.recipes import SQUARE
 from tests.hostile.sound import sound
+from tests.studies.challenge.filing import Filing, file, note_opening, read
+from tests.studies.challenge.folder import ChallengeFolder, data_hash, read_set, write_set
 
 _CODECS = {"mp4": "libx264", "mkv": "libx264", "mov": "mjpeg", "avi": "mjpeg", "ts": "libx264"}
 _LOG = "\n".join(

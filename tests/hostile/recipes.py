@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from flagdata.ingest.anemometer.recipe import parse as parse_sensor
 from flagdata.recipes import parsed
-from measure.challenge.recipe import parse as parse_challenge
 from measure.observe.recipe import load as load_experiment
 from models.training.recipe import parse as parse_training
 from sim.arcsim import read_material, read_scene
@@ -25,6 +24,8 @@ from sim.run.reading import parse as parse_scene
 from tests.damage import as_toml, damaged, damages, edited, edits
 from tests.hostile.campaign import Subject, command
 from tests.small import EXPERIMENT, SCENE, TRAINING
+from tests.studies.challenge.recipe import CHALLENGES
+from tests.studies.challenge.recipe import parse as parse_challenge
 
 CATALOGS = Path(__file__).parents[2] / "catalogs"
 
@@ -81,7 +82,7 @@ FORMS: dict[str, tuple[str, Callable[[str, Path], object]]] = {
         first("datasets"),
         lambda text, folder: parse_dataset(text, name="recipe", folder=folder, where="recipe"),
     ),
-    "challenge": (first("challenges"), lambda text, _: parse_challenge(text, where="recipe")),
+    "challenge": (CHALLENGES.named("films-3").text, lambda text, _: parse_challenge(text, where="recipe")),
     "material": (
         first("materials"),
         lambda text, _: Material.from_mapping(parsed(text, where="recipe"), name="recipe"),

@@ -1,4 +1,4 @@
-"""Remedies of `flagdata close-loop` and `flagdata challenge`, up to where their minutes of simulation begin."""
+"""Remedies of `flagdata close-loop`, up to where its minutes of simulation begin."""
 
 from __future__ import annotations
 
@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import RefusedError
-from measure.challenge.run import IN_THIS_PROCESS
-from measure.challenge.run import run as judge
 from measure.closing import close
-from measure.verdict.record import Conclusion
-from tests.measure.challenge import cases as challenges
 from tests.remedies.user import User
 
 BEGINS = "the loop begins"
@@ -72,30 +68,3 @@ def test_what_is_no_mesh_sequence_is_one_that_is_listed(user: User, cloth: str) 
     user.follows("ls", shows=f"meshes +{cloth}")
     ended = user.types("close-loop", cloth, *rest)
     assert BEGINS in ended.err
-
-
-@pytest.fixture
-def challenge(user: User, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
-    """What makes a folder of two small sets; a verdict that finds nothing stands for each loop."""
-
-    def run(folder: Any, fitter: Any, **options: Any) -> Any:
-        kept = {**options, "workers": IN_THIS_PROCESS}
-        return judge(folder, lambda experiment, seed: challenges.verdict(Conclusion.SUFFICIENT), **kept)
-
-    monkeypatch.setattr("measure.challenge.run.run", run)
-    (user.folder / "tiny.toml").write_text(challenges.TINY)
-    return ("challenge", "make", "sets", "--recipe", "tiny.toml", "--seed", "3", "--sets", "2")
-
-
-def test_a_challenge_that_is_not_there_is_made(user: User, challenge: tuple[str, ...]) -> None:
-    user.meets("challenge/folder.py", "check the path, or make", "challenge", "run", "sets")
-    user.follows(*challenge)
-
-
-def test_sets_are_judged_before_they_are_graded(user: User, challenge: tuple[str, ...]) -> None:
-    user.succeeds(*challenge)
-    user.meets("challenge/score.py", "run `flagdata challenge", "challenge", "score", "sets")
-    user.follows("challenge", "run", "sets")
-    ended = user.types("challenge", "score", "sets")
-    assert ended.code == 3  # it finds nothing, and misses what is there
-    assert "no filed verdict" not in ended.err

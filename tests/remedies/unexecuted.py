@@ -8,15 +8,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/lake/object_cache.py", "run flagdata verify: it"),
     ),
     "a change of bytes between two reads": (("flagdata/lake/transfer.py", "run flagdata verify"),),
-    "a data set whose films were not rendered, which `flagdata build` makes in hours": (
-        ("measure/gate/prepare.py", "build them: flagdata bui"),
-        ("measure/masks/examples.py", "build them: flagdata bui"),
-    ),
     "a definition, no remedy": (("flagdata/pages/glossary.py", "A regression that makes"),),
     "a disk that fails while it confirms": (("flagdata/lake/durable.py", "check the disk, then run"),),
-    "a filed verdict that goes between two reads of one command": (
-        ("measure/challenge/filing.py", "run `flagdata challenge"),
-    ),
     "a film of a minute or more that is itself looked at by a network, beside a log whose clock is off": (
         ("measure/anemometer/calibration.py", "align the film with the"),
         ("measure/anemometer/calibration.py", "check the clocks with fl"),
@@ -89,7 +82,6 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     "each guess that is no recording says what to do by itself": (
         ("flagdata/ingest/classify.py", "see flagdata ingest --sn"),
     ),
-    "films of a challenge, simulated for minutes a set": (("measure/challenge/nulls.py", "run `flagdata challenge"),),
     "it is for the start file of a shell; tests/contract completes in each shell": (
         ("flagdata/commands/completion.py", "flagdata completion fish"),
         ("flagdata/commands/completion.py", 'ion bash)"  in ~/.bashrc'),

@@ -11,8 +11,8 @@ What was fixed before the judged part was opened (only what lies before `OPENED`
 - a row is left out where, within its 30 frames, points were found anew or fewer than five were left, or a frame is
   missing: one jump of the tracker stays in its root mean square for all of them;
 - the value at rest is the median of the rows before `CALM`; the clock is that of the pairs of stamps, known to one
-  frame; dead zone, zero and the flag's law are fitted by `measure.instruments`. On the opened part a dead zone held
-  at the log's first step, 0.38 m/s, and with it a lag of the anemometer were tried and left out: in wind the fit
+  frame; dead zone, zero and the flag's law are fitted by `tests.studies.instruments`. On the opened part a dead zone
+  held at the log's first step, 0.38 m/s, and with it a lag of the anemometer were tried and left out: in wind the fit
   without each block erred by 2.3 and 2.8 m/s;
 - the error is the root mean square of flag less anemometer, with 90 % intervals over blocks of a second.
 
@@ -47,9 +47,9 @@ from flagdata.pages.pictures import png
 from flagdata.rng import stream
 from flagdata.stated import Stated
 from flagdata.timebase import NANOSECONDS, parse
-from measure.instruments.disagreement import Disagreement, Readings, Rows, fit, jackknife, without
 from models.evaluation.bootstrap import Resamples, estimate, ratio
 from tests.evidence import ABSENT, REFERENCE
+from tests.studies.instruments.disagreement import Disagreement, Readings, Rows, fit, jackknife, without
 
 FOLDER = REFERENCE / "wind" / "flag-camera-tunnel"
 ORIGIN = parse("2025-12-09T16:15:45", default=UTC)

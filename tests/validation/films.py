@@ -20,7 +20,7 @@ import torch
 from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.stated import Stated
 from measure.anemometer.network import Network, gate_beside, network
-from measure.estimate.dependence import of_model
+from measure.estimate.combine import of_model
 from measure.estimate.gate import Gate
 from measure.estimate.measuring import Measurement, measure
 from measure.estimate.options import Options

@@ -24,7 +24,6 @@ import torch
 
 from flagdata.errors import InputError, NotFoundError
 from flagdata.rng import child_seed
-from measure.challenge.classes import class_of
 from measure.closing.close import close_loop
 from measure.forecasting.segments import Segments
 from measure.loop.run import Options
@@ -34,6 +33,7 @@ from measure.observe.recipe import load, read
 from measure.shares import Share
 from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.record import Conclusion, Estimate
+from tests.studies.challenge.classes import class_of
 from tests.validation.environments import MUJOCO
 from tests.validation.mujoco.experiments import NOISE, NOMINAL, NOTHING, SPEEDS, UNDECLARED, Truth, draw, write
 

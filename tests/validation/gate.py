@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 from flagdata.errors import NotFoundError
 from measure.gate.gate import Gate
 from measure.gate.judgement import CONFIDENCE, FALSE_ALARM, Judgement, judge
-from measure.gate.prepare import FilmsOf, calibrated, data_of, rate_of
 from measure.gate.storage import read
 from measure.shares import Share
 from models.estimator import SHIPPED, Estimator, shipped
 from tests.evidence import ABSENT, REFERENCE
+from tests.studies.gate import FilmsOf, calibrated, data_of, rate_of
 from tests.validation.gate_clips import KINDS, made, seed_of
 
 LAKE = "FLAGDATA_LAKE"

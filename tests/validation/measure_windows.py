@@ -1,7 +1,7 @@
 """Whether intervals of one window and of several together hold what they say, on long films whose truth is known.
 
 Films of six windows of 1.2 s are simulated of the cloths that the shipped model was trained on, each with a seed of its
-own (`measure.estimate.long_films`). One window of each: ranks of simulation-based calibration (Talts et al.,
+own (`tests.studies.long_films`). One window of each: ranks of simulation-based calibration (Talts et al.,
 arXiv:1804.06788), coverage, and expected coverage by random points (TARP). Two, four and six: coverage, error and width
 of the answer that `flagdata measure` gives. Errors of two windows correlate by their distance in time.
 
@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 
 from flagdata.console import progress
 from flagdata.rng import child_seed, stream
-from measure.estimate.combine import OWN, combined
-from measure.estimate.dependence import Posteriors, of_model, posteriors
-from measure.estimate.long_films import LongFilm, simulated
+from measure.estimate.combine import OWN, combined, of_model
 from models import estimator
 from models.estimator import Estimator
 from models.evaluation.bootstrap import Resamples
 from models.evaluation.calibration import LEVELS, Coverage, coverage, rank_histogram, tarp
 from models.evaluation.predictions import WIND, Predictions
+from tests.studies.dependence import Posteriors, posteriors
+from tests.studies.long_films import LongFilm, simulated
 
 FILMS = int(os.environ.get("FLAGDATA_WINDOWS_FILMS", "300"))
 WINDOWS = 6

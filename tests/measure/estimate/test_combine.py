@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError
+from flagdata.errors import CorruptError, InputError
 from flagdata.rng import stream
-from measure.estimate.combine import Dependence, combined, effective
+from measure.estimate.combine import CARD_KEY, UNKNOWN, Dependence, combined, effective, of_model
+from models.estimator import Estimator
 
 CLOTH = ("density",)
 BOTH = ("wind_speed", "density")
@@ -141,3 +144,17 @@ def test_a_wind_that_trades_with_the_cloth_follows_what_all_windows_say_of_the_c
 def test_a_correlation_beyond_one_is_refused() -> None:
     with pytest.raises(InputError, match="0 to 1"):
         Dependence(wind=1.2, cloth=0.0, source="given")
+
+
+def test_a_model_without_an_entry_has_windows_that_count_as_one(model: Estimator) -> None:
+    assert of_model(model) is UNKNOWN
+    assert UNKNOWN.cloth == UNKNOWN.wind == 1
+
+
+def test_a_models_card_states_how_alike_its_windows_err(model: Estimator) -> None:
+    entry = {"wind": 0.5, "cloth": 0.25, "source": "made"}
+    stored = of_model(replace(model, card={**model.card, CARD_KEY: entry}))
+    assert stored == Dependence(wind=0.5, cloth=0.25, source="made")
+    for damaged in ({"wind": 3}, {**entry, "wind": 3}, [0.5]):
+        with pytest.raises(CorruptError, match=f"the card's {CARD_KEY} cannot be used"):
+            of_model(replace(model, card={**model.card, CARD_KEY: damaged}))

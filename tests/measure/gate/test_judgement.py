@@ -15,11 +15,11 @@ from measure.estimate.gate import verdict
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.gate import Gate
 from measure.gate.judgement import judge
-from measure.gate.prepare import calibrated
 from measure.gate.reasons import REASONS
 from measure.gate.storage import read, write
 from models.estimator import Estimator
 from tests.measure.gate.made import film, small_model
+from tests.studies.gate import calibrated
 
 PLAIN, DISTORTED, VALIDATION = 60, 4, 50
 

@@ -28,7 +28,7 @@ from flagdata.errors import (
 from flagdata.lake import Lake
 from flagdata.lake.catalog import Catalog
 from flagdata.locks import alone_in
-from models import estimator, shipping
+from models import estimator
 from models.storage import WEIGHTS, read_card
 from models.targets import Cloth
 from models.training import command, inputs
@@ -36,6 +36,7 @@ from models.training.command import sides_of
 from models.training.inputs import prepare_clips, prepare_films
 from models.training.recipe import TRAININGS, load, parse
 from tests.small import TRAINING
+from tests.studies import shipping
 
 
 def run(*arguments: str) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""Studies: what grades the product and makes what it ships. One door: `python -m tests.studies NAME`."""

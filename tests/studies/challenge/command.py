@@ -1,0 +1,245 @@
+"""`python -m tests.studies challenge make | bank | run | score`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from flagdata.console import LakePlace, LocalPath, document, echo, echo_lines, json_option, progress, say
+from flagdata.errors import UsageError
+
+if TYPE_CHECKING:
+    from flagdata.storage import Place
+    from tests.studies.challenge.filing import Filing
+
+_FOLDER = click.argument("folder", metavar="DIR", type=LocalPath())
+_ONLY = click.option("--only", multiple=True, metavar="SET", help="Take this set only; may be repeated.")
+
+
+@click.group()
+def challenge() -> None:
+    """Benchmark close-loop on recordings whose true effect is hidden.
+
+    Keys are opened by `score` alone, and only of sets whose verdict is filed. Until then `challenge.json` holds a hash
+    of each.
+
+    \b
+      python -m tests.studies challenge make out/challenge --seed 7 --sets 60 --workers 2
+      python -m tests.studies challenge make out/films --recipe films --seed 7 --sets 40 --workers 2
+      python -m tests.studies challenge bank out/bank --seed 8 --workers 2
+      python -m tests.studies challenge run out/challenge --bank out/bank --workers 2
+      python -m tests.studies challenge score out/challenge --out docs/results
+    """
+
+
+@challenge.command()
+@_FOLDER
+@click.option("--recipe", default="standard", show_default=True, help="Recipe: a name of the catalog, or a .toml file.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), required=True, help="Seed of everything that is drawn; keep it secret."
+)
+@click.option("--sets", "count", type=click.IntRange(min=1), default=60, show_default=True, help="Number of sets.")
+@click.option(
+    "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Number of processes that simulate."
+)
+@json_option
+def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json: bool) -> None:
+    """Draw keys, simulate, and write sealed data sets into a new folder; one that was stopped goes on."""
+    from flagdata.workload import announced
+    from tests.studies.challenge.make import make as make_challenge
+    from tests.studies.challenge.make import workload
+    from tests.studies.challenge.recipe import load
+
+    loaded = load(recipe)
+    say(announced(f"simulating {count} sets", workload(loaded, count), workers=workers))
+    with progress(count, label=loaded.title, unit="set") as advance:
+        made = make_challenge(folder, loaded, seed=seed, count=count, workers=workers, progress=advance)
+    if as_json:
+        document("challenge-made", {"folder": str(made.path), "sets": made.manifest()["sets"]})
+    else:
+        echo(str(made.path))
+
+
+@challenge.command()
+@_FOLDER
+@click.option(
+    "--recipe",
+    default="standard",
+    show_default=True,
+    help="Recipe of a challenge: a name of the catalog, or a .toml file; or a recipe of close-loop, for nulls of its "
+    "cloth, markers and winds.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    required=True,
+    help="Seed of everything that is drawn; it must differ from that of the challenge.",
+)
+@click.option(
+    "--lake",
+    "lake_path",
+    type=LakePlace(),
+    envvar="FLAGDATA_LAKE",
+    help="Lake that a recipe of close-loop reads artifacts from; also FLAGDATA_LAKE.",
+)
+@click.option(
+    "--kinds",
+    type=click.IntRange(min=4),
+    default=112,
+    show_default=True,
+    help="Number of kinds of numerics (meshes and methods).",
+)
+@click.option(
+    "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Number of processes that simulate."
+)
+@json_option
+def bank(
+    folder: Path, recipe: str, seed: int, lake_path: Place | None, kinds: int, workers: int, as_json: bool
+) -> None:
+    """Simulate nulls that all sets of a recipe share, by what participants know; a build that was stopped goes on."""
+    from flagdata.lake import Lake
+    from measure.nulls import bank as banks
+    from measure.nulls.workload import of_batches
+    from tests.studies.challenge.nulls import claim, nulls_of
+
+    lake = None if lake_path is None else Lake.open(lake_path)
+    origin, batches = nulls_of(recipe, seed=seed, kinds=kinds, lake=lake)
+    claim(folder, origin, seed=seed)
+    say(of_batches(batches, workers=workers))
+    with progress(kinds, label="null recordings", unit="kind") as advance:
+        banks.build(folder, batches, workers=workers, progress=advance)
+    if as_json:
+        document("challenge-bank", {"folder": str(folder), "kinds": kinds, "recordings": kinds * banks.WINDS})
+    else:
+        echo(str(folder))
+
+
+@challenge.command()
+@_FOLDER
+@_ONLY
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the fitter.")
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="Number of sets that are judged at a time; of films, processes that simulate the first one too.",
+)
+@click.option(
+    "--bank",
+    type=LocalPath(),
+    help="Folder of simulated nulls that the sets share; of films, where their simulations are kept.",
+)
+@json_option
+def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
+    """Judge the sets that have no verdict yet, and file the verdicts with their hashes."""
+    from flagdata.caches import user_cache
+    from measure.calibrate.workload import announced
+    from measure.films.command import workload
+    from measure.loop.run import Options
+    from measure.nulls.workload import of_recordings
+    from tests.studies.challenge.filing import filed
+    from tests.studies.challenge.fitter import ClosingTheLoop, ClosingTheLoopOnFilms
+    from tests.studies.challenge.folder import ChallengeFolder
+    from tests.studies.challenge.run import run as run_challenge
+    from tests.studies.challenge.run import run_films
+
+    target = ChallengeFolder(folder)
+    waiting = [name for name in target.chosen(only) if not filed(target, name)]
+    films = ClosingTheLoopOnFilms(folder=bank or user_cache() / "calibrate", workers=workers)
+    if target.filmed:
+        for name in waiting[:1]:
+            given = target.films(name)
+            lasting = [float(log.times[-1]) for _, log in given.recordings.values()]
+            say(announced(workload(lasting, films.options(given)), workers=workers))
+    elif waiting:
+        first = target.experiment(waiting[0])
+        options = Options(bank=bank)
+        say(
+            of_recordings(
+                first.recordings,
+                first.specimen.mesh.vertex_count,
+                options,
+                sets=len(waiting),
+                workers=workers,
+            )
+        )
+    with progress(len(waiting), label="judging", unit="set") as advance:
+
+        def report(filing: Filing) -> None:
+            advance(1)
+            # What it says stays in the file: who watches a run should not learn to read it.
+            say(f"{filing.name} filed after {filing.seconds:.0f} s{' (refused)' if filing.verdict is None else ''}")
+
+        if target.filmed:
+            filings = run_films(target, films, seed=seed, only=only, progress=report)
+        else:
+            bound = ClosingTheLoop(bank=bank)
+            filings = run_challenge(target, bound, seed=seed, only=only, workers=workers, progress=report)
+    if as_json:
+        rows = [{"set": f.name, "seconds": f.seconds, "refusal": f.refusal} for f in filings]
+        document("challenge-run", {"folder": str(folder), "filed": rows})
+    else:
+        for filing in sorted(filings, key=lambda f: f.name):
+            echo(str(target.verdict(filing.name)))
+
+
+@challenge.command()
+@_FOLDER
+@_ONLY
+@click.option("--out", type=LocalPath(), help="Folder to which the sheet is also written, as .json, .md and .png.")
+@click.option(
+    "--history",
+    type=LocalPath(),
+    metavar="FILE.csv",
+    help="File of all graded challenges, to which this one is added under its folder's name.",
+)
+@click.option(
+    "--against",
+    type=click.Choice(["true-model", "floor"]),
+    help="Error against which E_red is measured: that of the true model, which is computed, or the verdict's floor. By "
+    "default the true model's, and of films the floor.",
+)
+@json_option
+@click.pass_context
+def score(
+    context: click.Context,
+    folder: Path,
+    only: tuple[str, ...],
+    out: Path | None,
+    history: Path | None,
+    against: str | None,
+    as_json: bool,
+) -> None:
+    """Open the keys and grade; ends with 3 where a gate is not met.
+
+    From then on no verdict can be filed on these sets.
+    """
+    from tests.studies.challenge import history as histories
+    from tests.studies.challenge import sheet as sheets
+    from tests.studies.challenge.folder import ChallengeFolder
+    from tests.studies.challenge.score import score as score_challenge
+    from tests.studies.challenge.true_model import true_model_errors
+
+    target, name = ChallengeFolder(folder), folder.resolve().name
+    if out is not None:
+        sheets.check(out)
+    before = [] if history is None else histories.without(history, name)  # refused before any key is opened
+    if target.filmed and against == "true-model":
+        raise UsageError("no true model's error is computed of films", where="--against", fix="give floor")
+    reference = None if target.filmed or against == "floor" else true_model_errors
+    with progress(len(target.chosen(only)), label="grading", unit="set") as advance:
+        sheet = score_challenge(target, only=only, reference=reference, progress=advance)
+    if out is not None:
+        for path in sheets.write(sheet, out):
+            say(f"wrote {path}")
+    if history is not None:
+        histories.write(history, [*before, histories.row(name, sheets.as_dict(sheet))])
+    if as_json:
+        document("score", sheets.as_dict(sheet))
+    else:
+        echo_lines(sheets.markdown(sheet))
+    if not all(gate.met for gate in sheet.gates):
+        context.exit(3)

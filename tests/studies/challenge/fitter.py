@@ -1,0 +1,79 @@
+"""The fitter that is graded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from measure.observe.trajectory import Experiment
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Verdict
+from tests.studies.challenge.films import Filmed
+
+if TYPE_CHECKING:
+    from measure.films.run import Options
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosingTheLoop:
+    """`flagdata close-loop`, as a user runs it.
+
+    Attributes:
+        bank: folder of simulated nulls that several experiments share; None to simulate them anew for each.
+    """
+
+    bank: Path | None = None
+
+    def __call__(self, experiment: Experiment, seed: int) -> Verdict:
+        """The verdict.
+
+        Raises:
+            InputError: the data do not do.
+        """
+        from measure.closing.close import close_loop
+        from measure.loop.run import Options
+
+        return close_loop(experiment, Options(seed=seed, bank=self.bank))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosingTheLoopOnFilms:
+    """`flagdata close-loop` on films, as a user runs it.
+
+    Attributes:
+        folder: where simulations are kept, which all sets share.
+        simulations: of the base model for each recording.
+        kinds: of numerics among null experiments.
+        workers: processes that simulate.
+    """
+
+    folder: Path
+    simulations: int = 128
+    kinds: int = CRITERIA.film_kinds
+    workers: int = 1
+
+    def __call__(self, given: Filmed, seed: int) -> Verdict:
+        """The verdict. Simulations are drawn from one seed for all sets, so that they share them, and not from `seed`.
+
+        Raises:
+            FlagdataError: films that do not do.
+        """
+        del seed
+        from measure.films.run import close_loop
+
+        return close_loop(given.observed(), self.options(given), folder=self.folder, workers=self.workers)
+
+    def options(self, given: Filmed) -> Options:
+        """How a set is judged, by what is stated of it."""
+        from measure.calibrate.calibrate import Options as Calibrating
+        from measure.films.run import Options
+
+        calibration = Calibrating(
+            flag=given.flag,
+            azimuth=given.azimuth,
+            elevation=given.elevation,
+            distance=given.distance,
+            simulations=self.simulations,
+        )
+        return Options(calibration=calibration, kinds=self.kinds, area_weight=given.area_weight)
