@@ -20,6 +20,7 @@ import numpy as np
 
 from flagdata.documents import read_json
 from flagdata.errors import InputError, NotFoundError
+from flagdata.findings import Finding
 from measure.calibrate.observed import Observed
 from measure.calibrate.prior import AZIMUTH, ELEVATION, Normal, Uncertain
 from measure.calibrate.simulation import Flag
@@ -47,22 +48,27 @@ class Filmed:
     area_weight: tuple[float, float] | None
     recordings: Mapping[str, tuple[Path, Log]]
 
-    def observed(self) -> tuple[Observed, ...]:
-        """What its films show, in the order of the recordings.
+    def observed(self) -> tuple[tuple[Observed, ...], tuple[Finding, ...]]:
+        """What its films show, in the order of the recordings, and a warning for each that is left out, as `flagdata
+        close-loop` leaves it out.
 
         Raises:
-            FlagdataError: no flag is found.
+            FlagdataError: in none of the films a flag is found.
         """
         from flagdata.film import CameraFilm
         from measure.calibrate.filmed import Part
+        from measure.calibrate.leaving_out import usable
         from measure.film.conditioned import ConditionedFilm
         from measure.film.similarity import FlagSize
 
         size = FlagSize(length=self.flag.length, height=self.flag.height)
-        return tuple(
-            Part.of(ConditionedFilm(CameraFilm(path), aspect=size.aspect), log, source=name).read(size)
-            for name, (path, log) in self.recordings.items()
-        )
+
+        def read(name: str) -> Observed:
+            path, log = self.recordings[name]
+            return Part.of(ConditionedFilm(CameraFilm(path), aspect=size.aspect), log, source=name).read(size)
+
+        shown, left_out = usable(list(self.recordings), read, name=str)
+        return tuple(shown), left_out
 
 
 def read_films(folder: Path) -> Filmed:

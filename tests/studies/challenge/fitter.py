@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,7 +62,9 @@ class ClosingTheLoopOnFilms:
         del seed
         from measure.films.run import close_loop
 
-        return close_loop(given.observed(), self.options(given), folder=self.folder, workers=self.workers)
+        shown, left_out = given.observed()
+        verdict = close_loop(shown, self.options(given), folder=self.folder, workers=self.workers)
+        return replace(verdict, findings=(*left_out, *verdict.findings))
 
     def options(self, given: Filmed) -> Options:
         """How a set is judged, by what is stated of it."""

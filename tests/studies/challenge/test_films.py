@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import av
 import numpy as np
 import pytest
 
-from flagdata.errors import CorruptError, InputError, UnknownNameError
+from flagdata.errors import CorruptError, InputError, RefusedError, UnknownNameError
+from flagdata.film import CameraFilm
+from measure.calibrate.filmed import Part
+from measure.calibrate.prior import AZIMUTH, ELEVATION
+from measure.calibrate.simulation import Flag
+from measure.film.similarity import FlagSize
 from measure.verdict.record import Conclusion
 from tests.studies.challenge.cases import TINY, acting, filing, key, verdict
 from tests.studies.challenge.design import draw
 from tests.studies.challenge.filming import logged
-from tests.studies.challenge.films import read_films
+from tests.studies.challenge.films import Filmed, read_films
 from tests.studies.challenge.make import make
 from tests.studies.challenge.outcome import Outcome
 from tests.studies.challenge.recipe import ChallengeRecipe, Kind, load, parse
@@ -56,6 +63,33 @@ def test_sets_are_films_with_what_is_stated_beside_them(recipe: ChallengeRecipe,
     (tmp_path / "films" / "sets" / "set-001" / "b.mp4").write_bytes(b"another film")
     with pytest.raises(CorruptError, match="not those that were published"):
         made.films("set-001")
+
+
+def test_a_film_that_shows_no_flag_is_left_out_as_the_program_leaves_it_out(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def read(part: Part, size: FlagSize) -> str:
+        if part.source == "b":
+            raise RefusedError("no flag", where="b", fix="another film")
+        return part.source
+
+    monkeypatch.setattr(CameraFilm, "__init__", lambda *_: None)
+    monkeypatch.setattr(
+        Part,
+        "of",
+        lambda _, __, *, source: SimpleNamespace(source=source, read=partial(read, SimpleNamespace(source=source))),
+    )
+    given = Filmed(
+        flag=Flag(length=1.5, height=1.0),
+        azimuth=AZIMUTH,
+        elevation=ELEVATION,
+        distance=8.0,
+        area_weight=None,
+        recordings={name: (tmp_path / f"{name}.mp4", None) for name in "abc"},  # type: ignore[misc]
+    )
+    shown, left_out = given.observed()
+    assert shown == ("a", "c")
+    assert [one.what for one in left_out] == ["b is left out: no flag"]
 
 
 def test_all_sets_have_one_experiments_winds(recipe: ChallengeRecipe) -> None:
