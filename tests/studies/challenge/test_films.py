@@ -68,17 +68,13 @@ def test_sets_are_films_with_what_is_stated_beside_them(recipe: ChallengeRecipe,
 def test_a_film_that_shows_no_flag_is_left_out_as_the_program_leaves_it_out(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    def read(part: Part, size: FlagSize) -> str:
-        if part.source == "b":
+    def read(source: str, size: FlagSize) -> str:
+        if source == "b":
             raise RefusedError("no flag", where="b", fix="another film")
-        return part.source
+        return source
 
     monkeypatch.setattr(CameraFilm, "__init__", lambda *_: None)
-    monkeypatch.setattr(
-        Part,
-        "of",
-        lambda _, __, *, source: SimpleNamespace(source=source, read=partial(read, SimpleNamespace(source=source))),
-    )
+    monkeypatch.setattr(Part, "of", lambda *_, source: SimpleNamespace(read=partial(read, source)))
     given = Filmed(
         flag=Flag(length=1.5, height=1.0),
         azimuth=AZIMUTH,
