@@ -1,8 +1,8 @@
 """Immutable objects in a bucket: `mcap/<sha256>.mcap`, and folders as `zarr/<treehash>.zarr/…`.
 
 A folder's files are put first and `.sums`, the lines whose SHA-256 is its name, last: without it the folder is not
-there. It is deleted first. Objects are read from a local copy, see `flagdata.lake.object_cache`; of large records only
-the parts that are needed are fetched, see `flagdata.lake.object_ranges`.
+there. It is deleted first. Objects are read from a local copy, see `flagdata.object_cache`; of large records only
+the parts that are needed are fetched, see `flagdata.object_ranges`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from flagdata.errors import CorruptError
 from flagdata.files import is_beside
 from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.layout import STORES
-from flagdata.lake.object_cache import copy_of, fetched, forget, kept
 from flagdata.lake.objects import DAMAGED, REMEDY, Objects, StoredObject, path_in_lake
+from flagdata.object_cache import copy_of, fetched, forget, kept
 from flagdata.storage import Place, RemotePath
 
 SUMS = ".sums"

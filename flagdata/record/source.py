@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from flagdata.errors import NotFoundError
-from flagdata.lake.object_ranges import ObjectRanges
+from flagdata.object_ranges import ObjectRanges
 from flagdata.storage import Place
 
 

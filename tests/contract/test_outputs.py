@@ -31,7 +31,7 @@ ALLOWED = {
     "flagdata/lake/remote_leases.py": LAKE,
     "flagdata/lake/remote_objects.py": LAKE,
     "flagdata/storage/path.py": "writes, removes and renames what its callers name, as pathlib does for folders",
-    "flagdata/lake/object_cache.py": "a cache of a lake's objects by their hash",
+    "flagdata/object_cache.py": "a cache of a lake's objects by their hash",
     "sim/datasets/card.py": LAKE + "; a path that the user gives goes through flagdata.outputs",
     "flagdata/lake/transaction.py": LAKE,
     "measure/closing/artifacts.py": LAKE,

@@ -19,12 +19,32 @@ CALIBRATED = {"another-picture", "another-place", "another-framing", "another-wi
 PLAIN = {"too-few-frames", "low-frame-rate", "no-motion", "scale", "several-flags"}
 """Reasons that state what was counted, and infer nothing from it."""
 VERBS = {
-    "measure": ("measure/estimate", "measure/gate", "measure/anemometer", "measure/refine"),
-    "observe": ("measure/observables", "measure/estimate"),
-    "calibrate": ("measure/calibrate", "measure/anemometer", "measure/observables", "measure/estimate"),
-    "align": ("flagdata/align", "flagdata/commands/align.py", "flagdata/commands/align.py"),
+    "measure": (
+        "measure/estimate",
+        "measure/film",
+        "measure/commands/measure",
+        "measure/gate",
+        "measure/anemometer",
+        "measure/refine",
+    ),
+    "observe": ("measure/observables", "measure/film", "measure/commands/observe"),
+    "calibrate": (
+        "measure/calibrate",
+        "measure/commands/calibrate",
+        "measure/anemometer",
+        "measure/observables",
+        "measure/film",
+        "measure/estimate",
+    ),
+    "align": ("flagdata/align", "flagdata/commands/align.py"),
     "ingest": ("flagdata/ingest", "flagdata/commands/ingest_options.py", "flagdata/commands/confirm.py"),
-    "close-loop": ("measure/closing", "measure/films", "measure/observe", "measure/calibrate"),
+    "close-loop": (
+        "measure/closing",
+        "measure/commands/close_loop",
+        "measure/films",
+        "measure/observe",
+        "measure/calibrate",
+    ),
 }
 """Where the refusals of each command are."""
 CONDITIONAL = {

@@ -28,7 +28,7 @@ from flagdata.dataset.cache import DecodedCache
 from flagdata.errors import UnforeseenError
 from flagdata.lake import Artifact, Lake, catalog
 from flagdata.lake.expiry import expire
-from flagdata.lake.object_cache import block_of, keep_blocks
+from flagdata.object_cache import block_of, keep_blocks
 from flagdata.schema import Kind
 from measure.calibrate import design
 from measure.nulls import bank

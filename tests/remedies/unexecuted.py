@@ -5,7 +5,7 @@ from __future__ import annotations
 BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     "a bucket, with an upload that was cut off or an object that was changed": (
         ("flagdata/lake/health.py", "; flagdata gc aborts it"),
-        ("flagdata/lake/object_cache.py", "run flagdata verify: it"),
+        ("flagdata/object_cache.py", "run flagdata verify: it"),
     ),
     "a change of bytes between two reads": (("flagdata/lake/transfer.py", "run flagdata verify"),),
     "a definition, no remedy": (("flagdata/pages/glossary.py", "A regression that makes"),),

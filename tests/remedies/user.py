@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import sys
+import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -54,8 +55,10 @@ class User:
     _command: tuple[str, ...] = ()
 
     def begins(self) -> None:
-        """Go to a folder that is as it was before the first command."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        """Go to a folder that is as it was before the first command. The one before stays, since the process that
+        answers queries may work in it."""
+        if self.folder.exists():
+            self.folder.rename(self.folder.with_name(f"{self.folder.name}-{uuid.uuid4().hex}"))
         shutil.copytree(self.origin, self.folder, symlinks=True)
         os.chdir(self.folder)
 

@@ -35,7 +35,7 @@ from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify
-from flagdata.lake.object_ranges import ObjectRanges
+from flagdata.object_ranges import ObjectRanges
 from flagdata.provenance import code_version
 from flagdata.schema import Kind
 from flagdata.storage.path import RemotePath

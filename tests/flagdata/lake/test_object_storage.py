@@ -19,10 +19,11 @@ from urllib.request import urlopen
 import pytest
 
 import flagdata
+from flagdata import object_cache
 from flagdata.caches import beside
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError, RefusedError, UsageError
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake, object_cache, remote_leases
+from flagdata.lake import Artifact, Lake, remote_leases
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
 from flagdata.lake.leases import collecting, last_written, leases, open_lease

@@ -13,8 +13,8 @@ from flagdata.errors import ConflictError, CorruptError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
-from flagdata.lake.object_cache import forget
 from flagdata.lake.transfer import clone, transfer
+from flagdata.object_cache import forget
 from tests.flagdata.lake.conftest import overwrite
 from tests.program import invoke
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata import object_cache as cache
+from flagdata import object_ranges as ranges
 from flagdata.errors import CorruptError, NotFoundError
 from flagdata.lake import Artifact, Lake, remote_objects
-from flagdata.lake import object_cache as cache
-from flagdata.lake import object_ranges as ranges
 from flagdata.record import Chunking, Coding, Record
 from flagdata.record.checksums import ChecksummedWriter
 from flagdata.schema import Kind

@@ -24,7 +24,6 @@ from measure.observe.cloth import model_mesh
 from measure.observe.experiment import hold
 from measure.observe.trajectory import AttachmentTrack, Experiment, Specimen
 from measure.verdict.decided import NOT_REJECTED
-from measure.verdict.record import Conclusion
 from sim.effects import EFFECTS, Effect
 from sim.material import named
 from tests.pools import Here
@@ -184,7 +183,7 @@ def test_close_loop_judges_a_table_of_a_carried_cloth(
         )
     assert ended.value.code == 0
     said = json.loads(capsys.readouterr().out)
-    assert said["conclusion"] == Conclusion.SUFFICIENT.value
+    assert said["conclusion"] in {one.value for one in NOT_REJECTED}
     assert said["test"]["nulls"].endswith("carried along the recordings' own ways from other instants on")
     assert "own ways from other instants on" in (tmp_path / "loop" / "report.html").read_text(encoding="utf-8")
     # Recipes of the simulator hold cloth still.

@@ -51,7 +51,7 @@ METHOD = {
     "nulls/tracks": {"_TURN", "_WEIGHTS", "_HALVINGS"},
     "nulls/winds": {"_STEADY", "_EVERY"},
     "loop/gauss_newton": {"ROUNDS", "_FEW", "_HALVINGS", "STAYS", "_LONGEST", "_TRIED"},
-    "loop/profile": {"COUNT", "BEYOND", "_WITHIN_THE_END", "_AT_THE_END"},
+    "loop/refit": {"COUNT", "BEYOND", "_WITHIN_THE_END", "_AT_THE_END"},
     "loop/residuals": {"_SHOWN"},
     "loop/run": {"_FLOOR_COPIES", "_LOOKS"},
     "loop/selection": {"GUST_COLUMN"},

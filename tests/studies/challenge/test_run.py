@@ -13,6 +13,7 @@ import pytest
 from flagdata.errors import ConflictError, CorruptError, InputError, RefusedError, UnknownNameError
 from measure.observe.trajectory import Experiment
 from measure.verdict.record import Conclusion, Verdict
+from tests.pausing import finding_tests
 from tests.studies.challenge import cases
 from tests.studies.challenge import filing as filings
 from tests.studies.challenge import run as running
@@ -233,5 +234,7 @@ def test_a_worker_cannot_import_what_makes_challenges(tiny: ChallengeFolder, tmp
     (tmp_path / "judge.py").write_text(_JUDGE)
     script = tmp_path / "script.py"
     script.write_text(_WORKERS.format(folder=str(tmp_path), path=str(tiny.path)))
-    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, check=True, env=finding_tests()
+    )
     assert done.stdout.startswith("['kept apart: tests.studies.challenge.outside is not for fitters")

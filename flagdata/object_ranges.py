@@ -1,4 +1,4 @@
-"""Ranges of an object in a bucket, read in blocks that are kept on this machine: see `flagdata.lake.object_cache`.
+"""Ranges of an object in a bucket, read in blocks that are kept on this machine: see `flagdata.object_cache`.
 
 What lies within 1 MiB of each other is fetched by one request, and what is read from one end to the other in pieces of
 8 MiB. Nothing here knows whether the bytes are right: who reads them compares them with checksums of their own.
@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-from flagdata.lake import object_cache
+from flagdata import object_cache
 from flagdata.storage.path import RemotePath
 
 BLOCK = 256 << 10
