@@ -9,12 +9,11 @@ from typing import Any
 
 from flagdata.errors import UsageError
 from flagdata.schema import CATALOG
+from flagdata.timebase import iso
 
 
 def said(column: str, value: object) -> str:
     """A value for people: instants as times, numbers with their unit, mappings and lists as JSON."""
-    from flagdata.timebase import iso  # it needs NumPy, which no --help waits for
-
     unit = CATALOG[column].unit
     if unit == "ns" and isinstance(value, int):
         return iso(value)

@@ -25,11 +25,11 @@ import shutil
 import struct
 import uuid
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from flagdata.errors import ConflictError, FlagdataError, InputError
+from flagdata.errors import ConflictError, InputError
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder
 from flagdata.manifest import remove_listed, unlisted, write_manifest
 
@@ -271,39 +271,6 @@ def fresh_folder(path: Path, *, schema: str | None = None) -> Iterator[Path]:
             raise _taken(path) from None
         with confirming("the output", path):
             flush_folder(parent)
-
-
-@contextmanager
-def resumed_folder(path: Path, *, key: str, parts: Iterable[str]) -> Iterator[Path]:
-    """A scratch folder beside a new one, `.flagdata-KEY.making`, that outlives a process that is stopped.
-
-    It is taken up where the same key is given again; at the end its parts make the new folder, and it is removed, as it
-    is where a FlagdataError says that it can never be whole.
-
-    Args:
-        key: hash of all that shapes it.
-        parts: names in it that the new folder is to have.
-
-    Raises:
-        ConflictError: something is there.
-    """
-    check_folder(path)
-    making = path.absolute().parent / f".flagdata-{key[:16]}.making"
-    making.mkdir(parents=True, exist_ok=True)
-    try:
-        yield making
-        with fresh_folder(path) as whole:
-            for name in parts:
-                (making / name).rename(whole / name)
-    except FlagdataError:
-        removed(making)
-        raise
-    removed(making)
-
-
-def removed(folder: Path) -> None:
-    """Remove what a stopped process left in a folder of its own, and the folder; nothing where it is not there."""
-    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _check_free(path: Path, command: str | None) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -13,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.documents import read_json
-from flagdata.outputs import removed, resumed_folder
+from flagdata.errors import FlagdataError
+from flagdata.outputs import check_folder, fresh_folder
 from flagdata.provenance import code_version, recipe_hash
 from flagdata.rng import stream
 from measure.workers import single_threaded
@@ -67,9 +70,37 @@ def make(
         FlagdataError: a flag diverged, with weak effects too.
     """
     asked = {"recipe": asdict(recipe), "seed": seed, "sets": count, "code": code_version(), "folder": path.name}
-    with resumed_folder(path, key=recipe_hash(asked), parts=("sets", "sealed", "challenge.json")) as making:
+    with _resumed_folder(path, key=recipe_hash(asked), parts=("sets", "sealed", "challenge.json")) as making:
         _make(ChallengeFolder(making), recipe, seed=seed, count=count, workers=workers, progress=progress)
     return ChallengeFolder(path)
+
+
+@contextmanager
+def _resumed_folder(path: Path, *, key: str, parts: Iterable[str]) -> Iterator[Path]:
+    """A scratch folder beside a new one, `.flagdata-KEY.making`, that outlives a process that is stopped.
+
+    It is taken up where the same key is given again; at the end its parts make the new folder, and it is removed, as it
+    is where a FlagdataError says that it can never be whole.
+
+    Args:
+        key: hash of all that shapes it.
+        parts: names in it that the new folder is to have.
+
+    Raises:
+        ConflictError: something is there.
+    """
+    check_folder(path)
+    making = path.absolute().parent / f".flagdata-{key[:16]}.making"
+    making.mkdir(parents=True, exist_ok=True)
+    try:
+        yield making
+        with fresh_folder(path) as whole:
+            for name in parts:
+                (making / name).rename(whole / name)
+    except FlagdataError:
+        shutil.rmtree(making, ignore_errors=True)
+        raise
+    shutil.rmtree(making, ignore_errors=True)
 
 
 def _make(
@@ -131,7 +162,7 @@ def _made(
     made = simulate(recipe, seed, keys)
     for key in keys:
         if not _kept(target, key).is_file():
-            removed(target.data(key.name))
+            shutil.rmtree(target.data(key.name), ignore_errors=True)
             files.write_json(_kept(target, key), _write(target, recipe, seed, key, made[key.name]))
     return _published(target, keys)
 
