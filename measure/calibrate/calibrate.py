@@ -28,7 +28,7 @@ from measure.calibrate.summary import LEAST_IN_ALL, shown
 from measure.ends import PILED, WITHIN, Bound, Span, span
 from measure.observables.observable import WINDOW
 
-ANSWER = 4
+ANSWER = 5
 """Raised when the same recordings and options get another answer."""
 DETERMINED = 0.8
 """Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior."""

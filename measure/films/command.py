@@ -43,7 +43,7 @@ from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Candidate, Verdict
 from sim.material import named
 
-ANSWER = 3
+ANSWER = 4
 """Raised when the same recordings and options get another answer."""
 
 

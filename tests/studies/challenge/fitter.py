@@ -43,13 +43,13 @@ class ClosingTheLoopOnFilms:
 
     Attributes:
         folder: where simulations are kept, which all sets share.
-        simulations: of the base model for each recording.
+        simulations: of the base model for each recording; None for as many as the program takes.
         kinds: of numerics among null experiments.
         workers: processes that simulate.
     """
 
     folder: Path
-    simulations: int = 128
+    simulations: int | None = None
     kinds: int = CRITERIA.film_kinds
     workers: int = 1
 
@@ -69,6 +69,7 @@ class ClosingTheLoopOnFilms:
     def options(self, given: Filmed) -> Options:
         """How a set is judged, by what is stated of it."""
         from measure.calibrate.calibrate import Options as Calibrating
+        from measure.films.command import simulations_of
         from measure.films.run import Options
 
         calibration = Calibrating(
@@ -76,6 +77,6 @@ class ClosingTheLoopOnFilms:
             azimuth=given.azimuth,
             elevation=given.elevation,
             distance=given.distance,
-            simulations=self.simulations,
+            simulations=self.simulations or simulations_of(len(given.recordings)),
         )
         return Options(calibration=calibration, kinds=self.kinds, area_weight=given.area_weight)
