@@ -115,6 +115,10 @@ class Child:
             raise
         finally:
             timer.cancel()
+            timer.join()
+        if late.is_set():  # its time was up just as the answer came: it was ended all the same
+            self.close()
+            raise EndedError(late=True)
         if not answered:
             raise value
         return value

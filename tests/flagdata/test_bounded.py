@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -81,6 +82,26 @@ def test_a_child_is_ended_when_its_time_is_up_whatever_it_does() -> None:
         child.ask(("sleep", LONG), seconds=0.2)
     assert caught.value.late
     assert time.monotonic() - begun < LONG / 2
+
+
+def test_an_answer_that_comes_just_as_its_time_is_up_is_late_and_the_child_is_not_asked_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class FiredAtTheEnd(threading.Timer):
+        def start(self) -> None: ...
+
+        def cancel(self) -> None:
+            self.function(*self.args, **self.kwargs)
+
+        def join(self, timeout: float | None = None) -> None: ...
+
+    child = _child()
+    assert child.ask(("", None), seconds=LONG)
+    monkeypatch.setattr("flagdata.bounded.threading.Timer", FiredAtTheEnd)
+    with pytest.raises(EndedError) as ended:
+        child.ask(("", None), seconds=LONG)
+    assert ended.value.late
+    assert not child.usable
 
 
 def test_what_a_child_raises_is_raised_here_and_it_goes_on() -> None:
