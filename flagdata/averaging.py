@@ -46,7 +46,9 @@ def average(series: WindSeries, period: float = 1.0, *, channel: str = "wind_spe
         UsageError: a period that is not positive, or below a microsecond.
     """
     if not (math.isfinite(period) and period >= 1e-6):
-        raise UsageError(f"an averaging period of {period} s", where="period", fix="give seconds above 0")
+        raise UsageError(
+            f"the averaging period {period} s is not a positive number", where="period", fix="give seconds above 0"
+        )
     if channel not in series.channels:
         raise InputError(
             f"the log of {series.sensor.name} has no channel {channel}",

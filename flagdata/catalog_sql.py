@@ -300,7 +300,7 @@ def explain(error: Exception, *, where: str | None) -> UsageError:
         return UnknownNameError.of("column", name, COLUMNS, where=where)
     table = _MISSING_TABLE.search(text)
     if table:
-        return UsageError(f"no table {table[1]!r}", where=where, fix="the one table is called catalog")
+        return UsageError(f"there is no table {table[1]!r}", where=where, fix="the one table is called catalog")
     if isinstance(error, duckdb.PermissionException) or "Permission Error" in text:
         return UsageError(
             "SQL on a lake reads its catalog and nothing else", where=where, fix="select from catalog; leave out files"

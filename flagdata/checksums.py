@@ -29,13 +29,17 @@ def files_of(path: Path) -> list[Path]:
         InputError: a symbolic link or special file, whose content the hash would not cover.
     """
     if path.is_symlink() or not path.exists():
-        raise InputError("not a file or folder", where=str(path), fix="give the object itself, not a link to it")
+        raise InputError(
+            "this is neither a file nor a folder", where=str(path), fix="give the object itself, not a link to it"
+        )
     if path.is_file():
         return [path]
     found = []
     for entry in sorted(path.rglob("*"), key=lambda p: p.relative_to(path).as_posix()):
         if entry.is_symlink() or not (entry.is_dir() or entry.is_file()):
-            raise InputError("a link or special file inside an object", where=str(entry), fix="store plain files only")
+            raise InputError(
+                "an object contains a link or special file", where=str(entry), fix="store plain files only"
+            )
         if entry.is_file() and not any(map(is_beside, entry.relative_to(path).parts)):
             found.append(entry)
     return found

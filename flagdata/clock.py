@@ -42,7 +42,7 @@ class Segment:
         if self.end <= self.start:
             raise InputError("clock segment ends before it starts", fix="give end > start")
         if self.sigma_offset < 0 or self.sigma_drift < 0:
-            raise InputError("clock segment with a negative uncertainty", fix="give σ ≥ 0")
+            raise InputError("the uncertainty of a clock segment is negative", fix="give σ ≥ 0")
         if abs(self.drift) >= 0.1:
             raise InputError(f"a clock drift of {self.drift} s/s is too large to be one", fix="check the time units")
 

@@ -40,7 +40,7 @@ def from_toml(text: str) -> dict[str, Any]:
     except RecursionError:
         raise _deep() from None
     except ValueError as error:  # Python itself refuses numbers of very many digits
-        raise ValueError(f"not TOML: {error}") from None
+        raise ValueError(f"the file is not TOML: {error}") from None
     _check(content)
     return content
 

@@ -104,7 +104,7 @@ def check_file(path: Path, *, command: str | None = None) -> None:
     """
     with disk_errors("looking at the output's name", path):
         if not path.absolute().parent.is_dir():
-            raise InputError("no such folder", where=str(path.parent), fix="create it first, or name another")
+            raise InputError("there is no such folder", where=str(path.parent), fix="create it first, or name another")
         _check_writable(path.absolute().parent)
         _check_free(path, command)
 

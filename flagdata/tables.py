@@ -43,9 +43,14 @@ class Range:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low <= self.high):
-            raise InputError(f"a range from {self.low!r} to {self.high!r}", fix="give finite bounds, low ≤ high")
+            raise InputError(
+                f"the range from {self.low!r} to {self.high!r} is empty or infinite",
+                fix="give finite bounds, low ≤ high",
+            )
         if self.scale is Scale.LOG and self.low <= 0:
-            raise InputError(f"a logarithmic range from {self.low!r}", fix="let it begin above 0, or take it linear")
+            raise InputError(
+                f"a logarithmic range cannot begin at {self.low!r}", fix="let it begin above 0, or take it linear"
+            )
 
     def at(self, share: float) -> float:
         """The value that a share (0 to 1) of the range lies below."""
@@ -152,7 +157,7 @@ class Table:
             elif key in self._content:
                 values[entry.name] = self._of_type(key, hints[entry.name], bounds.get(entry.name))
             if needed and str(values.get(entry.name, "")).strip() == "":
-                raise InputError(f"no {key}", where=self.where, fix=f"add {key} = …")
+                raise InputError(f"the key {key} is missing", where=self.where, fix=f"add {key} = …")
         return kind(**values)
 
     def _of_type(self, key: str, hint: Any, bounds: Bounds | None) -> Any:

@@ -153,7 +153,7 @@ def zone(name: str, *, where: str | None = None) -> tzinfo:
         places = sorted(name for name in available_timezones() if "/" in name and not name.startswith("Etc/"))
         close = difflib.get_close_matches(text, places, n=1)
         raise UnknownNameError(
-            f"unknown time zone {name!r}",
+            f"the time zone {name!r} is unknown",
             where=where,
             fix=f"did you mean {close[0]!r}?" if close else "give a name such as Europe/Amsterdam, or +02:00, or UTC",
         ) from None

@@ -57,10 +57,14 @@ class ConstantWind:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.speed) and self.speed >= 0):
-            raise UsageError(f"a wind of {self.speed} m/s", where="--speed", fix="give a speed of 0 or more in m/s")
+            raise UsageError(
+                f"the wind speed {self.speed} m/s is not a number of 0 or more",
+                where="--speed",
+                fix="give a speed of 0 or more in m/s",
+            )
         if not (math.isfinite(self.sigma) and self.sigma > 0):
             raise UsageError(
-                f"an uncertainty of the wind of {self.sigma} m/s",
+                f"the uncertainty {self.sigma} m/s of the wind is not a positive number",
                 where="--sigma",
                 fix="state how well the speed is known, in m/s (one standard deviation)",
             )

@@ -46,10 +46,12 @@ def _declared(
     device: str, reference: str, *, method: str, start: int, end: int, offset: float, sigma: float
 ) -> ClockModel:
     if not math.isfinite(offset):
-        raise UsageError(f"an offset of {offset} s", where="offset", fix="give a finite number of seconds")
+        raise UsageError(
+            f"the clock offset {offset} s is not finite", where="offset", fix="give a finite number of seconds"
+        )
     if not (math.isfinite(sigma) and sigma > 0):
         raise UsageError(
-            f"an offset with the uncertainty {sigma} s",
+            f"the uncertainty {sigma} s of the clock offset is not a positive number",
             where="offset sigma",
             fix="state how well the two clocks were compared, e.g. 0.3 for whole seconds read off two displays",
         )

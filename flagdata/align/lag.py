@@ -86,7 +86,7 @@ class LagSearch:
             raise InputError("window, overlap and sigma must be positive", fix="give seconds > 0")
         if self.window > _WIDEST:
             raise InputError(
-                f"a search of ±{self.window:g} s",
+                f"the search window ±{self.window:g} s is too wide",
                 fix=f"search ±{_WIDEST:g} s at most, around a centre that is known better",
             )
         if self.response_sigma < 0 or self.stamp_sigma < 0 or self.gustiness < 0:

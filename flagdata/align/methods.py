@@ -64,21 +64,27 @@ class ClockOptions:
 
     def __post_init__(self) -> None:
         if self.offset is not None and not math.isfinite(self.offset):
-            raise UsageError(f"an offset of {self.offset} s", where="--offset", fix="give a finite number of seconds")
+            raise UsageError(
+                f"the clock offset {self.offset} s is not finite",
+                where="--offset",
+                fix="give a finite number of seconds",
+            )
         if self.offset_sigma is not None and not (math.isfinite(self.offset_sigma) and self.offset_sigma > 0):
             raise UsageError(
-                f"an offset with the uncertainty {self.offset_sigma} s", where="--offset-sigma", fix="give seconds > 0"
+                f"the uncertainty {self.offset_sigma} s of the clock offset is not a positive number",
+                where="--offset-sigma",
+                fix="give seconds > 0",
             )
         if (self.offset is not None) != (self.by is Method.GIVEN):
-            what = "without an offset" if self.by is Method.GIVEN else "together with an offset"
-            raise UsageError(f"alignment by {self.by} {what}", where="--offset", fix=_GIVEN)
+            needs = "needs an offset" if self.by is Method.GIVEN else "takes no offset"
+            raise UsageError(f"alignment by {self.by} {needs}", where="--offset", fix=_GIVEN)
         if (self.offset_sigma is not None) == (self.by is Method.ESTIMATE):
             if self.by is Method.ESTIMATE:
                 raise UsageError(
                     "the σ of an estimate is estimated", where="--offset-sigma", fix="leave it out, or use --by given"
                 )
             raise UsageError(
-                f"alignment by {self.by} without an uncertainty",
+                f"alignment by {self.by} needs the uncertainty of the clock offset",
                 where="--offset-sigma",
                 fix="state how well the clocks are known to agree, in seconds (one standard deviation)",
             )

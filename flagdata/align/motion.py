@@ -61,7 +61,7 @@ class MotionSeries:
         if len(self.time) > 1 and not bool(np.all(np.diff(self.time) > 0)):
             raise InputError("the times of the motion do not increase", fix="give the frames in order of time")
         if bool(np.any(self.energy < 0)):
-            raise InputError("a negative motion energy", fix="give mean absolute differences or another energy ≥ 0")
+            raise InputError("a motion energy is negative", fix="give mean absolute differences or another energy ≥ 0")
 
     def __len__(self) -> int:
         return len(self.time)

@@ -180,7 +180,7 @@ def truth_recipe(window: float) -> dict[str, Any]:
     """
     if not (math.isfinite(window) and 0 < window <= LONGEST_WINDOW):
         raise UsageError(
-            f"a ground truth over {window:g} s",
+            f"the ground truth cannot be averaged over {window:g} s",
             where="--window",
             fix=f"give a length of time above zero, {LONGEST_WINDOW:g} s at most",
         )

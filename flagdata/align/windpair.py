@@ -53,7 +53,9 @@ class WindPair:
                     fix="flagdata align REFERENCE SENSOR takes two wind artifacts; see flagdata ls",
                 )
         if found[0].id == found[1].id:
-            raise UsageError("a log and itself", where=found[0].id, fix="name two wind artifacts")
+            raise UsageError(
+                "both names are of the same wind artifact", where=found[0].id, fix="name two wind artifacts"
+            )
         series = []
         for artifact in found:
             samples = Record.open(lake.record_place(str(artifact.object))).wind()

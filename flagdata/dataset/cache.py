@@ -68,7 +68,9 @@ class DecodedCache:
         for folder in (self.path, *self.path.parents):
             if (folder / "lake.json").exists():
                 raise UsageError(
-                    "a cache inside a lake", where=str(self.path), fix="choose a folder outside it: it is disposable"
+                    "the cache would lie inside a lake",
+                    where=str(self.path),
+                    fix="choose a folder outside it: it is disposable",
                 )
         self.path.mkdir(parents=True, exist_ok=True)
         with os.scandir(self.path) as found:

@@ -95,7 +95,9 @@ class PairLoader:
         if batch_size < 1 or workers < 0:
             raise UsageError(f"batches of {batch_size} with {workers} workers", fix="give at least 1 and 0")
         if not 0 <= share[0] < share[1]:
-            raise UsageError(f"share {share[0]} of {share[1]}", fix="give (index, count) with 0 <= index < count")
+            raise UsageError(
+                f"there is no share {share[0]} of {share[1]}", fix="give (index, count) with 0 <= index < count"
+            )
         for option, value, known in (
             ("order", order, ("shuffled", "stored")),
             ("last", last, ("keep", "drop")),
@@ -103,7 +105,7 @@ class PairLoader:
             ("run_in", run_in, ("threads", "fork", "spawn", "forkserver")),
         ):
             if value not in known:
-                raise UsageError(f"{option} {value!r}", fix=f"give {' or '.join(map(repr, known))}")
+                raise UsageError(f"{option} cannot be {value!r}", fix=f"give {' or '.join(map(repr, known))}")
         if memory == "pinned" and not torch.accelerator.is_available():
             raise UsageError("pinned memory without an accelerator", fix="leave memory at 'pageable'")
         self.pairs = pairs
@@ -253,7 +255,8 @@ class PairLoader:
         count, total = int(share[2]), self._total()
         if min(numbers) < 0 or numbers[1] + numbers[2] * count >= total:
             raise UsageError(
-                f"no batch {state['cursor']!r} in epoch {state['epoch']!r}", fix="give what state_dict returned"
+                f"there is no batch {state['cursor']!r} in epoch {state['epoch']!r}",
+                fix="give what state_dict returned",
             )
         epoch, before, cursor = numbers
         self._iteration += 1

@@ -80,7 +80,7 @@ class Pairs(Batchable):
             CorruptError: its frames cannot be read.
         """
         if not 0 <= index < len(self.table):
-            raise IndexError(f"pair {index} of {len(self.table)}")
+            raise IndexError(f"there is no pair {index} among {len(self.table)}")
         table = self.table
         return Sample(
             clip=self._clip(index),
@@ -108,7 +108,7 @@ class Pairs(Batchable):
             CorruptError: its frames cannot be read.
         """
         if not 0 <= index < len(self.table):
-            raise IndexError(f"pair {index} of {len(self.table)}")
+            raise IndexError(f"there is no pair {index} among {len(self.table)}")
         record = self._record(int(self.table.object[index]))
         return record.frames(0, record.frame_count)
 
@@ -120,7 +120,7 @@ class Pairs(Batchable):
             IndexError: beyond the last pair.
         """
         if not 0 <= index < len(self.table):
-            raise IndexError(f"pair {index} of {len(self.table)}")
+            raise IndexError(f"there is no pair {index} among {len(self.table)}")
         times = self._record(int(self.table.object[index])).frame_times
         return (times - times[0]) / NANOSECONDS
 

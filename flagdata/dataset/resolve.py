@@ -80,7 +80,7 @@ def resolve(
 ) -> Resolved:
     """Pairs of `lake` at one version; arguments as in `Source.pairs`, which see for what it raises."""
     if window is not None and not (math.isfinite(window) and window > 0):
-        raise UsageError(f"a window of {window} s", fix="give a length above zero")
+        raise UsageError(f"the window of {window} s is not a positive length", fix="give a length above zero")
     catalog = lake.scan(lake.view(at))
     clips = _clips(catalog, where, COLUMNS)
     if not clips.num_rows:

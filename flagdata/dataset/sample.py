@@ -56,7 +56,7 @@ class Sample:
     def __post_init__(self) -> None:
         if self.clip.ndim != 4 or self.clip.dtype != torch.uint8:
             raise InputError(
-                f"a clip of shape {tuple(self.clip.shape)} and type {self.clip.dtype}",
+                f"a clip cannot have the shape {tuple(self.clip.shape)} and the type {self.clip.dtype}",
                 where=self.artifact,
                 fix="give uint8 of shape (channel, time, height, width)",
             )

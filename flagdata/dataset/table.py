@@ -95,7 +95,7 @@ class PairTable:
         for column in ("object", "frame_first", "frame_count", "start", "end"):
             if rows[column].null_count:
                 artifact = rows.filter(rows[column].is_null())["artifact"][0].as_py()
-                raise CorruptError(f"a clip without {column}", where=f"artifact {artifact}", fix="run flagdata doctor")
+                raise CorruptError(f"a clip has no {column}", where=f"artifact {artifact}", fix="run flagdata doctor")
         objects, index = _coded(rows, "object")
         ids = rows["artifact"].to_pylist()
         texts = rows["parameters"].to_pylist()

@@ -31,7 +31,9 @@ class Tolerance:
 
     def __post_init__(self) -> None:
         if not (self.clock_sigma >= 0 and self.staleness >= 0 and 0 <= self.coverage <= 1):
-            raise UsageError(f"{self}", fix="give σ and staleness of 0 s or more, and a coverage between 0 and 1")
+            raise UsageError(
+                f"{self} is out of bounds", fix="give σ and staleness of 0 s or more, and a coverage between 0 and 1"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -170,9 +170,11 @@ class TruthSeries:
             UsageError: a window or σ that is not a length of time.
         """
         if not (math.isfinite(window) and window > 0):
-            raise UsageError(f"a window of {window} s", fix="give a length above zero")
+            raise UsageError(f"the window of {window} s is not a positive length", fix="give a length above zero")
         if not (math.isfinite(clock_sigma) and clock_sigma >= 0):
-            raise UsageError(f"a clock uncertainty of {clock_sigma} s", fix="give a σ of zero or more")
+            raise UsageError(
+                f"the clock uncertainty {clock_sigma} s is negative or not a number", fix="give a σ of zero or more"
+            )
         begin = end - round(window * NANOSECONDS)
         first, last = np.searchsorted(self.time, [begin, end], side="right").tolist()
         staleness = (end - int(self.time[last - 1])) / NANOSECONDS if last else math.inf

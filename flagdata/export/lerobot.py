@@ -386,7 +386,9 @@ class _Films:
         """Container and stream of a new file for pictures like this one."""
         height, width = image.shape
         if height % 2 or width % 2:
-            raise InputError(f"AV1 of {width} × {height} px", where="--frames", fix="export with --frames png")
+            raise InputError(
+                f"AV1 cannot hold pictures of {width} × {height} px", where="--frames", fix="export with --frames png"
+            )
         self._number += 1
         self._frames = 0
         self._size = 0

@@ -97,7 +97,7 @@ class _Original:
         for index in range(frame, -1, -1):
             if is_key(messages.payload(memoryview(self.data(TOPIC_IMAGE, index)), field=field)):
                 return index
-        raise CorruptError(f"no key frame up to frame {frame}", where=self._where, fix="run flagdata verify")
+        raise CorruptError(f"there is no key frame up to frame {frame}", where=self._where, fix="run flagdata verify")
 
     def data(self, topic: str, index: int) -> bytes:
         """The payload of one message.

@@ -45,7 +45,7 @@ class Mp4:
 
     def __post_init__(self) -> None:
         if not 0 <= self.crf <= 51:
-            raise UsageError(f"a rate factor of {self.crf}", where="--crf", fix="give 0 (lossless) to 51")
+            raise UsageError(f"H.264 has no rate factor of {self.crf}", where="--crf", fix="give 0 (lossless) to 51")
 
     def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         frames = 0

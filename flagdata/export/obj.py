@@ -31,7 +31,7 @@ class ObjFolders:
         frames = 0
         for row in source.rows.to_pylist():
             if row["object"] is None:
-                raise CorruptError("a row without an object", where=row["artifact"], fix="run flagdata doctor")
+                raise CorruptError("a row has no object", where=row["artifact"], fix="run flagdata doctor")
             sequence = read_meshes(source.lake.whole_object(row["object"]))
             write_folder(folder / row["artifact"], sequence, scene=_scene(sequence, row))
             frames += len(sequence)

@@ -187,7 +187,7 @@ class Source:
             for row in batch.to_pylist():
                 name = row["object"]
                 if name is None:
-                    raise CorruptError("a row without an object", where=row["artifact"], fix="run flagdata doctor")
+                    raise CorruptError("a row has no object", where=row["artifact"], fix="run flagdata doctor")
                 if name not in checked:
                     self.lake.whole_object(name)
                     checked.add(name)

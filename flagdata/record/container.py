@@ -109,7 +109,7 @@ def read_summary(file: Bytes, *, where: str) -> Summary:
     size = file.size
     file.prepare([(0, len(MAGIC)), (size - _LAST, size)])
     if size < len(MAGIC) + _TAIL or file.read(len(MAGIC), 0) != MAGIC:
-        raise CorruptError("not an MCAP record", where=where, fix="check that it is the right file")
+        raise CorruptError("this is no MCAP record", where=where, fix="check that it is the right file")
     tail = read_exact(file, _TAIL, size - _TAIL, where=where)
     if tail[-len(MAGIC) :] != MAGIC:
         raise CorruptError("the record is cut off: its end is missing", where=where, fix=_RECOVER)
@@ -474,5 +474,5 @@ def _record_at(file: Bytes, offset: int, length: int, opcode: Opcode, *, where: 
     whole = read_exact(file, length, offset, where=where)
     records = list(split_records(whole, where=where))
     if len(records) != 1 or records[0][0] != opcode:
-        raise CorruptError(f"no {opcode.name.lower()} at byte {offset}", where=where, fix=_RECOVER)
+        raise CorruptError(f"there is no {opcode.name.lower()} at byte {offset}", where=where, fix=_RECOVER)
     return records[0][1]

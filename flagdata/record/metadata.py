@@ -43,7 +43,9 @@ def sensor_of(metadata: Mapping[str, Mapping[str, str]], *, where: str) -> Senso
     try:
         numbers = {key: float(value) for key, value in written.items() if key in known}
     except ValueError as error:
-        raise CorruptError(f"sensor metadata: {error}", where=where, fix="ingest the log again") from None
+        raise CorruptError(
+            f"the sensor's metadata cannot be read: {error}", where=where, fix="ingest the log again"
+        ) from None
     return Sensor(
         name=name,
         height=numbers.get("height"),

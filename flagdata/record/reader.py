@@ -198,7 +198,9 @@ class Record:
         try:
             decoded = [kind.FromString(bytes(part)) for part in self._read_frames(first, count)]
         except DecodeError as error:
-            raise CorruptError(f"{TOPIC_IMAGE}: {error}", where=str(self.path), fix=_VERIFY) from None
+            raise CorruptError(
+                f"a message of {TOPIC_IMAGE} cannot be read: {error}", where=str(self.path), fix=_VERIFY
+            ) from None
         return np.array([messages.timestamp_of(m.timestamp) for m in decoded], dtype=np.int64)
 
     def wind(self) -> WindSeries | None:
@@ -267,7 +269,9 @@ class Record:
             data = container.read_attachment(self._file, entry, where=str(self.path))
             return _unpack(data, name) if entry.media_type.endswith(GZIP_SUFFIX) else data
         raise NotFoundError(
-            f"no attachment {name!r}", where=str(self.path), fix=f"there are: {', '.join(self.attachments) or 'none'}"
+            f"there is no attachment {name!r}",
+            where=str(self.path),
+            fix=f"there are: {', '.join(self.attachments) or 'none'}",
         )
 
     def _video_frames(self, first: int, count: int) -> NDArray[np.uint8]:
@@ -275,7 +279,7 @@ class Record:
         pictures = self._payloads(first, count)
         while not is_key(pictures[0]):
             if key == 0:
-                raise CorruptError(f"no key frame up to frame {first}", where=str(self.path), fix=_VERIFY)
+                raise CorruptError(f"there is no key frame up to frame {first}", where=str(self.path), fix=_VERIFY)
             key -= 1
             pictures[:0] = self._payloads(key, 1)
         from flagdata.record.video import decode  # FFmpeg, which a wind's record needs nothing of
@@ -356,7 +360,9 @@ class Record:
         try:
             return [kind.FromString(bytes(part)) for part in self._read(topic, table, 0, len(table))]
         except DecodeError as error:
-            raise CorruptError(f"{topic}: {error}", where=str(self.path), fix=_VERIFY) from None
+            raise CorruptError(
+                f"a message of {topic} cannot be read: {error}", where=str(self.path), fix=_VERIFY
+            ) from None
 
 
 def _own_name(name: str, media_type: str) -> str:
@@ -368,7 +374,7 @@ def _unpack(data: bytes, name: str) -> bytes:
     try:
         out = unpacker.decompress(data, ATTACHMENT_LIMIT)
     except zlib.error as error:
-        raise CorruptError(f"attachment {name!r}: {error}", fix=_VERIFY) from None
+        raise CorruptError(f"attachment {name!r} cannot be unpacked: {error}", fix=_VERIFY) from None
     if not unpacker.eof:
         raise CorruptError(f"attachment {name!r} is cut off or unpacks beyond {ATTACHMENT_LIMIT} bytes", fix=_VERIFY)
     return out

@@ -180,10 +180,10 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
     try:
         stream = source.open("rb")
     except FileNotFoundError:
-        raise NotFoundError("no such record", where=str(source), fix="check the path") from None
+        raise NotFoundError("there is no such record", where=str(source), fix="check the path") from None
     with stream:
         if stream.read(len(MAGIC)) != MAGIC:
-            raise CorruptError("not an MCAP record", where=str(source), fix="check that it is the right file")
+            raise CorruptError("this is no MCAP record", where=str(source), fix="check that it is the right file")
         out = Output(target)
         try:
             with out:

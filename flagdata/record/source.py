@@ -58,4 +58,6 @@ def open_bytes(place: Place) -> Bytes:
             return _FileBytes(os.open(place, os.O_RDONLY | os.O_CLOEXEC))
         return ObjectRanges(place)
     except (FileNotFoundError, NotADirectoryError):
-        raise NotFoundError("no such record", where=str(place), fix="check the path, or run flagdata doctor") from None
+        raise NotFoundError(
+            "there is no such record", where=str(place), fix="check the path, or run flagdata doctor"
+        ) from None

@@ -517,5 +517,6 @@ def encode_jpeg(image: NDArray[np.uint8], *, quality: int = JPEG_QUALITY) -> byt
 def _check_image(image: NDArray[np.uint8]) -> None:
     if image.ndim != 2 or image.dtype != np.uint8 or image.size == 0:
         raise InputError(
-            f"a frame of shape {image.shape} and type {image.dtype}", fix="give a (height, width) uint8 gray image"
+            f"a frame cannot have the shape {image.shape} and the type {image.dtype}",
+            fix="give a (height, width) uint8 gray image",
         )

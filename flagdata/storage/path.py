@@ -78,7 +78,7 @@ class RemotePath:
         if found is None:
             shown = "s3://…" if _SECRET.search(address) else address
             raise UsageError(
-                "not the address of a bucket",
+                "this is not the address of a bucket",
                 where=shown,
                 fix="write s3://bucket/prefix; credentials are read from the environment or a profile",
             )

@@ -85,7 +85,9 @@ class Media:
         with self._busy:
             film = self.film(row)
             if not 0 <= first < len(film):
-                raise UsageError(f"frame {first} of {len(film)}", where=row["artifact"], fix="ask for one that it has")
+                raise UsageError(
+                    f"there is no frame {first} among {len(film)}", where=row["artifact"], fix="ask for one that it has"
+                )
             pictures = film.jpegs(first, min(FRAMES_AT_ONCE, len(film) - first))
         return b"".join(len(picture).to_bytes(4, "big") + picture for picture in pictures)
 

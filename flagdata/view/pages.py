@@ -119,7 +119,8 @@ class Site:
         found = self.rows().filter(pc.field("artifact") == artifact).to_pylist()
         if not found:
             raise NotFoundError(
-                f"no artifact {artifact[:SHORT]} at this version", fix="choose another version, or go to the overview"
+                f"there is no artifact {artifact[:SHORT]} at this version",
+                fix="choose another version, or go to the overview",
             )
         return found[0]
 

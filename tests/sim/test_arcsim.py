@@ -270,7 +270,7 @@ def test_a_material_file_is_complete_and_says_no_more(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="keys missing: bending, stretching"):
         read_material(path)
     path.write_text("[]")
-    with pytest.raises(InputError, match="not a JSON object"):
+    with pytest.raises(InputError, match="no JSON object"):
         read_material(path)
 
 

@@ -43,7 +43,7 @@ def in_order(paths: Sequence[Path]) -> tuple[Path, ...]:
     """
     check_films(paths)
     if len(paths) < 2:
-        raise UsageError("one file to join", where="--join", fix="name all chapters of the recording")
+        raise UsageError("a single file cannot be joined", where="--join", fix="name all chapters of the recording")
     if len({path.resolve() for path in paths}) < len(paths):
         raise UsageError("a file is named twice", where="--join", fix="name each chapter once")
 

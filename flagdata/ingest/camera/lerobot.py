@@ -62,7 +62,7 @@ def described(folder: Path) -> Mapping[str, Any]:
     version, stored = info.get("codebase_version"), info.get("storage_format", "parquet")
     if version != VERSION:
         fix = "convert it by LeRobot's own script, convert_dataset_v21_to_v30"
-        raise InputError(f"a LeRobot data set of version {version}, not {VERSION}", where=str(where), fix=fix)
+        raise InputError(f"the LeRobot data set has version {version}, not {VERSION}", where=str(where), fix=fix)
     if stored != "parquet":
         fix = "write it as Parquet and MP4 by LeRobot's own tools"
         raise InputError(f"a LeRobot data set stored as {stored}", where=str(where), fix=fix)

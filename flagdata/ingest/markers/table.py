@@ -59,7 +59,9 @@ class MarkerOptions:
 
     def __post_init__(self) -> None:
         if self.rate is not None and not (math.isfinite(self.rate) and 0 < self.rate <= 1e6):
-            raise UsageError(f"a rate of {self.rate!r} Hz", where="--rate", fix="give frames a second")
+            raise UsageError(
+                f"the frame rate {self.rate!r} Hz is out of range", where="--rate", fix="give frames a second"
+            )
         for name in (self.unit, self.rest_unit or self.unit):
             if unit(name).si != "m":
                 raise UsageError(f"{name!r} is no unit of length", where="--unit", fix="give mm, cm, m or ft")
@@ -103,7 +105,7 @@ def read_table(path: Path, options: MarkerOptions | None = None) -> Mapping[str,
         return {"": _sequence(table, options, str(path))}
     column = table["recording"]
     if column.null_count:
-        raise InputError("a row without a recording", where=str(path), fix="fill the column, or leave it out")
+        raise InputError("a row names no recording", where=str(path), fix="fill the column, or leave it out")
     found: dict[str, MarkerSequence] = {}
     of = column.to_numpy()
     for name in column.unique().to_pylist():
@@ -127,7 +129,11 @@ def _check_columns(names: list[str], options: MarkerOptions, where: str) -> None
     fix = f"give {', '.join(COLUMNS)}, and frame or time"
     check_columns(names, needed=COLUMNS, optional=_OPTIONAL, where=where, fix=fix)
     if "time" not in names and "frame" not in names:
-        raise InputError("neither frame nor time", where=where, fix="add the number of the frame, or its time in s")
+        raise InputError(
+            "the table has neither a frame nor a time column",
+            where=where,
+            fix="add the number of the frame, or its time in s",
+        )
     if "time" not in names and options.rate is None:
         raise UsageError("the table has frame numbers only", where=where, fix="give its rate, in frames a second")
     if "time" in names and options.rate is not None:
@@ -204,7 +210,7 @@ def _table_errors(path: Path) -> Iterator[None]:
 
 def _sequence(table: pa.Table, options: MarkerOptions, where: str) -> MarkerSequence:
     if table["marker"].null_count:
-        raise InputError("a row without a marker", where=where, fix="name every marker")
+        raise InputError("a row names no marker", where=where, fix="name every marker")
     names, marker = np.unique(table["marker"].to_numpy(), return_inverse=True)
     instants, frame = _frames(table, options, where)
     if len(instants) * len(names) > POSITIONS_LIMIT:
@@ -228,7 +234,7 @@ def _sequence(table: pa.Table, options: MarkerOptions, where: str) -> MarkerSequ
     positions[seat] = np.stack([length.to_si(_numbers(table, axis)) for axis in "xyz"], axis=1)
     rest = np.stack([rest_length.to_si(_seats(table, axis, marker, names, where)) for axis in "uv"], axis=1)
     if np.isinf(positions).any():
-        raise InputError("an infinite coordinate", where=where, fix="leave positions empty that were not tracked")
+        raise InputError("a coordinate is infinite", where=where, fix="leave positions empty that were not tracked")
     positions[~np.isfinite(positions).all(axis=1)] = np.nan
     return MarkerSequence(
         time=instants,
@@ -245,7 +251,7 @@ def _frames(table: pa.Table, options: MarkerOptions, where: str) -> tuple[NDArra
     values = _numbers(table, column)
     if not np.isfinite(values).all():
         row = int(np.flatnonzero(~np.isfinite(values))[0])
-        raise InputError(f"a row without {column}", where=f"{where}, row {row + 1}", fix="fill the column")
+        raise InputError(f"a row has no {column}", where=f"{where}, row {row + 1}", fix="fill the column")
     if column == "frame" and (values != np.rint(values)).any():
         raise InputError("a frame number with decimals", where=where, fix="name the column time, if it is in seconds")
     seconds = values if options.rate is None else values / options.rate

@@ -150,7 +150,7 @@ class _Scan:
 
     def run(self) -> Layout:
         if self.stream.read(len(MCAP)) != MCAP:
-            raise CorruptError("no MCAP file", where=str(self.path), fix="check that it is the right file")
+            raise CorruptError("this is no MCAP file", where=str(self.path), fix="check that it is the right file")
         at = len(MCAP)
         ended = closed = False
         while not closed:

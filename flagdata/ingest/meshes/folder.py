@@ -40,9 +40,9 @@ def read_json(path: Path) -> dict[str, Any]:
     try:
         content = from_json(bare)
     except ValueError as error:
-        raise InputError(f"not JSON: {error}", where=str(path), fix="correct the file") from None
+        raise InputError(f"the file is not JSON: {error}", where=str(path), fix="correct the file") from None
     if not isinstance(content, dict):
-        raise InputError("not a JSON object", where=str(path), fix="give a file of the form {…}")
+        raise InputError("the file holds no JSON object", where=str(path), fix="give a file of the form {…}")
     return content
 
 
@@ -65,7 +65,7 @@ def read_folder(
         LimitError: more than `FRAME_LIMIT` frames.
     """
     if not path.is_dir():
-        raise NotFoundError("no such folder", where=str(path), fix="name the folder with the .obj files")
+        raise NotFoundError("there is no such folder", where=str(path), fix="name the folder with the .obj files")
     numbered = frame_files(path)
     configured = (path / _CONFIGURATION).is_file()
     if rate is None and not configured:

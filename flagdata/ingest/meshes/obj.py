@@ -197,7 +197,7 @@ def read_obj(path: Path) -> Obj:
                 texture.extend(_numbers(values, 2, where))
             elif keyword == "nv":
                 if not positions:
-                    raise InputError("a velocity before any vertex", where=where, fix="write nv after its v")
+                    raise InputError("a velocity comes before any vertex", where=where, fix="write nv after its v")
                 velocities[len(positions) // 3 - 1] = _numbers(values, 3, where)
             elif keyword == "f":
                 if len(values) < 3:
@@ -207,7 +207,9 @@ def read_obj(path: Path) -> Obj:
                 sizes.append(len(values))
                 face_lines.append(number)
             elif keyword not in _PASSED_OVER:
-                raise InputError(f"unknown keyword {keyword!r}", where=where, fix="is this a Wavefront OBJ file?")
+                raise InputError(
+                    f"the keyword {keyword!r} is unknown", where=where, fix="is this a Wavefront OBJ file?"
+                )
     if not corners:
         raise InputError("a mesh without faces", where=str(path), fix="export triangles")
     faces = _Faces(

@@ -45,7 +45,9 @@ class MeshIngest:
 
     def __post_init__(self) -> None:
         if self.rate is not None and not (math.isfinite(self.rate) and 0 < self.rate <= 1e6):
-            raise UsageError(f"a rate of {self.rate!r} Hz", where="--rate", fix="give frames a second")
+            raise UsageError(
+                f"the frame rate {self.rate!r} Hz is out of range", where="--rate", fix="give frames a second"
+            )
         if unit(self.unit).si != "m":
             raise UsageError(f"{self.unit!r} is no unit of length", where="--unit", fix="give mm, cm, m or ft")
 

@@ -232,10 +232,10 @@ def test_a_steady_wind_is_refused_and_nothing_is_committed(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("options", "what"),
     [
-        (["--by", "given"], "without an offset"),
-        (["--offset", "3"], "together with an offset"),
-        (["--by", "given", "--offset", "3"], "without an uncertainty"),
-        (["--by", "stamps"], "without an uncertainty"),
+        (["--by", "given"], "needs an offset"),
+        (["--offset", "3"], "takes no offset"),
+        (["--by", "given", "--offset", "3"], "needs the uncertainty"),
+        (["--by", "stamps"], "needs the uncertainty"),
         (["--offset-sigma", "1"], "is estimated"),
         (["--by", "given", "--offset", "3", "--offset-sigma", "1", "--search", "5"], "searches nothing"),
         (["--by", "given", "--offset", "nan", "--offset-sigma", "1"], "offset of nan"),

@@ -100,5 +100,5 @@ def test_the_fingerprint_depends_on_every_value():
 
 def test_a_clip_that_is_nowhere_is_an_error_that_names_it():
     for column in ("object", "frame_first", "frame_count", "start", "end"):
-        with pytest.raises(CorruptError, match=f"artifact a1: a clip without {column}"):
+        with pytest.raises(CorruptError, match=f"artifact a1: a clip has no {column}"):
             PairTable.of(rows({}, {column: None}))

@@ -138,7 +138,7 @@ def test_what_is_not_one_recording_is_not_joined(film: Callable[..., Path], tmp_
         joined(film("GH010042.MP4", 10), film("GH030042.MP4", 10))
     with pytest.raises(UsageError, match="not successive chapters"):
         joined(film("GH010042.MP4", 10), film("GH020043.MP4", 10))
-    with pytest.raises(UsageError, match="one file to join"):
+    with pytest.raises(UsageError, match="a single file cannot be joined"):
         joined(tmp_path / "GH010042.MP4")
     with pytest.raises(UsageError, match="named twice"):
         joined(tmp_path / "GH010042.MP4", tmp_path / "GH010042.MP4")

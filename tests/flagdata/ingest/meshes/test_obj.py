@@ -63,7 +63,7 @@ def test_a_malformed_line_is_refused_by_its_number(tmp_path: Path) -> None:
         ("v 0 0 0x\n", "not 3 finite", 1),
         ("vt 0\n", "not 2 finite", 1),
         ("nv 1 2 3\n", "before any vertex", 1),
-        ("solid cube\n", "unknown keyword 'solid'", 1),
+        ("solid cube\n", "the keyword 'solid' is unknown", 1),
     ]
     for text, word, line in cases:
         refused = unrefused(lambda text: read(tmp_path, text), [(text, word)], InputError, where=f"line {line}$")
