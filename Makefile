@@ -14,12 +14,12 @@ BLENDER_VENV := .venv-blender
 BLENDER_STAMP := $(BLENDER_VENV)/.installed
 BLENDER := $(CURDIR)/$(BLENDER_VENV)/bin/python
 
-# MuJoCo, a second foreign simulator that `python -m tests.validation foreign` takes recordings from.
+# MuJoCo, a second foreign simulator that `python -m tests.studies foreign` takes recordings from.
 MUJOCO_VENV := .venv-mujoco
 MUJOCO_STAMP := $(MUJOCO_VENV)/.installed
 MUJOCO := $(CURDIR)/$(MUJOCO_VENV)/bin/python
 
-# VTK, the renderer of the films that `python -m tests.validation films` measures.
+# VTK, the renderer of the films that `python -m tests.studies films` measures.
 VTK_VENV := .venv-vtk
 VTK_STAMP := $(VTK_VENV)/.installed
 
@@ -32,7 +32,7 @@ DATASETS_STAMP := $(DATASETS_VENV)/.installed
 PYLANCE_VENV := .venv-pylance
 PYLANCE_STAMP := $(PYLANCE_VENV)/.installed
 
-# rclone's S3 server, which ignores the conditions of puts: `python -m tests.validation object-storage` wants it refused.
+# rclone's S3 server, which ignores the conditions of puts: `python -m tests.studies object-storage` wants it refused.
 RCLONE_VENV := .venv-rclone
 RCLONE_STAMP := $(RCLONE_VENV)/.installed
 
@@ -97,10 +97,10 @@ docs: $(STAMP)
 	$(BIN)/python -m mkdocs build --strict
 
 bench: $(STAMP)
-	$(BIN)/python -m tests.benchmarks --out docs/results
+	$(BIN)/python -m tests.studies bench --out docs/results
 
 validate: $(STAMP)
-	$(BIN)/python -m tests.validation --out docs/results
+	$(BIN)/python -m tests.studies validate --out docs/results
 
 $(STAMP): pyproject.toml constraints.txt
 	$(call environment,$(VENV),constraints.txt,dev)
@@ -118,24 +118,24 @@ $(BLENDER_STAMP): sim/blender/environment.py | $(STAMP)
 	$(BIN)/flagdata blender-setup --folder $(BLENDER_VENV)
 	touch $@
 
-$(MUJOCO_STAMP): tests/validation/environments.py | $(STAMP)
-	$(BIN)/python -m tests.validation.environments mujoco $(MUJOCO_VENV)
+$(MUJOCO_STAMP): tests/studies/validation/environments.py | $(STAMP)
+	$(BIN)/python -m tests.studies environments mujoco $(MUJOCO_VENV)
 	touch $@
 
-$(LEROBOT_STAMP): tests/validation/environments.py | $(STAMP)
-	$(BIN)/python -m tests.validation.environments lerobot $(LEROBOT_VENV)
+$(LEROBOT_STAMP): tests/studies/validation/environments.py | $(STAMP)
+	$(BIN)/python -m tests.studies environments lerobot $(LEROBOT_VENV)
 	touch $@
 
-$(DATASETS_STAMP): tests/validation/environments.py | $(STAMP)
-	$(BIN)/python -m tests.validation.environments datasets $(DATASETS_VENV)
+$(DATASETS_STAMP): tests/studies/validation/environments.py | $(STAMP)
+	$(BIN)/python -m tests.studies environments datasets $(DATASETS_VENV)
 	touch $@
 
-$(PYLANCE_STAMP): tests/validation/environments.py | $(STAMP)
-	$(BIN)/python -m tests.validation.environments pylance $(PYLANCE_VENV)
+$(PYLANCE_STAMP): tests/studies/validation/environments.py | $(STAMP)
+	$(BIN)/python -m tests.studies environments pylance $(PYLANCE_VENV)
 	touch $@
 
-$(VTK_STAMP): tests/validation/environments.py | $(STAMP)
-	$(BIN)/python -m tests.validation.environments vtk $(VTK_VENV)
+$(VTK_STAMP): tests/studies/validation/environments.py | $(STAMP)
+	$(BIN)/python -m tests.studies environments vtk $(VTK_VENV)
 	touch $@
 
 $(RCLONE_STAMP):

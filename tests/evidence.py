@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
 import time
-from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -44,29 +42,21 @@ def circumstances(seed: int) -> dict[str, Any]:
     }
 
 
-def run_all(kind: str, modules: Mapping[str, str]) -> Path:
-    """Command line shared by benchmarks and validation: run each named module's `run(seed)`, keep its dictionary.
+def keep(name: str, module: str, *, kind: str, seed: int, out: Path) -> Path:
+    """Runs a study and keeps what it returns, with its circumstances.
 
     Args:
-        kind: "bench" or "validate", the first part of the file names.
-        modules: name → module with `run(*, seed: int, out: Path) -> dict`; pictures it makes go into `out`.
+        name: of the study, in the file's name and in the document.
+        module: with `run(*, seed: int, out: Path) -> dict`; pictures it makes go into `out`.
+        kind: "bench" or "validate", the first part of the file's name.
 
     Returns:
-        The folder with the results.
+        The file.
     """
-    parser = argparse.ArgumentParser(description=f"Run the {kind} suite and keep its results.")
-    parser.add_argument("names", nargs="*", help=f"which to run, of {', '.join(modules)}; all if none is named")
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    unknown = set(options.names) - set(modules)
-    if unknown:
-        parser.error(f"unknown: {', '.join(sorted(unknown))}; known: {', '.join(modules)}")
-    options.out.mkdir(parents=True, exist_ok=True)
-    for name in options.names or modules:
-        result = import_module(modules[name]).run(seed=options.seed, out=options.out)
-        document = {"name": name, "circumstances": circumstances(options.seed), "result": result}
-        target = options.out / f"{kind}-{name}.json"
-        target.write_text(json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
-        print(f"{target}\n{json.dumps(result, indent=2)}")  # noqa: T201
-    return options.out
+    out.mkdir(parents=True, exist_ok=True)
+    result = import_module(module).run(seed=seed, out=out)
+    document = {"name": name, "circumstances": circumstances(seed), "result": result}
+    target = out / f"{kind}-{name}.json"
+    target.write_text(json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    print(f"{target}\n{json.dumps(result, indent=2)}")  # noqa: T201
+    return target

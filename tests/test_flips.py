@@ -1,4 +1,4 @@
-"""A bit that flips in what flagdata keeps gives no other value without an error; `tests.hostile.flips` draws more."""
+"""A bit that flips in what flagdata keeps gives no other value without an error; `studies.hostile.flips` draws more."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from tests.hostile.flips import campaign
+from tests.studies.hostile.flips import campaign
 
 COUNT = int(os.environ.get("FLAGDATA_FLIPS", "8"))
 """Flips of each kind of file."""

@@ -6,8 +6,8 @@ import os
 
 import pytest
 
-from tests.hostile import KINDS
-from tests.hostile.campaign import MEMORY, campaign
+from tests.studies.hostile import KINDS
+from tests.studies.hostile.campaign import MEMORY, campaign
 
 COUNT = int(os.environ.get("FLAGDATA_HOSTILE", "60"))
 """Examples of all classes together."""

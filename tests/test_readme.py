@@ -229,7 +229,7 @@ def test_what_it_takes_is_what_the_pages_and_the_program_state() -> None:
 def test_packages_and_disk_are_those_of_a_newcomers_run() -> None:
     kept = ROOT / "docs" / "results" / "bench-newcomer.json"
     if not kept.exists():
-        pytest.skip("not measured yet: python -m tests.benchmarks newcomer --out docs/results")
+        pytest.skip("not measured yet: python -m tests.studies newcomer --out docs/results")
     install = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
     stated = re.findall(r"^\| `pip install .*? \| (\d+) \| ([\d.]+) GB \|$", install, flags=re.MULTILINE)
     result = sheet("bench-newcomer")["python3.11"]

@@ -4,7 +4,7 @@ Of each recording some of the fit's own flags are simulated a second time, finer
 turbulence, so that the difference is the mesh's and chaos's alone. The mean difference corrects what the fit's flags
 show; by how much it differs from flag to flag beyond chaos, and how well so few flags show it, are drawn and so become
 a part of every answer's scatter. Slopes with the wind of so short a part say nothing of it: they have what was measured
-once (`python -m tests.validation weighed`, sixteen flags on a mesh of 18 columns).
+once (`python -m tests.studies weighed`, sixteen flags on a mesh of 18 columns).
 """
 
 from __future__ import annotations

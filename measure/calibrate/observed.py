@@ -6,7 +6,7 @@ A part of an observable's error lasts: it is the same in all windows of a film. 
 observable: an area is off by the same amount in every window, a frequency by another one in each. Of what lasts in a
 film a part is the flag's look, its colours, background and view, and the same in all recordings of it; the rest is the
 film's, whose wind bends the flag otherwise and whose light is another. Errors of observables that are read from the
-same outline are correlated. All is from films whose geometry is known (`python -m tests.validation looks`).
+same outline are correlated. All is from films whose geometry is known (`python -m tests.studies looks`).
 """
 
 from __future__ import annotations

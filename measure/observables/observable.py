@@ -44,7 +44,7 @@ class Observable:
         bias: median of pixels less geometry in filmed simulations, in the unit.
         sigma: robust deviation (1.48 times the median one) of the same for one window: what segmentation, blur and
             folds leave. Both are measured
-            by `python -m tests.validation observables` (docs/results/validate-observables.md).
+            by `python -m tests.studies observables` (docs/results/validate-observables.md).
         counted_in: what of the flag the value is counted in; None where it is of no length.
         quadratic: whether it is a root mean square or a standard deviation, so that parts of a window are averaged in
             squares.

@@ -119,7 +119,7 @@ def test_a_value_that_is_put_into_sql_is_found_and_values_beside_it_are_let_thro
 def test_no_module_puts_a_value_into_sql() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{line}"
-        for path in modules("flagdata", "sim", "models", "measure", "tests/validation")
+        for path in modules("flagdata", "sim", "models", "measure", "tests/studies/validation")
         if str(path.relative_to(ROOT)) not in NAMES_ALONE
         for line in pasted(path.read_text(encoding="utf-8"))
     ]

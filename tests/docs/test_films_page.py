@@ -11,7 +11,7 @@ import pytest
 from measure.calibrate import observed
 from measure.calibrate.simulation import OBSERVED
 from measure.observables import OBSERVABLES, Observable
-from tests.validation.power import reference_table, table
+from tests.studies.validation.power import reference_table, table
 
 PAGE = Path(__file__).parents[2] / "docs" / "method" / "films.md"
 

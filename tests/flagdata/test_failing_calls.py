@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.failing.commands import COMMANDS, Scene, core_scene
-from tests.failing.groups import grouped
-from tests.failing.injector import Fault, Injector, injecting
-from tests.failing.trial import Trials
+from tests.studies.failing.commands import COMMANDS, Scene, core_scene
+from tests.studies.failing.groups import grouped
+from tests.studies.failing.injector import Fault, Injector, injecting
+from tests.studies.failing.trial import Trials
 
 BEFORE, AFTER = 2, 3
 """How many of a command's calls fail in turn before and after it has published, spread evenly; all of them with
-FLAGDATA_EVERY_CALL set. `python -m tests.failing.campaign` has the slow commands as well, and kills."""
+FLAGDATA_EVERY_CALL set. `python -m tests.studies failing` has the slow commands as well, and kills."""
 EVERY = bool(os.environ.get("FLAGDATA_EVERY_CALL"))
 
 

@@ -22,8 +22,8 @@ from flagdata.recipes import parsed
 from measure.nulls import bank
 from sim.arcsim import read_material, read_scene
 from tests.damage import QUICK, as_toml, changed, damaged, damages, paths, wild
-from tests.hostile.models import arrays
-from tests.hostile.recipes import FORMS, MATERIAL_FILE, SCENE_FILE
+from tests.studies.hostile.models import arrays
+from tests.studies.hostile.recipes import FORMS, MATERIAL_FILE, SCENE_FILE
 
 SECONDS = 5.0
 """Within which a recipe is read or refused: none takes more than a tenth of one alone."""

@@ -23,9 +23,9 @@ from models.storage import CARD, read_tensors, write_tensors
 from models.training import checkpoint
 from models.training.recipe import TrainingRecipe, parse
 from tests.damage import QUICK, changed, paths, wild
-from tests.hostile.models import IDENTITY, WORDS, standing, write_checkpoint, write_model
 from tests.refusals import unrefused
 from tests.small import TRAINING
+from tests.studies.hostile.models import IDENTITY, WORDS, standing, write_checkpoint, write_model
 
 SECONDS = 5.0
 """Within which a card is read or refused: none takes more than a tenth of one alone."""

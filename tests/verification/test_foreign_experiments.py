@@ -16,9 +16,9 @@ from sim.effects.hem_mass import HemMass
 from sim.material import named
 from sim.membrane import energy as stretching
 from sim.mesh import grid
-from tests.validation import foreign
-from tests.validation.mujoco import experiments
-from tests.validation.mujoco.experiments import DAMPINGS, NOMINAL, NOTHING, SPREAD, UNDECLARED, Truth, draw
+from tests.studies.validation import foreign
+from tests.studies.validation.mujoco import experiments
+from tests.studies.validation.mujoco.experiments import DAMPINGS, NOMINAL, NOTHING, SPREAD, UNDECLARED, Truth, draw
 
 MATERIAL = named("camel-ponte-roma")
 TRUTHS = [draw(f"null-{k}", NOTHING, seed=3) for k in range(40)]

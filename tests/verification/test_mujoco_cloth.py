@@ -20,8 +20,8 @@ from sim.cloth import Cloth
 from sim.effects.finite_span_loading import FiniteSpanLoading
 from sim.material import named
 from sim.mesh import grid
-from tests.validation.environments import MUJOCO, UnusableError
-from tests.validation.mujoco.cloth import Air, Flight, Floats, Integrator, Method, Sheet, Wind, fly
+from tests.studies.validation.environments import MUJOCO, UnusableError
+from tests.studies.validation.mujoco.cloth import Air, Flight, Floats, Integrator, Method, Sheet, Wind, fly
 
 STILL, CALM = Air(pressure=0.0), Wind()
 GRAVITY = 9.81
@@ -156,7 +156,7 @@ def test_the_inertia_of_the_air_about_a_still_wave_is_that_of_its_wavenumbers(mo
     """η = a cos k₄u in a stream U: √e Σ_b m(k₄, b π/H) cos(b π v/H) ⟨√e cos⟩_b U² k₄² η; and the library's mass."""
     monkeypatch.setitem(sys.modules, "mujoco", ModuleType("mujoco"))
     mesh = grid(width=1.5, height=1.0, columns=40, rows=28)
-    carried = import_module("tests.validation.mujoco.worker").Carried(0.3, mesh.rest, mesh.vertex_areas)
+    carried = import_module("tests.studies.validation.mujoco.worker").Carried(0.3, mesh.rest, mesh.vertex_areas)
     u, v = mesh.rest.T
     along = 4 * np.pi / 1.5
     wave = 0.002 * np.cos(along * u)

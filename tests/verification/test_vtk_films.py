@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from flagdata.errors import NotFoundError
-from tests.validation.environments import VTK
-from tests.validation.vtk_films.designs import ALL_RATES, designs
-from tests.validation.vtk_films.runs import RATE, Motion
-from tests.validation.vtk_films.scene import Body, Camera, Light, Scene, View, film, pictures
+from tests.studies.validation.environments import VTK
+from tests.studies.validation.vtk_films.designs import ALL_RATES, designs
+from tests.studies.validation.vtk_films.runs import RATE, Motion
+from tests.studies.validation.vtk_films.scene import Body, Camera, Light, Scene, View, film, pictures
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""Other programs' readers, each in an environment of its own (`tests.validation.environments`)."""
+"""Other programs' readers, each in an environment of its own (`tests.studies.validation.environments`)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from flagdata.errors import NotFoundError
-from tests.validation.environments import Environment
+from tests.studies.validation.environments import Environment
 
 _OFFLINE = {"HF_HUB_OFFLINE": "1", "HF_DATASETS_OFFLINE": "1", "CUDA_VISIBLE_DEVICES": "", "PATH": "/usr/bin:/bin"}
 

@@ -15,7 +15,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.export import Export, export
 from flagdata.export.lerobot import common_rate
 from tests.flagdata.export.readers import read_by
-from tests.validation.environments import LEROBOT
+from tests.studies.validation.environments import LEROBOT
 
 CLIPS = "kind = 'clip'"
 READ = """

@@ -8,7 +8,7 @@ from typing import Any
 
 from flagdata.export import Export, export
 from tests.flagdata.export.readers import read_by
-from tests.validation.environments import DATASETS
+from tests.studies.validation.environments import DATASETS
 
 CLIPS = "kind = 'clip'"
 PARQUET = """

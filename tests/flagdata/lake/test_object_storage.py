@@ -32,9 +32,9 @@ from flagdata.lake.transaction import Transaction
 from flagdata.schema import Kind
 from flagdata.storage import RemotePath, StoreError
 from flagdata.storage.connection import plain
-from tests.failing.store import failing, planned
 from tests.program import invoke
 from tests.s3 import SECRETS, Careless, Denying, Forbidding, read_only, serving
+from tests.studies.failing.store import failing, planned
 
 NOW = timedelta(0)
 Put = Callable[..., Artifact]

@@ -25,7 +25,7 @@ from measure.calibrate.simulation import OBSERVED, Flag
 from measure.calibrate.wind import Log
 from measure.ends import Bound
 from tests.measure.calibrate.conftest import readings
-from tests.validation.looks import share, vtk
+from tests.studies.validation.looks import share, vtk
 
 _AZIMUTH = Uncertain(
     name="azimuth", unit="rad", prior=Normal(mean=math.radians(70), sigma=math.radians(7)), source="stated"

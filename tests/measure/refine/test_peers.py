@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import UnknownNameError
-from tests.validation.peers.registry import PEERS, minimise
+from tests.studies.validation.peers.registry import PEERS, minimise
 
 PLACE = np.array([0.4, -0.3])
 

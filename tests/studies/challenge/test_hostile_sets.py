@@ -11,9 +11,9 @@ import pytest
 
 from flagdata.errors import CorruptError, FlagdataError, InputError
 from tests.damage import changed
-from tests.hostile.inputs import ABOUT, write_small_set
 from tests.studies.challenge.filing import opened
 from tests.studies.challenge.folder import ChallengeFolder, read_set
+from tests.studies.hostile.inputs import ABOUT, write_small_set
 
 
 def test_the_set_is_whole(tmp_path: Path) -> None:

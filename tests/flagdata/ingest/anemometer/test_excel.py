@@ -19,7 +19,7 @@ from flagdata.ingest.anemometer import Limits, WindOptions, read_log, sniff
 from flagdata.ingest.anemometer.text.source import open_text
 from flagdata.lake import Lake
 from flagdata.timebase import iso
-from tests.hostile.campaign import command
+from tests.studies.hostile.campaign import command
 
 Book = Callable[..., Path]
 

@@ -1,0 +1,181 @@
+"""The commands of the core that write, each with a scene small enough to try every call of it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import av
+import numpy as np
+
+from flagdata.cli import main
+from flagdata.ingest.store import ingest_camera, ingest_wind
+from flagdata.lake import Lake
+from flagdata.lake.labels import columns
+from tests.small import SCENE
+from tests.studies.failing.trial import Command
+
+CLOTHS = "film,fabric,area_weight,wind_speed,wind_sigma\nthird.mp4,felt,0.3,2.0,0.2\nfourth.mp4,silk,0.1,,\n"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A folder that commands work on copies of, and ids by name."""
+
+    folder: Path
+    ids: dict[str, str] = field(default_factory=dict)
+
+
+def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callable[..., Path]) -> Scene:
+    """A lake with a film, a log, a branch, a tag and garbage; beside it films, logs, meshes, a cut record, recipes."""
+    lake = Lake.create(folder / "lake")
+    camera = ingest_camera(lake, write_video(folder / "first.mp4", frames=30)).artifact
+    wind = ingest_wind(lake, wind_log).artifact
+    lake.branch("side")
+    lake.tag("v0")
+    (folder / "second.mp4").write_bytes(video.read_bytes())
+    (folder / "second.csv").write_text(wind_log.read_text().replace("+02:00,5.", "+02:00,6."))
+    third = ingest_camera(lake, write_video(folder / "third.mp4", frames=28), branch="side").artifact
+    write_video(folder / "fourth.mp4", frames=26)
+    fifth = ingest_camera(lake, write_video(folder / "fifth.mp4", frames=32)).artifact
+    aligned = ["align", fifth.id, wind.id, "--by", "given", "--offset", "0", "--offset-sigma", "0.1"]
+    with suppress(SystemExit):
+        main([*aligned, "--lake", str(lake.path)])
+    (recording,) = lake.rows("kind = 'recording'")["artifact"].to_pylist()
+    single = ingest_camera(lake, write_video(folder / "single.mp4", frames=12)).artifact
+    spare = ingest_camera(lake, write_video(folder / "spare.mp4", frames=5)).artifact
+    lake.withdraw([spare.id], "spare")
+    (lake.staging / "left").mkdir()
+    (folder / "cut.mcap").write_bytes(lake.object_path(str(third.object)).read_bytes()[:-200])
+    (folder / "small.toml").write_text(SCENE)
+    (folder / "cloths.csv").write_text(CLOTHS)
+    (folder / "meshes").mkdir()
+    for frame in range(2):
+        corners = [
+            "v 0 0 {z}",
+            "v 0.5 0 {z}",
+            "v 0 0.5 {z}",
+            "v 0.5 0.5 {z}",
+            "vt 0 0",
+            "vt 0.5 0",
+            "vt 0 0.5",
+            "vt 0.5 0.5",
+        ]
+        text = "\n".join([*corners, "f 1/1 2/2 3/3", "f 2/2 4/4 3/3", ""]).format(z=0.1 * frame)
+        (folder / "meshes" / f"{frame:04d}_00.obj").write_text(text)
+    ids = {"camera": camera.id, "wind": wind.id, "recording": recording, "single": single.id}
+    return Scene(folder=folder, ids=ids)
+
+
+def made_scene(folder: Path) -> Scene:
+    """The same of films and a log that are made for it."""
+
+    def write_video(path: Path, *, frames: int = 40) -> Path:
+        row, column = np.mgrid[0:48, 0:64]
+        with av.open(str(path), "w") as container:
+            container.metadata["creation_time"] = "2026-05-01T10:00:00Z"
+            stream = container.add_stream("libx264", rate=50, options={"threads": "1"})
+            stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+            for k in range(frames):
+                bar = np.abs(column - 32 - 12 * np.sin(row / 9 + 0.25 * k)) < 4
+                image = (40 + row + 150 * bar).astype(np.uint8)
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="gray")))
+            container.mux(stream.encode(None))
+        return path
+
+    log = folder / "mast.csv"
+    lines = [f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}+02:00,5.{k % 10},{200 + k % 9}" for k in range(120)]
+    log.write_text("\n".join(["time,wind_speed (m/s),wind_direction (deg)", *lines, ""]))
+    return core_scene(folder, video=write_video(folder / "film.mp4"), wind_log=log, write_video=write_video)
+
+
+def rows(folder: Path) -> frozenset[object]:
+    """Every artifact of the lake with its object, by branch."""
+    lake = Lake.open(folder / "lake")
+    columns = ["artifact", "kind", "name", "branch", "object"]
+    return frozenset(tuple(row.values()) for row in lake.rows(columns=columns).to_pylist())
+
+
+def labels(folder: Path) -> frozenset[object]:
+    """Every artifact of the lake with its labels."""
+    table = columns(Lake.open(folder / "lake").rows())
+    return frozenset((name, *values.to_pylist()) for name, values in table.items())
+
+
+def artifacts(folder: Path) -> frozenset[object]:
+    """Every artifact of the lake, of commands whose objects note how long something took."""
+    return frozenset(Lake.open(folder / "lake").rows(columns=["artifact"])["artifact"].to_pylist())
+
+
+def files(*places: str) -> Callable[[Path], frozenset[object]]:
+    """What is at these places of the folder and under them: folders, and files with their hashes; no scratch files."""
+
+    def found(folder: Path) -> frozenset[object]:
+        every = [entry for place in places for entry in ((folder / place), *(folder / place).rglob("*"))]
+        return frozenset(
+            (str(path.relative_to(folder)), path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest())
+            for path in every
+            if path.exists() and not path.name.startswith(".")
+        )
+
+    return found
+
+
+_LAKE = ("--lake", "{folder}/lake")
+COMMANDS = {
+    "ingest camera": Command(arguments=("ingest", "{folder}/second.mp4", *_LAKE), state=rows),
+    "ingest wind": Command(arguments=("ingest", "{folder}/second.csv", *_LAKE), state=rows),
+    "ingest meshes": Command(arguments=("ingest", "{folder}/meshes", "--rate", "25", *_LAKE), state=rows),
+    "align": Command(
+        arguments=("align", "{camera}", "{wind}", "--by", "given", "--offset", "0", "--offset-sigma", "0.1", *_LAKE),
+        state=rows,
+    ),
+    "declare": Command(arguments=("declare", "{camera}", "--speed", "3", "--sigma", "0.2", *_LAKE), state=rows),
+    "declare-cloths": Command(arguments=("declare-cloths", "{folder}/cloths.csv", *_LAKE), state=rows, one_step=False),
+    "realign": Command(
+        arguments=(
+            *("realign", "{recording}", "--by", "given", "--offset", "0", "--offset-sigma", "0.3"),
+            *_LAKE,
+        ),
+        state=rows,
+    ),
+    "label": Command(arguments=("label", "{camera}", "operator=me", *_LAKE), state=labels),
+    "merge": Command(arguments=("merge", "side", *_LAKE), state=rows),
+    "withdraw": Command(arguments=("withdraw", "{camera}", "-m", "wrong", *_LAKE), state=rows),
+    "withdraw --everywhere": Command(
+        arguments=("withdraw", "{single}", "--everywhere", "-m", "a person asked", *_LAKE),
+        state=lambda folder: rows(folder) | files("lake/mcap")(folder),
+        one_step=False,
+        unfinished="erasure-unfinished",
+    ),
+    "expire": Command(
+        arguments=("expire", "--keep", "1", *_LAKE),
+        state=files("lake/mcap", "lake/zarr"),
+        one_step=False,
+    ),
+    "tag": Command(arguments=("tag", "v1", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.tags()}),
+    "tag --delete": Command(
+        arguments=("tag", "v0", "--delete", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.tags()}
+    ),
+    "branch": Command(
+        arguments=("branch", "more", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.branches()}
+    ),
+    "branch --delete": Command(
+        arguments=("branch", "side", "--delete", "--discard", *_LAKE),
+        state=lambda folder: {*Lake.open(folder / "lake").refs.branches()},
+    ),
+    "init": Command(
+        arguments=("init", "{folder}/new"), state=lambda folder: (folder / "new" / "lake.json").exists(), lake="new"
+    ),
+    "simulate": Command(arguments=("simulate", "{folder}/small.toml", "--workers", "1", *_LAKE), state=rows),
+    "gc": Command(
+        arguments=("gc", "--older-than", "0s", *_LAKE),
+        state=files("lake/mcap", "lake/zarr", "lake/staging"),
+        one_step=False,
+    ),
+    "recover": Command(arguments=("recover", "{folder}/cut.mcap", "{folder}/whole.mcap"), state=files("whole.mcap")),
+    "export": Command(arguments=("export", "parquet", "--to", "{folder}/out", *_LAKE), state=files("out")),
+}

@@ -1,0 +1,172 @@
+"""One command with one failing call: what it reported against what it did, and what it left."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+from flagdata.findings import Severity
+from flagdata.lake import Lake
+from flagdata.lake.health import doctor, object_names, read_refs, verify, verify_catalog
+from tests.studies.failing.groups import PUBLISHING, kinds
+from tests.studies.failing.injector import Done, Fault, Injector
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A command that writes.
+
+    Attributes:
+        arguments: {folder} stands for the folder that it works in, other names in braces for the scene's ids.
+        state: what it changes in that folder; equal states have equal content.
+        lake: the lake that must stay healthy, in that folder; it may be absent.
+        stand_in: "module:function" that puts something in the place of its computing, called with the scene's id "kept"
+            in the process that it is forked from.
+        one_step: whether it changes all or nothing; else what it has done before an error stays, and a repeat goes on.
+        unfinished: kind of the finding by which doctor reports that it was cut off; empty where it leaves none.
+    """
+
+    arguments: tuple[str, ...]
+    state: Callable[[Path], object]
+    lake: str = "lake"
+    stand_in: str | None = None
+    one_step: bool = True
+    unfinished: str = ""
+
+    def given(self, folder: Path, ids: Mapping[str, str]) -> list[str]:
+        return [argument.format(folder=folder, **ids) for argument in self.arguments]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Whole:
+    """A command without a fault: the state before and after it, and its calls."""
+
+    before: object
+    after: object
+    done: Done
+
+    @property
+    def published(self) -> int:
+        """The number of the call that published last."""
+        return max((n for n, call in enumerate(self.done.trace) if call.startswith(PUBLISHING)), default=0)
+
+
+class Trials:
+    """Trials of one command, each in a copy of the scene's folder.
+
+    Attributes:
+        whole: the command without a fault.
+        failed: how many calls of each kind (`groups.kinds`) have failed. Threads do not make their calls
+            in the same order each time, so that a number may meet another call than in `whole`.
+
+    Raises:
+        AssertionError: the command fails or changes nothing without any fault.
+    """
+
+    def __init__(
+        self, command: Command, scene: Path, ids: Mapping[str, str], injector: Injector, scratch: Path
+    ) -> None:
+        self._command, self._scene, self._ids = command, scene, ids
+        self._injector, self._scratch = injector, scratch
+        self._count = 0
+        self.failed: Counter[str] = Counter()
+        if command.stand_in is not None:
+            injector.prepare(command.stand_in, ids["kept"])
+        folder = self._copy()
+        before = command.state(folder)
+        done = injector.run(folder, command.given(folder, ids), traced=True)
+        self.whole = Whole(before=before, after=command.state(folder), done=done)
+        assert done.code == 0, done.stderr
+        assert self.whole.after != before, "it changed nothing"
+        shutil.rmtree(folder)
+
+    def wrong(self, fault: Fault, *, repeated: bool) -> dict[str, Any] | None:
+        """What is wrong with a command that met this fault; None where all is right.
+
+        Args:
+            repeated: whether a command that failed is given once more, without the fault.
+        """
+        command, folder = self._command, self._copy()
+        done = self._injector.run(folder, command.given(folder, self._ids), fault, traced=True)
+        met = kinds(done.trace)[fault.call] if fault.call < len(done.trace) else "none: there were fewer"
+        self.failed[met] += 1
+        state = command.state(folder)
+        problems = self._lost(done, state) if fault.kills else self._report_against(done, state)
+        problems += _health(folder / command.lake, unfinished=command.unfinished)
+        if done.code and (repeated or fault.kills):
+            again = self._injector.run(folder, command.given(folder, self._ids))
+            if again.code or command.state(folder) != self.whole.after:
+                problems.append(f"the repeat fails or ends otherwise: {again.stderr}")
+            problems += [f"after the repeat: {problem}" for problem in _health(folder / command.lake)]
+        shutil.rmtree(folder)
+        if not problems:
+            return None
+        return {
+            "call": fault.call,
+            "of": self.whole.done.calls,
+            "stays": fault.stays,
+            "was": met,
+            "code": done.code,
+            "after_publication": fault.call > self.whole.published,
+            "problems": problems,
+            "stderr": done.stderr,
+        }
+
+    def _report_against(self, done: Done, state: object) -> list[str]:
+        problems: list[str] = []
+        if (done.code == 0) != (state == self.whole.after):
+            what = (
+                "all is" if state == self.whole.after else "nothing is" if state == self.whole.before else "a part is"
+            )
+            problems.append(f"exit code {done.code}, and {what} published")
+        elif done.code and self._command.one_step and state != self.whole.before:
+            problems.append("a part is published")
+        if done.code not in (0, 1):
+            problems.append(f"exit code {done.code}")
+        if done.code and "fix:" not in done.stderr:
+            problems.append("no fix is named")
+        return problems + [word for word in ("Traceback", "unforeseen", "interrupted") if word in done.stderr]
+
+    def _lost(self, done: Done, state: object) -> list[str]:
+        """What is wrong with a command that was killed: what was there before must be there, if it does not go."""
+        problems = [] if done.code == -signal.SIGKILL else [f"exit code {done.code}, not killed"]
+        if self._command.one_step and state not in (self.whole.before, self.whole.after):
+            problems.append("a part is published")
+        before, after = self.whole.before, self.whole.after
+        if isinstance(state, frozenset) and isinstance(before, frozenset) and isinstance(after, frozenset):
+            problems += ["something is lost"] * (not before & after <= state)
+        return problems
+
+    def _copy(self) -> Path:
+        self._count += 1
+        folder = self._scratch / str(self._count)
+        shutil.copytree(self._scene, folder, symlinks=True)
+        return folder
+
+
+def _health(path: Path, *, unfinished: str = "") -> list[str]:
+    """What is wrong with a lake, if there is one.
+
+    Args:
+        unfinished: kind of a finding that is right before the command is given once more.
+    """
+    if not (path / "lake.json").exists():
+        return []
+    lake = Lake.open(path)
+    refs = read_refs(lake)
+    found = (
+        *doctor(lake, grace=timedelta(0)),
+        *verify_catalog(lake, refs),
+        *verify(lake, object_names(lake, refs)),
+    )
+    return [
+        f"unhealthy: {finding.kind}: {finding.what}"
+        for finding in found
+        if finding.severity is Severity.ERROR and finding.kind != unfinished
+    ]
