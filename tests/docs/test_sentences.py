@@ -27,7 +27,7 @@ _CODE = re.compile(r"^( *)```.*?^\1```$|^\$\$.*?^\$\$$", re.DOTALL | re.MULTILIN
 _PARAGRAPH = re.compile(r"\n\s*\n|\n(?=\s*(?:[-*] |\d+\. |: ))")
 _NO_PROSE = re.compile(r"#|\||!\[|\*[^*]+\*$")
 """A heading, a table, a picture; a line all in italics, which repeats a message of the program."""
-_END = re.compile(r"(?<!et al)[.!?][)\"*]*\s+(?=[\"(*\[`$]*[A-Z0-9`$])|:\s*$|[.!?][)\"*]*$")
+_END = re.compile(r"(?<!et al)[.!?][)\"*]*\s+(?=[\"(*\[`$]*(?:[A-Z0-9`$]|flagdata|p ))|:\s*$|[.!?][)\"*]*$")
 
 
 def prose(text: str) -> list[str]:
