@@ -254,7 +254,7 @@ def withdraw(
 def _erase(lake: Lake, artifacts: tuple[str, ...], message: str, *, with_descendants: bool, as_json: bool) -> None:
     from dataclasses import asdict
 
-    from flagdata.lake.erasure import BEYOND
+    from flagdata.lake.removal import BEYOND
 
     done = lake.erase([_anywhere(lake, one) for one in artifacts], message, with_descendants=with_descendants)
     if as_json:
@@ -275,7 +275,7 @@ def _anywhere(lake: Lake, artifact: str) -> str:
         NotFoundError: no branch or tag does, and none did.
     """
     from flagdata.errors import NotFoundError
-    from flagdata.lake.erasure import erased_as
+    from flagdata.lake.removal import erased_as
 
     for ref in (*lake.refs.branches(), *lake.refs.tags()):
         try:

@@ -17,13 +17,11 @@ import pyarrow as pa
 
 from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake.catalog import persist
-from flagdata.lake.durable import disk_errors
-from flagdata.lake.leases import keeping_collectors_out
+from flagdata.lake.lineage import removals
 from flagdata.lake.matching import made_from, matching
 from flagdata.lake.refs import Slice
-from flagdata.lake.removals import removals
+from flagdata.lake.removal import left, remove
 from flagdata.lake.store import Store
-from flagdata.lake.withdrawal import take_off
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
 
@@ -60,7 +58,7 @@ def merge(lake: Store, branch: str, message: str, *, into: str) -> MergeResult:
     lake.check_writable()
     if branch == into:
         raise UsageError(f"{branch!r} cannot be merged into itself", fix="name two branches")
-    with disk_errors("merging", lake.path), keeping_collectors_out(lake.staging):
+    with lake.changing("merging"):
         return persist(lambda: _attempt(lake, branch, message, into), where=lake.catalog.path)
 
 
@@ -94,7 +92,7 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
     }
     if withdrawn:
         info["withdrawn"] = str(len(withdrawn))
-    version = take_off(lake, withdrawn, branch=into, base=head, info=info, fresh=_published(fresh, into))
+    version = remove(lake, withdrawn, branch=into, base=head, info=info, fresh=_published(fresh, into))
     return MergeResult(
         version=version,
         commit=commit,
@@ -129,8 +127,10 @@ def _decided(
     left_out: dict[str, int] = {}
     brought_back: dict[str, int] = {}
     first = max(since, lineage.life(ours)[1])
-    for removal in reversed(list(removals(lake, since=first, branch=ours.branch) if candidates else ())):
-        if found := removal.artifacts & candidates:
+    for removal in reversed(removals(lake.catalog.history())):
+        if not (candidates and removal.withdrawn and removal.version > first and removal.branch == ours.branch):
+            continue
+        if found := (left(lake, removal).keys() | removal.hidden) & candidates:
             then = Slice(branch=theirs.branch, version=max(removal.version, lineage.life(theirs)[1]))
             had = found & frozenset(lake.identities(lineage.view(then)).to_pylist())
             for artifact in found:

@@ -25,8 +25,8 @@ from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.healing import Healing, healing
 from flagdata.lake.leases import Lease, RemoteLease, collecting, open_lease
+from flagdata.lake.removal import remove
 from flagdata.lake.store import Store
-from flagdata.lake.withdrawal import take_off
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
 
@@ -279,7 +279,7 @@ class Transaction:
             if moved:
                 info["withdrawn"] = str(len(moved))
             with self.keeping_collectors_out():
-                version = take_off(self._lake, moved, branch=self.branch, base=version, info=info, fresh=rows)
+                version = remove(self._lake, moved, branch=self.branch, base=version, info=info, fresh=rows)
                 self._result = CommitResult(
                     version=version, commit=commit, added=tuple(fresh), existing=existing, artifacts=artifacts
                 )

@@ -74,10 +74,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/commands/confirm.py", "describe the file by a r"),
     ),
     "each finding that leads here has a fix of its own, which is said instead": (
-        ("flagdata/lake/collect.py", "run flagdata doctor"),
-        ("flagdata/lake/expiry.py", "run flagdata doctor"),
+        ("flagdata/lake/marking.py", "run flagdata doctor"),
         ("flagdata/lake/transfer.py", "run flagdata doctor"),
-        ("flagdata/lake/usage.py", "run flagdata doctor"),
     ),
     "each guess that is no recording says what to do by itself": (
         ("flagdata/ingest/classify.py", "see flagdata ingest --sn"),
