@@ -22,8 +22,9 @@ from flagdata.lake.collect import left_uploads
 from flagdata.lake.durable import SCRATCH
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import FOLDERS, STORES, foreign_entries
-from flagdata.lake.leases import COLLECT, TURN, LeaseState, last_written, leases, looking, unleased
+from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased
 from flagdata.lake.lineage import removals
+from flagdata.lake.locks import COLLECT, TURN
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import DAMAGED, StoredObject

@@ -21,10 +21,10 @@ from flagdata.lake.durable import disk_errors, put_if_absent
 from flagdata.lake.labels import Value, put
 from flagdata.lake.layout import FOLDERS, STAGING, STORES, scratch_files
 from flagdata.lake.lineage import removals
+from flagdata.lake.locks import MADE, TimedLocks
 from flagdata.lake.merging import MergeResult, merge
 from flagdata.lake.objects import Objects
 from flagdata.lake.refs import MAIN, Ref, View
-from flagdata.lake.remote_leases import MADE, claimed, unfinished
 from flagdata.lake.removal import Erasure, Withdrawal, check_whole, delete, descendants, erase, explained, withdraw
 from flagdata.lake.store import Store
 from flagdata.lake.transaction import Transaction
@@ -112,7 +112,7 @@ class Lake(Store):
         """Whether anything is there but, in a bucket, what a process left that was killed while it made a lake."""
         if isinstance(self.staging, RemotePath):
             others = any(entry != self.staging for entry in self._entries())
-            return others and not unfinished(self.staging, done=self.path / _MARKER)
+            return others and not TimedLocks(self.staging).unfinished(done=self.path / _MARKER)
         there = self.path.exists() and not self.path.is_dir()
         return there or (self.path.is_dir() and any(self._entries()))
 
@@ -127,7 +127,7 @@ class Lake(Store):
         """Whether this process makes the lake: the one that succeeds in making its staging."""
         if isinstance(self.staging, RemotePath):
             self.check_writable()
-            return claimed(self.staging, done=self.path / _MARKER)
+            return TimedLocks(self.staging).claimed(done=self.path / _MARKER)
         self.path.mkdir(parents=True, exist_ok=True)
         try:
             self.staging.mkdir()

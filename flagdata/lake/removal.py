@@ -31,8 +31,9 @@ from flagdata.errors import ConflictError, FlagdataError, NotFoundError, Unknown
 from flagdata.lake import naming
 from flagdata.lake.catalog import persist
 from flagdata.lake.durable import disk_errors
-from flagdata.lake.leases import Check, leases, looking
+from flagdata.lake.leases import leases, looking
 from flagdata.lake.lineage import Removal, removals
+from flagdata.lake.locks import Check
 from flagdata.lake.marking import catalog_files, mark
 from flagdata.lake.matching import made_from, matching
 from flagdata.lake.refs import MAIN, Slice, View, as_json

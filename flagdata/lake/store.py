@@ -19,8 +19,9 @@ from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Catalog
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.layout import STAGING, check_writable
-from flagdata.lake.leases import Check, collecting, keeping_collectors_out
+from flagdata.lake.leases import collecting, keeping_collectors_out
 from flagdata.lake.lineage import Lineage, with_labels
+from flagdata.lake.locks import Check
 from flagdata.lake.matching import Values, Where, condition, matching
 from flagdata.lake.objects import Objects
 from flagdata.lake.refs import Refs, Slice, View

@@ -28,7 +28,7 @@ ALLOWED = {
     "flagdata/lake/catalog.py": LAKE,
     "flagdata/lake/summaries.py": LAKE,
     "flagdata/lake/layout.py": LAKE,
-    "flagdata/lake/remote_leases.py": LAKE,
+    "flagdata/lake/locks.py": LAKE,
     "flagdata/lake/remote_objects.py": LAKE,
     "flagdata/storage/path.py": "writes, removes and renames what its callers name, as pathlib does for folders",
     "flagdata/object_cache.py": "a cache of a lake's objects by their hash",
