@@ -32,8 +32,8 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
     from flagdata.errors import UnknownNameError
     from flagdata.lake import Lake
     from flagdata.lake.matching import matching
+    from flagdata.lake.naming import superseded
     from flagdata.lake.removal import lost
-    from flagdata.lake.revisions import superseded
     from flagdata.schema import Kind
 
     if kind is not None and kind not in list(Kind):

@@ -182,7 +182,7 @@ def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
     Both are tags, branches, version numbers or commits; AFTER is the head of main by default.
     """
     from flagdata.lake import Lake
-    from flagdata.lake.difference import difference
+    from flagdata.lake.merging import difference
 
     found = difference(Lake.open(lake_path), before, after)
     added = [relative(row) for row in found.added.to_pylist()]

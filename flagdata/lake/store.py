@@ -23,9 +23,8 @@ from flagdata.lake.leases import collecting, keeping_collectors_out
 from flagdata.lake.lineage import Lineage, with_labels
 from flagdata.lake.locks import Check
 from flagdata.lake.matching import Values, Where, condition, matching
-from flagdata.lake.objects import Objects
+from flagdata.lake.objects import Objects, RemoteObjects
 from flagdata.lake.refs import Refs, Slice, View
-from flagdata.lake.remote_objects import RemoteObjects
 from flagdata.lake.rowfiles import ROW_ORDER, Scan, in_order
 from flagdata.printable import SHORT
 from flagdata.schema import CATALOG, Kind

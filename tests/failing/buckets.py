@@ -40,7 +40,7 @@ from flagdata.lake import Lake
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify
 from flagdata.lake.lineage import labels_of
-from flagdata.lake.remote_objects import SUMS
+from flagdata.lake.objects import SUMS
 from flagdata.storage import RemotePath, connection
 from tests.evidence import circumstances
 from tests.failing import slow

@@ -13,7 +13,7 @@ import pytest
 from flagdata import object_cache as cache
 from flagdata import object_ranges as ranges
 from flagdata.errors import CorruptError, NotFoundError
-from flagdata.lake import Artifact, Lake, remote_objects
+from flagdata.lake import Artifact, Lake, objects
 from flagdata.record import Chunking, Coding, Record
 from flagdata.record.checksums import ChecksummedWriter
 from flagdata.schema import Kind
@@ -176,9 +176,9 @@ def test_a_lake_reads_small_records_whole_and_the_parts_of_large_ones(
         tx.add(Artifact(kind=Kind.CAMERA, name="film", object=name))
     assert isinstance(remote_lake.record_place(name), Path)  # what was put is there
     cache.forget(name, ".mcap")
-    monkeypatch.setattr(remote_objects, "WHOLE", 1000)
+    monkeypatch.setattr(objects, "WHOLE", 1000)
     place = remote_lake.record_place(name)
     assert place == remote_lake.objects.path(name)
     assert Record.open(place).frames(3, 2).shape == (2, 48, 64)
-    monkeypatch.setattr(remote_objects, "WHOLE", 10**6)
+    monkeypatch.setattr(objects, "WHOLE", 10**6)
     assert isinstance(remote_lake.record_place(name), Path)
