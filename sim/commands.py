@@ -54,7 +54,7 @@ def simulate(
       flagdata simulate my-flag.toml --lake lake --batch 64 --device cuda
     """
     from flagdata.lake import Lake
-    from flagdata.lake.difference import added_since
+    from flagdata.lake.merging import added_since
     from sim.run import simulate as run
     from sim.run.models import load
 

@@ -32,8 +32,8 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
     from flagdata.errors import UnknownNameError
     from flagdata.lake import Lake
     from flagdata.lake.matching import matching
-    from flagdata.lake.removals import lost
-    from flagdata.lake.revisions import superseded
+    from flagdata.lake.naming import superseded
+    from flagdata.lake.removal import lost
     from flagdata.schema import Kind
 
     if kind is not None and kind not in list(Kind):
@@ -82,8 +82,8 @@ def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: s
     from flagdata.ingest.before import unconfirmed
     from flagdata.lake import Lake
     from flagdata.lake.labels import PREFIX
+    from flagdata.lake.lineage import labels_of
     from flagdata.lake.results import versions
-    from flagdata.lake.tabled import labels_of
 
     lake = Lake.open(lake_path)
     found = lake.artifact(artifact, at=at)

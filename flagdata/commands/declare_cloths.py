@@ -39,7 +39,7 @@ def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path
     from flagdata.ingest.cloths import read_cloths
     from flagdata.ingest.store import CameraIngest, Labels, ingest_camera
     from flagdata.lake import Lake
-    from flagdata.lake.difference import added_since
+    from flagdata.lake.merging import added_since
 
     box = parse_crop(crop)
     lake = Lake.open(lake_path)

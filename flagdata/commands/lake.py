@@ -182,7 +182,7 @@ def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
     Both are tags, branches, version numbers or commits; AFTER is the head of main by default.
     """
     from flagdata.lake import Lake
-    from flagdata.lake.difference import difference
+    from flagdata.lake.merging import difference
 
     found = difference(Lake.open(lake_path), before, after)
     added = [relative(row) for row in found.added.to_pylist()]
@@ -254,7 +254,7 @@ def withdraw(
 def _erase(lake: Lake, artifacts: tuple[str, ...], message: str, *, with_descendants: bool, as_json: bool) -> None:
     from dataclasses import asdict
 
-    from flagdata.lake.erasure import BEYOND
+    from flagdata.lake.removal import BEYOND
 
     done = lake.erase([_anywhere(lake, one) for one in artifacts], message, with_descendants=with_descendants)
     if as_json:
@@ -275,7 +275,7 @@ def _anywhere(lake: Lake, artifact: str) -> str:
         NotFoundError: no branch or tag does, and none did.
     """
     from flagdata.errors import NotFoundError
-    from flagdata.lake.erasure import erased_as
+    from flagdata.lake.removal import erased_as
 
     for ref in (*lake.refs.branches(), *lake.refs.tags()):
         try:

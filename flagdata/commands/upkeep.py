@@ -192,8 +192,8 @@ def expire(
     from dataclasses import asdict
 
     from flagdata.lake import Lake
-    from flagdata.lake.expiry import expire as expiring
-    from flagdata.lake.expiry import last_version
+    from flagdata.lake.removal import expire as expiring
+    from flagdata.lake.removal import last_version
 
     if older_than is None and keep is None:
         raise UsageError("which versions expire is not given", fix="give --older-than AGE, --keep N, or both")

@@ -18,10 +18,10 @@ from flagdata.dataset.tolerance import Refusal, Tolerance, judge
 from flagdata.documents import column_json
 from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
+from flagdata.lake.lineage import labels_of
 from flagdata.lake.matching import Where
 from flagdata.lake.rowfiles import Scan
 from flagdata.lake.selection import Request, Selection
-from flagdata.lake.tabled import labels_of
 from flagdata.record import Record
 from flagdata.schema import TRUTH_WINDOW, Kind
 

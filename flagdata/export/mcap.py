@@ -24,7 +24,7 @@ from flagdata.dataset.truth import HISTORY
 from flagdata.errors import CorruptError
 from flagdata.export.source import FILMED, Entry, Source, label_units
 from flagdata.record import Coding, messages
-from flagdata.record.checksums import ChecksummedWriter
+from flagdata.record.checksums import ChecksummedFile
 from flagdata.record.container import Messages, check_parts, read_exact, read_messages, read_summary
 from flagdata.record.key_frames import is_key
 from flagdata.record.metadata import ROWS, SAMPLE
@@ -118,10 +118,10 @@ class _Original:
 def _cut(entry: Entry, original: _Original, target: Path) -> None:
     first = original.decodable_from(entry.first) if entry.record.coding is Coding.H264 else entry.first
     with target.open("xb") as sink:
-        writer = ChecksummedWriter(sink, chunk_size=CHUNK_BYTES)
-        writer.start(profile=PROFILE, library=f"flagdata format {entry.row['format_version']}")
+        library = f"flagdata format {entry.row['format_version']}"
+        writer = ChecksummedFile(sink, chunk_size=CHUNK_BYTES, profile=PROFILE, library=library)
         for name, values in entry.record.metadata.items():
-            writer.add_metadata(name, dict(values))
+            writer.add_metadata(name, values)
         writer.add_metadata(SAMPLE, _sample(entry, lead_in=entry.first - first))
         channels: dict[str, int] = {}
         for topic, index in _order(entry, original, first):
@@ -129,7 +129,7 @@ def _cut(entry: Entry, original: _Original, target: Path) -> None:
                 channels[topic] = _register(writer, original, topic)
             table = original.messages[topic]
             writer.add_message(
-                channels[topic],
+                channel_id=channels[topic],
                 log_time=int(table.log_time[index]),
                 data=original.data(topic, index),
                 publish_time=int(table.publish_time[index]),
@@ -159,11 +159,15 @@ def _order(entry: Entry, original: _Original, first_frame: int) -> Iterator[tupl
         yield names[topic_of[k]], index_of[k]
 
 
-def _register(writer: ChecksummedWriter, original: _Original, topic: str) -> int:
+def _register(writer: ChecksummedFile, original: _Original, topic: str) -> int:
     channel = original.summary.channels[topic]
     schema = original.summary.schemas.get(channel.schema_id)
-    known = 0 if schema is None else writer.register_schema(schema.name, schema.encoding, schema.data)
-    return writer.register_channel(topic, channel.message_encoding, known, dict(channel.metadata))
+    known = (
+        0 if schema is None else writer.register_schema(name=schema.name, encoding=schema.encoding, data=schema.data)
+    )
+    return writer.register_channel(
+        topic=topic, message_encoding=channel.message_encoding, schema_id=known, metadata=channel.metadata
+    )
 
 
 def _sample(entry: Entry, *, lead_in: int) -> dict[str, str]:

@@ -22,8 +22,8 @@ from flagdata.errors import NotFoundError, UsageError
 from flagdata.export.source import Source
 from flagdata.lake import Lake
 from flagdata.lake.labels import columns
+from flagdata.lake.lineage import labels_of, with_labels
 from flagdata.lake.selection import Request, Selection
-from flagdata.lake.tabled import labels_of, with_labels
 from flagdata.manifest import write_manifest
 from flagdata.outputs import fresh_folder
 from flagdata.provenance import code_version, digest, recipe_hash

@@ -20,15 +20,16 @@ from flagdata.findings import Finding, Severity
 from flagdata.lake.artifact import OBJECT_NAME, Artifact
 from flagdata.lake.collect import left_uploads
 from flagdata.lake.durable import SCRATCH
-from flagdata.lake.erasure import unfinished
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import FOLDERS, STORES, foreign_entries
-from flagdata.lake.leases import COLLECT, TURN, LeaseState, last_written, leases, looking, unleased
+from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased
+from flagdata.lake.lineage import removals
+from flagdata.lake.locks import COLLECT, TURN
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import DAMAGED, StoredObject
 from flagdata.lake.refs import MAIN
-from flagdata.lake.removals import erased, expirations, removals
+from flagdata.lake.removal import erased_objects, left, unfinished
 from flagdata.printable import SHORT, counted
 from flagdata.schema import FORMAT_VERSION, Kind
 from flagdata.storage import Place, StoreError
@@ -204,7 +205,7 @@ def _linked(path: Path) -> Finding:
 def _rows(lake: Lake, marked: Marked, foreign: Collection[Path]) -> list[Finding]:
     findings: list[Finding] = []
     seen: set[str] = set()
-    gone = set(erased(lake)) - marked.objects if not marked.findings else set()
+    gone = set(erased_objects(lake)) - marked.objects if not marked.findings else set()
     for ref, table in marked.refs.items():
         ids = table["artifact"].to_pylist()
         known = set(ids)
@@ -281,7 +282,7 @@ def _gone(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
 
 def _erased(lake: Lake, marked: Marked) -> list[Finding]:
     """A note for each tag or branch that lists rows whose data were erased."""
-    gone = {name: why for name, why in erased(lake).items() if name not in marked.objects}
+    gone = {name: why for name, why in erased_objects(lake).items() if name not in marked.objects}
     findings = []
     for ref, table in marked.refs.items():
         names = [name for name in table["object"].to_pylist() if name in gone]
@@ -319,13 +320,14 @@ def _expired(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Findin
             kind="expired",
             severity=Severity.NOTE,
             count=len(gone),
-            where=f"versions up to {one.up_to}",
+            where=f"versions up to {up_to}",
             what=f"{len(gone)} of the objects that these versions show went when they expired, by version "
-            f"{one.version} ({one.message})",
-            fix=f"none needed; all branches and tags, and versions from {one.version} on, are whole without them",
+            f"{removal.version} ({removal.reason})",
+            fix=f"none needed; all branches and tags, and versions from {removal.version} on, are whole without them",
         )
-        for one in expirations(lake)
-        if (gone := one.objects - _needed(marked) - frozenset(stored))
+        for removal in removals(lake.catalog.history())
+        for up_to, objects in (removal.expired,)
+        if (gone := objects - _needed(marked) - frozenset(stored))
     ]
 
 
@@ -333,8 +335,9 @@ def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Find
     """A note where gc has deleted what was withdrawn, so that older versions show rows without data."""
     try:
         gone = lake.catalog.objects() - _needed(marked) - frozenset(stored)
-        gone -= {name for one in expirations(lake) for name in one.objects}
-        last = next((r for r in removals(lake) if not gone.isdisjoint(r.objects.values())), None) if gone else None
+        removed = removals(lake.catalog.history())
+        gone -= {name for removal in removed for name in removal.expired[1]}
+        last = next((r for r in removed if not gone.isdisjoint(left(lake, r).values())), None) if gone else None
     except FlagdataError as error:  # a file of which older versions are made
         kind = "catalog-file-unreadable"
         return [Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)]
@@ -345,7 +348,7 @@ def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Find
             kind="withdrawn-collected",
             severity=Severity.NOTE,
             what=f"gc deleted what was withdrawn: {len(gone)} of the objects that older versions show; the last were"
-            f" withdrawn by version {last.version} ({last.message})",
+            f" withdrawn by version {last.version} ({last.reason})",
             where=f"versions before {last.version}",
             count=len(gone),
             fix=f"none needed; all tags, and versions from {last.version} on, are whole without them",

@@ -16,12 +16,9 @@ import pyarrow as pa
 
 from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake.catalog import persist
-from flagdata.lake.durable import disk_errors
-from flagdata.lake.leases import keeping_collectors_out
-from flagdata.lake.lineage import LABELS
+from flagdata.lake.lineage import LABELS, labels_of
+from flagdata.lake.removal import clips_of
 from flagdata.lake.store import Store
-from flagdata.lake.tabled import labels_of
-from flagdata.lake.withdrawal import clips_of
 from flagdata.schema import catalog_schema
 
 Value: TypeAlias = bool | int | float | str
@@ -96,8 +93,7 @@ def put(
 
     for name, value in values.items():
         _check(name, value)
-    lake.check_writable()
-    with disk_errors("labelling", lake.path), keeping_collectors_out(lake.staging):
+    with lake.changing("labelling"):
         return persist(attempt, where=lake.catalog.path)
 
 

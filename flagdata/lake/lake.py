@@ -1,7 +1,4 @@
-"""The lake as users hold it: open it, ask for rows, publish, name versions.
-
-Deleting tags and branches: a commit notes what they showed, so that what was built on them is still resolved.
-"""
+"""The lake as users hold it: open it, ask for rows, publish, name versions."""
 
 from __future__ import annotations
 
@@ -14,85 +11,25 @@ from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import unquote
 
-import pyarrow.compute as pc
-
 from flagdata import provenance
 from flagdata.addresses import lake_place
 from flagdata.documents import from_json
-from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.files import is_beside, open_regular
-from flagdata.lake.catalog import newer, persist
+from flagdata.lake.catalog import newer
 from flagdata.lake.durable import disk_errors, put_if_absent
-from flagdata.lake.erasure import Erasure, erase
-from flagdata.lake.expiry import check_whole
 from flagdata.lake.labels import Value, put
 from flagdata.lake.layout import FOLDERS, STAGING, STORES, scratch_files
-from flagdata.lake.leases import collecting
-from flagdata.lake.lineage import noted_view
+from flagdata.lake.lineage import removals
+from flagdata.lake.locks import MADE, TimedLocks
 from flagdata.lake.merging import MergeResult, merge
 from flagdata.lake.objects import Objects
-from flagdata.lake.refs import MAIN, Ref, View, as_json
-from flagdata.lake.remote_leases import MADE, claimed, unfinished
-from flagdata.lake.removals import explained
+from flagdata.lake.refs import MAIN, Ref, View
+from flagdata.lake.removal import Erasure, Withdrawal, check_whole, delete, descendants, erase, explained, withdraw
 from flagdata.lake.store import Store
 from flagdata.lake.transaction import Transaction
-from flagdata.lake.withdrawal import Withdrawal, descendants, take_off, withdraw
 from flagdata.schema import FORMAT_VERSION
 from flagdata.storage import Place, RemotePath
-
-_NOUNS = {"tags": "tag", "branches": "branch"}
-
-
-def delete(lake: Store, kind: str, name: str, message: str | None, *, discard: bool) -> int:
-    """See `Lake.delete_tag` and `Lake.delete_branch`.
-
-    Args:
-        kind: "tags" or "branches".
-    """
-    noun = _NOUNS[kind]
-
-    def attempt() -> int:
-        head = lake.catalog.head()
-        known = lake.refs.tags() if kind == "tags" else lake.refs.branches()
-        if name not in known:
-            raise NotFoundError(
-                f"there is no {noun} {name!r}", where=str(lake.path), fix=UnknownNameError.of(noun, name, known).fix
-            )
-        shown = lake.table(known[name].view if kind == "tags" else lake.refs.view(name, head))
-        if not discard:
-            _check_elsewhere(lake, noun, name, set(shown["artifact"].to_pylist()))
-        info = {"message": message or f"delete the {noun} {name}", "deleted": f"{noun} {name}"}
-        info["view"] = json.dumps(as_json(known[name].view))
-        if kind == "tags":
-            return lake.catalog.append(shown.slice(0, 0), base=head, info=info)
-        own = shown.filter(pc.field("branch") == name)["artifact"].to_pylist()
-        info |= {"branch": name, "withdrawn": str(len(own))}
-        return take_off(lake, own, branch=name, base=head, info=info)
-
-    lake.check_writable()
-    if name == MAIN:
-        raise UsageError(f"{MAIN} cannot be deleted", fix="withdraw what is on it, or begin a new lake")
-    with disk_errors(f"deleting the {noun} {name}", lake.path), collecting(lake.staging):
-        version = persist(attempt, where=lake.catalog.path)
-        lake.refs.remove(kind, name)
-    return version
-
-
-def _check_elsewhere(lake: Store, noun: str, name: str, shown: set[str]) -> None:
-    """Whether other refs show all rows, too.
-
-    Raises:
-        ConflictError: some would be lost.
-    """
-    for ref in (MAIN, *lake.refs.branches(), *lake.refs.tags()):
-        if ref != name:
-            shown = shown - set(lake.rows(at=ref, columns=["artifact"])["artifact"].to_pylist())
-    if shown:
-        raise ConflictError(
-            f"{len(shown)} artifacts are shown by this {noun} alone: without it, gc deletes them",
-            where=f"{noun} {name}",
-            fix="merge or tag them first, or add --discard to give them up",
-        )
 
 
 def check_reuse(lake: Store, name: str, view: View) -> None:
@@ -101,8 +38,8 @@ def check_reuse(lake: Store, name: str, view: View) -> None:
     Raises:
         ConflictError: a deleted tag of that name showed other artifacts.
     """
-    for entry in lake.catalog.history():
-        if entry.get("deleted") == f"tag {name}" and _shown(lake, noted_view(entry)) != _shown(lake, view):
+    for removal in removals(lake.catalog.history()):
+        if removal.deleted == f"tag {name}" and _shown(lake, removal.view) != _shown(lake, view):
             raise ConflictError(
                 f"a tag {name!r} showed other artifacts until it was deleted",
                 where=str(lake.path),
@@ -175,7 +112,7 @@ class Lake(Store):
         """Whether anything is there but, in a bucket, what a process left that was killed while it made a lake."""
         if isinstance(self.staging, RemotePath):
             others = any(entry != self.staging for entry in self._entries())
-            return others and not unfinished(self.staging, done=self.path / _MARKER)
+            return others and not TimedLocks(self.staging).unfinished(done=self.path / _MARKER)
         there = self.path.exists() and not self.path.is_dir()
         return there or (self.path.is_dir() and any(self._entries()))
 
@@ -190,7 +127,7 @@ class Lake(Store):
         """Whether this process makes the lake: the one that succeeds in making its staging."""
         if isinstance(self.staging, RemotePath):
             self.check_writable()
-            return claimed(self.staging, done=self.path / _MARKER)
+            return TimedLocks(self.staging).claimed(done=self.path / _MARKER)
         self.path.mkdir(parents=True, exist_ok=True)
         try:
             self.staging.mkdir()
@@ -331,8 +268,7 @@ class Lake(Store):
             ConflictError: the name is taken, or was that of a tag that showed other artifacts; or data of an expired
                 version went.
         """
-        self.check_writable()
-        with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
+        with self.changing("naming a version", alone=True):  # one ref at a time: no name is both a tag and a branch
             view = self.view(at)
             check_whole(self, view)
             check_reuse(self, name, view)
@@ -345,8 +281,7 @@ class Lake(Store):
             UsageError: a name that cannot be one.
             ConflictError: the name is taken; data of an expired version went.
         """
-        self.check_writable()
-        with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
+        with self.changing("naming a version", alone=True):  # one ref at a time: no name is both a tag and a branch
             view = self.view(at)
             check_whole(self, view)
             return self.refs.put("branches", name, view)

@@ -7,37 +7,23 @@ the making of a ref take the lock `staging/.collect` shared; a collection takes 
 then the catalog, and deletes. A collector therefore either sees the lease, or finds the row committed, or comes before
 the transaction looked for the object.
 
-Locks work between processes of one machine, and over file systems that carry flock between machines (NFS 4, Lustre).
-For a lake in a bucket, `flagdata.lake.remote_leases` has locks and leases of the same meaning.
+So it is on a disk; in a bucket, `flagdata.lake.locks` has locks and leases of the same meaning.
 """
 
 from __future__ import annotations
 
-import errno
-import fcntl
-import json
-import os
 import shutil
-import socket
-import uuid
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO
 
 from flagdata.caches import user_cache
 from flagdata.documents import from_json
 from flagdata.files import is_beside
-from flagdata.lake import remote_leases
-from flagdata.lake.durable import disk_errors
 from flagdata.lake.layout import LinkError
+from flagdata.lake.locks import OF_LOCKS, SHARED, Check, FileNote, locks_of
 from flagdata.storage import Place, RemotePath
-
-_LEASE = "lease"
-COLLECT = ".collect"
-TURN = ".turn"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,88 +41,44 @@ class LeaseState:
     objects: frozenset[str]
 
 
-Check = Callable[[], None]
-"""Raises ConflictError where a lock may have been lost meanwhile, which that of a disk never is."""
-
-
 class Lease:
-    """The staging folder of one running transaction."""
+    """The lease of one running transaction, and its folder on this machine."""
 
-    def __init__(self, staging: Path) -> None:
-        owner = {"pid": os.getpid(), "host": socket.gethostname(), "since": datetime.now(UTC).isoformat()}
-        with keeping_collectors_out(staging):
-            self.folder = staging / uuid.uuid4().hex
-            self.folder.mkdir()
-            self._file = (self.folder / _LEASE).open("wb", buffering=0)
-            try:
-                fcntl.flock(self._file, fcntl.LOCK_EX)
-                self._line(json.dumps(owner))
-            except OSError:
-                self._remove()
-                raise
-
-    def hold(self, object_name: str) -> None:
-        """Note that the transaction relies on the object; no collection that has not seen it runs afterwards."""
-        with self.keeping_collectors_out():
-            self._line(object_name)
-
-    @contextmanager
-    def keeping_collectors_out(self) -> Iterator[Check]:
-        """No collection runs during the block."""
-        with keeping_collectors_out(self.folder.parent) as check:
-            yield check
-
-    def close(self) -> None:
-        """Give everything up and remove the folder; what cannot be removed is left to a collection."""
-        with keeping_collectors_out(self.folder.parent):  # none sees the folder half removed
-            self._remove()
-
-    def _remove(self) -> None:
-        shutil.rmtree(self.folder, ignore_errors=True)
-        self._file.close()
-
-    def _line(self, text: str) -> None:
-        self._file.write(f"{text}\n".encode())
-
-
-class RemoteLease:
-    """The lease of one running transaction of a lake in a bucket; its folder is on this machine."""
-
-    def __init__(self, staging: RemotePath) -> None:
-        self._staging = staging
-        self._local = Lease(_scratch())
-        self.folder = self._local.folder
+    def __init__(self, staging: Place) -> None:
+        self._locks = locks_of(staging)
+        self._local = Lease(_scratch()) if isinstance(staging, RemotePath) else None
         try:
-            self._held = remote_leases.new_lease(staging)
+            self._note = self._locks.note()
         except BaseException:
-            self._local.close()
+            if self._local is not None:
+                self._local.close()
             raise
 
+    @property
+    def folder(self) -> Path:
+        """Returns the folder in which the transaction writes."""
+        return self._note.folder if isinstance(self._note, FileNote) else self._local.folder  # type: ignore[union-attr]
+
     def hold(self, object_name: str) -> None:
         """Note that the transaction relies on the object; no collection that has not seen it runs afterwards."""
-        self._held.append(object_name)
-        remote_leases.await_collectors(self._staging)
+        self._note.append(object_name)
 
     @contextmanager
     def keeping_collectors_out(self) -> Iterator[Check]:
-        """As `Lease.keeping_collectors_out`; the check is of the lease, too."""
-        with keeping_collectors_out(self._staging) as check:
+        """No collection runs during the block; the check is of the lease, too."""
+        with self._locks.sharing() as check:
 
             def check_both() -> None:
                 check()
-                self._held.check()
+                self._note.check()
 
             yield check_both
 
     def close(self) -> None:
-        """As `Lease.close`."""
-        self._held.close()
-        self._local.close()
-
-
-def open_lease(staging: Place) -> Lease | RemoteLease:
-    """The lease of a transaction that begins."""
-    return RemoteLease(staging) if isinstance(staging, RemotePath) else Lease(staging)
+        """Give everything up and remove the folder; what cannot be removed is left to a collection."""
+        self._note.close()
+        if self._local is not None:
+            self._local.close()
 
 
 def _scratch() -> Path:
@@ -150,52 +92,31 @@ def _scratch() -> Path:
     return folder
 
 
-@contextmanager
-def keeping_collectors_out(staging: Place) -> Iterator[Check]:
+def keeping_collectors_out(staging: Place) -> AbstractContextManager[Check]:
     """No collection runs during the block; any number of writers may."""
-    if isinstance(staging, RemotePath):
-        with remote_leases.sharing(staging) as held:
-            yield held.check
-    else:
-        with _locked(staging, fcntl.LOCK_SH):
-            yield _sure
+    return locks_of(staging).sharing()
 
 
-@contextmanager
-def collecting(staging: Place) -> Iterator[Check]:
+def collecting(staging: Place) -> AbstractContextManager[Check]:
     """No transaction starts, puts an object, commits or ends, and no ref is made, during the block."""
-    if isinstance(staging, RemotePath):
-        with remote_leases.alone(staging) as held:
-            yield held.check
-    else:
-        with _locked(staging, fcntl.LOCK_EX):
-            yield _sure
+    return locks_of(staging).alone()
 
 
-@contextmanager
-def looking(staging: Place) -> Iterator[None]:
+def looking(staging: Place) -> AbstractContextManager[object]:
     """Staging is looked at: on a disk, where folders appear before their leases do, none is being made meanwhile; in a
     bucket each entry shows whole, so that no lock is put for which the keys would have to permit writing."""
-    if isinstance(staging, RemotePath):
-        yield
-    else:
-        with collecting(staging):
-            yield
-
-
-def _sure() -> None:
-    """The kernel keeps a lock until it is given up."""
+    return nullcontext() if isinstance(staging, RemotePath) else collecting(staging)
 
 
 def leases(staging: Place) -> list[LeaseState]:
     """All staging folders, by name."""
-    states = []
+    states, locks = [], locks_of(staging)
     for folder in sorted(path for path in _entries(staging) if _is_folder(path)):  # type: ignore[type-var]
-        if folder.name == remote_leases.SHARED or is_beside(folder.name):
+        if folder.name == SHARED or is_beside(folder.name):
             continue
         leased = True
         try:
-            lines, alive = _lines_of(folder)
+            lines, alive = locks.lines(folder)
         except (FileNotFoundError, IsADirectoryError, LinkError):
             leased, alive, lines = False, False, []
             if not _is_folder(folder):
@@ -205,21 +126,11 @@ def leases(staging: Place) -> list[LeaseState]:
     return states
 
 
-def _lines_of(folder: Place) -> tuple[list[str], bool]:
-    """The lines of a lease, and whether its owner lives."""
-    if isinstance(folder, RemotePath):
-        return remote_leases.lease_lines(folder)
-    with _plain(folder / _LEASE) as file:
-        alive = not _try_lock(file.fileno())
-        return file.read().splitlines(), alive
-
-
 def unleased(staging: Place) -> list[Place]:
     """Entries of staging without a lease: folders without one, and files, by name."""
     # The shared locks' folder in a bucket is gone with the last of them, which may be between two requests.
-    own = (remote_leases.COLLECT, remote_leases.MADE, remote_leases.SHARED)
     folders = [state.folder for state in leases(staging) if not state.leased]
-    entries = [path for path in _entries(staging) if path.name not in own and not is_beside(path.name)]
+    entries = [path for path in _entries(staging) if path.name not in OF_LOCKS and not is_beside(path.name)]
     files = [path for path in entries if not _is_folder(path)]
     return sorted([*folders, *files])  # type: ignore[type-var]
 
@@ -249,46 +160,3 @@ def _owner(line: str) -> str:
         return f"process {owner['pid']} on {owner['host']} since {owner['since']}"
     except (ValueError, KeyError, TypeError):  # it died, or the disk was full, before the line was whole
         return "owner unknown"
-
-
-def _try_lock(descriptor: int) -> bool:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
-
-
-@contextmanager
-def _locked(staging: Path, mode: int) -> Iterator[None]:
-    """Take the lock behind a turnstile: a process that waits for it holds the turnstile, so that a stream of shared
-    holders cannot keep an exclusive one out for ever. Not to be nested."""
-    with ExitStack() as held:
-        with _opened(staging / TURN) as turn:
-            fcntl.flock(turn, fcntl.LOCK_EX)
-            lock = held.enter_context(_opened(staging / COLLECT))
-            fcntl.flock(lock, mode)
-        yield
-
-
-def _opened(path: Path) -> IO[str]:
-    with disk_errors("locking the lake", path):
-        if not os.path.lexists(path):
-            path.parent.mkdir(exist_ok=True)  # copies of a lake may come without empty folders
-            path.touch()
-        return _plain(path)
-
-
-def _plain(path: Path) -> IO[str]:
-    """A file of staging, opened to read; a link is not followed, and a pipe not waited for.
-
-    Raises:
-        LinkError: a link.
-    """
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-    except OSError as error:
-        if error.errno != errno.ELOOP:
-            raise
-        raise LinkError("a link where a lock of the lake belongs", where=str(path), fix="delete the link") from None
-    return os.fdopen(descriptor, encoding="utf-8")

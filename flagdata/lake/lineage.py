@@ -1,4 +1,4 @@
-"""How branches came to be: forks, merges, rows that they hide, deletions, as the refs and the notes of the log say.
+"""What the notes of the log say: how branches came to be, why rows went, and the labels of artifacts.
 
 All branches share one sequence of versions. A commit on a branch notes its name; a merge also notes which branch it
 took in, and at which version. So for a branch at a version it is known which commits of which branches went into it,
@@ -8,9 +8,13 @@ identified by the version that deleted the one before it.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
+
+import pyarrow as pa
 
 from flagdata.documents import from_json
 from flagdata.errors import CorruptError, NotFoundError
@@ -19,29 +23,6 @@ from flagdata.lake.refs import MAIN, Slice, View, view_from
 Entry = Mapping[str, Any]
 Life = tuple[str, int]
 """A branch, and the version that deleted the last one of its name; -1 for the first."""
-
-
-def noted_hidden(entry: Entry) -> frozenset[str]:
-    """Ids of the rows of its base that a commit hides on its branch.
-
-    Raises:
-        CorruptError: the note cannot be read.
-    """
-    with _reading(entry):
-        return frozenset(str(artifact) for artifact in from_json(entry.get("hidden", "[]")))
-
-
-def noted_erased(entry: Entry) -> Mapping[str, str | None]:
-    """The artifacts that a commit erased from all refs → the object of each.
-
-    Raises:
-        CorruptError: the note cannot be read.
-    """
-    with _reading(entry):
-        noted = dict(from_json(entry.get("erased", "{}")).items())
-        if not all(name is None or isinstance(name, str) for name in noted.values()):
-            raise ValueError("no name of an object")
-        return noted
 
 
 def noted_labels(entry: Entry) -> Mapping[str, Mapping[str, Any]]:
@@ -59,29 +40,6 @@ def noted_labels(entry: Entry) -> Mapping[str, Mapping[str, Any]]:
 
 LABELS = "labels"
 """Note of a commit that puts labels on artifacts: artifact → name → value, `null` where it takes one off."""
-EXPIRED = "expired"
-"""Note of a commit that let versions expire."""
-
-
-def noted_expired(entry: Entry) -> tuple[int, frozenset[str]]:
-    """The newest version that a commit let expire, with all before it, and the names of the objects that went.
-
-    Raises:
-        CorruptError: the note cannot be read.
-    """
-    with _reading(entry):
-        noted = from_json(entry[EXPIRED])
-        return int(noted["up_to"]), frozenset(str(name) for name in noted["objects"])
-
-
-def noted_view(entry: Entry) -> View:
-    """What the tag showed that a commit deleted, or what the branch began from.
-
-    Raises:
-        CorruptError: the note cannot be read.
-    """
-    with _reading(entry):
-        return view_from(from_json(entry["view"]))
 
 
 def _noted_merge(entry: Entry) -> Slice:
@@ -99,6 +57,83 @@ def _reading(entry: Entry) -> Iterator[None]:
             where="the catalog's log",
             fix="run flagdata verify; restore the log entry from a copy",
         ) from None
+
+
+@dataclass(frozen=True)
+class Removal:
+    """A commit by which rows, or the data of rows, went for a reason: withdrawn from a branch or hidden on it, erased
+    everywhere, shown by a tag or branch that was deleted, or of versions that expired. Notes of the log are read as
+    they are asked for.
+
+    Raises:
+        CorruptError: the note that is asked for cannot be read.
+    """
+
+    entry: Entry
+
+    NOTES = ("withdrawn", "hidden", "erased", "deleted", "expired")
+    """Notes of a commit of which at least one says that it is a removal."""
+
+    @property
+    def version(self) -> int:
+        """Returns the version that the commit made."""
+        return int(self.entry["version"])
+
+    @property
+    def branch(self) -> str:
+        """Returns the branch that it is on, "" for one of a tag or of versions."""
+        return str(self.entry.get("branch", ""))
+
+    @property
+    def reason(self) -> str:
+        """Returns the message of whoever made it."""
+        return str(self.entry.get("message", ""))
+
+    @property
+    def withdrawn(self) -> bool:
+        """Returns whether it took rows off the table."""
+        return "withdrawn" in self.entry
+
+    @property
+    def hidden(self) -> frozenset[str]:
+        """Returns the ids of the rows of its base that it hides on its branch."""
+        with _reading(self.entry):
+            return frozenset(str(artifact) for artifact in from_json(self.entry.get("hidden", "[]")))
+
+    @property
+    def erased(self) -> Mapping[str, str | None]:
+        """Returns the artifacts that it erased from all refs, with the object of each."""
+        with _reading(self.entry):
+            noted = dict(from_json(self.entry.get("erased", "{}")).items())
+            if not all(name is None or isinstance(name, str) for name in noted.values()):
+                raise ValueError("no name of an object")
+            return noted
+
+    @property
+    def deleted(self) -> str:
+        """Returns the tag or branch that it deleted, as "tag v1"; "" where it deleted none."""
+        return str(self.entry.get("deleted", ""))
+
+    @property
+    def view(self) -> View:
+        """Returns what the tag showed that it deleted, or what the branch began from."""
+        with _reading(self.entry):
+            return view_from(from_json(self.entry["view"]))
+
+    @property
+    def expired(self) -> tuple[int, frozenset[str]]:
+        """Returns the newest version that it let expire, with all before it, and the names of the objects that went; -1
+        and none where it let none expire."""
+        if "expired" not in self.entry:
+            return -1, frozenset()
+        with _reading(self.entry):
+            noted = from_json(self.entry["expired"])
+            return int(noted["up_to"]), frozenset(str(name) for name in noted["objects"])
+
+
+def removals(history: Iterable[Entry]) -> list[Removal]:
+    """Returns the removals among the commits of the log, in their order."""
+    return [Removal(entry) for entry in history if any(note in entry for note in Removal.NOTES)]
 
 
 class Lineage:
@@ -127,7 +162,7 @@ class Lineage:
         later = (entry for entry in self._entries.get(part.branch, ()) if entry["version"] > part.version)
         for entry in later:
             if "deleted" in entry:
-                return noted_view(entry)
+                return Removal(entry).view
         return self._forks.get(part.branch)
 
     def view(self, part: Slice) -> View:
@@ -153,21 +188,23 @@ class Lineage:
 
     def hidden(self, part: Slice) -> frozenset[str]:
         """Ids of rows of its base that a branch does not show, since they were withdrawn from it."""
-        return frozenset(artifact for entry in self.commits(part) for artifact in noted_hidden(entry))
+        return frozenset(artifact for entry in self.commits(part) for artifact in Removal(entry).hidden)
 
-    def labelled(self, part: Slice) -> Sequence[Entry]:
-        """The commits that put labels on artifacts, oldest first, of all branches whose commits went into one."""
-        if not any("labels" in entry for entries in self._entries.values() for entry in entries):
-            return ()
-        known = self._known(part)
-        found = [
-            entry
-            for entries in self._entries.values()
-            for entry in entries
-            if "labels" in entry
-            and entry["version"] <= known.get(self.life(Slice(branch=entry["branch"], version=entry["version"])), -1)
-        ]
-        return sorted(found, key=lambda entry: entry["version"])
+    def labels(self, part: Slice) -> dict[str, dict[str, Any]]:
+        """Returns the labels of each artifact, after all commits that went into a branch at a version.
+
+        Raises:
+            CorruptError: what a commit notes cannot be read.
+        """
+        labelled = [e for entries in self._entries.values() for e in entries if LABELS in e]
+        known = self._known(part) if labelled else {}
+        labels: dict[str, dict[str, Any]] = {}
+        for entry in sorted(labelled, key=lambda entry: entry["version"]):
+            life = self.life(Slice(branch=entry["branch"], version=entry["version"]))
+            for artifact, values in noted_labels(entry).items() if entry["version"] <= known.get(life, -1) else ():
+                merged = labels.get(artifact, {}) | values
+                labels[artifact] = {name: value for name, value in merged.items() if value is not None}
+        return {artifact: values for artifact, values in labels.items() if values}
 
     def knows(self, part: Slice, other: Slice) -> bool:
         """Whether all commits that went into `other` went into `part` too."""
@@ -203,3 +240,21 @@ class Lineage:
                 begun.add(life)
                 parts += self.fork(part) or ()
         return newest
+
+
+_BESIDE = b"flagdata.labels"
+"""Key of the labels in the metadata of the schema of a table of rows."""
+
+
+def with_labels(rows: pa.Table, labels: Mapping[str, Mapping[str, Any]]) -> pa.Table:
+    """Returns the rows, with the labels of artifacts beside them."""
+    if not labels:
+        return rows
+    text = json.dumps(labels, ensure_ascii=False, sort_keys=True)
+    return rows.replace_schema_metadata({**(rows.schema.metadata or {}), _BESIDE: text.encode()})
+
+
+def labels_of(rows: pa.Table) -> dict[str, dict[str, Any]]:
+    """Returns the labels of each artifact, of a table of rows that `Store.table` gave, whole or filtered."""
+    text = (rows.schema.metadata or {}).get(_BESIDE)
+    return {} if text is None else json.loads(text)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
 from math import inf
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flagdata.errors import FlagdataError
+from flagdata.errors import CorruptError, FlagdataError
 from flagdata.findings import Finding, Severity
-from flagdata.lake.lineage import noted_erased, noted_hidden, noted_view
+from flagdata.lake.lineage import Removal, removals
 from flagdata.lake.log import COPY_BACK, LogGapError
 from flagdata.lake.refs import MAIN, Slice, View
 from flagdata.lake.store import Store
@@ -39,6 +38,21 @@ class Marked:
     refs: dict[str, pa.Table]
     objects: frozenset[str]
     findings: tuple[Finding, ...]
+
+    def check(self, *more: Finding, outcome: str = "", fix: str | None = None) -> None:
+        """Checks that it is known which objects are needed.
+
+        Args:
+            more: findings on the catalog's files.
+            outcome: what follows, for the message; fix: in place of the remedy of what is damaged.
+
+        Raises:
+            CorruptError: a ref cannot be read or is lost, or a file is damaged.
+        """
+        for finding in (*self.findings, *more):
+            if finding.severity is Severity.ERROR:
+                what = f"which objects are needed is unknown{outcome}: {finding.what}"
+                raise CorruptError(what, where=finding.where, fix=fix or finding.fix or "run flagdata doctor")
 
 
 def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
@@ -137,34 +151,31 @@ def _lost(head: pa.Table, known: list[str], where: str) -> list[Finding]:
 
 
 def _withdrawn(lake: Store, *, since: float, first: int | None) -> Iterator[pa.Table]:
-    for entry in lake.catalog.history():
-        before = entry["version"] - 1
-        recent = _is_recent(lake, entry, since)
+    for removal in removals(lake.catalog.history()):
+        before = removal.version - 1
+        recent = _is_recent(lake, removal, since)
         if not recent and (first is None or before < first):
             continue
-        if "withdrawn" in entry:
+        if removal.withdrawn:
             yield _unerased(lake, lake.catalog.rows(before), (Slice(branch=MAIN, version=before),))
-        if noted_hidden(entry):  # rows of a base, which may have left the table long ago
-            view = lake.lineage().view(Slice(branch=entry["branch"], version=before))
+        if removal.hidden:  # rows of a base, which may have left the table long ago
+            view = lake.lineage().view(Slice(branch=removal.branch, version=before))
             yield _unerased(lake, lake.table(view), view)
-        if recent and "deleted" in entry:
-            yield _unerased(lake, lake.table(noted_view(entry)), noted_view(entry))
+        if recent and removal.deleted:
+            yield _unerased(lake, lake.table(removal.view), removal.view)
 
 
-def _is_recent(lake: Store, entry: Mapping[str, Any], since: float) -> bool:
-    """Whether a version was committed since then: as its writer's clock says, or that of the disk or store, since the
+def _is_recent(lake: Store, removal: Removal, since: float) -> bool:
+    """Returns whether rows went since then: as the writer's clock says, or that of the disk or store, since the
     writer's may be behind."""
-    stated = entry["timestamp"] / 1000
-    taken = any(word in entry for word in ("withdrawn", "deleted")) or bool(noted_hidden(entry))
-    if not taken or stated >= since:
-        return bool(stated >= since)
-    return bool(stated >= since - _BEHIND) and lake.catalog.written(entry["version"]) >= since
+    stated = removal.entry["timestamp"] / 1000
+    return bool(stated >= since or (stated >= since - _BEHIND and lake.catalog.written(removal.version) >= since))
 
 
 def _unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
-    """The rows that no version after those of a view erased."""
+    """Returns the rows that no version after those of a view erased."""
     newest = max(part.version for part in view)
-    erased = {a for entry in lake.catalog.history() if entry["version"] > newest for a in noted_erased(entry)}
+    erased = {a for removal in removals(lake.catalog.history()) if removal.version > newest for a in removal.erased}
     return rows.filter(~pc.field("artifact").isin(pa.array(sorted(erased), pa.string()))) if erased else rows
 
 

@@ -3,13 +3,15 @@
 A row that both had and that the other has withdrawn since stays withdrawn; a row that both had and that the branch has
 withdrawn is withdrawn. So it is where no merge is recorded (lakes of older versions of flagdata, or the same source
 ingested on both): a withdrawal that is later than the branch's own row stands. What is made anew on the branch after
-the other withdrew it comes back, and is named.
+the other withdrew it comes back, and is named. `difference` says what changed between any two refs.
 """
 
 from __future__ import annotations
 
 import secrets
 import shlex
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -17,13 +19,11 @@ import pyarrow as pa
 
 from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake.catalog import persist
-from flagdata.lake.durable import disk_errors
-from flagdata.lake.leases import keeping_collectors_out
+from flagdata.lake.lineage import removals
 from flagdata.lake.matching import made_from, matching
 from flagdata.lake.refs import Slice
-from flagdata.lake.removals import removals
+from flagdata.lake.removal import left, remove
 from flagdata.lake.store import Store
-from flagdata.lake.withdrawal import take_off
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
 
@@ -60,7 +60,7 @@ def merge(lake: Store, branch: str, message: str, *, into: str) -> MergeResult:
     lake.check_writable()
     if branch == into:
         raise UsageError(f"{branch!r} cannot be merged into itself", fix="name two branches")
-    with disk_errors("merging", lake.path), keeping_collectors_out(lake.staging):
+    with lake.changing("merging"):
         return persist(lambda: _attempt(lake, branch, message, into), where=lake.catalog.path)
 
 
@@ -94,7 +94,7 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
     }
     if withdrawn:
         info["withdrawn"] = str(len(withdrawn))
-    version = take_off(lake, withdrawn, branch=into, base=head, info=info, fresh=_published(fresh, into))
+    version = remove(lake, withdrawn, branch=into, base=head, info=info, fresh=_published(fresh, into))
     return MergeResult(
         version=version,
         commit=commit,
@@ -129,8 +129,10 @@ def _decided(
     left_out: dict[str, int] = {}
     brought_back: dict[str, int] = {}
     first = max(since, lineage.life(ours)[1])
-    for removal in reversed(list(removals(lake, since=first, branch=ours.branch) if candidates else ())):
-        if found := removal.artifacts & candidates:
+    for removal in reversed(removals(lake.catalog.history())):
+        if not (candidates and removal.withdrawn and removal.version > first and removal.branch == ours.branch):
+            continue
+        if found := (left(lake, removal).keys() | removal.hidden) & candidates:
             then = Slice(branch=theirs.branch, version=max(removal.version, lineage.life(theirs)[1]))
             had = found & frozenset(lake.identities(lineage.view(then)).to_pylist())
             for artifact in found:
@@ -188,3 +190,62 @@ def _apart(parent: str, *, gone: str, there: str) -> str:
         f"flagdata withdraw {parent} --with-descendants --branch {there} -m {shlex.quote(f'as on {gone}')}, or ingest "
         f"its source again with --branch {gone}"
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """From one ref to another.
+
+    Attributes:
+        added, removed: rows of the catalog, whole.
+        objects_added, objects_removed: names, sorted; an object that several rows share counts when the last one goes.
+    """
+
+    added: pa.Table
+    removed: pa.Table
+    objects_added: tuple[str, ...]
+    objects_removed: tuple[str, ...]
+
+
+def difference(lake: Store, before: str | None, after: str | None) -> Difference:
+    """What `after` shows that `before` does not, and the other way round; rows are compared by identity.
+
+    Raises:
+        NotFoundError: no such ref.
+    """
+    old, new = lake.rows(at=before), lake.rows(at=after)
+    old_objects, new_objects = _objects(old), _objects(new)
+    return Difference(
+        added=_without(new, old),
+        removed=_without(old, new),
+        objects_added=tuple(sorted(new_objects - old_objects)),
+        objects_removed=tuple(sorted(old_objects - new_objects)),
+    )
+
+
+def added_since(lake: Store, branch: str) -> Callable[[], str]:
+    """What a branch has gained since this call, in words, such as "on branch main: camera 2, recording 1"; "" if
+    nothing. For `flagdata.console.in_steps`.
+
+    Raises:
+        NotFoundError: no such branch.
+    """
+    before = lake.rows(at=branch, columns=["artifact", "kind"])
+
+    def words() -> str:
+        added = Counter(_without(lake.rows(at=branch, columns=["artifact", "kind"]), before)["kind"].to_pylist())
+        kinds = ", ".join(f"{kind} {count}" for kind, count in sorted(added.items()))
+        return f"on branch {branch}: {kinds}" if kinds else ""
+
+    return words
+
+
+def _without(table: pa.Table, other: pa.Table) -> pa.Table:
+    known = set(other["artifact"].to_pylist())
+    return table.filter(
+        pa.array([identity not in known for identity in table["artifact"].to_pylist()], type=pa.bool_())
+    )
+
+
+def _objects(table: pa.Table) -> set[str]:
+    return set(table["object"].drop_null().to_pylist())

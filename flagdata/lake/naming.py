@@ -1,14 +1,18 @@
-"""What a user means who names an artifact: by its id or the beginning of it, its name, or the file it came from."""
+"""What a user means who names an artifact: by its id or the beginning of it, its name, or the file it came from.
+
+Which rows revise which, by what their recipes state: see `flagdata.lake.results`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from datetime import datetime
 from pathlib import PurePath
 from typing import Any
 
 import pyarrow.compute as pc
 
-from flagdata.lake.revisions import superseded
+from flagdata.documents import column_json
 from flagdata.schema import Kind
 
 COLUMNS = ("artifact", "kind", "name", "parents", "source_name")
@@ -48,3 +52,42 @@ def meant(rows: Iterable[Mapping[str, Any]], wanted: str, *, kinds: Collection[K
         named = [row for row in named if row["artifact"] not in older]
     parents = {parent for row in named for parent in row["parents"] or ()}
     return [row for row in named if row["artifact"] not in parents]
+
+
+REVISION = "revision"
+"""Key of a later version's recipe: `of`, the id of the first version, and `code`, the version of the code that inferred
+it. The models that a verdict left have that of the verdict."""
+
+
+def revised(recipe: Mapping[str, Any]) -> str | None:
+    """Id of the first version of what a row revises; `None` where it revises nothing."""
+    stated = recipe.get(REVISION)
+    return stated.get("of") if isinstance(stated, Mapping) else None
+
+
+def superseded(rows: Iterable[Mapping[str, Any]]) -> set[str]:
+    """Ids of rows that a later one revises: them, their first version, or what they were made from.
+
+    Args:
+        rows: of the catalog, with its columns `artifact`, `parents`, `recipe` and `created`.
+    """
+    rows = list(rows)
+    first: dict[str, str] = {}
+    newest: dict[str, datetime] = {}
+    for row in rows:
+        artifact, recipe = row["artifact"], row["recipe"]
+        of = None
+        if recipe and f'"{REVISION}"' in recipe:
+            of = revised(column_json(recipe, "recipe", artifact=artifact))
+        if of is not None:
+            first[artifact] = of
+            newest[of] = max(newest.get(of, row["created"]), row["created"])
+    if not newest:
+        return set()
+    found: set[str] = set()
+    for row in rows:
+        artifact = row["artifact"]
+        known = (first[artifact],) if artifact in first else (artifact, *(row["parents"] or ()))
+        if any(newest[one] > row["created"] for one in known if one in newest):
+            found.add(artifact)
+    return found

@@ -17,8 +17,8 @@ import pyarrow.compute as pc
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.healing import Healing, present
 from flagdata.lake.lake import Lake
+from flagdata.lake.naming import REVISION, revised
 from flagdata.lake.refs import MAIN
-from flagdata.lake.revisions import REVISION, revised
 from flagdata.lake.store import Store
 from flagdata.printable import SHORT
 from flagdata.schema import Kind

@@ -5,7 +5,8 @@ from __future__ import annotations
 import difflib
 import os
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from tempfile import TemporaryFile
 
 import pyarrow as pa
@@ -18,13 +19,13 @@ from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Catalog
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.layout import STAGING, check_writable
-from flagdata.lake.lineage import Lineage
+from flagdata.lake.leases import collecting, keeping_collectors_out
+from flagdata.lake.lineage import Lineage, with_labels
+from flagdata.lake.locks import Check
 from flagdata.lake.matching import Values, Where, condition, matching
-from flagdata.lake.objects import Objects
+from flagdata.lake.objects import Objects, RemoteObjects
 from flagdata.lake.refs import Refs, Slice, View
-from flagdata.lake.remote_objects import RemoteObjects
 from flagdata.lake.rowfiles import ROW_ORDER, Scan, in_order
-from flagdata.lake.tabled import folded, with_labels
 from flagdata.printable import SHORT
 from flagdata.schema import CATALOG, Kind
 from flagdata.storage import Place, RemotePath
@@ -58,6 +59,20 @@ class Store:
             FlagdataError: the lake can only be read.
         """
         check_writable(self.path)
+
+    @contextmanager
+    def changing(self, doing: str, *, alone: bool = False) -> Iterator[Check]:
+        """Keeps collections out while the block commits, or all other processes that change the lake.
+
+        Args:
+            doing: what the block does, for errors of the disk ("withdrawing").
+
+        Raises:
+            FlagdataError: as `check_writable`, or what the disk refused.
+        """
+        self.check_writable()
+        with disk_errors(doing, self.path), (collecting if alone else keeping_collectors_out)(self.staging) as check:
+            yield check
 
     def now(self) -> float:
         """Read the clock by which files of the lake have their times [s since 1970].
@@ -162,11 +177,11 @@ class Store:
             if hidden:
                 rows = rows.filter(~pc.field("artifact").isin(sorted(hidden)))
             rows = pa.concat_tables([rows, self._own(part)])
-        return with_labels(rows, folded(lineage.labelled(view[0])))
+        return with_labels(rows, lineage.labels(view[0]))
 
     def scan(self, view: View) -> pa.Table | Scan:
         """What `table` gives, decoded as it is asked for where the view is one branch's rows without labels."""
-        if len(view) == 1 and not self.lineage().labelled(view[0]):
+        if len(view) == 1 and not self.lineage().labels(view[0]):
             found = self.catalog.scan(view[0].version)
             if found is not None:
                 return found.matching(pc.field("branch") == view[0].branch)
@@ -185,7 +200,7 @@ class Store:
         Raises:
             UnknownNameError, UsageError: as there.
         """
-        scans = None if self.lineage().labelled(view[0]) else self._scans(view)
+        scans = None if self.lineage().labels(view[0]) else self._scans(view)
         if scans is None:
             return matching(self.table(view), values)
         wanted = CATALOG if columns is None else dict.fromkeys([*columns, *ROW_ORDER])

@@ -24,9 +24,9 @@ from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.healing import Healing, healing
-from flagdata.lake.leases import Lease, RemoteLease, collecting, open_lease
+from flagdata.lake.leases import Lease, collecting
+from flagdata.lake.removal import remove
 from flagdata.lake.store import Store
-from flagdata.lake.withdrawal import take_off
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
 
@@ -86,13 +86,13 @@ class Transaction:
         self._restored: dict[str, str] = {}  # id of an existing artifact whose object was put back → that
         self._moved: dict[str, tuple[str, Artifact]] = {}  # id of one that has another object now → the one before, row
         self._sizes: dict[str, int] = {}  # of the objects that the lease holds
-        self._held: Lease | RemoteLease | None = None
+        self._held: Lease | None = None
 
     def __enter__(self) -> Transaction:
         self._lake.check_writable()
         self._look()
         with disk_errors("starting a transaction", self._lake.staging):
-            self._held = open_lease(self._lake.staging)
+            self._held = Lease(self._lake.staging)
         return self
 
     def __exit__(
@@ -225,7 +225,7 @@ class Transaction:
         return self._lake.artifact(artifact_id, at=self.branch) if artifact_id in self._known else None
 
     @property
-    def _lease(self) -> Lease | RemoteLease:
+    def _lease(self) -> Lease:
         if self._held is None:
             raise UsageError("the transaction is not open", fix="use it inside its with-block")
         return self._held
@@ -279,7 +279,7 @@ class Transaction:
             if moved:
                 info["withdrawn"] = str(len(moved))
             with self.keeping_collectors_out():
-                version = take_off(self._lake, moved, branch=self.branch, base=version, info=info, fresh=rows)
+                version = remove(self._lake, moved, branch=self.branch, base=version, info=info, fresh=rows)
                 self._result = CommitResult(
                     version=version, commit=commit, added=tuple(fresh), existing=existing, artifacts=artifacts
                 )

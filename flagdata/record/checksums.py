@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 import numpy as np
-from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
 from flagdata.errors import CorruptError
@@ -126,51 +125,22 @@ class _Tally:
         return {**entry, "messages": np.array(self._messages, dtype=">u4").tobytes().hex()}
 
 
-class Tallies:
-    """The checksums of a record that is being written."""
-
-    def __init__(self) -> None:
-        self._channels: dict[int, _Tally] = {}
-        self._metadata: dict[str, int] = {}
-
-    def channel(self, number: int, topic: str) -> None:
-        """A channel was added."""
-        self._channels[number] = _Tally(topic)
-
-    def message(self, channel: int, *, sequence: int, log_time: int, publish_time: int, data: bytes) -> None:
-        """A message was added."""
-        self._channels[channel].add(_HEAD.pack(channel, sequence, log_time, publish_time), data)
-
-    def block(self, channel: int, *, heads: bytes, data: bytes, count: int) -> None:
-        """Messages of a channel other than frames were added, their heads and payloads one behind the other."""
-        self._channels[channel].add(heads, data, count)
-
-    def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """A metadata record was added."""
-        self._metadata[name] = metadata_checksum(values)
-
-    def record(self) -> dict[str, str]:
-        """The metadata record `CHECKSUMS`."""
-        document = {
-            "schema": SCHEMA,
-            "channels": {tally.topic: tally.as_dict() for tally in self._channels.values()},
-            "metadata": self._metadata,
-        }
-        content = json.dumps(document, sort_keys=True)
-        return {"content": content, "crc32": f"{zlib.crc32(content.encode()):08x}"}
-
-
 class ChecksummedFile(McapFile):
     """An MCAP file with the checksums of all that was written as its last metadata record."""
 
     def __init__(self, stream: IO[bytes], *, chunk_size: int, profile: str, library: str) -> None:
-        self._tallies = Tallies()
+        self._tallies: dict[int, _Tally] = {}
+        self._checksums: dict[str, int] = {}
         super().__init__(stream, chunk_size=chunk_size, profile=profile, library=library)
 
-    def register_channel(self, *, topic: str, message_encoding: str, schema_id: int) -> int:
+    def register_channel(
+        self, *, topic: str, message_encoding: str, schema_id: int, metadata: Mapping[str, str] | None = None
+    ) -> int:
         """See `McapFile`."""
-        channel = super().register_channel(topic=topic, message_encoding=message_encoding, schema_id=schema_id)
-        self._tallies.channel(channel, topic)
+        channel = super().register_channel(
+            topic=topic, message_encoding=message_encoding, schema_id=schema_id, metadata=metadata
+        )
+        self._tallies[channel] = _Tally(topic)
         return channel
 
     def add_message(self, *, channel_id: int, log_time: int, publish_time: int, sequence: int, data: bytes) -> None:
@@ -178,7 +148,7 @@ class ChecksummedFile(McapFile):
         super().add_message(
             channel_id=channel_id, log_time=log_time, publish_time=publish_time, sequence=sequence, data=data
         )
-        self._tallies.message(channel_id, sequence=sequence, log_time=log_time, publish_time=publish_time, data=data)
+        self._tallies[channel_id].add(_HEAD.pack(channel_id, sequence, log_time, publish_time), data)
 
     def add_messages(self, block: MessageBlock, *, channel_id: int, sequence: int) -> None:
         """See `McapFile`."""
@@ -187,47 +157,20 @@ class ChecksummedFile(McapFile):
         heads = np.empty(count, dtype=[("ch", "<u2"), ("seq", "<u4"), ("log", "<u8"), ("pub", "<u8")])
         heads["ch"], heads["seq"] = channel_id, np.arange(sequence, sequence + count)
         heads["log"], heads["pub"] = block.log_time, block.publish_time
-        data = block.payload[block.used].tobytes()
-        self._tallies.block(channel_id, heads=heads.tobytes(), data=data, count=count)
+        self._tallies[channel_id].add(heads.tobytes(), block.payload[block.used].tobytes(), count)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """See `McapFile`."""
         super().add_metadata(name, values)
-        self._tallies.metadata(name, values)
+        self._checksums[name] = metadata_checksum(values)
 
     def finish(self) -> None:
         """See `McapFile`."""
-        super().add_metadata(CHECKSUMS, self._tallies.record())
-        super().finish()
-
-
-class ChecksummedWriter(Writer):
-    """MCAP's own writer, with plain chunks and the same checksums; for what was salvaged, as it was found.
-
-    Args:
-        output: the open file.
-        chunk_size: bytes after which a chunk is closed.
-    """
-
-    def __init__(self, output: IO[bytes], *, chunk_size: int) -> None:
-        super().__init__(output, chunk_size=chunk_size, compression=CompressionType.NONE, enable_data_crcs=True)
-        self._tallies = Tallies()
-
-    def register_channel(
-        self, topic: str, message_encoding: str, schema_id: int, metadata: dict[str, str] | None = None
-    ) -> int:
-        channel = super().register_channel(topic, message_encoding, schema_id, metadata or {})
-        self._tallies.channel(channel, topic)
-        return channel
-
-    def add_message(self, channel_id: int, log_time: int, data: bytes, publish_time: int, sequence: int = 0) -> None:
-        super().add_message(channel_id, log_time, data, publish_time, sequence)
-        self._tallies.message(channel_id, sequence=sequence, log_time=log_time, publish_time=publish_time, data=data)
-
-    def add_metadata(self, name: str, data: dict[str, str]) -> None:
-        super().add_metadata(name, data)
-        self._tallies.metadata(name, data)
-
-    def finish(self) -> None:
-        super().add_metadata(CHECKSUMS, self._tallies.record())
+        document = {
+            "schema": SCHEMA,
+            "channels": {tally.topic: tally.as_dict() for tally in self._tallies.values()},
+            "metadata": self._checksums,
+        }
+        content = json.dumps(document, sort_keys=True)
+        super().add_metadata(CHECKSUMS, {"content": content, "crc32": f"{zlib.crc32(content.encode()):08x}"})
         super().finish()

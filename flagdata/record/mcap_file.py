@@ -107,10 +107,16 @@ class McapFile:
         self._chunk.data += _bytes(schema)
         return schema.id
 
-    def register_channel(self, *, topic: str, message_encoding: str, schema_id: int) -> int:
+    def register_channel(
+        self, *, topic: str, message_encoding: str, schema_id: int, metadata: Mapping[str, str] | None = None
+    ) -> int:
         """Add a channel; its number."""
         channel = Channel(
-            id=len(self._channels) + 1, topic=topic, message_encoding=message_encoding, schema_id=schema_id, metadata={}
+            id=len(self._channels) + 1,
+            topic=topic,
+            message_encoding=message_encoding,
+            schema_id=schema_id,
+            metadata=dict(metadata or {}),
         )
         self._channels.append(channel)
         self._chunk.data += _bytes(channel)
@@ -158,9 +164,11 @@ class McapFile:
             self._end_full_chunk()
             first = last
 
-    def add_attachment(self, *, log_time: int, name: str, media_type: str, data: Iterable[bytes], size: int) -> None:
+    def add_attachment(
+        self, *, log_time: int, name: str, media_type: str, data: Iterable[bytes], size: int, create_time: int = 0
+    ) -> None:
         """Add an attachment of `size` bytes that come in pieces."""
-        fixed = [struct.pack("<QQ", log_time, 0), *(_prefixed(text) for text in (name, media_type))]
+        fixed = [struct.pack("<QQ", log_time, create_time), *(_prefixed(text) for text in (name, media_type))]
         head = b"".join(fixed) + struct.pack("<Q", size)
         length = len(head) + size + 4
         offset = self._at
@@ -175,7 +183,7 @@ class McapFile:
             AttachmentIndex(
                 offset=offset,
                 length=_HEADER + length,
-                create_time=0,
+                create_time=create_time,
                 log_time=log_time,
                 data_size=size,
                 name=name,

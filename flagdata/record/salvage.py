@@ -36,7 +36,7 @@ from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
 from flagdata.errors import CorruptError, FlagdataError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.record import messages
-from flagdata.record.checksums import CHECKSUMS, ChecksummedWriter
+from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
 from flagdata.record.container import (
     CHUNK_HEAD,
     MAGIC,
@@ -224,8 +224,9 @@ class _Copy:
         self._channels: dict[int, tuple[Channel, int]] = {}
         self._unknown = 0
         self._salvaged = 0
-        self._writer = ChecksummedWriter(out, chunk_size=CHUNK_BYTES[Chunking.COMMITTED])
-        self._writer.start(profile=PROFILE, library=library_name())
+        self._writer = ChecksummedFile(
+            out, chunk_size=CHUNK_BYTES[Chunking.COMMITTED], profile=PROFILE, library=library_name()
+        )
 
     def define(self, summary: Summary) -> None:
         """Schemas and channels of a sound summary: the chunk that holds them first may be damaged."""
@@ -281,7 +282,8 @@ class _Copy:
             log_time=attachment.log_time,
             name=attachment.name,
             media_type=attachment.media_type,
-            data=attachment.data,
+            data=[attachment.data],
+            size=len(attachment.data),
         )
 
     def metadata(self, metadata: Metadata) -> None:

@@ -14,8 +14,7 @@ from PIL import Image, ImageDraw
 from flagdata.errors import LimitError
 from flagdata.export.source import FILMED, entry_of
 from flagdata.lake import Lake
-from flagdata.lake.markers import read_markers
-from flagdata.lake.meshes import read_meshes
+from flagdata.lake.meshes import read_markers, read_meshes
 from flagdata.record import Record
 from flagdata.record.writer import encode_jpeg
 from flagdata.schema import Kind

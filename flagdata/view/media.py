@@ -18,7 +18,7 @@ from flagdata.align.recording import CURVE
 from flagdata.documents import from_stored_json
 from flagdata.errors import CorruptError, NotFoundError, UsageError
 from flagdata.lake import Lake
-from flagdata.lake.removals import explained
+from flagdata.lake.removal import explained
 from flagdata.record import Record
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS

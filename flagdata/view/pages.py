@@ -20,10 +20,10 @@ from flagdata.errors import FlagdataError, NotFoundError, UnknownNameError, Usag
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.ancestry import ancestry
 from flagdata.lake.labels import PREFIX
+from flagdata.lake.lineage import labels_of
 from flagdata.lake.refs import MAIN, View
 from flagdata.lake.results import versions
 from flagdata.lake.selection import COLUMNS, Request, Selection
-from flagdata.lake.tabled import labels_of
 from flagdata.pages.graph import COLOURS
 from flagdata.pages.lineage import picture
 from flagdata.pages.render import render, text_of

@@ -9,7 +9,7 @@ import numpy as np
 from flagdata.errors import InputError
 from flagdata.ingest.markers import MarkerOptions, read_table
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.markers import MarkerSequence, read_markers
+from flagdata.lake.meshes import MarkerSequence, read_markers
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 from measure.observe.observation import Observation

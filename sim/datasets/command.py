@@ -88,7 +88,7 @@ def build(
             _print_plan(planned)
         return
 
-    from flagdata.lake.difference import added_since
+    from flagdata.lake.merging import added_since
     from sim.datasets import card as cards
     from sim.datasets.build import Build
     from sim.datasets.cluster import connected

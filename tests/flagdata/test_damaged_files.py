@@ -23,8 +23,15 @@ from flagdata.ingest.markers.table import is_marker_table, read_table
 from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
 from flagdata.lake.health import doctor
-from flagdata.lake.markers import MarkerSequence, read_markers, write_markers
-from flagdata.lake.meshes import MeshSequence, open_meshes, read_meshes, write_meshes
+from flagdata.lake.meshes import (
+    MarkerSequence,
+    MeshSequence,
+    open_meshes,
+    read_markers,
+    read_meshes,
+    write_markers,
+    write_meshes,
+)
 from flagdata.record import Record, RecordWriter, salvage
 from flagdata.signals import Sensor, WindSeries
 from tests.damage import QUICK, changed, damaged, damages, paths, wild

@@ -105,7 +105,7 @@ def test_a_row_that_somebody_withdrew_meanwhile_is_not_listed(user: User, verb: 
         if verb == "label":
             fix = user.meets("lake/labels.py", "give ids of rows that fl", verb, "first", *rest)
         else:
-            fix = user.meets("lake/withdrawal.py", "give ids of rows that fl", verb, "first", *rest)
+            fix = user.meets("lake/removal.py", "give ids of rows that fl", verb, "first", *rest)
     assert "flagdata ls --at main" in fix
     listed = user.follows("ls", "--at", "main").out
     assert "first" not in listed
@@ -122,7 +122,7 @@ def test_what_is_on_a_branch_that_somebody_deletes_meanwhile_is_not_listed(user:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Lake, "erase", late)
-        user.meets("lake/erasure.py", "flagdata ls --at REF lis", "withdraw", "third", "--everywhere", "-m", "asked")
+        user.meets("lake/removal.py", "flagdata ls --at REF lis", "withdraw", "third", "--everywhere", "-m", "asked")
     listed = user.follows("ls", "--at", "main").out
     (other,) = (line.split()[0] for line in listed.splitlines() if " mast " in line)
     user.succeeds("withdraw", other, "--everywhere", "-m", "asked")

@@ -100,7 +100,7 @@ def test_an_erasure_deletes_nothing_until_what_doctor_names_is_mended(user: User
     kept = path.read_bytes()
     path.unlink()
     erase = ("withdraw", "first", "--everywhere", "-m", "asked")
-    user.meets("lake/erasure.py", "mend what flagdata docto", *erase)
+    user.meets("lake/removal.py", "mend what flagdata docto", *erase)
     user.follows("doctor", code=3, shows="error: branch-lost")
     path.write_bytes(kept)
     user.succeeds(*erase)
@@ -128,7 +128,7 @@ def test_a_disk_that_lets_nothing_be_deleted_keeps_what_gc_or_the_same_command_d
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(Objects, "delete", refuse)
-            user.meets("lake/erasure.py", "let its folder and what", *erase)
+            user.meets("lake/removal.py", "let its folder and what", *erase)
         user.follows("gc") if words == ("gc",) else user.succeeds(*words)
         user.succeeds("doctor", shows="(?m)^healthy")
 

@@ -69,7 +69,7 @@ def test_where_there_is_no_lake_one_is_made_or_named(user: User, monkeypatch) ->
 
 def test_a_log_that_a_recording_needs_is_withdrawn_with_it(user: User) -> None:
     aligned(user)
-    user.meets("lake/withdrawal.py", "flagdata withdraw --with-descendants", "withdraw", "mast", "-m", "zero")
+    user.meets("lake/removal.py", "flagdata withdraw --with-descendants", "withdraw", "mast", "-m", "zero")
     user.follows("withdraw", "mast", "-m", "zero", "--with-descendants")
     user.succeeds("doctor")
 
@@ -198,7 +198,7 @@ def test_what_was_erased_is_left_out_of_an_export(user: User) -> None:
     user.meets("lake/health.py", "leave them out by --where", "doctor")
     user.follows("export", "mcap", "--to", "out", "--at", "v1", "--where", "kind = 'camera'")
     user.meets(
-        "lake/removals.py",
+        "lake/removal.py",
         "leave its artifact out by --where",
         "export",
         "mcap",

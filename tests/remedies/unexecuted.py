@@ -74,10 +74,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/commands/confirm.py", "describe the file by a r"),
     ),
     "each finding that leads here has a fix of its own, which is said instead": (
-        ("flagdata/lake/collect.py", "run flagdata doctor"),
-        ("flagdata/lake/expiry.py", "run flagdata doctor"),
+        ("flagdata/lake/marking.py", "run flagdata doctor"),
         ("flagdata/lake/transfer.py", "run flagdata doctor"),
-        ("flagdata/lake/usage.py", "run flagdata doctor"),
     ),
     "each guess that is no recording says what to do by itself": (
         ("flagdata/ingest/classify.py", "see flagdata ingest --sn"),
@@ -120,7 +118,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "wrong bytes under right checksums: a damage is found by those before, with a remedy of its own": (
         ("flagdata/export/mcap.py", "run flagdata verify"),
-        ("flagdata/lake/markers.py", "run flagdata verify; ing"),
+        ("flagdata/lake/meshes.py", "run flagdata verify; ing"),
         ("flagdata/lake/meshes.py", "run flagdata verify; imp"),
         ("flagdata/record/messages.py", "run flagdata verify"),
         ("flagdata/record/reader.py", "run flagdata verify"),

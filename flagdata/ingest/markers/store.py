@@ -14,7 +14,7 @@ from flagdata.ingest.source import Source
 from flagdata.ingest.store import IngestResult, Labels, find, kept, result_of
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.durable import disk_errors
-from flagdata.lake.markers import MarkerSequence, write_markers
+from flagdata.lake.meshes import MarkerSequence, write_markers
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError, LimitError, UsageError
 from flagdata.files import check_input
 from flagdata.ingest.headings import check_columns, small_table_head
-from flagdata.lake.markers import MarkerSequence
+from flagdata.lake.meshes import MarkerSequence
 from flagdata.plain_text import encoding_of
 from flagdata.timebase import NANOSECONDS
 from flagdata.units import unit

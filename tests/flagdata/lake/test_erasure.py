@@ -17,7 +17,7 @@ from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, verify, verify_catalog
-from flagdata.lake.removals import lost
+from flagdata.lake.removal import lost
 
 Put = Callable[..., Artifact]
 

@@ -12,9 +12,8 @@ from flagdata.errors import ConflictError, NotFoundError
 from flagdata.export import Export, export
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
-from flagdata.lake.expiry import expire, last_version
 from flagdata.lake.health import doctor, is_healthy, verify_catalog
-from flagdata.lake.removals import lost
+from flagdata.lake.removal import expire, last_version, lost
 from tests.program import invoke
 
 Put = Callable[..., Artifact]

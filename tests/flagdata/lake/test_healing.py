@@ -17,7 +17,7 @@ from flagdata.ingest.meshes.store import MeshIngest, ingest_meshes
 from flagdata.ingest.store import IngestResult, Labels, ingest_camera, ingest_wind
 from flagdata.lake import Artifact, Lake, results
 from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, verify
-from flagdata.lake.tabled import labels_of
+from flagdata.lake.lineage import labels_of
 from flagdata.lake.transfer import clone, transfer
 from flagdata.object_cache import forget
 from flagdata.schema import Kind

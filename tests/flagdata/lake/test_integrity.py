@@ -18,7 +18,7 @@ import pytest
 
 from flagdata.checksums import content_hash
 from flagdata.errors import CorruptError, FlagdataError, LimitError, NotFoundError
-from flagdata.lake import Artifact, Lake, catalog, remote_leases
+from flagdata.lake import Artifact, Lake, catalog, locks
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, is_healthy, object_names, verify, verify_catalog
 from flagdata.lake.log import Log
@@ -140,13 +140,13 @@ def test_a_lock_of_a_bucket_that_states_a_long_life_is_void_after_an_hour(
 ) -> None:
     staging = remote_lake.path / "staging"
     assert isinstance(staging, RemotePath)
-    owner = {**remote_leases.owner(), "machine": "another"}
+    owner = {**locks.owner(), "machine": "another"}
     for life in (1e300, "nan", "inf"):
         (staging / "collect").write_bytes(json.dumps({**owner, "life": life}).encode())
         written = (staging / "collect").stat().st_mtime
         for later, counts in ((0.0, True), (3700.0, False)):
             monkeypatch.setattr(RemotePath, "now", lambda self, at=written + later: at)
-            assert (remote_leases._living(staging / "collect", staging) is not None) == counts
+            assert (locks.living(staging / "collect", staging) is not None) == counts
 
 
 def summary(lake: Lake, content: dict[str, Any], first: int, last: int) -> Place:

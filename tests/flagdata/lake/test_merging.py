@@ -15,7 +15,7 @@ from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor
-from flagdata.lake.lineage import noted_hidden, noted_view
+from flagdata.lake.lineage import Removal
 from flagdata.lake.marking import mark
 from flagdata.schema import Kind
 from tests.program import Ended, invoke
@@ -245,10 +245,10 @@ def test_a_file_that_only_older_versions_need_does_not_end_doctor(lake: Lake, pu
 @pytest.mark.parametrize("note", [{"hidden": "{"}, {"hidden": "3"}, {"hidden": "9" * 5000}])
 def test_a_note_of_the_log_that_cannot_be_read_is_damage(note: dict[str, str]) -> None:
     with pytest.raises(CorruptError, match="version 7"):
-        noted_hidden({"version": 7, **note})
+        _ = Removal({"version": 7, **note}).hidden
     for view in ({}, {"view": "[1]"}, {"view": '[{"branch": "b"}]'}):
         with pytest.raises(CorruptError, match="version 7"):
-            noted_view({"version": 7, **view})
+            _ = Removal({"version": 7, **view}).view
 
 
 def test_the_verbs_say_what_a_merge_and_a_deletion_did(

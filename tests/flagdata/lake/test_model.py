@@ -17,8 +17,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
-from flagdata.lake.difference import difference
 from flagdata.lake.health import doctor, is_healthy
+from flagdata.lake.merging import difference
 from flagdata.schema import Kind
 
 TEXTS = st.sampled_from([f"text {i}" for i in range(6)])

@@ -23,10 +23,10 @@ from flagdata import object_cache
 from flagdata.caches import beside
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError, RefusedError, UsageError
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake, remote_leases
+from flagdata.lake import Artifact, Lake, locks
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
-from flagdata.lake.leases import collecting, last_written, leases, open_lease
+from flagdata.lake.leases import Lease, collecting, last_written, leases
 from flagdata.lake.selection import select
 from flagdata.lake.transaction import Transaction
 from flagdata.schema import Kind
@@ -245,9 +245,9 @@ def test_an_upload_whose_parts_the_store_has_joined_without_an_answer_is_made_ag
 def dead_owner() -> dict[str, object]:
     """What a process of this machine noted that has ended."""
     with subprocess.Popen(["sleep", "60"]) as process:
-        started = remote_leases._started(process.pid)
+        started = locks._started(process.pid)
         process.kill()
-    return {**remote_leases.owner(), "pid": process.pid, "started": started}
+    return {**locks.owner(), "pid": process.pid, "started": started}
 
 
 def test_locks_of_a_process_that_was_killed_hold_nobody_up(remote_lake: Lake, put_text: Put) -> None:
@@ -264,7 +264,7 @@ def test_locks_of_a_process_that_was_killed_hold_nobody_up(remote_lake: Lake, pu
 
 def test_a_lease_of_another_machine_counts_until_it_was_not_renewed_for_its_life(bucket_folder: str) -> None:
     staging = RemotePath.parse(bucket_folder)
-    owner = {**remote_leases.owner(), "machine": "another", "pid": 1, "started": 1}
+    owner = {**locks.owner(), "machine": "another", "pid": 1, "started": 1}
     for life, folder in ((60.0, "0" * 32), (-60.0, "1" * 32)):
         (staging / folder / "lease").write_bytes(json.dumps({**owner, "life": life}).encode() + b"\nmcap/x\n")
     assert [(state.alive, state.objects) for state in leases(staging)] == [
@@ -290,7 +290,7 @@ def test_who_was_cut_off_for_long_publishes_nothing(
 
     def slow(transaction: Transaction, path: Path) -> str:
         name = put(transaction, path)
-        monkeypatch.setattr(remote_leases, "LIFE", 0.0)  # has passed since the lease was renewed
+        monkeypatch.setattr(locks, "LIFE", 0.0)  # has passed since the lease was renewed
         return name
 
     monkeypatch.setattr(Transaction, "put", slow)
@@ -303,8 +303,8 @@ def test_who_was_cut_off_for_long_publishes_nothing(
 def test_a_long_wait_for_a_lock_is_reported_once(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(remote_leases, "_SILENT", 0.0)
-    tries = list(itertools.islice(remote_leases._pauses(RemotePath("bucket", "lake/staging")), 4))
+    monkeypatch.setattr(locks, "_SILENT", 0.0)
+    tries = list(itertools.islice(locks._pauses(RemotePath("bucket", "lake/staging")), 4))
     assert len(tries) == 4
     assert caplog.text.count("waiting for another process") == 1
 
@@ -406,9 +406,9 @@ def test_a_lease_that_the_store_refuses_leaves_nothing_on_this_machine(
     def refused(*_: object) -> None:
         raise OSError("no answer")
 
-    monkeypatch.setattr(remote_leases, "new_lease", refused)
+    monkeypatch.setattr(locks.TimedLocks, "note", refused)
     with pytest.raises(OSError, match="no answer"):
-        open_lease(remote_lake.staging)
+        Lease(remote_lake.staging)
     assert leases(tmp_path / "cache" / "staging") == []
 
 
@@ -441,7 +441,7 @@ def test_erasing_stops_where_its_lock_was_lost_on_the_way(
 
     def slow(path: RemotePath) -> None:
         remove(path)
-        monkeypatch.setattr(remote_leases, "LIFE", 0.0)  # has passed since the lock was renewed
+        monkeypatch.setattr(locks, "LIFE", 0.0)  # has passed since the lock was renewed
 
     monkeypatch.setattr(remote_lake.objects, "remove", slow)
     with pytest.raises(ConflictError, match="take this process for dead"):
@@ -526,7 +526,7 @@ def test_with_keys_that_only_read_every_command_that_commits_nothing_works_and_a
     put_text(remote_lake, "gusts")
     remote_lake.tag("v1")
     put_text(remote_lake, "more")
-    leftover = json.dumps({**remote_leases.owner(), "machine": "another", "pid": 1}).encode() + b"\n"
+    leftover = json.dumps({**locks.owner(), "machine": "another", "pid": 1}).encode() + b"\n"
     (remote_lake.staging / ("0" * 32) / "lease").write_bytes(leftover)  # of a transaction on another machine
     with read_only(s3_server) as address:
         use_store(address)
@@ -614,7 +614,7 @@ def test_a_lake_whose_making_was_killed_is_made_by_the_same_command(bucket_folde
 
 def test_a_lake_that_a_living_process_is_making_is_left_to_it(bucket_folder: str) -> None:
     place = RemotePath.parse(bucket_folder)
-    (place / "staging" / "made").write_bytes(json.dumps(remote_leases.owner()).encode() + b"\n")
+    (place / "staging" / "made").write_bytes(json.dumps(locks.owner()).encode() + b"\n")
     with pytest.raises(ConflictError, match="another process is making"):
         Lake.create(bucket_folder)
     (place / "lake-of-others").write_bytes(b"1")

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from flagdata.errors import CorruptError
-from flagdata.lake import Lake, catalog, summaries
+from flagdata.lake import Lake, catalog, log
 from flagdata.lake.log import Log
 from flagdata.schema import catalog_schema
 from tests.flagdata.lake.conftest import overwrite
@@ -20,8 +20,8 @@ EVERY = 4
 @pytest.fixture(autouse=True)
 def _often(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(catalog, "_TIDY_EVERY", EVERY)
-    monkeypatch.setattr(summaries, "_MANY", 3)
-    monkeypatch.setattr(summaries, "_LARGE", 6 * EVERY)
+    monkeypatch.setattr(log, "_MANY", 3)
+    monkeypatch.setattr(log, "_LARGE", 6 * EVERY)
 
 
 def commit(lake: Lake, versions: int, message: str) -> None:

@@ -8,8 +8,7 @@ from datetime import timedelta
 from pathlib import Path
 
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.collect import collect
-from flagdata.lake.usage import CATALOG, OTHER, UNSHOWN, Usage, files_of, usage
+from flagdata.lake.collect import CATALOG, OTHER, UNSHOWN, Usage, collect, files_of, usage
 from flagdata.schema import Kind
 from tests.program import Run, invoke
 

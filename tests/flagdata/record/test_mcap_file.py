@@ -110,9 +110,10 @@ def test_a_file_in_bulk_is_the_mcap_librarys() -> None:
     file.add_metadata("m", {"a": "ä", "b": "2"})
     for topic in ("/one", "/two"):
         number = library.register_schema(name="flagdata.WindSample", encoding=SchemaEncoding.Protobuf, data=schema)
-        library.register_channel(topic=topic, message_encoding=MessageEncoding.Protobuf, schema_id=number)
+        known = {"topic": topic, "message_encoding": MessageEncoding.Protobuf, "metadata": {"of": topic, "ä": "1"}}
+        library.register_channel(schema_id=number, **known)
         number = file.register_schema(name="flagdata.WindSample", encoding=SchemaEncoding.Protobuf, data=schema)
-        file.register_channel(topic=topic, message_encoding=MessageEncoding.Protobuf, schema_id=number)
+        file.register_channel(schema_id=number, **known)
     library.add_message(channel_id=2, log_time=START, publish_time=START + 1, sequence=0, data=b"before")
     file.add_message(channel_id=2, log_time=START, publish_time=START + 1, sequence=0, data=b"before")
     for i, data in enumerate(one_by_one(series)):
@@ -126,8 +127,9 @@ def test_a_file_in_bulk_is_the_mcap_librarys() -> None:
             used=payloads.used[rows],
         )
         file.add_messages(block, channel_id=1, sequence=rows.start)
-    library.add_attachment(create_time=0, log_time=START, name="log", media_type="text/plain", data=b"abcdef")
-    file.add_attachment(log_time=START, name="log", media_type="text/plain", data=[b"abc", b"def"], size=6)
+    about = {"create_time": 7, "log_time": START, "name": "log", "media_type": "text/plain"}
+    library.add_attachment(data=b"abcdef", **about)
+    file.add_attachment(data=[b"abc", b"def"], size=6, **about)
     library.add_message(channel_id=2, log_time=START, publish_time=START, sequence=1, data=b"after")
     file.add_message(channel_id=2, log_time=START, publish_time=START, sequence=1, data=b"after")
     library.finish()

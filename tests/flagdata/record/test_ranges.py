@@ -13,9 +13,9 @@ import pytest
 from flagdata import object_cache as cache
 from flagdata import object_ranges as ranges
 from flagdata.errors import CorruptError, NotFoundError
-from flagdata.lake import Artifact, Lake, remote_objects
+from flagdata.lake import Artifact, Lake, objects
 from flagdata.record import Chunking, Coding, Record
-from flagdata.record.checksums import ChecksummedWriter
+from flagdata.record.checksums import ChecksummedFile
 from flagdata.schema import Kind
 from flagdata.storage import RemotePath
 from tests.flagdata.record.conftest import PERIOD, START
@@ -123,14 +123,15 @@ def unordered(sample: Path, tmp_path: Path) -> Path:
     path = tmp_path / "unordered.mcap"
     with sample.open("rb") as stream, path.open("wb") as sink:
         found = list(make_reader(stream).iter_messages(["/camera/image"]))
-        writer = ChecksummedWriter(sink, chunk_size=20_000)
-        writer.start(profile="", library="")
+        writer = ChecksummedFile(sink, chunk_size=20_000, profile="", library="")
         schema = found[0][0]
         assert schema is not None
         number = writer.register_schema(name=schema.name, encoding=schema.encoding, data=schema.data)
-        channel = writer.register_channel("/camera/image", found[0][1].message_encoding, number)
+        encoding = found[0][1].message_encoding
+        channel = writer.register_channel(topic="/camera/image", message_encoding=encoding, schema_id=number)
         for _, _, message in found[30:] + found[:30]:
-            writer.add_message(channel, message.log_time, message.data, message.publish_time)
+            times = {"log_time": message.log_time, "publish_time": message.publish_time}
+            writer.add_message(channel_id=channel, sequence=0, data=message.data, **times)
         writer.finish()
     return path
 
@@ -176,9 +177,9 @@ def test_a_lake_reads_small_records_whole_and_the_parts_of_large_ones(
         tx.add(Artifact(kind=Kind.CAMERA, name="film", object=name))
     assert isinstance(remote_lake.record_place(name), Path)  # what was put is there
     cache.forget(name, ".mcap")
-    monkeypatch.setattr(remote_objects, "WHOLE", 1000)
+    monkeypatch.setattr(objects, "WHOLE", 1000)
     place = remote_lake.record_place(name)
     assert place == remote_lake.objects.path(name)
     assert Record.open(place).frames(3, 2).shape == (2, 48, 64)
-    monkeypatch.setattr(remote_objects, "WHOLE", 10**6)
+    monkeypatch.setattr(objects, "WHOLE", 10**6)
     assert isinstance(remote_lake.record_place(name), Path)

@@ -12,7 +12,7 @@ from flagdata.findings import Severity
 from flagdata.lake import Lake
 from flagdata.lake.collect import collect, garbage
 from flagdata.lake.health import doctor
-from flagdata.lake.leases import open_lease
+from flagdata.lake.leases import Lease
 from flagdata.storage import RemotePath, StoreError, connection
 from flagdata.storage.path import BLOCK
 from flagdata.storage.uploads import Upload, unfinished
@@ -59,7 +59,7 @@ def test_an_upload_that_was_cut_off_is_named_by_doctor_and_aborted_by_gc(
 
 def test_an_upload_of_a_running_transaction_is_left_alone(remote_lake: Lake, s3_server: str) -> None:
     name = f"mcap/{'1' * 64}"
-    lease = open_lease(remote_lake.staging)
+    lease = Lease(remote_lake.staging)
     lease.hold(name)
     identity = begin(s3_server, f"{root(remote_lake).key}/{name}.mcap")
     assert doctor(remote_lake, grace=NOW) == ()

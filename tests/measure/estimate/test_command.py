@@ -23,7 +23,7 @@ from flagdata.cli import main
 from flagdata.console import progress
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
-from flagdata.lake import Artifact, Lake, remote_objects
+from flagdata.lake import Artifact, Lake, objects
 from flagdata.lake.transfer import clone
 from flagdata.record import Record, RecordWriter
 from flagdata.schema import Kind
@@ -275,7 +275,7 @@ def test_a_recording_in_a_bucket_is_measured_by_its_parts_as_in_a_folder(
     options = (*SIZED, "--model", model_folder, "--anyway", "--seed", "5")
     expected = answer("made-1", "--lake", lake, "--read-only", *options)
     remote, _ = clone(Lake.open(lake), bucket_folder, bars=progress)
-    monkeypatch.setattr(remote_objects, "WHOLE", 0)
+    monkeypatch.setattr(objects, "WHOLE", 0)
     shutil.rmtree(tmp_path / "cache", ignore_errors=True)
     found = answer("made-1", "--lake", bucket_folder, *options)
     assert found["quantities"] == expected["quantities"]

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.lake.remote_objects import RemoteObjects
+from flagdata.lake.objects import RemoteObjects
 from flagdata.record import Record, RecordWriter
 from flagdata.rng import stream
 from flagdata.schema import CLIP_FRAMES

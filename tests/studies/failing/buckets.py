@@ -40,8 +40,8 @@ from flagdata.findings import Severity
 from flagdata.lake import Lake
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify
-from flagdata.lake.remote_objects import SUMS
-from flagdata.lake.tabled import labels_of
+from flagdata.lake.lineage import labels_of
+from flagdata.lake.objects import SUMS
 from flagdata.storage import RemotePath, connection
 from tests.evidence import circumstances
 from tests.s3 import BUCKET, SECRETS, moto

@@ -27,7 +27,7 @@ from flagdata.console import foreseen
 from flagdata.dataset.cache import DecodedCache
 from flagdata.errors import UnforeseenError
 from flagdata.lake import Artifact, Lake, catalog
-from flagdata.lake.expiry import expire
+from flagdata.lake.removal import expire
 from flagdata.object_cache import block_of, keep_blocks
 from flagdata.schema import Kind
 from measure.calibrate import design

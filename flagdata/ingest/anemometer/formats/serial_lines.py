@@ -3,7 +3,7 @@
 The instruments do not know the time: it is the stamp that the logging computer wrote before each line, ISO 8601 or Unix
 time, alone or in brackets, set off by a comma, semicolon, tab or blank. Signal K's server writes the connection's name
 between stamp and sentence, other programs what they have to say about it; an NMEA sentence is found wherever its line
-holds a stamp. Each instrument's file declares what its lines mean; the rest is here.
+holds a stamp. What the lines of an instrument mean is declared beside: see `makers`.
 """
 
 from __future__ import annotations
@@ -25,11 +25,9 @@ from flagdata.ingest.anemometer.formats.sentences import tag_time
 from flagdata.ingest.anemometer.instants.stamps import ABBREVIATED, ENGLISH, Stamps
 from flagdata.ingest.anemometer.instants.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.instants.zones import instants
-from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading, described
 from flagdata.ingest.anemometer.samples import rules
-from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.table import with_horizontal
+from flagdata.ingest.anemometer.sniffing import Head
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor
@@ -115,9 +113,6 @@ class Instrument:
         described_by: the maker's description that `parse` follows, where no file of the instrument was at hand.
         splits: makes, for a file, what divides a line into stamp ("" where there is none; ISO 8601 or Unix time) and
             the rest.
-        format, about, line: name and description of its format, and what a line is, where it has one of its own.
-        axes_from_south: whether wind along +x comes from the south mark, and not from the azimuth.
-        in_unit: of a unit that the user gives, the `parse` that reads lines with `Defect.UNIT` in it.
     """
 
     name: str
@@ -126,11 +121,6 @@ class Instrument:
     sensor: Sensor
     described_by: str | None = None
     splits: Callable[[], Split] = lambda: split_stamp
-    format: str = ""
-    about: str = ""
-    line: str = ""
-    axes_from_south: bool = False
-    in_unit: Callable[[str], Parse] | None = None
 
 
 @dataclass
@@ -205,48 +195,6 @@ def without_comments(lines: Sequence[str]) -> list[str]:
 def is_comment(line: str) -> bool:
     """Whether a line is marked by "#" as a program's own."""
     return line.lstrip().startswith("#")
-
-
-class InstrumentLines:
-    """The format of an instrument's lines."""
-
-    def __init__(self, instrument: Instrument) -> None:
-        self.instrument = instrument
-        self.name, self.about = instrument.format, f"{instrument.about}, each after a computer's stamp"
-        self.uses = frozenset({"zone", "azimuth", *(["unit"] if instrument.in_unit else [])})
-
-    def recognise(self, head: Head) -> Guess | None:
-        """Most lines are of the instrument, some of them readings."""
-        split, parse = self.instrument.splits(), self.instrument.parse
-        lines = [split(line) for line in head.lines if line.strip(NOTHING)]
-        found = [parse(raw) if len(raw) <= LONGEST else Defect.OTHER for _, raw in lines]
-        readings = sum(not isinstance(one, Defect) or one is Defect.UNIT for one in found)
-        right = readings + found.count(Defect.BESIDE)
-        if not readings or right < max(1, len(lines) // 2):
-            return None
-        stamps = sum(bool(stamp) for stamp, _ in lines)
-        reasons = (
-            f"{right} of the first {len(lines)} lines are {self.instrument.line}",
-            GIVEN_CLOCK if head.counted else f"{stamps} of them carry the stamp of the computer that logged them",
-        )
-        return Guess(format=self.name, score=0.95, reasons=reasons)
-
-    def read(self, source: TextFile, options: WindOptions) -> Reading:
-        """Read speed and direction, or components, of every line whose checksum is right or absent."""
-        instrument, where = self.instrument, str(source.path)
-        if options.unit is not None and instrument.in_unit is not None:
-            split = instrument.splits()
-            if not any(instrument.parse(split(line)[1]) is Defect.UNIT for line in source.head()):
-                raise UsageError("the lines state the unit of speed", where=where, fix="leave out --unit")
-            instrument = replace(instrument, parse=instrument.in_unit(options.unit))
-        reading = read_lines(source, instrument, zone_name=options.zone)
-        if not instrument.axes_from_south or "wind_x" not in reading.channels:
-            return turned(reading, options.azimuth, where=where)
-        # with_horizontal takes wind along +x to come from the azimuth; here it comes from the opposite.
-        own = {name: reading.channels[name] for name in ("wind_x", "wind_y")}
-        facing = replace(reading, channels={**reading.channels, **{name: -values for name, values in own.items()}})
-        done = with_horizontal(facing, options.azimuth, where=where)
-        return replace(done, channels={**done.channels, **own})
 
 
 def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | None) -> Reading:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import ModuleType
 
 import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
-from flagdata.ingest.anemometer.formats import canboat, ft, gill, metek, thies, trisonica, vaisala, young
+from flagdata.ingest.anemometer.formats import canboat
+from flagdata.ingest.anemometer.formats.makers import SerialLines, crc16
 from flagdata.ingest.anemometer.formats.sentences import checksum
 from flagdata.ingest.anemometer.formats.serial_lines import Defect, split_stamp
 from flagdata.schema import SampleFlag
@@ -28,6 +28,9 @@ def kinds(log: WindLog) -> dict[str, int]:
     return {finding.kind: finding.count for finding in log.findings}
 
 
+ft, gill, metek, thies, trisonica, vaisala, young = map(
+    SerialLines, ("ft", "gill", "metek", "thies", "trisonica", "vaisala", "young")
+)
 SENTENCE = "$WIMWV,200.0,T,3.5,M,A*22"
 POLAR = [f"\x02Q,{229 + i},00{2 + i}.74,M,00,\x03" for i in range(6)]
 
@@ -110,12 +113,12 @@ METEK = "1B010000322000000300100000000000;-0.015;0.053;0.062;16.486;0.055;164.45
         (ft, "$WI,WVP=007.4,212,0*//", {SPEED: 7.4}),
     ],
 )
-def test_lines_read_as_the_manuals_say(instrument: ModuleType, line: str, values: dict[str, float]) -> None:
+def test_lines_read_as_the_manuals_say(instrument: SerialLines, line: str, values: dict[str, float]) -> None:
     sample = instrument.parse(line)
     assert not isinstance(sample, Defect)
     assert {name: sample[0][name] for name in values} == pytest.approx(values, nan_ok=True)
     assert sample[1] == SampleFlag.OK
-    assert set(sample[0]) <= set(instrument.INSTRUMENT.channels)
+    assert set(sample[0]) <= set(instrument.maker.channels)
 
 
 @pytest.mark.parametrize(
@@ -136,7 +139,7 @@ def test_lines_read_as_the_manuals_say(instrument: ModuleType, line: str, values
     ],
 )
 def test_lines_that_are_no_reading_are_divided_by_what_they_are(
-    instrument: ModuleType, line: str, defect: Defect
+    instrument: SerialLines, line: str, defect: Defect
 ) -> None:
     assert instrument.parse(line) is defect
 
@@ -198,7 +201,7 @@ def test_a_north_mark_that_points_elsewhere_turns_directions(read: Read) -> None
     ],
 )
 def test_the_checksum_of_vaisala_is_the_manuals(message: str, crc: str) -> None:
-    assert vaisala.crc16(message) == crc
+    assert crc16(message) == crc
 
 
 def test_vaisala_messages_of_wind_and_weather_are_read_together(read: Read) -> None:
@@ -215,7 +218,7 @@ def test_vaisala_messages_of_wind_and_weather_are_read_together(read: Read) -> N
 
 def test_vaisalas_mark_of_invalid_data_is_a_fault_and_a_wrong_checksum_is_left_out(read: Read) -> None:
     good = "0r1,Dm=283D,Sm=1.0M"
-    lines = [f"{good}{vaisala.crc16(good)}"] * 3 + ["0R1,Dm=000#,Sm=0.0#", f"{good}xyz", "0R1,Dm=28"]
+    lines = [f"{good}{crc16(good)}"] * 3 + ["0R1,Dm=000#,Sm=0.0#", f"{good}xyz", "0R1,Dm=28"]
     log = read(stamped(lines))
     assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [3]
     assert (kinds(log)["checksum-errors"], kinds(log)["cut-off"]) == (1, 1)

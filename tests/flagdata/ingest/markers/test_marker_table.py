@@ -13,7 +13,7 @@ from flagdata.errors import CorruptError, InputError, UnknownNameError, UsageErr
 from flagdata.ingest.markers import MarkerOptions, is_marker_table, read_table
 from flagdata.ingest.markers.store import ingest_markers
 from flagdata.lake import Lake
-from flagdata.lake.markers import read_markers
+from flagdata.lake.meshes import read_markers
 from flagdata.schema import Kind
 from tests.program import invoke
 from tests.refusals import unrefused

@@ -1,0 +1,535 @@
+"""Rows go, for a reason: withdrawn from a branch, erased everywhere, with a branch or tag that is deleted, with
+versions that expire. All go by one commit, `remove`, whose notes say which rows and why.
+
+*Withdrawn*: the branch's rows leave the table; rows of its base, which its parent goes on to show, are hidden by a
+note, see `flagdata.lake.lineage`. `gc` deletes their data after the grace period.
+
+*Erased*: off every branch, the bytes deleted at once, also where a tag or an old version shows them. Their rows stay in
+tags and older versions, which say what was erased and why. Objects that other rows need stay. What a lake cannot reach
+is named: exports, clones, caches. The commit comes first: a process that is killed before it has deleted the bytes, or
+a disk that refuses, leaves an erasure that the log knows, see `unfinished`. The same command finishes it, and so does
+`gc`.
+
+*Expired*: the oldest versions give up the data that only they show, at once. Their rows stay readable, and what a
+branch or a tag shows does not change.
+
+*Deleted*: a branch or tag; the commit notes what it showed, so that what was built on it is still resolved.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from functools import partial
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UnknownNameError, UsageError
+from flagdata.lake import naming
+from flagdata.lake.catalog import persist
+from flagdata.lake.durable import disk_errors
+from flagdata.lake.leases import leases, looking
+from flagdata.lake.lineage import Removal, removals
+from flagdata.lake.locks import Check
+from flagdata.lake.marking import catalog_files, mark
+from flagdata.lake.matching import made_from, matching
+from flagdata.lake.refs import MAIN, Slice, View, as_json
+from flagdata.lake.store import Store
+from flagdata.schema import Kind, catalog_schema
+
+BEYOND = (
+    "exports that were made of them",
+    "clones and copies of this lake",
+    "caches outside it, and backups",
+    "older versions of its objects, where it lies in a bucket that keeps them",
+    "the files that were ingested",
+)
+"""What holds the bytes of what is erased where this lake does not reach."""
+_GRACE = timedelta(days=1)
+"""How long what was withdrawn is needed, as far as an erasure before it is concerned."""
+_NOUNS = {"tags": "tag", "branches": "branch"}
+_COLUMNS = ["artifact", "branch", "kind", "name", "object", "parents"]
+_RESTORE = "the version of flagdata that ingested the source restores it by ingesting it again"
+_LEAVE_OUT = "leave its artifact out by --where; no version has its data any more"
+
+
+def remove(
+    lake: Store,
+    leaving: Collection[str],
+    *,
+    base: int,
+    info: Mapping[str, str],
+    branch: str | None = None,
+    fresh: pa.Table | None = None,
+) -> int:
+    """Commits that a branch does not show some rows any more, and returns the version.
+
+    Args:
+        leaving: ids of these rows; there may be none.
+        base: the version that the commit follows.
+        info: notes of the commit: its message, and the reason.
+        branch: the branch; `None` where no row leaves one.
+        fresh: rows that the same commit adds.
+
+    Raises:
+        Moved: `base` is no longer the newest version; nothing was published.
+    """
+    fresh = catalog_schema().empty_table() if fresh is None else fresh
+    noted = {**info, **({"branch": branch} if branch else {})}
+    stored: set[str] = set()
+    if branch and leaving:
+        stored = set(leaving).intersection(lake.identities((Slice(branch=branch, version=base),)).to_pylist())
+    if hidden := sorted(set(leaving) - stored):
+        noted["hidden"] = json.dumps(hidden)
+    if not stored:
+        return lake.catalog.append(fresh, base=base, info=noted)
+    going = (pc.field("branch") == branch) & pc.field("artifact").isin(pa.array(sorted(stored), pa.string()))
+    return lake.catalog.drop(going, fresh=fresh, base=base, info=noted)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Withdrawal:
+    """What a withdrawal did.
+
+    Attributes:
+        version: of the table after it.
+        asked: ids that were named, sorted.
+        clips: ids of the clips of these that went along, sorted.
+    """
+
+    version: int
+    asked: tuple[str, ...]
+    clips: tuple[str, ...]
+
+
+def withdraw(lake: Store, artifacts: Collection[str], message: str, *, branch: str) -> Withdrawal:
+    """See `Lake.withdraw`."""
+    asked = frozenset(artifacts)
+
+    def attempt() -> Withdrawal:
+        head = lake.catalog.head()
+        shown = lake.columns(lake.refs.view(branch, head), _COLUMNS)
+        clips = clips_of(shown, asked)
+        leaving = asked | clips
+        check_leaving(shown, leaving, branch=branch, where=str(lake.path))
+        info = {"message": message, "withdrawn": str(len(leaving))}
+        version = remove(lake, leaving, branch=branch, base=head, info=info)
+        return Withdrawal(version=version, asked=tuple(sorted(asked)), clips=tuple(sorted(clips)))
+
+    with lake.changing("withdrawing"):
+        return persist(attempt, where=lake.catalog.path)
+
+
+def clips_of(shown: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
+    """Ids of the clips that are slices of the objects of `artifacts` themselves, so that they mean nothing without."""
+    named = matching(shown, {"artifact": list(artifacts)}).select(_COLUMNS).to_pylist()
+    objects = {row["artifact"]: row["object"] for row in named}
+    made = matching(made_from(shown, objects), {"kind": Kind.CLIP}).select(_COLUMNS).to_pylist()
+    return frozenset(
+        row["artifact"]
+        for row in made
+        if row["object"] is not None and any(objects.get(parent) == row["object"] for parent in row["parents"])
+    ) - frozenset(artifacts)
+
+
+def descendants(shown: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
+    """Ids of all rows that were made from `artifacts`, or from what was made from them; without `artifacts`."""
+    found, newest = set(artifacts), set(artifacts)
+    while newest:
+        newest = set(made_from(shown, newest)["artifact"].to_pylist()) - found
+        found |= newest
+    return frozenset(found - set(artifacts))
+
+
+def check_leaving(shown: pa.Table, leaving: Collection[str], *, branch: str, where: str) -> None:
+    """Whether the rows `leaving` can go.
+
+    Raises:
+        NotFoundError: one that the branch does not show.
+        ConflictError: a row that stays on the branch was made from one of them.
+    """
+    there = matching(shown, {"artifact": list(leaving)})["artifact"].to_pylist()
+    if foreign := set(leaving) - set(there):
+        raise NotFoundError(
+            f"{', '.join(sorted(foreign))} is not on branch {branch!r}",
+            where=where,
+            fix=f"give ids of rows that flagdata ls --at {branch} shows",
+        )
+    made = made_from(shown, leaving).select(_COLUMNS).to_pylist()
+    staying = [row for row in made if row["artifact"] not in leaving]
+    if staying:
+        first = f"{staying[0]['kind']} {staying[0]['name']!r} ({staying[0]['artifact']})"
+        more = f", and {len(staying) - 1} more," if len(staying) > 1 else ""
+        raise ConflictError(
+            f"{first}{more} would stay, made from what would be withdrawn",
+            where=where,
+            fix="withdraw all that was made from it too: flagdata withdraw --with-descendants",
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Erasure:
+    """What was erased.
+
+    Attributes:
+        version: of the table after it.
+        artifacts: ids, sorted, those of clips and of descendants among them.
+        branches: that showed them.
+        tags: that go on to list them, without data.
+        objects: names of the objects whose bytes are gone.
+        kept: object → why its bytes are still there.
+    """
+
+    version: int
+    artifacts: tuple[str, ...]
+    branches: tuple[str, ...]
+    tags: tuple[str, ...]
+    objects: tuple[str, ...]
+    kept: dict[str, str]
+
+
+def erase(lake: Store, artifacts: Collection[str], message: str, *, with_descendants: bool) -> Erasure:
+    """See `Lake.erase`."""
+    asked = frozenset(artifacts)
+    with lake.changing("erasing", alone=True) as check:
+        tags = lake.refs.tags()
+        shown = {ref: lake.rows(at=ref) for ref in (MAIN, *lake.refs.branches(), *tags)}
+        version, before = _erased_with(lake, asked)
+        going = _all(shown, asked, erased=before, with_descendants=with_descendants, where=str(lake.path))
+        erased = {artifact: name for artifact, name in before.items() if artifact in going} | {
+            row["artifact"]: row["object"]
+            for table in shown.values()
+            for row in table.select(["artifact", "object"]).to_pylist()
+            if row["artifact"] in going
+        }
+        concerned = [ref for ref, table in shown.items() if going.intersection(table["artifact"].to_pylist())]
+        branches = [ref for ref in concerned if ref not in tags]
+
+        def attempt(branch: str) -> int:
+            head = lake.catalog.head()
+            leaving = erased.keys() & set(lake.table(lake.refs.view(branch, head))["artifact"].to_pylist())
+            noted = {"withdrawn": str(len(leaving)), "erased": json.dumps(erased, sort_keys=True)}
+            return remove(lake, leaving, branch=branch, base=head, info={"message": message, **noted})
+
+        for branch in branches or ([] if going <= before.keys() else [MAIN]):
+            version = persist(partial(attempt, branch), where=lake.catalog.path)
+        objects = {name for name in (*erased.values(), *before.values()) if name is not None}
+        removed, kept = _delete(lake, objects, check)
+    return Erasure(
+        version=version,
+        artifacts=tuple(sorted(erased)),
+        branches=tuple(branches),
+        tags=tuple(ref for ref in concerned if ref in tags),
+        objects=removed,
+        kept=kept,
+    )
+
+
+def _erased_with(lake: Store, asked: frozenset[str]) -> tuple[int, dict[str, str | None]]:
+    """Returns the newest version that erased some artifacts before, 0 where there is none, and what these versions
+    erased, artifact by object, that nothing which was committed since needs."""
+    earlier = [removal for removal in removals(lake.catalog.history()) if asked & removal.erased.keys()]
+    if not earlier:
+        return 0, {}
+    needed = mark(lake, grace=_GRACE).objects
+    erased = (item for removal in earlier for item in removal.erased.items())
+    return earlier[0].version, {artifact: name for artifact, name in erased if name not in needed}
+
+
+def erased_objects(lake: Store) -> dict[str, tuple[int, str]]:
+    """Returns, for each object of which an artifact was erased from all refs, the newest version that did so and
+    why."""
+    return {
+        name: (removal.version, removal.reason)
+        for removal in reversed(removals(lake.catalog.history()))
+        for name in removal.erased.values()
+        if name is not None
+    }
+
+
+def unfinished(lake: Store, needed: Collection[str]) -> dict[str, tuple[int, str]]:
+    """Object that is stored though all artifacts of it were erased → the version that erased it, and why.
+
+    Args:
+        needed: objects of other rows, and those that running transactions hold.
+    """
+    known = erased_objects(lake)
+    stored = {stored.name for stored in lake.objects} if known else set()
+    return {name: known[name] for name in sorted((known.keys() & stored) - set(needed))}
+
+
+def erased_as(lake: Store, artifact: str) -> str | None:
+    """The id of an artifact that was erased, by an id, its beginning, or the name that it had; `None` where there is
+    none, or more than one."""
+    for removal in removals(lake.catalog.history()):
+        if gone := removal.erased:
+            rows = lake.catalog.rows(removal.version - 1).select(naming.COLUMNS)
+            named = naming.meant(rows.filter(pc.field("artifact").isin(sorted(gone))).to_pylist(), artifact)
+            found = {row["artifact"] for row in named} or {one for one in gone if one.startswith(artifact)}
+            if found:
+                return found.pop() if len(found) == 1 else None
+    return None
+
+
+def _all(
+    shown: dict[str, pa.Table],
+    asked: frozenset[str],
+    *,
+    erased: Collection[str],
+    with_descendants: bool,
+    where: str,
+) -> frozenset[str]:
+    """What goes: what was asked for, its clips and, if wanted, its descendants, wherever a ref shows them.
+
+    Args:
+        erased: those that were erased before, which no ref need show.
+
+    Raises:
+        NotFoundError: no ref shows one of them.
+        ConflictError: on a branch, something made from them would stay.
+    """
+    going = set(asked)
+    for table in shown.values():
+        going |= clips_of(table, asked)
+        if with_descendants:
+            going |= descendants(table, asked)
+    known = {artifact for table in shown.values() for artifact in table["artifact"].to_pylist()}
+    if foreign := sorted(asked - known - set(erased)):
+        raise NotFoundError(f"no ref shows {', '.join(foreign)}", where=where, fix="flagdata ls --at REF lists ids")
+    for ref, table in shown.items():
+        present = going.intersection(table["artifact"].to_pylist())
+        check_leaving(table, present, branch=ref, where=where)
+    return frozenset(going)
+
+
+def _delete(lake: Store, names: Collection[str], check: Check) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Delete the objects that nothing else needs; the lock that keeps transactions out is held, and checked.
+
+    Raises:
+        ConflictError: the lock may have been lost.
+        CorruptError: a ref cannot be read, so what is needed is unknown; the rows are withdrawn.
+        FlagdataError: the disk refuses to delete some; the others are gone.
+    """
+    marked = mark(lake, grace=timedelta(0))
+    marked.check(outcome=", so none was deleted", fix="mend what flagdata doctor reports, and run the command again")
+    held = _held(lake)
+    kept = dict.fromkeys(sorted(set(names) & marked.objects), "another artifact has the same content")
+    kept |= dict.fromkeys(sorted(set(names) & held - marked.objects), "a running transaction holds it")
+    gone = sorted({stored.name for stored in lake.objects}.intersection(names) - kept.keys())
+    refused: dict[str, OSError] = {}
+    for name in gone:
+        check()
+        try:
+            lake.objects.delete(name)
+        except OSError as error:
+            refused[name] = error
+    if refused:
+        name, error = next(iter(refused.items()))
+        raise FlagdataError(
+            f"the artifacts are erased from all refs, but the data of {len(refused)} of {len(gone)} objects are still "
+            f"there, {name} among them: {error.strerror}",
+            where=str(lake.objects.path(name)),
+            fix="let its folder and what is in it be written, and run the same command again, or flagdata gc",
+        )
+    return tuple(gone), kept
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expiry:
+    """What expires.
+
+    Attributes:
+        up_to: the newest version that expires, with all before it; −1 where none does.
+        objects: names of the objects that go, sorted.
+        size: of these [B].
+        version: of the table after it; `None` where nothing was committed.
+    """
+
+    up_to: int
+    objects: tuple[str, ...]
+    size: int
+    version: int | None = None
+
+
+def last_version(lake: Store, *, older_than: timedelta | None, keep: int | None) -> int:
+    """The newest version that expires: one that another replaced so long ago, and that is not among the newest `keep`;
+    −1 where there is none. The head never expires."""
+    history = lake.catalog.history()  # newest first
+    last = history[0]["version"] - 1
+    if keep is not None:
+        last = min(last, history[0]["version"] - keep)
+    if older_than is not None:
+        limit = (datetime.now(UTC) - older_than).timestamp() * 1000
+        later = [entry["version"] for entry in history if entry["timestamp"] > limit]
+        last = min(last, min(later) - 2 if later else last)
+    return max(last, -1)
+
+
+def expire(lake: Store, up_to: int, message: str | None = None, *, dry_run: bool = False) -> Expiry:
+    """Let the versions up to `up_to` expire: note it, and delete what no other version, branch or tag shows.
+
+    Args:
+        up_to: before the head.
+        message: why.
+        dry_run: find out only.
+
+    Raises:
+        CorruptError: a ref cannot be read or the catalog is damaged, so what is needed is unknown; nothing was deleted.
+    """
+    if dry_run or up_to < 0:
+        if not dry_run:
+            lake.check_writable()
+        with disk_errors("expiring versions", lake.path), looking(lake.staging):
+            return _expiring(lake, up_to)
+    with lake.changing("expiring versions", alone=True) as check:
+        going = _expiring(lake, up_to)
+        noted = json.dumps({"up_to": up_to, "objects": list(going.objects)})
+        info = {"message": message or f"expire versions up to {up_to}", "expired": noted}
+        version = persist(lambda: remove(lake, (), base=lake.catalog.head(), info=info), where=lake.catalog.path)
+        for name in going.objects:
+            check()
+            lake.objects.delete(name)
+    return replace(going, version=version)
+
+
+def _expiring(lake: Store, up_to: int) -> Expiry:
+    """Returns what goes with the versions up to one; transactions are kept out."""
+    held = _held(lake)
+    marked = mark(lake, grace=timedelta(0), first=up_to + 1)
+    # Rows read from a changed file may name other objects than those they need, so files are re-hashed first.
+    marked.check(*catalog_files(lake))
+    committed = lake.catalog.objects() - marked.objects - held
+    going = [stored for stored in lake.objects if stored.name in committed]
+    return Expiry(up_to=up_to, objects=tuple(sorted(one.name for one in going)), size=sum(one.size for one in going))
+
+
+def _held(lake: Store) -> set[str]:
+    """Returns the names of the objects that running transactions hold."""
+    return {name for state in leases(lake.staging) if state.alive for name in state.objects}
+
+
+def check_whole(lake: Store, view: View) -> None:
+    """Whether a new tag or branch may show a view: not that of an expired version whose data went.
+
+    Raises:
+        ConflictError: some of its data are not in the lake.
+    """
+    newest = max(part.version for part in view)
+    if any(newest <= removal.expired[0] for removal in removals(lake.catalog.history())):
+        for why in lost(lake, lake.table(view)).values():
+            raise ConflictError(why.what, where=str(lake.path), fix="choose a newer version, or one that a tag shows")
+
+
+def delete(lake: Store, kind: str, name: str, message: str | None, *, discard: bool) -> int:
+    """See `Lake.delete_tag` and `Lake.delete_branch`.
+
+    Args:
+        kind: "tags" or "branches".
+    """
+    noun = _NOUNS[kind]
+
+    def attempt() -> int:
+        head = lake.catalog.head()
+        known = lake.refs.tags() if kind == "tags" else lake.refs.branches()
+        if name not in known:
+            raise NotFoundError(
+                f"there is no {noun} {name!r}", where=str(lake.path), fix=UnknownNameError.of(noun, name, known).fix
+            )
+        shown = lake.table(known[name].view if kind == "tags" else lake.refs.view(name, head))
+        if not discard:
+            _check_elsewhere(lake, noun, name, set(shown["artifact"].to_pylist()))
+        info = {"message": message or f"delete the {noun} {name}", "deleted": f"{noun} {name}"}
+        info["view"] = json.dumps(as_json(known[name].view))
+        if kind == "tags":
+            return remove(lake, (), base=head, info=info)
+        leaving = shown.filter(pc.field("branch") == name)["artifact"].to_pylist()
+        return remove(lake, leaving, branch=name, base=head, info={**info, "withdrawn": str(len(leaving))})
+
+    lake.check_writable()
+    if name == MAIN:
+        raise UsageError(f"{MAIN} cannot be deleted", fix="withdraw what is on it, or begin a new lake")
+    with lake.changing(f"deleting the {noun} {name}", alone=True):
+        version = persist(attempt, where=lake.catalog.path)
+        lake.refs.remove(kind, name)
+    return version
+
+
+def _check_elsewhere(lake: Store, noun: str, name: str, shown: set[str]) -> None:
+    """Whether other refs show all rows, too.
+
+    Raises:
+        ConflictError: some would be lost.
+    """
+    for ref in (MAIN, *lake.refs.branches(), *lake.refs.tags()):
+        if ref != name:
+            shown = shown - set(lake.rows(at=ref, columns=["artifact"])["artifact"].to_pylist())
+    if shown:
+        raise ConflictError(
+            f"{len(shown)} artifacts are shown by this {noun} alone: without it, gc deletes them",
+            where=f"{noun} {name}",
+            fix="merge or tag them first, or add --discard to give them up",
+        )
+
+
+def left(lake: Store, removal: Removal) -> dict[str, str | None]:
+    """Returns the rows that left the table by a removal, id by object; later versions do not show them, unless another
+    branch does or they came again."""
+    if not removal.withdrawn:
+        return {}
+    before, after = (_stored(lake, version) for version in (removal.version - 1, removal.version))
+    gone = pc.invert(pc.is_in(_keys(before), value_set=_keys(after)))  # type: ignore[attr-defined]
+    return {row["artifact"]: row["object"] for row in before.filter(gone).to_pylist()}
+
+
+def _stored(lake: Store, version: int) -> pa.Table:
+    columns = ["artifact", "branch", "object"]
+    rows = lake.catalog.scan(version)
+    return lake.catalog.rows(version).select(columns) if rows is None else rows.table(columns)
+
+
+def _keys(rows: pa.Table) -> pa.ChunkedArray:
+    """What distinguishes rows: artifact and branch."""
+    return pc.binary_join_element_wise(rows["artifact"], rows["branch"], "/")  # type: ignore[attr-defined]
+
+
+def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
+    """Returns why an object is missing: it was erased, it went with versions that expired, or it was collected after a
+    version withdrew it; `missing` where no version did, or where the catalog cannot be asked."""
+    reasons = (
+        ("was erased from all versions by version {0.version} ({0.reason})", lambda r: name in r.erased.values()),
+        (
+            "went when versions up to {0.expired[0]} expired, by version {0.version} ({0.reason})",
+            lambda r: name in r.expired[1],
+        ),
+        (
+            "was withdrawn by version {0.version} ({0.reason}), and gc has deleted it",
+            lambda r: name in left(lake, r).values(),
+        ),
+    )
+    try:
+        if name in mark(lake, grace=timedelta(0)).objects:
+            return missing
+        gone = removals(lake.catalog.history())
+        for what, went in reasons:
+            for removal in filter(went, gone):
+                restored = f"use a tag, or a version from {removal.version} on; {_RESTORE}"
+                return NotFoundError(
+                    f"{name} {what.format(removal)}",
+                    where=missing.where,
+                    fix=_LEAVE_OUT if name in removal.erased.values() else restored,
+                )
+    except FlagdataError:
+        return missing
+    return missing
+
+
+def lost(lake: Store, rows: pa.Table) -> dict[str, NotFoundError]:
+    """Object of some of the rows that is not in the lake → why."""
+    found: dict[str, NotFoundError] = {}
+    for name in sorted(rows["object"].drop_null().unique().to_pylist()):
+        if not lake.objects.has(name):
+            found[name] = explained(lake, name, lake.objects.missing(name))
+    return found
