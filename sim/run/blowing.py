@@ -106,7 +106,7 @@ def _log(table: Table, logs: Logs | None) -> tuple[str, WindSeries | Wind]:
         raise UsageError(
             f"the log {name!r} is looked for in a lake, and there is none",
             where=table.where,
-            fix="give what flagdata.wind returns, or run flagdata simulate on the lake that holds the log",
+            fix="give the log itself, as flagdata.wind returns it",
         )
     return logs(name)
 
