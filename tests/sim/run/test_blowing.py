@@ -184,7 +184,7 @@ def test_a_run_that_goes_beyond_its_samples_may_hold_the_last_one() -> None:
 
 def test_only_the_samples_of_the_run_make_a_recipe_what_it_is() -> None:
     longer = np.concatenate([[[-9.0, 1.0, 0.0, 0.0]], GUST, [[9.0, 1.0, 0.0, 0.0]]])
-    other = GUST + [0.0, 1e-3, 0.0, 0.0]
+    other = GUST + np.array([0.0, 1e-3, 0.0, 0.0])
     hashes = [json.dumps(recipe_of({"samples": rows}).identity()) for rows in (GUST, longer, other)]
     assert hashes[0] == hashes[1] != hashes[2]
     assert "samples" not in recipe_of({"speed": 3.0}).identity()["wind"]
