@@ -21,12 +21,14 @@ class Simulated:
         name: of the recipe.
         members: each as a mesh sequence, which `flagdata.render` films.
         parameters: name → (member,) what each drew or was given, SI: "wind_speed", "density", "damping", …
+        wind: (member, frame, 3) where the undisturbed air goes to [m/s], at each frame.
         failed: why a member is not there: its number → the reason.
     """
 
     name: str
     members: tuple[MeshSequence, ...]
     parameters: Mapping[str, NDArray[np.float64]]
+    wind: NDArray[np.float64]
     failed: Mapping[int, str]
 
     def __len__(self) -> int:

@@ -39,6 +39,24 @@ def shrunk_covariance(points: NDArray[np.floating]) -> tuple[NDArray[np.float64]
     return shrinkage * level * np.eye(d) + (1 - shrinkage) * sample, shrinkage
 
 
+def whitening(covariance: NDArray[np.floating], *, least: float) -> NDArray[np.float64]:
+    """Returns W (d, d) with WᵀW the inverse of a covariance whose eigenvalues are raised to `least`."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors.T / np.sqrt(np.maximum(values, least))[:, None])
+
+
+def conformal_p(reference: NDArray[np.floating], scores: NDArray[np.floating] | float) -> NDArray[np.float64]:
+    """Returns p of scores (…): (1 + reference scores that are at least as large)/(their number + 1).
+
+    Exact for a score that is exchangeable with the reference ones, whatever their distribution.
+
+    Args:
+        reference: (n,) ascending, of clips that shaped nothing of what scores them.
+    """
+    smaller = np.searchsorted(reference, scores, side="left")
+    return np.asarray((1 + len(reference) - smaller) / (len(reference) + 1))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Familiarity:
     """How usual summaries are among those of the training and validation clips.
@@ -89,8 +107,7 @@ class Familiarity:
 
     def p_value(self, summaries: NDArray[np.floating]) -> NDArray[np.float64]:
         """Conformal p of summaries (n, d): (1 + validation clips at least as far)/(validation clips + 1), (n,)."""
-        nearer = np.searchsorted(self.reference, self.distance(summaries), side="left")
-        return (1 + len(self.reference) - nearer) / (len(self.reference) + 1)
+        return conformal_p(self.reference, self.distance(summaries))
 
     def threshold(self, false_alarm: float) -> float:
         """Distance beyond which a clip is called unfamiliar, such that this happens to familiar ones at most so often.

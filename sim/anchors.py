@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import InputError
+from sim.wind.sampled import Beyond, Even, between, place
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,6 +41,5 @@ class AnchorTracks:
 
     def displacement(self, time: float) -> Tensor:
         """(held, 3, batch) [m] at a time [s]."""
-        place = min(max((time - self.start) / self.period, 0.0), float(len(self.samples) - 1))
-        index = min(int(place), len(self.samples) - 2)
-        return torch.lerp(self.samples[index], self.samples[index + 1], place - index)
+        even = Even(start=self.start, period=self.period, count=len(self.samples))
+        return between(self.samples, *place(even, time, Beyond.HOLD))

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+SPEED_LIMIT = 300.0
+"""Speed of a vertex that only divergence reaches [m/s]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class State:
@@ -24,7 +27,7 @@ class State:
         """Where some members are and how fast, without what is remembered."""
         return State(position=self.position[..., members], velocity=self.velocity[..., members], time=self.time)
 
-    def healthy(self, *, speed_limit: float = 300.0) -> Tensor:
-        """(batch,) bool: finite, and no vertex faster than the limit [m/s], which only divergence reaches."""
+    def healthy(self, *, speed_limit: float = SPEED_LIMIT) -> Tensor:
+        """(batch,) bool: finite, and no vertex faster than the limit [m/s]."""
         finite = torch.isfinite(self.position).all(0).all(0) & torch.isfinite(self.velocity).all(0).all(0)
         return finite & ((self.velocity**2).sum(1).amax(0) < speed_limit**2)

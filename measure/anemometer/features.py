@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from flagdata.errors import RefusedError
 from measure.estimate.joint import WIND
 from measure.film.conditioned import ConditionedFilm
-from measure.film.similarity import POWERS, FlagSize, spacing, trained_on
-from measure.film.windows import Layout, cut, lay_out
+from measure.film.similarity import POWERS, FlagSize, trained_on
+from measure.film.windows import Layout, WindowReader
 from measure.observables.film import FilmWindow
 from measure.observables.watching import Watcher
-from models.conditioning.repeats import Distinct, TimedFrame
 from models.estimator import Estimator
 
 SUMMARY = "summary-"
@@ -100,30 +99,16 @@ def features_of(
         UsageError, InputError: a part that the film does not have.
     """
     scale = size.scale(trained_on(model.targets))
-    layout = lay_out(
-        frames=model.front_end.frames,
-        spacings=(spacing(scale, rate=model.front_end.rate),),
-        rate=film.rate,
-        duration=film.duration,
-        step=None,
-        first=first,
-        last=last,
-    )
+    reader = WindowReader(film, model, [scale], first=first, last=last)
+    layout = reader.layout
     summaries: NDArray[np.float32] | None = None
     rows: dict[int, NDArray[np.float32]] = {}
     winds = np.full(layout.count, np.nan)
     clip: NDArray[np.uint8] | None = None
     hoist = _Hoist()
     watcher = Watcher(film, size, begin=layout.first, count=layout.count, seconds=layout.step, found=hoist.take)
-    margin = 2 * layout.period
-
-    def watched() -> Iterator[TimedFrame]:
-        for time, frame in film.frames(layout.first - margin, layout.last + margin):
-            watcher.look(time, frame)
-            yield time, frame
-
-    frames = Distinct(watched())
-    for window in cut(frames, layout):
+    reader.look = watcher.look
+    for window in reader.windows(advance):
         embeddings = model.embeddings(model.inputs(window.clips))
         summary = embeddings[0][0].cpu().numpy().astype(np.float32)
         if summaries is None:
@@ -132,8 +117,6 @@ def features_of(
         rows[window.index] = np.concatenate([one[0].cpu().numpy() for one in embeddings])
         values = model.learners[0].scaling.values(model.posterior(embeddings).mean().float())
         winds[window.index] = float(values[0, 0]) * scale ** POWERS[WIND]
-        if advance is not None:
-            advance(layout.count, 1)
     if summaries is None or clip is None:
         raise RefusedError(
             "no window of the film has all its frames", where=film.name, fix="choose another part by --start and --end"

@@ -18,13 +18,13 @@ from measure.anemometer.reading import ReadingModel
 from measure.ends import Span, limits_of
 from measure.estimate.answer import Quantity, information
 from measure.estimate.combine import Dependence
-from measure.estimate.gate import Reason, Verdict
 from measure.estimate.joint import DRAWS, WIND, WindowAnswer
 from measure.estimate.measuring import Measurement
 from measure.estimate.options import Options
 from measure.film.conditioned import ConditionedFilm
 from measure.film.similarity import FlagSize, Sizes, trained_on
 from measure.gate.reasons import REASONS
+from measure.gate.verdict import Reason, Verdict
 from models.estimator import Estimator
 
 Floats = NDArray[np.float64]

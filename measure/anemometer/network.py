@@ -15,9 +15,8 @@ from flagdata.provenance import digest, file_hash
 from flagdata.schema import Kind
 from measure.anemometer.reading import ReadingModel
 from measure.anemometer.storage import read as read_reading_model
-from measure.estimate.checked import CheckedGate
-from measure.estimate.gate import Gate, gate_of
 from measure.gate import storage
+from measure.gate.window import CheckedGate, WindowGate, gate_of
 from models import estimator
 from models.estimator import Estimator
 from models.storage import CARD, WEIGHTS
@@ -26,7 +25,7 @@ CALIBRATED = "anemometer"
 """Key of the recipes of reading models (`measure.anemometer`)."""
 
 
-def gate_beside(found: Network, *, false_alarm: float) -> Gate:
+def gate_beside(found: Network, *, false_alarm: float) -> WindowGate:
     """The gate of a network: the calibrated one where it lies in the model's folder, else the distance of summaries.
 
     Raises:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from flagdata.findings import Finding, Severity
 from measure.anemometer.features import Place
-from models.outliers import shrunk_covariance
+from models.outliers import conformal_p, shrunk_covariance, whitening
 
 Floats = NDArray[np.float64]
 
@@ -97,7 +97,6 @@ class Familiar:
         powers = np.vander(winds, _DEGREE + 1, increasing=True)
         coefficients = np.linalg.lstsq(powers, standard, rcond=None)[0]
         covariance, _ = shrunk_covariance(standard - powers @ coefficients)
-        own, vectors = np.linalg.eigh(covariance)
         low, high = np.quantile(winds, [0.02, 0.98])
         return cls(
             centre=centre,
@@ -107,7 +106,7 @@ class Familiar:
             low=float(low),
             high=float(high),
             noise=0.0,
-            whitening=(vectors / np.sqrt(np.maximum(own, 1e-12))).T,
+            whitening=np.asfortranarray(whitening(covariance, least=1e-12)),  # the order of products' sums
         )
 
     def _white(self, values: Floats, winds: Floats) -> Floats:
@@ -120,8 +119,7 @@ class Familiar:
 
     def p_value(self, values: Floats, winds: Floats) -> Floats:
         """(n,) conformal p of a window of the calibration being as far."""
-        nearer = np.searchsorted(self.distances, self.distance(values, winds), side="left")
-        return (1 + len(self.distances) - nearer) / (len(self.distances) + 1)
+        return conformal_p(self.distances, self.distance(values, winds))
 
     def within(self, winds: Floats) -> NDArray[np.bool_]:
         """(n,) whether films are compared at these winds."""

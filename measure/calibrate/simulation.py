@@ -21,11 +21,11 @@ from measure.calibrate.fabric import TABLES
 from measure.calibrate.prior import Floats
 from measure.calibrate.wind import RATE as WIND_RATE
 from measure.calibrate.wind import Log, blown
-from measure.forecasting.observer import SegmentWind
 from measure.forecasting.regressors import EffectColumn
 from measure.observables import OBSERVABLES, Observable, View, seen_from
 from measure.observables.cloth import edges_of
 from measure.observables.observable import WINDOW
+from sim import batch
 from sim import handles as held
 from sim.effects import apply
 from sim.handles import Handles
@@ -37,6 +37,7 @@ from sim.mesh import Mesh, grid
 from sim.scene import Scene, assemble
 from sim.state import State
 from sim.system import System
+from sim.wind.sampled import Beyond, Even, SampledWind
 
 COLUMNS = 12
 RATE = 12.5
@@ -184,13 +185,8 @@ class Batch:
     def positions(self, mesh: Mesh, *, rate: float = RATE) -> Floats:
         """(frame, vertex, 3, flag) [m] of the film's frames, `rate` a second [Hz]."""
         system, state, integrator = self._assembled(mesh)
-        frames: list[Floats] = []
-        with torch.no_grad():
-            for frame in range(round((SETTLE + self._simulated) * rate)):
-                state = integrator.advance(system, state, 1 / rate)
-                if frame >= round(SETTLE * rate):
-                    frames.append(state.position.double().numpy().copy())
-        return np.stack(frames)
+        simulated = batch.Batch(system=system, state=state, integrator=integrator, divergence=batch.Divergence.KEEP)
+        return simulated.positions(batch.after(SETTLE, self._simulated, rate), rate)
 
     def _assembled(self, mesh: Mesh) -> tuple[System, State, Integrator]:
         """Flags in their winds at rest, and what simulates them."""
@@ -224,7 +220,7 @@ class Batch:
             fabric=TABLES[int(own["fabric"] * len(TABLES))],
         )
 
-    def _wind(self, system: System) -> SegmentWind:
+    def _wind(self, system: System) -> SampledWind:
         made = []
         for place, seed in enumerate(self.seeds):
             own = {name: float(values[place]) for name, values in self.values.items()}
@@ -238,7 +234,8 @@ class Batch:
             )
             made.append(velocity * own["gain"])
         samples = torch.as_tensor(np.stack(made, axis=-1), dtype=system.cloth.dtype)
-        return SegmentWind(period=1 / WIND_RATE, samples=samples)
+        times = Even(start=0.0, period=1 / WIND_RATE, count=len(samples))
+        return SampledWind(times=times, samples=samples, beyond=Beyond.HOLD)
 
     @property
     def step(self) -> float | None:

@@ -25,6 +25,7 @@ from measure.camera import write_film
 from measure.demo.logger import CUP, SENSOR, write_log
 from sim import handles
 from sim.assets import Assets
+from sim.batch import Batch, Divergence, after
 from sim.datasets.anemometer import logged, velocities
 from sim.effects import EFFECTS, apply
 from sim.effects.gusts import Gusts
@@ -294,18 +295,13 @@ def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
 def _flown(recipe: RecordingRecipe, system: System, state: State, advance: Callable[[int], object]) -> MeshSequence:
     """The flag in each frame of the film."""
     method = BackwardEuler(step=recipe.step, tolerance=1e-3)
-    settle, count = round(_SETTLE * recipe.rate), round(recipe.duration * recipe.rate)
-    frames: list[NDArray[np.float32]] = []
-    with torch.no_grad():
-        for frame in range(settle + count):
-            state = method.advance(system, state, 1 / recipe.rate)
-            if frame >= settle:
-                frames.append(state.position[..., 0].float().numpy().copy())
-                advance(1)
+    batch = Batch(system=system, state=state, integrator=method, divergence=Divergence.REFUSE)
+    frames = after(_SETTLE, recipe.duration, recipe.rate)
+    positions = batch.positions(frames, recipe.rate, look=lambda _: advance(1))
     mesh = recipe.mesh
     return MeshSequence(
-        time=np.round(np.arange(count) / recipe.rate * NANOSECONDS).astype(np.int64),
-        positions=np.stack(frames),
+        time=np.round(np.arange(len(frames)) / recipe.rate * NANOSECONDS).astype(np.int64),
+        positions=positions[..., 0].astype(np.float32),
         faces=mesh.faces.astype(np.int32),
         rest=mesh.rest.astype(np.float32),
         attributes={},

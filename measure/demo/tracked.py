@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.observe.interpolation import onto
 from sim import handles
+from sim.batch import Batch, Divergence, after
 from sim.effects import EFFECTS, apply
 from sim.handles import Handles
 from sim.integrate.symplectic import Symplectic
@@ -172,13 +172,8 @@ def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object])
         scenes.append(Scene(mesh=flat, position=start + rough, material=material, handles=held, wind=(speed, 0.0, 0.0)))
     effect = EFFECTS[recipe.effect](**{recipe.parameter: recipe.strength})
     method = Symplectic(outer=_OUTER)
-    settle, count = round(recipe.settle * recipe.rate), round(recipe.duration * recipe.rate)
-    frames: list[NDArray[np.float64]] = []
-    with torch.no_grad():
-        system, state = apply([effect], *assemble(scenes))
-        for frame in range(settle + count):
-            state = method.advance(system, state, 1 / recipe.rate)
-            advance(1)
-            if frame >= settle:
-                frames.append(state.position.double().numpy().copy())
-    return np.stack(frames)
+    system, state = apply([effect], *assemble(scenes))
+    batch = Batch(system=system, state=state, integrator=method, divergence=Divergence.REFUSE)
+    frames = after(recipe.settle, recipe.duration, recipe.rate)
+    run = batch.positions(range(1, frames.stop), recipe.rate, look=lambda _: advance(1))
+    return run[frames.start - 1 :]

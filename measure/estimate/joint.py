@@ -16,10 +16,10 @@ from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
 from measure.estimate.answer import Quantity, quantities
 from measure.estimate.combine import OWN, Dependence, combined, effective
-from measure.estimate.gate import Reason
 from measure.estimate.options import Options
 from measure.film.similarity import POWERS, Sizes, scaled_back
 from measure.film.windows import Layout
+from measure.gate.verdict import Reason
 from models.estimator import Estimator
 from models.mixture import Mixture
 from models.restriction import Known, Restricted

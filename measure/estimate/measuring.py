@@ -16,12 +16,13 @@ from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
 from measure.estimate.answer import Quantity, sentence
 from measure.estimate.combine import OWN, Dependence
-from measure.estimate.gate import Gate, Verdict, verdict
 from measure.estimate.joint import DRAWS, Joint, Look, WindowAnswer
 from measure.estimate.options import Options
-from measure.film.similarity import Sizes, sizes, spacing, trained_on
-from measure.film.windows import Layout, Window, cut, findings_of, lay_out
+from measure.film.similarity import Sizes, sizes, trained_on
+from measure.film.windows import Layout, Window, WindowReader, findings_of
 from measure.gate.reasons import REASONS
+from measure.gate.verdict import Verdict, verdict
+from measure.gate.window import WindowGate
 from models.conditioning.repeats import Distinct
 from models.estimator import Estimator
 from models.learner import Loss
@@ -117,7 +118,7 @@ def measure(
     film: Film,
     model: Estimator,
     *,
-    gate: Gate,
+    gate: WindowGate,
     dependence: Dependence,
     options: Options,
     advance: Callable[[int, int], None] | None = None,
@@ -149,28 +150,18 @@ def measure(
         trained=trained_on(model.targets),
     )
     given = Joint(model=model, sizes=considered, options=options)
-    layout = lay_out(
-        frames=model.front_end.frames,
-        rate=film.rate,
-        duration=film.duration,
-        step=options.step,
-        first=options.first,
-        last=options.last,
-        spacings=tuple(spacing(s, rate=model.front_end.rate) for s in considered.scale.tolist()),
-    )
+    scales = considered.scale.tolist()
+    reader = WindowReader(film, model, scales, step=options.step, first=options.first, last=options.last)
+    layout, distinct = reader.layout, reader.distinct
     seen: list[Look] = []
     clips: NDArray[np.uint8] | None = None  # of the first window, or of the first with something to measure
     interpolated = 0
-    margin = 2 * layout.period
-    distinct = Distinct(film.frames(layout.first - margin, layout.last + margin))
-    for window in cut(distinct, layout):
+    for window in reader.windows(advance):
         one = _look(window, gate, given)
         if clips is None or (all(earlier.blank for earlier in seen) and not one.blank):
             clips = window.clips
         seen.append(one)
         interpolated += window.interpolated
-        if advance is not None:
-            advance(layout.count, 1)
     of_film = film.findings()
     faults = [one for one in of_film if one.kind in REASONS]
     if clips is None:
@@ -214,7 +205,7 @@ def measure(
 
 
 @torch.no_grad()
-def _look(window: Window, gate: Gate, given: Joint) -> Look:
+def _look(window: Window, gate: WindowGate, given: Joint) -> Look:
     model, own = given.model, child_seed(given.options.seed, "window", window.index)
     embeddings = model.embeddings(model.inputs(window.clips))
     posterior = model.posterior(embeddings)

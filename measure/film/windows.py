@@ -9,16 +9,20 @@ which frames are missing is left out. Where a film's coding left no noise, some 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
+from flagdata.film import Film
 from flagdata.findings import Finding, Severity
+from measure.film.similarity import spacing
 from models.conditioning.grain import grained
 from models.conditioning.instants import Interpolator, TimedFrame, at_instants
+from models.conditioning.repeats import Distinct
+from models.estimator import Estimator
 
 _BEYOND = 0.05
 """Share of the time between two frames by which an instant may lie beyond the film's last: stamps are rounded to
@@ -130,6 +134,63 @@ def lay_out(
     return layout
 
 
+class WindowReader:
+    """Reads a film once, window by window, for a network.
+
+    Attributes:
+        layout: of the windows.
+        distinct: the frames, with how many were read and how many repeat the one before.
+        look: called with each frame and its time before the windows are cut, where someone else looks as well.
+    """
+
+    def __init__(
+        self,
+        film: Film,
+        model: Estimator,
+        scales: Sequence[float],
+        *,
+        step: float | None = None,
+        first: float | None = None,
+        last: float | None = None,
+    ) -> None:
+        """Lays the windows out.
+
+        Args:
+            scales: of the sizes of flag that are considered.
+            step, first, last: see `lay_out`, which also says what is raised.
+        """
+        rate = model.front_end.rate
+        self.layout = lay_out(
+            frames=model.front_end.frames,
+            spacings=tuple(spacing(scale, rate=rate) for scale in scales),
+            rate=film.rate,
+            duration=film.duration,
+            step=step,
+            first=first,
+            last=last,
+        )
+        self.look: Callable[[float, NDArray[np.uint8]], object] | None = None
+        margin = 2 * self.layout.period
+        self.distinct = Distinct(self._shown(film.frames(self.layout.first - margin, self.layout.last + margin)))
+
+    def windows(self, advance: Callable[[int, int], None] | None = None) -> Iterator[Window]:
+        """Yields the windows, in order; one in which frames are missing is left out.
+
+        Args:
+            advance: called after each window with how many there are and 1.
+        """
+        for window in cut(self.distinct, self.layout):
+            yield window
+            if advance is not None:
+                advance(self.layout.count, 1)
+
+    def _shown(self, frames: Iterable[TimedFrame]) -> Iterator[TimedFrame]:
+        for time, frame in frames:
+            if self.look is not None:
+                self.look(time, frame)
+            yield time, frame
+
+
 def cut(frames: Iterable[TimedFrame], layout: Layout) -> Iterator[Window]:
     """The windows of a film, in order; one in which frames are missing is left out.
 
@@ -163,8 +224,8 @@ def _window(held: deque[TimedFrame], layout: Layout, index: int, interpolator: I
     if abs(start - layout.start(index)) > _LONGEST * layout.period:
         return None
     clips, interpolated = [], 0
-    for spacing in layout.spacings:
-        instants = start + spacing * np.arange(layout.frames)
+    for interval in layout.spacings:
+        instants = start + interval * np.arange(layout.frames)
         before = np.searchsorted(times, instants, side="right").clip(1, len(times) - 1) - 1
         gaps = times[before + 1] - times[before]
         place = (instants - times[before]) / gaps

@@ -37,6 +37,7 @@ from sim.integrate.split import SplitEuler
 from sim.scene import Scene, assemble
 from sim.state import State
 from sim.system import InapplicableError, System
+from sim.wind.sampled import Beyond, Even, SampledWind
 
 Floats = NDArray[np.float64]
 
@@ -46,33 +47,6 @@ segments take 34 s by 72 members at a time, 20 s by 400 (with 486 vertices 54 an
 
 _JOINT = 200
 """Members of a joint batch, half as many, so that two workers have one each where one batch would have all."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SegmentWind:
-    """The logged wind of every member at its own time.
-
-    Attributes:
-        period: of the samples [s].
-        samples: (n, 3, batch) [m/s].
-    """
-
-    period: float
-    samples: Tensor
-
-    @classmethod
-    def of(cls, segments: Segments, *, dtype: torch.dtype, device: torch.device | str) -> SegmentWind:
-        """Sampled at the frames of each segment."""
-        count = len(segments.items[0].positions) + 1
-        own = np.asarray(np.arange(count) * segments.period, dtype=np.float64)
-        samples = np.stack([s.wind.at(s.start + own) for s in segments.items], axis=-1)
-        return cls(period=segments.period, samples=torch.as_tensor(samples, dtype=dtype, device=device))
-
-    def velocity(self, time: float) -> Tensor:
-        """(3, batch) [m/s], linear between samples, `time` [s] since the start of the segment."""
-        place = min(max(time / self.period, 0.0), len(self.samples) - 1.001)
-        index = int(place)
-        return torch.lerp(self.samples[index], self.samples[index + 1], place - index)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -133,8 +107,15 @@ class Forecaster:
             for own, c in zip(segments.items, calibrations, strict=True)
         ]
         system, state = assemble(scenes, dtype=self.dtype, device=self.device)
-        wind = SegmentWind.of(segments, dtype=self.dtype, device=self.device)
-        return replace(system, wind=wind, motion=self._motion(segments)), state
+        return replace(system, wind=self._wind(segments), motion=self._motion(segments)), state
+
+    def _wind(self, segments: Segments) -> SampledWind:
+        """Returns the logged wind of every segment at its own time, sampled at its frames and one frame beyond."""
+        count, period = len(segments.items[0].positions) + 1, segments.period
+        since = np.asarray(np.arange(count) * period, dtype=np.float64)
+        samples = np.stack([item.wind.at(item.start + since) for item in segments.items], axis=-1)
+        times = Even(start=0.0, period=period, count=count)
+        return SampledWind(times=times, samples=self._real(samples), beyond=Beyond.HOLD)
 
     def _motion(self, segments: Segments) -> AnchorTracks | None:
         """Motion of every segment's attachments, from their places in its first frame; None where they stand still."""

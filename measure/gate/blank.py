@@ -6,38 +6,18 @@ not even where the gate is overruled.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from measure.gate.clip_statistics import LEAST_DEVIATION, ClipStatistics
 from measure.gate.reasons import REASONS
+from measure.gate.verdict import Reason
 
 _FLAT = 1.0
 """Standard deviation of all gray levels of a clip below which nothing is visible: one step of the camera's."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Blank:
-    """Why there is nothing to measure.
-
-    Attributes:
-        kind: of `measure.gate.reasons`.
-        sentence: what is missing, with the figure.
-        fix: what can be done.
-        check: name of the statistic that shows it, of `measure.gate.checks`.
-        value: its figure.
-    """
-
-    kind: str
-    sentence: str
-    fix: str
-    check: str
-    value: float
-
-
-def blank(frames: NDArray[np.uint8]) -> Blank | None:
+def blank(frames: NDArray[np.uint8]) -> Reason | None:
     """What a clip lacks; None where there is something to measure.
 
     Args:
@@ -48,9 +28,8 @@ def blank(frames: NDArray[np.uint8]) -> Blank | None:
     """
     contrast = float(frames.std())
     if contrast < _FLAT:
-        reason = REASONS["too-dark"]
-        what = f"{reason.sentence}: all gray levels lie within {contrast:.2g} of each other"
-        return Blank(kind="too-dark", sentence=what, fix=reason.fix, check="contrast", value=contrast)
+        what = f"{REASONS['too-dark'].sentence}: all gray levels lie within {contrast:.2g} of each other"
+        return _lacking("too-dark", what, check="contrast", value=contrast)
     most = float(ClipStatistics.of(frames).deviation.max())
     if most > LEAST_DEVIATION:
         return None
@@ -58,4 +37,8 @@ def blank(frames: NDArray[np.uint8]) -> Blank | None:
         f"no motion is found in the picture: its gray levels change by {most:.1f} at most (standard deviation in "
         f"time), and up to {LEAST_DEVIATION:g} comes of rounding and coding"
     )
-    return Blank(kind="no-motion", sentence=what, fix=REASONS["no-motion"].fix, check="strength", value=most)
+    return _lacking("no-motion", what, check="strength", value=most)
+
+
+def _lacking(kind: str, what: str, *, check: str, value: float) -> Reason:
+    return Reason(kind=kind, what=what, p=None, fix=REASONS[kind].fix, blank=True, check=check, value=value)

@@ -19,8 +19,8 @@ from flagdata.errors import InputError
 from measure.gate.checks import CHECKS
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.features import MOVES
-from measure.gate.tail_probability import ExponentialTails, joint_p
-from models.outliers import shrunk_covariance
+from measure.gate.tail_probability import ExponentialTails
+from models.outliers import conformal_p, shrunk_covariance, whitening
 
 Vector = NDArray[np.float64]
 
@@ -127,13 +127,11 @@ class Gate:
             direction = np.linalg.solve(pooled, other.mean(axis=0) - z.mean(axis=0))
             directions.append(direction)
             offsets.append(direction @ (other.mean(axis=0) + z.mean(axis=0)) / 2)
-        values, vectors = np.linalg.eigh(shrunk_covariance(z)[0])
-        whitening = vectors.T / np.sqrt(np.maximum(values, 1e-9))[:, None]
         blank = ExponentialTails(start=np.zeros(len(SCORES)), excess=np.ones(len(SCORES)))
         gate = cls(
             centre=centre,
             scale=scale,
-            whitening=whitening,
+            whitening=whitening(shrunk_covariance(z)[0], least=1e-9),
             directions=np.array(directions),
             offsets=np.array(offsets),
             tails=blank,
@@ -160,7 +158,7 @@ class Gate:
 
     def p_value(self, surprise: float) -> float:
         """Conformal p of a clip whose largest surprise is this."""
-        return joint_p(self.calibration, surprise)
+        return float(conformal_p(self.calibration, surprise))
 
 
 def squashed(vectors: Vector, centre: Vector, scale: Vector) -> Vector:

@@ -45,15 +45,6 @@ class ExponentialTails:
         return (scores - self.start) / self.excess
 
 
-def joint_p(calibration: NDArray[np.float64], score: float) -> float:
-    """Conformal p of a joint score: (1 + calibration clips with at least as much)/(their number + 1).
-
-    Args:
-        calibration: (n,) ascending joint scores of clips that shaped none of the tails.
-    """
-    return float(1 + len(calibration) - np.searchsorted(calibration, score, side="left")) / (len(calibration) + 1)
-
-
 def level(count: int, false_alarm: float, confidence: float) -> float:
     """The p at or below which a clip is refused, so that the false-alarm rate keeps to what is stated.
 

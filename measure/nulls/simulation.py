@@ -7,6 +7,7 @@ shorter by other methods.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,12 +18,12 @@ from scipy.spatial import Delaunay
 from flagdata.errors import FlagdataError
 from flagdata.rng import stream
 from measure.forecasting.calibration import Calibration
-from measure.forecasting.observer import SegmentWind
 from measure.nulls.stiffness import StiffnessFactors
 from measure.observe.anchors import carried
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import AttachmentTrack, Specimen, Trajectory, WindTrack
 from sim.anchors import AnchorTracks
+from sim.batch import Batch, DivergedError, Divergence, after
 from sim.effects import Effect, apply
 from sim.handles import Handles
 from sim.integrate import Integrator
@@ -32,6 +33,7 @@ from sim.integrate.symplectic import SAFETY, Symplectic
 from sim.mesh import Diagonals, Mesh, grid
 from sim.scene import Scene, assemble
 from sim.system import System
+from sim.wind.sampled import Beyond, Even, SampledWind
 
 Floats = NDArray[np.float64]
 
@@ -128,9 +130,8 @@ class NullBatch:
             FlagdataError: it diverges in the smallest steps as well.
         """
         for halvings in range(1 + _HALVINGS):
-            found = self._run(flat, held, *self._method(halvings))
-            if np.isfinite(found).all():
-                return found
+            with suppress(DivergedError):
+                return self._run(flat, held, *self._method(halvings))
         raise FlagdataError(
             f"a simulation of nulls diverges, even in steps {2**_HALVINGS} times smaller than usual",
             where=f"{self.calibrations[0]}, stretching × {self.stiffness.stretching:.3g}, winds "
@@ -145,17 +146,22 @@ class NullBatch:
             FlagdataError: it diverges.
         """
         specimen = self.specimen
-        found = self._run(specimen.mesh, specimen.held, SplitEuler(), 0.0)
-        if not np.isfinite(found).all():
+        try:
+            found = self._run(specimen.mesh, specimen.held, SplitEuler(), 0.0)
+        except DivergedError:
             raise FlagdataError(
                 "a free run of the model diverges",
                 where=f"{self.calibrations[0]}",
                 fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
-            )
+            ) from None
         return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), found)
 
     def _run(self, flat: Mesh, held: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
-        """The same by a method that damps by itself so much [s]; if it diverges, the first frame that is not finite."""
+        """The same by a method that damps by itself so much [s].
+
+        Raises:
+            DivergedError: a position is not finite.
+        """
         specimen = self.specimen
         first = np.array([-self._begins])
         begun = [track.at(first)[0] for track in self.tracks] or [specimen.anchors] * len(self.speeds)
@@ -182,31 +188,31 @@ class NullBatch:
         if self.tracks:
             system = replace(system, motion=self._carrying(system))
         system, state = apply(self.effects, system, state)
-        frames = []
-        with torch.no_grad():
-            for frame in range(round((SETTLE + self.duration) * self.rate)):
-                state = integrator.advance(system, state, 1 / self.rate)
-                if not torch.isfinite(state.position).all():
-                    return state.position.double().numpy()[None]
-                if frame >= round(SETTLE * self.rate):
-                    frames.append(state.position.double().numpy().copy())
-        return np.stack(frames)
+        batch = Batch(
+            system=system,
+            state=state,
+            integrator=integrator,
+            divergence=Divergence.REFUSE,
+            speed_limit=math.inf,
+        )
+        return batch.positions(after(SETTLE, self.duration, self.rate), self.rate)
 
     @property
     def _begins(self) -> float:
         """When the recording's first frame is, since the start of the run [s]."""
-        return (round(SETTLE * self.rate) + 1) / self.rate
+        return after(SETTLE, self.duration, self.rate).start / self.rate
 
     def _times(self, period: float) -> Floats:
         """(n,) of a run, so far apart, since the recording's first frame [s]."""
         return np.arange(math.ceil((SETTLE + self.duration) / period) + 2, dtype=np.float64) * period - self._begins
 
-    def _blowing(self, system: System) -> SegmentWind:
+    def _blowing(self, system: System) -> SampledWind:
         """The winds since the start of the run."""
         times = self._times(_SAMPLED)
         samples = np.stack([wind.at(times) for wind in self.winds], axis=-1)
         blown = torch.as_tensor(samples, dtype=system.cloth.dtype, device=system.cloth.device)
-        return SegmentWind(period=_SAMPLED, samples=blown)
+        even = Even(start=0.0, period=_SAMPLED, count=len(times))
+        return SampledWind(times=even, samples=blown, beyond=Beyond.HOLD)
 
     def _carrying(self, system: System) -> AnchorTracks:
         """The ways of the attachments since the start of the run."""

@@ -36,6 +36,18 @@ def left_of(vectors: Tensor, *, axis: int) -> Tensor:
     return torch.stack([-y, x, torch.zeros_like(z)], axis)
 
 
+def disturbed(wind: Tensor, relative: Tensor) -> Tensor:
+    """Returns the wind (3, batch) with disturbances relative to its horizontal speed.
+
+    Args:
+        wind: (3, batch) [m/s].
+        relative: (3, batch) along the wind's horizontal part, to its left, and up.
+    """
+    level = horizontal(wind, axis=0)
+    up = torch.zeros_like(wind).index_fill(0, torch.tensor(2, device=wind.device), 1.0)
+    return wind + relative[0] * level + relative[1] * left_of(wind, axis=0) + relative[2] * norm(level, axis=0) * up
+
+
 def boundary_edges(mesh: Mesh) -> NDArray[np.int64]:
     """(edge, 2) vertices of the edges with one face, sorted."""
     pairs = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])

@@ -9,9 +9,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from sim.effects import history
 from sim.effects.effect import WindEffect
+from sim.effects.geometry import disturbed
 from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
+from sim.wind import sampled
 from sim.wind.spectral import VonKarman
 
 
@@ -24,7 +25,7 @@ class Gusts(WindEffect):
         lateral: r₂, the standard deviation across the wind over that along it.
         vertical: r₃, the vertical one over that along the wind.
         times: (n,) of the samples [s].
-        samples: (3, n, batch or 1) g, of mean 0 and variance 1 in the ensemble.
+        samples: (n, 3, batch or 1) g, of mean 0 and variance 1 in the ensemble.
     """
 
     intensity: Annotated[
@@ -45,16 +46,17 @@ class Gusts(WindEffect):
         shape(unit="1", prior=(0.3, 0.7), admissible=NOT_NEGATIVE, source="0.5–0.55 near the ground (ESDU 85020)"),
     ] = 0.52
     times: tuple[float, ...] = (0.0, 1e9)
-    samples: Tensor = field(default_factory=lambda: torch.zeros(3, 2, 1))
+    samples: Tensor = field(default_factory=lambda: torch.zeros(2, 3, 1))
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        history.check(self.times, self.samples, where="gusts")
+        sampled.check(self.times, self.samples, where="gusts")
 
     def velocity(self, time: float, wind: Tensor) -> Tensor:
-        along, left, up = history.at(self.times, self.samples, time, where="gusts")
+        now = sampled.place(self.times, time, sampled.Beyond.REFUSE, where="gusts")
+        along, left, up = sampled.between(self.samples, *now)
         relative = [self.intensity * along, self.intensity * self.lateral * left, self.intensity * self.vertical * up]
-        return history.disturbed(wind, torch.stack(torch.broadcast_tensors(*relative)))
+        return disturbed(wind, torch.stack(torch.broadcast_tensors(*relative)))
 
     def with_series(
         self,
@@ -84,8 +86,8 @@ class Gusts(WindEffect):
             count = round(duration * rate) + 1
             draws = [spectrum.series(rng, duration=count / rate, rate=rate) for _ in range(batch)]
             series.append((np.stack(draws, axis=-1) - speed) / spectrum.sigma)
-        samples = torch.from_numpy(np.stack(series))
-        return replace(self, samples=samples, times=tuple(np.arange(samples.shape[1]) / rate))
+        samples = torch.from_numpy(np.stack(series, axis=1))
+        return replace(self, samples=samples, times=tuple(np.arange(len(samples)) / rate))
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, *, batch: int) -> Self:

@@ -70,5 +70,6 @@ def _answer(recipe: Recipe, found: list[Outcome]) -> Simulated:
         name=recipe.name,
         members=tuple(one.sequence for one in whole if one.sequence is not None),
         failed=failed,
+        wind=np.stack([one.wind for one in whole]),
         parameters={name: np.array([one.member.parameters[name] for one in whole], dtype=np.float64) for name in names},
     )

@@ -7,17 +7,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import LimitError
 from flagdata.lake.meshes import MeshSequence
 from flagdata.timebase import NANOSECONDS
 from sim import membrane
+from sim.batch import Batch, Divergence
 from sim.cloth import Cloth
 from sim.integrate import Integrator
 from sim.integrate.backend import Backend
@@ -126,12 +128,14 @@ class Outcome:
     Attributes:
         member: which.
         sequence: its meshes; None where it failed.
+        wind: (frame, 3) undisturbed air at each kept frame, where it goes to [m/s].
         diagnosis: what was measured on the way.
         failure: kind and sentence, where it failed.
     """
 
     member: Member
     sequence: MeshSequence | None
+    wind: NDArray[np.float64]
     diagnosis: Diagnosis
     failure: tuple[str, str] | None = None
 
@@ -184,12 +188,11 @@ class Stepper:
         """[s]."""
         return 1 / self.recipe.time.rate / self.steps
 
-    def frame(self, system: System, state: State) -> State:
-        """One frame later."""
-        frame = 1 / self.recipe.time.rate
+    def advance(self, system: System, state: State, duration: float) -> State:
+        """Returns the state one frame of `duration` [s] later."""
         if self.method is not None:
-            return self.method.advance(system, state, frame)
-        return advance(system, state, frame, steps=self.steps, backend=self.recipe.integrator.backend)
+            return self.method.advance(system, state, duration)
+        return advance(system, state, duration, steps=self.steps, backend=self.recipe.integrator.backend)
 
     def unstable(self, system: System) -> Tensor:
         """(batch,) whether a member's own limit is below the step."""
@@ -219,27 +222,23 @@ def run(
     """
     filled = [*members, *[members[-1]] * (size - len(members))]
     time = crew.recipe.time
+    system, state = crew.assemble(filled, device=device)
+    batch = Batch(system=system, state=state, integrator=stepper, divergence=Divergence.RESTART)
+    monitor, kept, winds = Monitor(), [], []
     with torch.no_grad():
-        system, state = crew.assemble(filled, device=device)
-        start, monitor, kept = state, Monitor(), []
-        failures: dict[int, tuple[str, str]] = {}
-        unstable = stepper.unstable(system)
-        for place in torch.nonzero(unstable).flatten().tolist():
-            failures[place] = ("unstable-step", f"its stable step is below the recipe's, {stepper.step:.3g} s")
-        for frame in range(time.total):
-            if frame:
-                state = stepper.frame(system, state)
-                failed = ~state.healthy()
-                for place in torch.nonzero(failed).flatten().tolist():
-                    if failures.get(place, ("",))[0] != "diverged":
-                        failures[place] = ("diverged", f"it diverged before {state.time:.3f} s")
-                state = _restarted(state, start, failed)
+        unstable = torch.nonzero(stepper.unstable(system)).flatten().tolist()
+        for frame, state in enumerate(batch.states(range(time.total), time.rate)):
             if frame >= time.settling:
                 monitor.look(system, state)
                 kept.append(state.position.to("cpu", torch.float32))
+                winds.append(system.wind.velocity(state.time).expand(3, size).double().cpu().numpy())
             if progress is not None:
                 progress(1)
-    positions = torch.stack(kept).numpy()
+    failures = dict.fromkeys(
+        unstable, ("unstable-step", f"its stable step is below the recipe's, {stepper.step:.3g} s")
+    )
+    failures |= {place: ("diverged", f"it diverged before {seen:.3f} s") for place, seen in batch.diverged.items()}
+    positions, blown = torch.stack(kept).numpy(), np.stack(winds)
     first = [round((time.settling + i) / time.rate * NANOSECONDS) for i in range(time.frames)]
     outcomes: list[Outcome] = []
     for place, member in enumerate(members):
@@ -252,9 +251,11 @@ def run(
                 positions=np.ascontiguousarray(positions[..., place]),
                 faces=crew.mesh.faces.astype(np.int32),
                 rest=crew.mesh.rest.astype(np.float32),
-                attributes=_attributes(crew, stepper, member, diagnosis),
+                attributes=_attributes(crew, stepper, member, diagnosis, blown[..., place]),
             )
-        outcomes.append(Outcome(member=member, sequence=sequence, diagnosis=diagnosis, failure=failure))
+        outcomes.append(
+            Outcome(member=member, sequence=sequence, wind=blown[..., place], diagnosis=diagnosis, failure=failure)
+        )
     return outcomes
 
 
@@ -265,8 +266,10 @@ def _crumpled(diagnosis: Diagnosis) -> tuple[str, str] | None:
     return "crumpled", f"it crumpled: its faces are compressed by {rate}; declare more damping"
 
 
-def _attributes(crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnosis) -> dict[str, Any]:
-    """What a sequence says of itself, also outside the lake."""
+def _attributes(
+    crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnosis, wind: NDArray[np.float64]
+) -> dict[str, Any]:
+    """Returns what a sequence says of itself, also outside the lake; the wind where its recipe gives samples of it."""
     return {
         "source": "flagdata simulate",
         "recipe": crew.recipe.name,
@@ -277,20 +280,9 @@ def _attributes(crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnos
         "energies": {name: list(values) for name, values in diagnosis.energies.items()},
         "largest_strain": list(diagnosis.largest_strain),
         "compression": list(diagnosis.compression),
+        **({} if crew.recipe.wind.samples is None else {"wind": wind.tolist()}),
     }
 
 
 def _plain(value: Parameter) -> float | str | list[float]:
     return list(value) if isinstance(value, tuple) else value
-
-
-def _restarted(state: State, start: State, failed: torch.Tensor) -> State:
-    """Failed members from the start again, so that no infinity slows the batch down; they are not kept."""
-    if not bool(failed.any()):
-        return state
-    return replace(
-        state,
-        position=torch.where(failed, start.position, state.position),
-        velocity=torch.where(failed, 0.0, state.velocity),
-        memory=tuple(torch.where(failed, old, new) for old, new in zip(start.memory, state.memory, strict=True)),
-    )

@@ -155,6 +155,9 @@ class Crew:
             UsageError: an effect that does not fit.
         """
         system, state = assemble([m.scene for m in members], dtype=self.recipe.dtype, device=device)
+        samples = self.recipe.wind.samples
+        if samples is not None:
+            system = replace(system, wind=samples.wind(self.recipe.time.first, len(members), system.anchors))
         return apply([self._effect(name, members) for name in self.recipe.effects], system, state)
 
     def corners(self, place: int) -> tuple[System, State]:

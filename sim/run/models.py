@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from flagdata.addresses import local_path
-from flagdata.errors import CorruptError, NotFoundError, UnknownNameError
+from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.naming import OF_RESULTS, meant
+from flagdata.lake.naming import COLUMNS, OF_RESULTS, meant
 from flagdata.printable import SHORT
+from flagdata.record.parent import open_parent
 from flagdata.schema import Kind
+from flagdata.signals import WindSeries
 from sim.run import reading
 from sim.run.recipe import Recipe
 
@@ -26,7 +29,7 @@ def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
         FlagdataError: as `sim.run.reading.load`.
     """
     if local_path(source).suffix in (".toml", ".json") or source in reading.SCENES.names():
-        return reading.load(source)
+        return reading.load(source, logs=partial(_log, lake, branch))
     rows = lake.rows({"kind": Kind.MODEL}, at=branch, columns=OF_RESULTS).to_pylist()
     found = [row["artifact"] for row in meant(rows, source)]
     if len(found) > 1:
@@ -35,6 +38,20 @@ def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
         names = [*reading.SCENES.names(), *(row["name"] for row in rows)]
         raise UnknownNameError.of("recipe or model", source, names)
     return of_artifact(lake.artifact(found[0], at=branch))
+
+
+def _log(lake: Lake, branch: str, name: str) -> tuple[str, WindSeries]:
+    rows = lake.rows({"kind": [Kind.WIND, Kind.RECORDING]}, at=branch, columns=COLUMNS).to_pylist()
+    found = [row["artifact"] for row in meant(rows, name, kinds=(Kind.WIND,))]
+    if len(found) > 1:
+        raise NotFoundError(f"{len(found)} logs are meant by {name!r}", where=str(lake.path), fix=_one_of(found))
+    if not found:
+        raise UnknownNameError.of("log", name, [row["name"] for row in rows], where=str(lake.path))
+    artifact = lake.artifact(found[0], at=branch)
+    series = None if artifact.object is None else open_parent(lake, artifact.object).wind()
+    if series is None:
+        raise InputError("the record has no wind", where=f"artifact {artifact.id}", fix="name a wind artifact")
+    return artifact.id, series
 
 
 def of_artifact(artifact: Artifact) -> Recipe:

@@ -212,7 +212,7 @@ def member_artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, see
         seed=seed,
         frame_count=recipe.time.frames,
         rate=recipe.time.rate,
-        parents=(recipe.model,) if recipe.model else (),
+        parents=recipe.parents,
     )
 
 

@@ -12,7 +12,11 @@ which each member draws its own value.
                  table (what such a TOML file holds); density, density-factor, stretching-factor,
                  bending-factor, damping: quantities; bending-factors: a quantity drawn for each of the 15 coefficients
     [wind]       speed [m/s], toward (where the air goes to, from +x towards +y) [rad], or toward-deg in degrees:
-                 quantities; vertical [m/s]; force = "quadratic-normal" | "stokes"; density, drag | viscosity
+                 quantities; vertical [m/s]. In place of a steady wind: samples = [[time, x, y, z], …], in s since the
+                 first frame that is kept and m/s; or log (a wind or recording of the lake), log-start (the first
+                 frame that is kept, since the log's first sample [s]), toward (of the log's vector mean, an angle);
+                 beyond = "refuse" | "hold" (what a run longer than the samples gets). With each of them:
+                 force = "quadratic-normal" | "stokes"; density, drag | viscosity
     [contact]    thickness, stiffness, friction; without the table, layers pass through each other
     [limits]     low, high, sweeps; without the table, strain has no limits
     [integrator] name = "symplectic" | "implicit"; step; air-shape (of the implicit); backend = "auto" | "torch" |
@@ -48,6 +52,8 @@ from sim.integrate.backend import Backend
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
+from sim.run import blowing
+from sim.run.blowing import Logs
 from sim.run.recipe import (
     DTYPES,
     Attachment,
@@ -70,8 +76,11 @@ _GUST_LENGTH = 60.0  # m, integral length scale near the ground; see sim.wind.sp
 SCENES = Shelf(folder="scenes", noun="recipe")
 
 
-def load(source: str) -> Recipe:
+def load(source: str, *, logs: Logs | None = None) -> Recipe:
     """The recipe of that name in the catalog, of a `.toml` file, or of an ArcSim scene `.json`.
+
+    Args:
+        logs: gives the logs of a lake that recipes name.
 
     Raises:
         NotFoundError: no such file.
@@ -81,7 +90,8 @@ def load(source: str) -> Recipe:
     if source.endswith(".json"):
         return _of_scene_file(local_path(source))
     found = SCENES.find(source)
-    return parse(found.text, name=found.name, folder=found.folder, where=found.where)
+    content = parsed(found.text, where=found.where)
+    return of_content(content, name=found.name, folder=found.folder, where=found.where, logs=logs)
 
 
 def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
@@ -96,8 +106,12 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
     return of_content(parsed(text, where=where), name=name, folder=folder, where=where)
 
 
-def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: str) -> Recipe:
+def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: str, logs: Logs | None = None) -> Recipe:
     """A recipe from what its TOML holds.
+
+    Args:
+        folder: that the files it names are relative to.
+        logs: gives the logs of a lake that it names.
 
     Raises:
         UnknownNameError, InputError: as `load`.
@@ -121,7 +135,7 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
         precision=top.named("precision", "float32", DTYPES, noun="precision"),
         scene=scene,
         material=_material(top.table("material"), folder, scene),
-        wind=_wind(top.table("wind"), scene),
+        wind=_wind(top.table("wind"), scene, time, logs),
         contact=contact,
         limits=limits,
         integrator=integrator,
@@ -287,7 +301,7 @@ def material_file(path: Path) -> Material:
     return Material.from_mapping(parsed(read_recipe(path).text, where=str(path)), name=path.stem)
 
 
-def _wind(table: Table, scene: SceneSpec) -> WindSpec:
+def _wind(table: Table, scene: SceneSpec, time: TimeSpec, logs: Logs | None = None) -> WindSpec:
     if scene.arcsim is not None and not table.names():
         x, y, z = scene.arcsim.scene.wind
         return WindSpec(speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=scene.arcsim.scene.air)
@@ -300,6 +314,11 @@ def _wind(table: Table, scene: SceneSpec) -> WindSpec:
         force = QuadraticNormal(
             density=table.number("density", base.density, least=0.0), drag=table.number("drag", base.drag, least=0.0)
         )
+    samples = blowing.read(table, before=time.first, duration=(time.frames - 1) / time.rate, logs=logs)
+    if samples is not None:
+        table.done()
+        x, y, z = samples.mean(time.frames, time.rate).tolist()
+        return WindSpec(speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=force, samples=samples)
     spec = WindSpec(
         speed=table.quantity("speed", 0.0, least=0.0, most=100.0),
         toward=table.angle("toward", 0.0),
@@ -308,7 +327,9 @@ def _wind(table: Table, scene: SceneSpec) -> WindSpec:
     )
     table.done()
     if "speed" not in table:
-        raise InputError("no wind speed is given", where=table.where, fix="add speed = 4.0 (m/s), or a range")
+        raise InputError(
+            "no wind speed is given", where=table.where, fix="add speed = 4.0 (m/s), or a range; a log or samples"
+        )
     return spec
 
 
@@ -349,9 +370,9 @@ def _effects(table: Table) -> dict[str, EffectSpec]:
             raise UnknownNameError.of("effect", name, EFFECTS, where=table.where)
         if name == "logged-gusts":
             raise UsageError(
-                "logged gusts need a log, which a recipe cannot name",
+                "logged gusts need a log, which an effect of a recipe cannot name",
                 where=table.where,
-                fix="take gusts, or apply the effect from Python",
+                fix='name the log in [wind], as log = "NAME"',
             )
         inner = table.table(name)
         length = inner.number("length", _GUST_LENGTH, above=0.0) if name == "gusts" else None
@@ -377,6 +398,7 @@ def _of_scene_file(path: Path) -> Recipe:
     file = read_scene(path)
     scene = _arcsim(file, noise=0.0, evaluation=Evaluation.ARCSIM)
     where = f"scene {path}"
+    time = TimeSpec(settle=0.0, frames=file.frames + 1, rate=1 / file.frame_time)
     return Recipe(
         name=path.stem,
         title=path.name,
@@ -386,10 +408,10 @@ def _of_scene_file(path: Path) -> Recipe:
         precision="float64",
         scene=scene,
         material=_material(Table({}, where=where), path.parent, scene),
-        wind=_wind(Table({}, where=where), scene),
+        wind=_wind(Table({}, where=where), scene, time),
         contact=file.scene.contact,
         limits=file.scene.limits,
         integrator=IntegratorSpec(name="implicit", step=file.step, air_shape=AirShape.PREVIOUS),
-        time=TimeSpec(settle=0.0, frames=file.frames + 1, rate=1 / file.frame_time),
+        time=time,
         effects={},
     )

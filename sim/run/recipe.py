@@ -24,6 +24,7 @@ from sim.integrate.backend import Backend
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
+from sim.run.blowing import WindSamples
 from sim.tables import Evaluation
 
 MEMBERS_LIMIT = 1_000_000
@@ -147,12 +148,14 @@ class WindSpec:
         toward: where the air goes to, from +x towards +y [rad]; a flag starts in the y–z plane.
         vertical: upward speed of the air [m/s].
         force: how it pushes.
+        samples: what blows in place of a steady wind, whose mean the others then are; None where it is steady.
     """
 
     speed: Quantity
     toward: Quantity = 0.0
     vertical: float = 0.0
     force: AirForce = field(default_factory=QuadraticNormal)
+    samples: WindSamples | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,6 +191,11 @@ class TimeSpec:
                 where="[time]",
                 fix=f"have at most {FRAMES_LIMIT} frames in all",
             )
+
+    @property
+    def first(self) -> float:
+        """When the first frame that is kept is, on the clock of the run [s]."""
+        return self.settling / self.rate
 
     @property
     def total(self) -> int:
@@ -256,6 +264,12 @@ class Recipe:
             )
 
     @property
+    def parents(self) -> tuple[str, ...]:
+        """Artifacts of the lake that it was read from: a model, a log."""
+        samples = self.wind.samples
+        return tuple(artifact for artifact in (self.model, samples.artifact if samples else "") if artifact)
+
+    @property
     def dtype(self) -> torch.dtype:
         return DTYPES[self.precision]
 
@@ -293,6 +307,7 @@ class Recipe:
                 "toward": plain(wind.toward),
                 "vertical": wind.vertical,
                 "force": _force(wind.force),
+                **({} if wind.samples is None else {"samples": wind.samples.content()}),
             },
             "contact": None if self.contact is None else vars(self.contact).copy(),
             **({} if self.limits is None else {"limits": vars(self.limits).copy()}),

@@ -53,8 +53,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "a trained network, and a film on which its answer lies at an end or contradicts what is given": (
         ("measure/estimate/answer.py", "check --flag-size, with"),
-        ("measure/estimate/gate.py", "crop to the flag by --cr"),
-        ("measure/estimate/gate.py", "give --flag-size, the le"),
+        ("measure/gate/verdict.py", "crop to the flag by --cr"),
+        ("measure/gate/verdict.py", "give --flag-size, the le"),
         ("measure/estimate/joint.py", "weigh the cloth and give"),
         ("measure/estimate/measuring.py", "check --area-weight and"),
         ("measure/estimate/measuring.py", "choose a part of the fil"),

@@ -7,9 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from measure.anemometer.network import gate_beside, network
-from measure.estimate.checked import CheckedGate
-from measure.estimate.gate import FamiliarityGate
 from measure.gate.storage import write
+from measure.gate.window import CheckedGate, FamiliarityGate
 from tests.measure.gate.made import learned
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from flagdata.film import CameraFilm
 from measure.estimate.combine import UNKNOWN
-from measure.estimate.gate import gate_of
 from measure.estimate.measuring import Options, measure
 from measure.film.conditioned import ConditionedFilm
 from measure.film.similarity import FlagSize
+from measure.gate.window import gate_of
 from models import estimator
 
 pytestmark = pytest.mark.reference

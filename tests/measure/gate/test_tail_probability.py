@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.gate.tail_probability import BODY, ExponentialTails, joint_p, level
+from measure.gate.tail_probability import BODY, ExponentialTails, level
+from models.outliers import conformal_p
 
 
 def test_one_more_surprise_is_e_times_rarer_in_an_exponential_tail() -> None:
@@ -26,7 +27,7 @@ def test_a_score_that_is_always_the_same_is_measured_by_its_resolution() -> None
 def test_p_counts_the_calibration_clips_with_at_least_as_much() -> None:
     """Of 1, 2, 3: at 2 two have at least as much, p = 3/4; beyond all 1/4; below all 1."""
     calibration = np.array([1.0, 2.0, 3.0])
-    assert [joint_p(calibration, score) for score in (2.0, 9.0, -1.0)] == [0.75, 0.25, 1.0]
+    assert [conformal_p(calibration, score) for score in (2.0, 9.0, -1.0)] == [0.75, 0.25, 1.0]
 
 
 @pytest.mark.parametrize("count", [99, 200])

@@ -41,7 +41,7 @@ def test_gusts_have_the_stated_intensities_and_no_mean() -> None:
 def test_members_have_gusts_of_their_own_and_the_same_stream_gives_the_same() -> None:
     one, two = (Gusts(intensity=0.2).with_series(stream(2), batch=3, speed=5.0) for _ in range(2))
     assert torch.equal(one.samples, two.samples)
-    correlation = np.corrcoef(one.samples[0].T.numpy())
+    correlation = np.corrcoef(one.samples[:, 0].T.numpy())
     assert np.abs(correlation - np.eye(3)).max() < 0.95
 
 

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from flagdata.errors import FlagdataError, UsageError
 from flagdata.rng import stream
+from sim.batch import Batch, DivergedError, Divergence
 from sim.contact import Contact
 from sim.effects.effect import Effect, apply
 from sim.effects.gusts import Gusts
@@ -24,6 +25,7 @@ from sim.material import Material, named
 from sim.scene import Scene, assemble
 from sim.state import State
 from sim.system import System
+from sim.wind.sampled import Beyond, Even, SampledWind
 from sim.wind.spectral import VonKarman
 from tests.studies.challenge.answer_key import Acting, AnswerKey
 from tests.studies.challenge.meshes import mesh_of
@@ -40,41 +42,6 @@ _SHORTEST_OUTER = 1e-4
 _HALVINGS = 3
 _START_NOISE = 2e-3  # m
 _GUST_RATE = 10.0  # Hz
-
-
-class _DivergedError(Exception):
-    """A simulated cloth that is no longer one.
-
-    Attributes:
-        place: of its set among those simulated.
-        seconds: after the first frame.
-    """
-
-    def __init__(self, place: int, seconds: float) -> None:
-        super().__init__(place, seconds)
-        self.place = place
-        self.seconds = seconds
-
-
-@dataclass(frozen=True, kw_only=True)
-class SampledWind:
-    """A wind that is linear between samples, the same everywhere.
-
-    Attributes:
-        first: time of the first sample [s].
-        rate: samples a second [Hz].
-        samples: (n, 3, batch) [m/s].
-    """
-
-    first: float
-    rate: float
-    samples: Tensor
-
-    def velocity(self, time: float) -> Tensor:
-        """(3, batch) [m/s]; outside the samples the first and the last."""
-        place = min(max((time - self.first) * self.rate, 0.0), len(self.samples) - 1.0)
-        index = min(int(place), len(self.samples) - 2)
-        return torch.lerp(self.samples[index], self.samples[index + 1], place - index)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,12 +85,12 @@ def simulate(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) -> d
 def _tried(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey], halvings: int) -> dict[str, SimulatedSet]:
     try:
         return _simulated(recipe, seed, keys)
-    except _DivergedError as error:
-        place, seconds = error.place, error.seconds
+    except DivergedError as error:
+        place, seconds = error.member // recipe.count, error.time
     key = keys[place]
     if not halvings:
         raise FlagdataError(
-            f"the cloth diverged {seconds:.2f} s after the first frame",
+            f"the cloth diverged {seconds:.2f} s after its run began",
             where=f"{key.name}, numerics {key.numerics!r}",
             fix="narrow the recipe's ranges of damping or of that effect",
         )
@@ -203,8 +170,9 @@ def _turbulent(recipe: ChallengeRecipe, key: AnswerKey, count: int, rng: np.rand
             duration=(count - 1) / recipe.log_rate,
             rate=recipe.log_rate,
         )
-        .samples[:, :count, 0]
+        .samples[:count, :, 0]
         .numpy()
+        .T
     )
     parts = np.array([1.0, float(gusts.lateral), float(gusts.vertical)])[:, None] * key.intensity * speed * series
     return parts.T + np.array([speed, 0.0, 0.0])
@@ -238,7 +206,8 @@ def _base(
     count = round((recipe.settle + recipe.duration) * recipe.log_rate) + 1
     each = [np.broadcast_to(wind, (count, 3)) for key in keys for wind in winds[key.name]]
     samples = torch.as_tensor(np.stack(each, axis=-1), dtype=system.cloth.dtype)
-    return replace(system, wind=SampledWind(first=0.0, rate=recipe.log_rate, samples=samples)), state
+    times = Even(start=0.0, period=1 / recipe.log_rate, count=count)
+    return replace(system, wind=SampledWind(times=times, samples=samples, beyond=Beyond.HOLD)), state
 
 
 def heading(key: AnswerKey) -> Floats:
@@ -314,19 +283,13 @@ def _run(
     stops = {ticks // recipe.log_rate * i - settle for i in range(1, (settle + span) * recipe.log_rate // ticks)}
     frames: dict[int, NDArray[np.float32]] = {}
     snapshots: list[State] = []
-    now = -settle
-    for tick in sorted(wanted | instants | {stop for stop in stops if stop < span}):
-        if tick > now:
-            state = stepper.advance(system, state, (tick - now) / ticks)
-            now = tick
-        if tick in wanted:
-            healthy = state.healthy()
-            if not bool(healthy.all()):
-                member = int(torch.nonzero(~healthy)[0])
-                raise _DivergedError(member // recipe.count, tick / ticks)
-            frames[tick] = state.position.numpy().copy()
-        if tick in instants:
-            snapshots.append(state)
+    batch = Batch(system=system, state=state, integrator=stepper, divergence=Divergence.REFUSE)
+    numbers = [tick + settle for tick in sorted(wanted | instants | {stop for stop in stops if stop < span})]
+    for number, at in zip(numbers, batch.states(numbers, ticks), strict=True):
+        if number - settle in wanted:
+            frames[number - settle] = at.position.numpy().copy()
+        if number - settle in instants:
+            snapshots.append(at)
     return frames, snapshots
 
 

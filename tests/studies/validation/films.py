@@ -21,12 +21,12 @@ from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.stated import Stated
 from measure.anemometer.network import Network, gate_beside, network
 from measure.estimate.combine import of_model
-from measure.estimate.gate import Gate
 from measure.estimate.measuring import Measurement, measure
 from measure.estimate.options import Options
 from measure.film.similarity import FlagSize
 from measure.film.source import Reading, subjects
 from measure.gate.reasons import REASONS
+from measure.gate.window import WindowGate
 from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.environments import VTK
@@ -65,7 +65,7 @@ def chosen(found: Sequence[Design]) -> list[Design]:
     return [one for one in found if any(fnmatch(one.name, pattern) for pattern in only)]
 
 
-def answers(design: Design, found: Network, gate: Gate, *, seed: int) -> dict[str, Any]:
+def answers(design: Design, found: Network, gate: WindowGate, *, seed: int) -> dict[str, Any]:
     """One film, measured with its weight open and stated."""
     motion = read(REFERENCE, design.run)
     begun = time.perf_counter()
@@ -86,7 +86,7 @@ def answers(design: Design, found: Network, gate: Gate, *, seed: int) -> dict[st
     }
 
 
-def answer(path: Path, found: Network, gate: Gate, options: Options) -> dict[str, Any]:
+def answer(path: Path, found: Network, gate: WindowGate, options: Options) -> dict[str, Any]:
     """The answer for a film: wind and area weight with their intervals, or why it is refused."""
     (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=Reading())
     try:

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from flagdata.errors import NotFoundError
 from measure.gate.gate import Gate
-from measure.gate.judgement import CONFIDENCE, FALSE_ALARM, Judgement, judge
 from measure.gate.storage import read
+from measure.gate.window import CONFIDENCE, FALSE_ALARM, Judgement, judge
 from measure.shares import Share
 from models.estimator import SHIPPED, Estimator, shipped
 from tests.evidence import ABSENT, REFERENCE
@@ -110,7 +110,7 @@ def _kind(judged: list[Judgement], name: str) -> dict[str, Any]:
         "right_first_reason": sum(_right(name, one) for one in judged),
         "p": [one.p for one in judged],
         "first_reasons": dict(Counter(one.reasons[0].kind if one.reasons else "familiar" for one in judged)),
-        "example": next((one.reasons[0].sentence for one in judged if one.reasons), ""),
+        "example": next((one.reasons[0].what for one in judged if one.reasons), ""),
     }
 
 
@@ -128,7 +128,7 @@ def _real(model: Estimator, gate: Gate) -> dict[str, Any]:
 
 def _window(window: NDArray[np.uint8], model: Estimator, gate: Gate) -> dict[str, Any]:
     one = judge(window, model, gate)
-    return {"familiar": one.familiar, "p": one.p, "reasons": [reason.sentence for reason in one.reasons]}
+    return {"familiar": one.familiar, "p": one.p, "reasons": [reason.what for reason in one.reasons]}
 
 
 def _page(result: dict[str, Any]) -> str:

@@ -17,9 +17,9 @@ import torch
 
 from flagdata.errors import NotFoundError
 from measure.anemometer.network import Network, gate_beside, network
-from measure.estimate.gate import Gate
 from measure.estimate.options import Options
 from measure.film.similarity import FlagSize
+from measure.gate.window import WindowGate
 from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.environments import VTK
@@ -50,7 +50,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return sheet
 
 
-def row(kind: str, number: int, found: Network, gate: Gate, *, python: Path, seed: int) -> dict[str, Any]:
+def row(kind: str, number: int, found: Network, gate: WindowGate, *, python: Path, seed: int) -> dict[str, Any]:
     """What `flagdata measure` reports of one film."""
     path = defect(kind, number, folder=FOLDER, python=python)
     said = answer(path, found, gate, Options(size=FlagSize(length=LENGTH, height=HEIGHT), seed=seed))

@@ -49,9 +49,9 @@ from measure.calibrate.observed import Observed
 from measure.calibrate.prior import Floats, Normal, Uncertain
 from measure.calibrate.simulation import BATCH, OBSERVED, RATE, Flag, windows
 from measure.calibrate.wind import Log
-from measure.forecasting.observer import SegmentWind
 from measure.observables import View
 from sim import handles
+from sim.batch import Batch, Divergence, after
 from sim.effects.anemometer_lag import AnemometerLag
 from sim.handles import Handles
 from sim.integrate.implicit import BackwardEuler
@@ -59,6 +59,7 @@ from sim.integrate.symplectic import Symplectic
 from sim.material import MATERIALS, named
 from sim.mesh import Diagonals, Mesh, grid
 from sim.scene import Scene, assemble
+from sim.wind.sampled import Beyond, Even, SampledWind
 from sim.wind.spectral import VonKarman
 from tests.studies.validation import environments
 from tests.studies.validation.mujoco.cloth import Air, Method, Sheet, Wind, fly
@@ -175,15 +176,11 @@ def by_kernel(*, explicit: bool) -> dict[int, Floats]:
     times, velocity = wind()
     blowing = velocity[times >= -_SETTLE - 1e-9]
     samples = torch.as_tensor(np.stack([blowing * truth["gain"] for truth in some], axis=-1), dtype=torch.float32)
-    system = replace(system, wind=SegmentWind(period=1 / _WIND_RATE, samples=samples))
+    even = Even(start=0.0, period=1 / _WIND_RATE, count=len(samples))
+    system = replace(system, wind=SampledWind(times=even, samples=samples, beyond=Beyond.HOLD))
     integrator = Symplectic() if explicit else BackwardEuler(step=_STEP, tolerance=1e-3)
-    frames = []
-    with torch.no_grad():
-        for frame in range(round((_SETTLE + DURATION) * FILM_RATE)):
-            state = integrator.advance(system, state, 1 / FILM_RATE)
-            if frame >= round(_SETTLE * FILM_RATE):
-                frames.append(state.position.double().numpy().copy())
-    together = np.stack(frames)
+    batch = Batch(system=system, state=state, integrator=integrator, divergence=Divergence.KEEP)
+    together = batch.positions(after(_SETTLE, DURATION, FILM_RATE), FILM_RATE)
     return {truth["number"]: together[..., place] for place, truth in enumerate(some)}
 
 

@@ -33,9 +33,10 @@ from measure.calibrate.observed import Observed
 from measure.calibrate.posterior import Sight, weighed
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
-from measure.forecasting.observer import SegmentWind
+from sim.batch import Batch, Divergence, after
 from sim.integrate.implicit import BackwardEuler
 from sim.scene import assemble
+from sim.wind.sampled import Beyond, Even, SampledWind
 from sim.wind.spectral import VonKarman
 from tests.studies.validation import loop_on_films as loop
 from tests.studies.validation import weighed as large
@@ -100,16 +101,12 @@ def moved() -> Floats:
     own, some = large.mesh("kernel"), truths()
     system, state = assemble([large._scene(own, truth, damped=_STEP) for truth in some])
     samples = np.stack([wind(truth["number"]) * truth["gain"] for truth in some], axis=-1)
-    system = replace(
-        system, wind=SegmentWind(period=1 / loop._RATE, samples=torch.as_tensor(samples, dtype=torch.float32))
-    )
-    integrator, frames = BackwardEuler(step=_STEP, tolerance=1e-3), []
-    with torch.no_grad():
-        for frame in range(round((_SETTLE + loop.DURATION) * large.FILM_RATE)):
-            state = integrator.advance(system, state, 1 / large.FILM_RATE)
-            if frame >= round(_SETTLE * large.FILM_RATE):
-                frames.append(state.position.double().numpy().copy())
-    return np.moveaxis(np.stack(frames), -1, 0)
+    even = Even(start=0.0, period=1 / loop._RATE, count=len(samples))
+    blowing = SampledWind(times=even, samples=torch.as_tensor(samples, dtype=torch.float32), beyond=Beyond.HOLD)
+    method = BackwardEuler(step=_STEP, tolerance=1e-3)
+    batch = Batch(system=replace(system, wind=blowing), state=state, integrator=method, divergence=Divergence.KEEP)
+    frames = batch.positions(after(_SETTLE, loop.DURATION, large.FILM_RATE), large.FILM_RATE)
+    return np.moveaxis(frames, -1, 0)
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:

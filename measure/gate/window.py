@@ -1,24 +1,31 @@
-"""The verdict on a clip: familiar or refused, with a p and the reasons in words."""
+"""Gates of windows: whether one clip is like those of the training, with a p and the reasons in words.
+
+Two gates answer the same question: the distance of the network's summary, and the calibrated checks of
+`measure.gate.gate`, all of them together.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
 from measure.gate.blank import blank
 from measure.gate.checks import CHECKS
+from measure.gate.counted import COUNTED
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.features import features_of
 from measure.gate.gate import SCORES, Gate, Vector
 from measure.gate.motion import LEAST_AREA
 from measure.gate.reasons import REASONS
 from measure.gate.tail_probability import level
+from measure.gate.verdict import Reason
 from models.estimator import Estimator
+from models.outliers import Familiarity
 
 FALSE_ALARM = 0.05
 """Share of clips like the simulated ones that may be refused."""
@@ -31,29 +38,100 @@ _LIKENESS = 0.5
 clips, of the training side, where 1 called still pictures repeated and 0 called dark ones still."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Cause:
-    """One reason for a refusal.
+class WindowGate(Protocol):
+    """Looks at one window at a time."""
+
+    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
+        """What was found of a window, strange or not; at least one reason.
+
+        Where there are several, the first speaks for all: its p holds for the checks together.
+
+        Args:
+            frames: (n, height, width) gray, at the model's rate.
+            summary: (dimension,) what the model's first network made of them.
+        """
+        ...
+
+    def level(self, false_alarm: float) -> float:
+        """p at or below which a window is strange, so that this happens to familiar ones at most so often.
+
+        The rate itself where p-values are exact; less where the clips that they were calibrated by are few and the rate
+        is to hold for most draws of these.
+
+        Raises:
+            InputError: too few of these for such a rate: no window would be strange.
+        """
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FamiliarityGate:
+    """The distance of a window's summary to those of the training clips; see `models.outliers`."""
+
+    cloud: Familiarity
+
+    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
+        nothing = blank(frames)
+        if nothing is not None:
+            return [nothing.of(1 / (len(self.cloud.reference) + 1))]
+        distance = float(self.cloud.distance(summary[None])[0])
+        p = float(self.cloud.p_value(summary[None])[0])
+        usual = float(np.median(self.cloud.reference))
+        what = (
+            f"its summary is {distance:.1f} standard deviations from the training clips, usual are {usual:.1f}; "
+            f"p = {p:.3f} among {len(self.cloud.reference)} validation clips"
+        )
+        return [Reason(kind="unlike-training", what=what, p=p)]
+
+    def level(self, false_alarm: float) -> float:
+        self.cloud.threshold(false_alarm)  # checks that the clips suffice for this rate
+        return false_alarm
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CheckedGate:
+    """A gate that was calibrated for a model, all of its checks together.
 
     Attributes:
-        kind: of `measure.gate.reasons`.
-        sentence: what is wrong, with the figure and its usual range.
-        figure: these two alone.
-        fix: what can be done.
-        check: the score that shows it.
-        value: its figure, in the unit that the sentence names; None where none could be measured.
-        p: conformal p of the clip by this score alone, at the scale of all.
-        blank: whether there is nothing to measure in the clip.
+        model: whose training windows are compared with.
+        calibrated: its checks, by clips that the model was not trained on.
+        false_alarm: rate at which reasons are given.
     """
 
-    kind: str
-    sentence: str
-    figure: str = ""
-    fix: str
-    check: str
-    value: float | None
-    p: float
-    blank: bool = False
+    model: Estimator
+    calibrated: Gate
+    false_alarm: float
+
+    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
+        """As `WindowGate`. Of a statistic it says that the window is unlike the training clips, and in which figure:
+        faults such as a moving camera are counted in the film (`measure.gate.counted`), and are stated from there."""
+        judged = judge(
+            frames, self.model, self.calibrated, false_alarm=self.false_alarm, summary=summary, without=COUNTED
+        )
+        if not judged.reasons:
+            return [
+                Reason(kind="familiar", what=f"no check is unusual, p = {judged.p:.3f} over all checks", p=judged.p)
+            ]
+        # The first speaks for all checks together.
+        return [one.of(one.p if place else judged.p) for place, one in enumerate(judged.reasons)]
+
+    def level(self, false_alarm: float) -> float:
+        return level(len(self.calibrated.calibration), false_alarm, CONFIDENCE)
+
+
+def gate_of(model: Estimator) -> WindowGate:
+    """The gate that belongs to a model.
+
+    Raises:
+        InputError: the model does not know its training clips.
+    """
+    if model.cloud is None:
+        raise InputError(
+            "the network has no data on its training clips, so it cannot be checked whether it applies to this film",
+            where=f"model {model.name!r}",
+            fix="ship it, in a checkout of flagdata: python -m tests.studies shipping stores its training clips",
+        )
+    return FamiliarityGate(cloud=model.cloud)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,42 +142,13 @@ class Judgement:
         familiar: whether intervals may be shown.
         p: conformal p over all checks together: of so many clips like the simulated ones, one looks at least as odd.
         level: p at or below which a clip is refused.
-        false_alarm, confidence: what is kept by that level.
         reasons: why it is refused, the weightiest first; none for a familiar clip.
     """
 
     familiar: bool
     p: float
     level: float
-    false_alarm: float
-    confidence: float
-    reasons: tuple[Cause, ...]
-
-    @property
-    def sentence(self) -> str:
-        """The verdict as one sentence."""
-        rate = f"p = {self.p:.2g}, refused from {self.level:.2g}: at most {self.false_alarm:.0%} false alarms"
-        if self.familiar:
-            return f"The clip is like those that the network was trained on ({rate})."
-        return f"The clip is unlike those that the network was trained on ({rate}): {self.reasons[0].sentence}."
-
-    def findings(self) -> tuple[Finding, ...]:
-        """The reasons as findings."""
-        return tuple(
-            Finding(kind=f"gate-{one.kind}", severity=Severity.ERROR, what=one.sentence, value=one.value, fix=one.fix)
-            for one in self.reasons
-        )
-
-    def as_dict(self) -> dict[str, object]:
-        """As JSON."""
-        return {
-            "familiar": self.familiar,
-            "p": self.p,
-            "level": self.level,
-            "false_alarm": self.false_alarm,
-            "confidence": self.confidence,
-            "reasons": [vars(one) for one in self.reasons],
-        }
+    reasons: tuple[Reason, ...]
 
 
 def judge(
@@ -137,24 +186,9 @@ def judge(
         )
     least = 1 / (len(gate.calibration) + 1)
 
-    def refused(cause: Cause) -> Judgement:
-        return Judgement(
-            familiar=False,
-            p=least,
-            level=at,
-            false_alarm=false_alarm,
-            confidence=confidence,
-            reasons=(cause,),
-        )
-
-    if len(frames) < wanted:
-        reason = REASONS["too-few-frames"]
-        what = f"{reason.sentence}: {len(frames)} instead of {wanted}"
-        cause = Cause(kind="too-few-frames", sentence=what, fix=reason.fix, check="frames", value=len(frames), p=least)
-        return refused(cause)
-    nothing = blank(frames)
+    nothing = _too_few(len(frames), wanted) if len(frames) < wanted else blank(frames)
     if nothing is not None:
-        return refused(Cause(**vars(nothing), p=least, blank=True))
+        return Judgement(familiar=False, p=least, level=at, reasons=(replace(nothing, p=least),))
     found = features_of(model, frames, summary)
     vector = found.vector(model)
     scores, surprises = gate.scores(vector[None])[0], gate.surprises(vector[None])[0]
@@ -162,17 +196,16 @@ def judge(
     p = gate.p_value(float(surprises.max()))
     still = found.checks[_AREA] <= np.log10(LEAST_AREA)
     reasons = () if p > at else _reasons(gate, scores, surprises, at, still=bool(still))
-    return Judgement(
-        familiar=p > at,
-        p=p,
-        level=at,
-        false_alarm=false_alarm,
-        confidence=confidence,
-        reasons=reasons,
-    )
+    return Judgement(familiar=p > at, p=p, level=at, reasons=reasons)
 
 
-def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float, *, still: bool) -> tuple[Cause, ...]:
+def _too_few(count: int, wanted: int) -> Reason:
+    row = REASONS["too-few-frames"]
+    what = f"{row.sentence}: {count} instead of {wanted}"
+    return Reason(kind="too-few-frames", what=what, p=None, fix=row.fix, check="frames", value=count)
+
+
+def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float, *, still: bool) -> tuple[Reason, ...]:
     """Each kind once, of those whose scores would refuse the clip alone. Of a still clip none is about what moves.
 
     A fault shows in many scores. The kinds are in the order of two voices: the surprise of the kind's weightiest score
@@ -198,13 +231,13 @@ def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float, *, still:
         weightiest, key=lambda kind: -surprises[weightiest[kind]] / most - _LIKENESS * ratios[kind] / likeliest
     )
     return tuple(
-        _cause(gate, place, float(scores[place]), gate.p_value(float(surprises[place])))
+        _reason(gate, place, float(scores[place]), gate.p_value(float(surprises[place])))
         for place in (pictured.get(kind, weightiest[kind]) for kind in order)
     )
 
 
-def _cause(gate: Gate, place: int, value: float, p: float) -> Cause:
-    score, reason = SCORES[place], REASONS[SCORES[place].reason]
+def _reason(gate: Gate, place: int, value: float, p: float) -> Reason:
+    score, row = SCORES[place], REASONS[SCORES[place].reason]
     check = CHECKS.get(score.name)
     if check is None:
         shown, limit = value, gate.tails.start[place] + np.log(20) * gate.tails.excess[place]
@@ -215,12 +248,12 @@ def _cause(gate: Gate, place: int, value: float, p: float) -> Cause:
         low, high = (check.shown(float(end)) for end in np.quantile(column, _USUAL))
         usual = f"normal from {low:.3g} to {high:.3g}, as 98 % of the simulated clips"
     figure = f"{score.what}: {shown:.3g}; {usual}"
-    return Cause(
+    return Reason(
         kind=score.reason,
-        sentence=f"{reason.sentence} ({figure})",
-        figure=figure,
-        fix=reason.fix,
-        check=score.name,
-        value=shown,
+        what=f"{row.sentence} ({figure})",
         p=p,
+        fix=row.fix,
+        value=shown,
+        figure=figure,
+        check=score.name,
     )

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from flagdata.checksums import write_sums
 from flagdata.errors import CorruptError, InputError, NotFoundError
-from measure.estimate.checked import CheckedGate
-from measure.estimate.gate import verdict
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.gate import Gate
-from measure.gate.judgement import judge
 from measure.gate.reasons import REASONS
 from measure.gate.storage import read, write
+from measure.gate.verdict import verdict
+from measure.gate.window import CheckedGate, judge
 from models.estimator import Estimator
 from tests.measure.gate.made import film, small_model
 from tests.studies.gate import calibrated
@@ -67,11 +66,10 @@ def test_a_fault_is_refused_and_named(model: Estimator, gate: Gate, fault: str, 
     judged = judge(frames, model, gate)
     assert not judged.familiar
     assert kind in {one.kind for one in judged.reasons}
-    assert judged.reasons[0].sentence in judged.sentence
     assert len({one.kind for one in judged.reasons}) == len(judged.reasons)
     assert all(one.p <= judged.level for one in judged.reasons)
     assert not next(one for one in judged.reasons if one.kind == kind).check.startswith("like-")
-    assert all(finding.fix and finding.kind.startswith("gate-") for finding in judged.findings())
+    assert all(one.fix and one.figure in one.what and one.value is not None for one in judged.reasons)
 
 
 def test_kinds_that_are_left_out_refuse_nothing_and_make_no_other_kind_more_suspicious(
@@ -95,14 +93,14 @@ def test_where_nothing_moves_no_reason_is_about_what_moves(model: Estimator, gat
     assert not {"scale", "cut-off", "several-flags", "unlike-cloth"} & set(kinds)
     without = judge(np.repeat(still[:1], 12, axis=0), model, gate)
     assert [one.kind for one in without.reasons] == ["no-motion"]
-    assert "no motion is found in the picture" in without.sentence
+    assert "no motion is found in the picture" in without.reasons[0].what
     assert without.reasons[0].blank
 
 
 def test_too_few_frames_and_a_black_film_are_refused_before_anything_is_measured(model: Estimator, gate: Gate) -> None:
     short = judge(clip(1)[:10], model, gate)
     assert [one.kind for one in short.reasons] == ["too-few-frames"]
-    assert "10 instead of 12" in short.sentence
+    assert "10 instead of 12" in short.reasons[0].what
     black = judge(np.zeros((12, 64, 64), dtype=np.uint8), model, gate)
     assert [one.kind for one in black.reasons] == ["too-dark"]
     assert black.p == pytest.approx(1 / (VALIDATION + 1))

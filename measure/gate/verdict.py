@@ -18,17 +18,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding
-from measure.gate.blank import blank
 from measure.gate.several import refusing, window_rate
-from models.estimator import Estimator
-from models.outliers import Familiarity
 
 GIVE_SIZE = "give --flag-size, the length along the wind times the height along the pole in metres, as in 1.5x1.0"
 
@@ -43,7 +40,9 @@ class Reason:
         p: probability that a familiar clip is at least as strange; None of what was counted.
         fix: what the user can do about it.
         blank: whether there is nothing to measure in the window, so that no number is given of it in any case.
-        value: the figure of what was counted.
+        value: the figure in the sentence, in its unit; None where there is none.
+        figure: the figure with its name and its usual range, without what it may mean.
+        check: the score that shows it; empty for what was counted in the film.
     """
 
     kind: str
@@ -52,81 +51,23 @@ class Reason:
     fix: str = "crop to the flag by --crop, give another film, or look at it with --anyway"
     blank: bool = False
     value: float | None = None
+    figure: str = ""
+    check: str = ""
 
     @classmethod
     def counted(cls, fault: Finding) -> Reason:
         """A fault of the film."""
         return cls(kind=fault.kind, what=fault.what, p=None, fix=fault.fix or cls.fix, value=fault.value)
 
+    def of(self, p: float | None) -> Reason:
+        """Returns what a recording's verdict states of it: of a statistic that the window is unlike, by its figure."""
+        if self.blank or not self.figure:
+            return Reason(kind=self.kind, what=self.what, p=p, fix=self.fix, blank=self.blank)
+        return Reason(kind="unlike-training", what=self.figure, p=p)
+
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
         return {"kind": self.kind, "what": self.what, "p": self.p, "value": self.value, "fix": self.fix}
-
-
-class Gate(Protocol):
-    """Looks at one window at a time."""
-
-    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
-        """What was found of a window, strange or not; at least one reason.
-
-        Where there are several, the first speaks for all: its p holds for the checks together.
-
-        Args:
-            frames: (n, height, width) gray, at the model's rate.
-            summary: (dimension,) what the model's first network made of them.
-        """
-        ...
-
-    def level(self, false_alarm: float) -> float:
-        """p at or below which a window is strange, so that this happens to familiar ones at most so often.
-
-        The rate itself where p-values are exact; less where the clips that they were calibrated by are few and the rate
-        is to hold for most draws of these.
-
-        Raises:
-            InputError: too few of these for such a rate: no window would be strange.
-        """
-        ...
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FamiliarityGate:
-    """The distance of a window's summary to those of the training clips; see `models.outliers`."""
-
-    cloud: Familiarity
-
-    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
-        nothing = blank(frames)
-        if nothing is not None:
-            least = 1 / (len(self.cloud.reference) + 1)
-            return [Reason(kind=nothing.kind, what=nothing.sentence, p=least, fix=nothing.fix, blank=True)]
-        distance = float(self.cloud.distance(summary[None])[0])
-        p = float(self.cloud.p_value(summary[None])[0])
-        usual = float(np.median(self.cloud.reference))
-        what = (
-            f"its summary is {distance:.1f} standard deviations from the training clips, usual are {usual:.1f}; "
-            f"p = {p:.3f} among {len(self.cloud.reference)} validation clips"
-        )
-        return [Reason(kind="unlike-training", what=what, p=p)]
-
-    def level(self, false_alarm: float) -> float:
-        self.cloud.threshold(false_alarm)  # checks that the clips suffice for this rate
-        return false_alarm
-
-
-def gate_of(model: Estimator) -> Gate:
-    """The gate that belongs to a model.
-
-    Raises:
-        InputError: the model does not know its training clips.
-    """
-    if model.cloud is None:
-        raise InputError(
-            "the network has no data on its training clips, so it cannot be checked whether it applies to this film",
-            where=f"model {model.name!r}",
-            fix="ship it, in a checkout of flagdata: python -m tests.studies shipping stores its training clips",
-        )
-    return FamiliarityGate(cloud=model.cloud)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,7 +182,8 @@ def verdict(
     Args:
         windows: the reasons of each window, for each size of flag considered; the first of each has a p-value.
         false_alarm: between 0 and 1.
-        level: p at or below which a window is strange, of the rate at which familiar windows may be; see `Gate.level`.
+        level: p at or below which a window is strange, of the rate at which familiar windows may be; see
+            `measure.gate.window`.
         faults: of the film, the weightiest first.
 
     Raises:
