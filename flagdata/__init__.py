@@ -14,11 +14,15 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from flagdata.installed_names import step_aside
+
 if TYPE_CHECKING:
     from flagdata.api.lakes import open, pairs, query  # noqa: A004  read as flagdata.open
     from flagdata.api.physics import calibrate, close_loop, measure, render, simulate
     from flagdata.api.recordings import frames, meshes, motion, wind
     from flagdata.examples import example
+
+step_aside()
 
 __all__ = [
     "calibrate",

@@ -2,8 +2,10 @@
 
 In a checkout `sim`, `models`, `measure` and `catalogs` lie beside `flagdata` and are imported so. In a wheel they are
 `flagdata._packages.sim` and so on: `BuildPackages` moves them there and renames them in import statements, and in texts
-that name one of their modules, as tables of lazily imported attributes do. A checkout that is installed to be edited
-stays as it is.
+that name one of their modules, as tables of lazily imported attributes do.
+
+A checkout, also one that is installed to be edited, keeps the short names unless a file of the user has one of them:
+`step_aside` then loads each module by the name that it has in a wheel, renamed as it is read.
 
 The building of a wheel loads this file by itself, so it imports nothing of flagdata.
 """
@@ -13,17 +15,19 @@ from __future__ import annotations
 import ast
 import re
 import shutil
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Sequence
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import decode_source, find_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     BuildPy: Any = object
+elif "setuptools" in sys.modules:  # which builds a wheel
+    from setuptools.command.build_py import build_py as BuildPy  # noqa: N812
 else:
-    try:
-        from setuptools.command.build_py import build_py as BuildPy  # noqa: N812
-    except ModuleNotFoundError:  # where it is installed and nothing is built
-        BuildPy = object
+    BuildPy = object
 
 BESIDE = ("catalogs", "measure", "models", "sim")
 """Packages that are beside flagdata in a checkout."""
@@ -31,12 +35,70 @@ FOLDER = "_packages"
 PREFIX = f"flagdata.{FOLDER}."
 _ABOUT = '"""The packages that lie beside flagdata in a checkout."""\n'
 _HERE = Path(__file__).parent
+_ROOT = _HERE.parent
 _NAME = re.compile(rf"(?P<module>(?:{'|'.join(BESIDE)})(?:\.\w+)*)(?::\w+)?")
 
 
-def installed() -> bool:
-    """Whether this is an installation, not a checkout."""
-    return (_HERE / FOLDER).is_dir()
+def renaming() -> bool:
+    """Returns whether the packages are imported as `flagdata._packages.sim` and so on, not as `sim`."""
+    return (_HERE / FOLDER).is_dir() or any(isinstance(finder, _Finder) for finder in sys.meta_path)
+
+
+def step_aside() -> None:
+    """Gives a checkout the names of an installation, if a file or folder of the user is imported in place of a package.
+
+    `import flagdata` calls it before any other module is loaded. A wheel has those names already.
+    """
+    if not renaming() and not all(map(_is_free, BESIDE)):
+        sys.meta_path.insert(0, _Finder())
+
+
+def _is_free(name: str) -> bool:
+    """Returns whether importing a package's name leads to this checkout's package, or to nothing yet."""
+    try:
+        spec = find_spec(name)
+    except ValueError:  # imported already, from no file
+        return False
+    if spec is None:
+        return True
+    return spec.origin is not None and Path(spec.origin).resolve() == (_ROOT / name / "__init__.py").resolve()
+
+
+class _Finder:
+    """Finds the modules of a checkout by their names in an installation."""
+
+    def find_spec(self, name: str, path: Sequence[str] | None, target: object = None) -> ModuleSpec | None:
+        """Returns what loads a module of flagdata or of the packages beside it; None for any other."""
+        top, *parts = name.split(".")
+        if top != "flagdata" or not parts:
+            return None
+        if parts == [FOLDER]:
+            spec = ModuleSpec(name, None, is_package=True)
+            spec.submodule_search_locations = []
+            return spec
+        place = _ROOT.joinpath(*parts[1:]) if parts[0] == FOLDER else _HERE.joinpath(*parts)
+        package = place / "__init__.py"
+        file, folders = (package, [str(place)]) if package.is_file() else (place.with_suffix(".py"), None)
+        if not file.is_file():
+            return None
+        loader = _Loader(name, str(file))
+        return spec_from_file_location(name, file, loader=loader, submodule_search_locations=folders)
+
+
+class _Loader(SourceFileLoader):
+    """Loads a module of a checkout with the names of an installation in its source."""
+
+    def source_to_code(self, data: Any, path: Any, *, _optimize: int = -1) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Returns the code of the renamed source."""
+        return compile(renamed(decode_source(data), _ROOT), path, "exec", dont_inherit=True, optimize=_optimize)
+
+    def path_stats(self, path: Any) -> Any:
+        """Refuses to date the source, so that no byte code is read or kept: what is kept has the short names.
+
+        Raises:
+            OSError: always, which the import system takes for a source without a date.
+        """
+        raise OSError(path)
 
 
 def renamed(source: str, root: Path) -> str:

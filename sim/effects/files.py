@@ -10,7 +10,7 @@ from types import ModuleType
 from flagdata.addresses import local_path
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.files import check_input
-from flagdata.installed_names import installed, renamed
+from flagdata.installed_names import renamed, renaming
 from flagdata.plain_text import plain_text
 from flagdata.provenance import file_hash
 from sim.effects.effect import Effect
@@ -50,7 +50,7 @@ def _module(path: Path) -> object:
     sys.modules[name] = module
     try:
         source = plain_text(path.read_bytes(), noun="file of an effect", where=str(path))
-        if installed():  # the file imports sim as in a checkout
+        if renaming():  # the file imports sim as in a checkout
             source = renamed(source, path.parent)
         exec(compile(source, str(path), "exec"), vars(module))
     except Exception as error:

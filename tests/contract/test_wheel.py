@@ -128,11 +128,30 @@ class Denser(PressureEffect):
 """
 
 
-def test_a_users_own_files_of_the_packages_names_neither_break_the_wheel_nor_are_shadowed(
-    wheel: zipfile.ZipFile, tmp_path: Path
+EDITABLE = """
+import sys
+from importlib.machinery import PathFinder
+from importlib.util import spec_from_file_location
+from pathlib import Path
+class Editable:
+    def find_spec(self, name, path, target=None):
+        if name in {packages!r}:
+            return spec_from_file_location(name, Path({root!r}) / name / "__init__.py")
+sys.meta_path.insert(sys.meta_path.index(PathFinder) + 1, Editable())
+"""
+"""What an editable installation leaves behind: a finder that is asked after the folders of `sys.path`."""
+
+
+@pytest.mark.parametrize("installation", ["wheel", "checkout", "editable"])
+def test_a_users_own_files_of_the_packages_names_neither_break_an_installation_nor_are_shadowed(
+    installation: str, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
     site, home = tmp_path / "site", tmp_path / "home"
-    wheel.extractall(site)
+    if installation == "wheel":
+        request.getfixturevalue("wheel").extractall(site)
+    elif installation == "editable":
+        site.mkdir()
+        (site / "sitecustomize.py").write_text(EDITABLE.format(packages=PACKAGES, root=str(ROOT)))
     for name in ("catalogs.py", "measure.py", "sim.py", "models/__init__.py"):
         (home / name).parent.mkdir(parents=True, exist_ok=True)
         (home / name).write_text(MINE)
@@ -141,7 +160,7 @@ def test_a_users_own_files_of_the_packages_names_neither_break_the_wheel_nor_are
     done = subprocess.run(
         [sys.executable, "script.py"],
         cwd=home,
-        env={**os.environ, "PYTHONPATH": str(site)},
+        env={**os.environ, "PYTHONPATH": str(ROOT if installation == "checkout" else site)},
         capture_output=True,
         text=True,
         check=False,
@@ -149,6 +168,39 @@ def test_a_users_own_files_of_the_packages_names_neither_break_the_wheel_nor_are
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout.splitlines()[-1])
     assert found["mine"] == ["mine"] * 4
-    assert Path(found["from"]).is_relative_to(site)
+    assert Path(found["from"]).is_relative_to(site if installation == "wheel" else ROOT)
     assert (found["frames"], found["film"], found["kind"], found["code"]) == (2, 2, "bad-input", 0)
     assert found["own"] == ["change"]
+
+
+def test_a_script_and_a_folder_of_weights_may_have_the_name_of_a_package_of_an_editable_installation(
+    tmp_path: Path,
+) -> None:
+    """An import of its name would find the script itself, and a folder that holds no module hides a package."""
+    site, home = tmp_path / "site", tmp_path / "home"
+    site.mkdir()
+    (site / "sitecustomize.py").write_text(EDITABLE.format(packages=PACKAGES, root=str(ROOT)))
+    (home / "models").mkdir(parents=True)
+    (home / "sim.py").write_text("from flagdata.cli import main\nmain(['catalog', 'models'])\n")
+    done = subprocess.run(
+        [sys.executable, "sim.py"],
+        cwd=home,
+        env={**os.environ, "PYTHONPATH": str(site)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, "flow-outdoor" in done.stdout) == (0, True), done.stderr
+
+
+def test_a_checkout_keeps_its_names_where_no_file_of_a_user_has_one(tmp_path: Path) -> None:
+    code = "import sys, flagdata, sim.effects; print('flagdata._packages' in sys.modules, sim.effects.__name__)"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["False", "sim.effects"]
