@@ -50,9 +50,14 @@ class Range:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low <= self.high):
-            raise InputError(f"a range from {self.low!r} to {self.high!r}", fix="give finite bounds, low ≤ high")
+            raise InputError(
+                f"the range from {self.low!r} to {self.high!r} is empty or infinite",
+                fix="give finite bounds, low ≤ high",
+            )
         if self.scale is Scale.LOG and self.low <= 0:
-            raise InputError(f"a logarithmic range from {self.low!r}", fix="let it begin above 0, or take it linear")
+            raise InputError(
+                f"a logarithmic range cannot begin at {self.low!r}", fix="let it begin above 0, or take it linear"
+            )
 
     def at(self, share: float) -> float:
         """The value that a share (0 to 1) of the range lies below."""
@@ -148,7 +153,7 @@ def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:
         if entry.name not in values and _is_table(types[key]):
             values[entry.name] = value(types[key], {}, key=key, where=where)
         if str(values.get(entry.name, "")).strip() == "":
-            raise InputError(f"no {key} is given", where=where, fix=f"add {key} = …")
+            raise InputError(f"the key {key} is missing", where=where, fix=f"add {key} = …")
     try:
         return kind(**values)
     except InputError as error:
