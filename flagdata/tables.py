@@ -11,6 +11,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from enum import EnumMeta, StrEnum
+from functools import cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -143,7 +144,7 @@ def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:
         InputError: a value that does not fit its type, or none for a field without a default.
         LimitError: a whole number above its bound.
     """
-    hints = get_type_hints(kind, include_extras=True)
+    hints = _hints(kind)
     keys = {entry.name.replace("_", "-"): entry for entry in fields(kind)}  # pyright: ignore[reportArgumentType]
     types = {key: Any if entry.name in computed else hints[entry.name] for key, entry in keys.items()}
     values = {keys[key].name: entry for key, entry in entries(types, content, where=where).items()} | computed
@@ -158,6 +159,11 @@ def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:
         return kind(**values)
     except InputError as error:
         raise type(error)(error.what, where=error.where or where, fix=error.fix) from None
+
+
+@cache
+def _hints(kind: type) -> Mapping[str, Any]:
+    return get_type_hints(kind, include_extras=True)
 
 
 def entries(types: Mapping[str, Any], content: Any, *, where: str) -> dict[str, Any]:
@@ -206,9 +212,9 @@ def value(kind: Any, given: Any, *, key: str, where: str) -> Any:
         return _quantity(bare, notes, given, key=key, where=where)
     if _is_table(bare):
         return _table(bare, given, where=f"{where} [{key}]")
-    if _Mark.SPELLED in notes and isinstance(given, list):
+    if _Mark.SPELLED in notes and isinstance(given, list | tuple):
         return tuple(str(item).strip() for item in given)
-    if origin is tuple and inner[-1] is ... and isinstance(given, list):
+    if origin is tuple and inner[-1] is ... and isinstance(given, list | tuple):
         item, marks = _stripped(inner[0])
         if _is_table(item):
             return tuple(_table(item, each, where=f"{where} [[{key}]] {n}") for n, each in enumerate(given, start=1))
@@ -263,11 +269,9 @@ def _converted(bare: Any, notes: list[Any], given: Any, *, key: str, where: str)
     for bound in bounds:
         kind = Annotated[kind, bound]
     try:
-        made = msgspec.convert(given, kind)
+        made = msgspec.convert(_exact(given), kind)
     except msgspec.ValidationError:
-        made = None
-    if made is None or not _finite(made):
-        raise _refusal(bare, bounds, given, key=key, where=where)
+        raise _refusal(bare, bounds, given, key=key, where=where) from None
     if _Mark.ANGLE in notes and abs(made) > _TURN:
         raise InputError(
             f"{key} is {made:.4g} rad, more than a whole turn",
@@ -326,10 +330,17 @@ def _stripped(kind: Any) -> tuple[Any, list[Any]]:
             return kind, notes
 
 
-def _finite(made: Any) -> bool:
-    if isinstance(made, tuple):
-        return all(map(_finite, made))
-    return not isinstance(made, float) or math.isfinite(made)
+def _exact(given: Any) -> Any:
+    """Returns a value with floats for their subclasses, such as NumPy's, which msgspec refuses.
+
+    Raises:
+        msgspec.ValidationError: a number that is not finite.
+    """
+    if isinstance(given, float) and not math.isfinite(given):
+        raise msgspec.ValidationError(given)
+    if isinstance(given, list | tuple):
+        return [_exact(item) for item in given]
+    return float(given) if isinstance(given, float) else given
 
 
 def _excerpt(given: Any) -> str:

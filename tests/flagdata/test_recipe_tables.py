@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Literal
 
+import numpy as np
 import pytest
 from msgspec import Meta
 
@@ -61,7 +62,7 @@ def test_what_no_key_states_is_the_classes_default() -> None:
 
 def test_every_type_of_field_is_read() -> None:
     content = {
-        "frame-rate": 50,
+        "frame-rate": np.float64(50),
         "count": 7,
         "open": True,
         "kind": "large",
