@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from flagdata.schema import CHANNELS
+from flagdata.tables import NotNegative
 
 Instants: TypeAlias = NDArray[np.int64]
 Series: TypeAlias = NDArray[np.float64]
@@ -32,13 +33,13 @@ class Sensor:
     """
 
     name: str
-    height: float | None = None
-    distance_constant: float | None = None
-    averaging: float | None = None
-    threshold: float | None = None
-    resolution: float | None = None
-    accuracy: float | None = None
-    accuracy_relative: float | None = None
+    height: NotNegative | None = None
+    distance_constant: NotNegative | None = None
+    averaging: NotNegative | None = None
+    threshold: NotNegative | None = None
+    resolution: NotNegative | None = None
+    accuracy: NotNegative | None = None
+    accuracy_relative: NotNegative | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

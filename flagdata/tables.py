@@ -1,17 +1,25 @@
-"""Typed values out of parsed TOML tables, where every key must be known, and ranges that values are drawn from."""
+"""Parsed TOML as typed values, read by msgspec, and ranges that values are drawn from.
+
+A recipe is a dataclass whose fields are the keys of a table. The type of a field says what its key may hold: a number
+within bounds, one of some names, a list, a table inside. Unknown keys are refused before any value is looked at, and
+the nearest is named.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import MISSING, dataclass, fields
-from enum import StrEnum
-from types import NoneType
-from typing import Any, Literal, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
+from collections.abc import Collection, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from enum import EnumMeta, StrEnum
+from functools import cache
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+from msgspec import Meta
 
 from flagdata.errors import InputError, LimitError, UnknownNameError
 
-E = TypeVar("E", bound=StrEnum)
 R = TypeVar("R")
 WHOLE_LIMIT = 1_000_000
 """Most of anything that a recipe counts, where no other limit is named."""
@@ -62,18 +70,41 @@ class Range:
         return {"low": self.low, "high": self.high, "scale": self.scale.value}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Bounds:
-    """Where a number may lie: at least `least`, above `above`, at most `most`."""
-
-    least: float = -math.inf
-    above: float = -math.inf
-    most: float = math.inf
-
-
-POSITIVE, NOT_NEGATIVE, COUNT = Bounds(above=0.0), Bounds(least=0.0), Bounds(least=1)
 Quantity: TypeAlias = float | Range
 """One value for all members, or a range that each draws its own from."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """Marks a text, in `Annotated`, that is one of the known names.
+
+    Attributes:
+        noun: what one is called in error messages.
+    """
+
+    noun: str
+    known: Collection[str]
+
+
+class _Mark(StrEnum):
+    ANGLE = "angle"
+    SPELLED = "spelled"
+
+
+POSITIVE, NOT_NEGATIVE = Meta(gt=0.0), Meta(ge=0.0)
+Positive: TypeAlias = Annotated[float, POSITIVE]
+NotNegative: TypeAlias = Annotated[float, NOT_NEGATIVE]
+PositiveQuantity: TypeAlias = Annotated[Quantity, POSITIVE]
+NotNegativeQuantity: TypeAlias = Annotated[Quantity, NOT_NEGATIVE]
+Whole: TypeAlias = Annotated[int, Meta(ge=0, le=WHOLE_LIMIT)]
+Count: TypeAlias = Annotated[int, Meta(ge=1, le=WHOLE_LIMIT)]
+Seed: TypeAlias = Annotated[int, Meta(ge=0, le=SEED_LIMIT)]
+Index: TypeAlias = Annotated[int, Meta(ge=0)]
+Angle: TypeAlias = Annotated[float, _Mark.ANGLE]
+"""[rad], under its key; or in degrees, under the key with `DEGREES` behind it. A whole turn at most."""
+AngleQuantity: TypeAlias = Annotated[Quantity, _Mark.ANGLE]
+Spelled: TypeAlias = Annotated[tuple[str, ...], _Mark.SPELLED]
+"""Texts, or values that are taken as they are spelled."""
 
 
 def ends(quantity: Quantity) -> tuple[float, float]:
@@ -93,289 +124,231 @@ def plain(quantity: Quantity | None) -> Any:
     return quantity.as_dict() if isinstance(quantity, Range) else quantity
 
 
-class Table:
-    """A TOML table that is read key by key; `done` refuses what nobody asked for."""
-
-    def __init__(self, content: Any, *, where: str) -> None:
-        if not isinstance(content, Mapping):
-            raise InputError(f"{_shown(content)} is not a table", where=where, fix="write it as [table] with keys")
-        self._content = content
-        self._asked: set[str] = set()
-        self.where = where
-
-    def __contains__(self, key: str) -> bool:
-        self._asked.add(key)
-        return key in self._content
-
-    def names(self) -> list[str]:
-        """Its keys."""
-        return list(self._content)
-
-    def done(self) -> None:
-        """Make sure that every key was asked for.
-
-        Raises:
-            UnknownNameError: one was not; the nearest that was is suggested.
-        """
-        for key in self._content:
-            if key not in self._asked:
-                raise UnknownNameError.of("key", key, self._asked, where=self.where)
-
-    def only(self, *keys: str) -> None:
-        """Refuse other keys before any value is looked at; raises as `done`."""
-        self._asked |= set(keys)
-        self.done()
-
-    def table(self, key: str) -> Table:
-        """A table inside; an empty one if it is not there."""
-        self._asked.add(key)
-        return Table(self._content.get(key, {}), where=f"{self.where} [{key}]")
-
-    def record(self, kind: type[R], read: Mapping[str, Callable[[], Any]] | None = None, /, **bounds: Bounds) -> R:
-        """A dataclass whose fields are the keys of this table in kebab-case; other keys are refused before all else.
-
-        A field is read by its type: float, int, bool, str, a Literal, a StrEnum, `Quantity`, `Range`,
-        tuple[float, ...] or tuple[str, ...], each also with None. The class states what a key that is not there
-        stands for; a text without that may not be blank.
-
-        Args:
-            read: field → what gives its value by rules of its own, whether its key is there or not.
-            bounds: of numbers, by the field's name; whole numbers are from 0 to `WHOLE_LIMIT` in any case.
-
-        Raises:
-            UnknownNameError: a key or a choice that is not known; the nearest is suggested.
-            InputError: a value that does not fit, or none for a field without a default.
-            LimitError: a whole number above its bound.
-        """
-        hints, values = get_type_hints(kind), {}
-        entries = {entry.name.replace("_", "-"): entry for entry in fields(kind)}  # pyright: ignore[reportArgumentType]
-        self.only(*entries)
-        for key, entry in entries.items():
-            needed = entry.default is MISSING and entry.default_factory is MISSING
-            if entry.name in (read or {}):
-                values[entry.name] = (read or {})[entry.name]()
-            elif key in self._content:
-                values[entry.name] = self._of_type(key, hints[entry.name], bounds.get(entry.name))
-            if needed and str(values.get(entry.name, "")).strip() == "":
-                raise InputError(f"the key {key} is missing", where=self.where, fix=f"add {key} = …")
-        return kind(**values)
-
-    def _of_type(self, key: str, hint: Any, bounds: Bounds | None) -> Any:
-        """The value of a key as a field of that type."""
-        kinds = {hint} if get_origin(hint) in (None, tuple, Literal) else set(get_args(hint)) - {NoneType}
-        within = vars(bounds or Bounds())
-        if kinds == {float, Range}:
-            return self.quantity(key, math.nan, **within)
-        (kind,) = kinds
-        readers: dict[Any, Callable[[], Any]] = {
-            Range: lambda: self.range(key, math.nan, **within),
-            float: lambda: self.number(key, math.nan, **within),
-            int: lambda: self.whole(
-                key, 0, least=int(max(within["least"], 0)), most=int(min(within["most"], WHOLE_LIMIT))
-            ),
-            bool: lambda: self.flag(key),
-            str: lambda: self.text(key, None),
-            tuple[str, ...]: lambda: self.texts(key),
-            tuple[float, ...]: lambda: self.numbers(key),
-        }
-        if kind in readers:
-            return readers[kind]()
-        return self.text(key, None) if get_origin(kind) is Literal else self.choice(key, next(iter(kind)))
-
-    def named(self, key: str, default: str, known: Collection[str], *, noun: str) -> str:
-        """One of the known names.
-
-        Raises:
-            UnknownNameError: another; the nearest is suggested.
-        """
-        name = self.text(key, default)
-        if name not in known:
-            raise UnknownNameError.of(noun, str(name), known, where=self.where)
-        return str(name)
-
-    def says(self, key: str, word: str) -> bool:
-        """Whether the value is this text."""
-        return self._take(key, None) == word
-
-    def number(
-        self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf, most: float = math.inf
-    ) -> float:
-        value = self._take(key, default)
-        if not _finite(value):
-            raise self._wrong(key, value, "a finite number")
-        self._bound(key, float(value), least=least, above=above, most=most)
-        return float(value)
-
-    def whole(self, key: str, default: int, *, least: int, most: int = WHOLE_LIMIT) -> int:
-        """A whole number.
-
-        Raises:
-            InputError: another value, or one below `least`.
-            LimitError: one above `most`.
-        """
-        value = self._take(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            raise self._wrong(key, value, f"a whole number of at least {least}")
-        if value > most:
-            raise LimitError(f"{key} is {_shown(value)}", where=self.where, fix=f"give at most {most}")
-        return value
-
-    def value(self, key: str) -> Any:
-        """Whatever stands there, for who checks it by rules of its own; None if it is not there."""
-        return self._take(key, None)
-
-    def text(self, key: str, default: str | None) -> str | None:
-        value = self._take(key, default)
-        if value is not None and not isinstance(value, str):
-            raise self._wrong(key, value, "text in quotes")
-        return value
-
-    def texts(self, key: str) -> tuple[str, ...]:
-        value = self._take(key, [])
-        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-            raise self._wrong(key, value, 'a list of texts, ["…", "…"]')
-        return tuple(value)
-
-    def flag(self, key: str) -> bool:
-        """A truth value; false if it is not there."""
-        value = self._take(key, False)
-        if not isinstance(value, bool):
-            raise self._wrong(key, value, "true or false")
-        return value
-
-    def numbers(self, key: str) -> tuple[float, ...]:
-        value = self._take(key, [])
-        if not isinstance(value, list) or not all(_finite(item) for item in value):
-            raise self._wrong(key, value, "a list of finite numbers")
-        return tuple(float(item) for item in value)
-
-    def points(self, key: str, size: int = 2) -> tuple[tuple[float, ...], ...]:
-        """A list of points with `size` finite coordinates; empty if it is not there."""
-        value = self._take(key, [])
-        points = isinstance(value, list) and all(isinstance(item, list) and len(item) == size for item in value)
-        if not points or not all(_finite(number) for item in value for number in item):
-            zeros = ", ".join(["0.0"] * size)
-            raise self._wrong(key, value, f"a list of points, [[{zeros}], …]")
-        return tuple(tuple(float(number) for number in item) for item in value)
-
-    def indices(self, key: str, size: int) -> tuple[tuple[int, ...], ...]:
-        """A list of groups of `size` whole numbers from 0 (of plain numbers, if it is 1); empty if it is not there."""
-        value = self._take(key, [])
-        groups = [item if isinstance(item, list) else [item] for item in value] if isinstance(value, list) else [[]]
-        if not all(len(group) == size and all(_index(number) for number in group) for group in groups):
-            raise self._wrong(key, value, f"a list of whole numbers from 0, {size} each")
-        return tuple(tuple(group) for group in groups)
-
-    def mapping(self, key: str) -> Mapping[str, Any]:
-        """The content of a table inside, for who reads it by rules of its own; empty if it is not there."""
-        value = self._take(key, {})
-        if not isinstance(value, Mapping):
-            raise self._wrong(key, value, "a table")
-        return value
-
-    def tables(self, key: str) -> tuple[Table, ...]:
-        """A list of tables inside; empty if it is not there."""
-        value = self._take(key, [])
-        if not isinstance(value, list):
-            raise self._wrong(key, value, f"tables, [[{key}]]")
-        return tuple(Table(item, where=f"{self.where} [[{key}]] {place}") for place, item in enumerate(value, start=1))
-
-    def choice(self, key: str, default: E) -> E:
-        value = self._take(key, default.value)
-        options = [option.value for option in type(default)]
-        if value not in options:
-            raise UnknownNameError.of(key, str(value), options, where=self.where)
-        return type(default)(value)
-
-    def quantity(
-        self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf, most: float = math.inf
-    ) -> Quantity:
-        """A number, or a table {low, high, scale}."""
-        value = self._take(key, default)
-        if isinstance(value, Mapping):
-            inner = Table(value, where=f"{self.where} {key}")
-            bounds = {end: inner.number(end, math.nan) for end in ("low", "high") if end in inner}
-            if len(bounds) != 2:
-                raise self._wrong(key, dict(value), "a number or { low = …, high = … }")
-            scale = inner.choice("scale", Scale.LINEAR)
-            inner.done()
-            try:
-                value = Range(low=bounds["low"], high=bounds["high"], scale=scale)
-            except InputError as error:
-                raise InputError(error.what, where=f"{self.where} {key}", fix=error.fix) from None
-            for end in ends(value):
-                self._bound(key, end, least=least, above=above, most=most)
-            return value
-        return self.number(key, default, least=least, above=above, most=most)
-
-    def range(
-        self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf, most: float = math.inf
-    ) -> Range:
-        """As `quantity`; one number is a range of no width."""
-        value = self.quantity(key, default, least=least, above=above, most=most)
-        return value if isinstance(value, Range) else Range(low=value, high=value)
-
-    def angle(self, key: str, default: float) -> Quantity:
-        """An angle [rad]: a quantity in radians under `key`, or in degrees under `key-deg`.
-
-        Raises:
-            InputError: both, or more than a whole turn, as an angle in degrees is.
-        """
-        degrees = key + DEGREES
-        if degrees not in self:
-            given = self.quantity(key, default)
-        elif key in self:
-            raise InputError(f"{key} is given twice", where=self.where, fix=f"keep {key} or {degrees}")
-        else:
-            given = in_radians(self.quantity(degrees, 0.0))
-        for end in ends(given):
-            if abs(end) > _TURN:
-                raise InputError(
-                    f"{key} is {end:.4g} rad, more than a whole turn",
-                    where=self.where,
-                    fix=f"give radians, or degrees as {degrees} = {end:.4g}",
-                )
-        return given
-
-    def one_angle(self, key: str, default: float) -> float:
-        """An `angle` that is no range.
-
-        Raises:
-            InputError: as `angle`, or a range.
-        """
-        given = self.angle(key, default)
-        if isinstance(given, Range):
-            raise self._wrong(key, given.as_dict(), "one number")
-        return given
-
-    def _take(self, key: str, default: Any) -> Any:
-        self._asked.add(key)
-        return self._content.get(key, default)
-
-    def _bound(self, key: str, value: float, *, least: float, above: float, most: float = math.inf) -> None:
-        if value < least or value <= above or value > most:
-            lower = f"at least {least:g}" if value < least else f"above {above:g}"
-            raise self._wrong(key, value, f"a number of at most {most:g}" if value > most else f"a number {lower}")
-
-    def _wrong(self, key: str, value: Any, wanted: str) -> InputError:
-        return InputError(f"{key} is {_shown(value)}", where=self.where, fix=f"give {wanted}")
+def within(kind: Any, least: float = -math.inf, most: float = math.inf) -> Any:
+    """Returns the type of numbers, or of quantities, that lie from `least` to `most`."""
+    bounds = {key: bound for key, bound in (("ge", least), ("le", most)) if math.isfinite(bound)}
+    return Annotated[kind, Meta(**bounds)]
 
 
-def _index(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:
+    """Reads a dataclass whose fields are the keys of a table in kebab-case.
 
+    The class says what a missing key stands for. A missing table is an empty one; a text without a default is not
+    blank. An error of the class itself that names no place gets that of the table.
 
-def _finite(value: Any) -> bool:
+    Args:
+        computed: values of fields that are not read by their type; their keys may be there.
+
+    Raises:
+        UnknownNameError: a key or a name that is not known; the nearest is suggested.
+        InputError: a value that does not fit its type, or none for a field without a default.
+        LimitError: a whole number above its bound.
+    """
+    hints = _hints(kind)
+    keys = {entry.name.replace("_", "-"): entry for entry in fields(kind)}  # pyright: ignore[reportArgumentType]
+    types = {key: Any if entry.name in computed else hints[entry.name] for key, entry in keys.items()}
+    values = {keys[key].name: entry for key, entry in entries(types, content, where=where).items()} | computed
+    for key, entry in keys.items():
+        if entry.default is not MISSING or entry.default_factory is not MISSING:
+            continue
+        if entry.name not in values and _is_table(types[key]):
+            values[entry.name] = value(types[key], {}, key=key, where=where)
+        if str(values.get(entry.name, "")).strip() == "":
+            raise InputError(f"the key {key} is missing", where=where, fix=f"add {key} = …")
     try:
-        return not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
-    except OverflowError:  # a whole number beyond any float
-        return False
+        return kind(**values)
+    except InputError as error:
+        raise type(error)(error.what, where=error.where or where, fix=error.fix) from None
 
 
-def _shown(value: Any) -> str:
+@cache
+def _hints(kind: type) -> Mapping[str, Any]:
+    return get_type_hints(kind, include_extras=True)
+
+
+def entries(types: Mapping[str, Any], content: Any, *, where: str) -> dict[str, Any]:
+    """Reads those keys of a table that are there, each as its type; raises as `read`.
+
+    Args:
+        types: key → type, of all keys that may be there.
+    """
+    angles = {key for key, kind in types.items() if _Mark.ANGLE in _stripped(kind)[1]}
+    check_keys(content, [*types, *(key + DEGREES for key in angles)], where=where)
+    values = {}
+    for key, kind in types.items():
+        if key in angles and key + DEGREES in content:
+            values[key] = _in_degrees(kind, content, key=key, where=where)
+        elif key in content:
+            values[key] = value(kind, content[key], key=key, where=where)
+    return values
+
+
+def check_keys(content: Any, known: Collection[str], *, where: str) -> None:
+    """Makes sure that a value is a table of known keys.
+
+    Raises:
+        InputError: it is no table.
+        UnknownNameError: a key that is not known; the nearest is suggested.
+    """
+    if not isinstance(content, Mapping):
+        raise InputError(f"{_excerpt(content)} is not a table", where=where, fix="write it as [table] with keys")
+    for key in content:
+        if key not in known:
+            raise UnknownNameError.of("key", key, known, where=where)
+
+
+def value(kind: Any, given: Any, *, key: str, where: str) -> Any:
+    """Reads the value of a key as a type: one of msgspec's, a dataclass, a quantity or a range, or tables or a list of
+    them. Numbers are finite.
+
+    Raises:
+        UnknownNameError, InputError, LimitError: as `read`.
+    """
+    bare, notes = _stripped(kind)
+    origin, inner = get_origin(bare), get_args(bare)
+    if bare is Any:
+        return given
+    if Range in (bare, *inner):
+        return _quantity(bare, notes, given, key=key, where=where)
+    if _is_table(bare):
+        return _table(bare, given, where=f"{where} [{key}]")
+    if _Mark.SPELLED in notes and isinstance(given, list | tuple):
+        return tuple(str(item).strip() for item in given)
+    if origin is tuple and inner[-1] is ... and isinstance(given, list | tuple):
+        item, marks = _stripped(inner[0])
+        if _is_table(item):
+            return tuple(_table(item, each, where=f"{where} [[{key}]] {n}") for n, each in enumerate(given, start=1))
+        if isinstance(item, EnumMeta) or any(isinstance(mark, Named) for mark in marks):
+            return tuple(value(inner[0], each, key=key, where=where) for each in given)
+    return _converted(bare, notes, given, key=key, where=where)
+
+
+def _is_table(bare: Any) -> bool:
+    return is_dataclass(bare) or get_origin(bare) is Mapping
+
+
+def _table(bare: Any, given: Any, *, where: str) -> Any:
+    """Reads a dataclass, or a table whose keys are names of one type and whose values are of another."""
+    if is_dataclass(bare):
+        return read(bare, given, where=where)  # pyright: ignore[reportArgumentType]
+    check_keys(given, given if isinstance(given, Mapping) else (), where=where)
+    name, kind = get_args(bare)
+    names = {each: value(name, each, key="name", where=where) for each in given}
+    return {names[each]: value(kind, content, key=each, where=where) for each, content in given.items()}
+
+
+def _quantity(bare: Any, notes: list[Any], given: Any, *, key: str, where: str) -> Quantity:
+    if isinstance(given, Mapping):
+        made = read(Range, given, where=f"{where} {key}")
+    else:
+        number = _converted(float, notes, given, key=key, where=where)
+        made = Range(low=number, high=number) if bare is Range else number
+    for end in ends(made):
+        _converted(float, notes, end, key=key, where=where)
+    return made
+
+
+def _in_degrees(kind: Any, content: Mapping[str, Any], *, key: str, where: str) -> Quantity:
+    """Reads an angle that is given in degrees [rad]."""
+    bare, notes = _stripped(kind)
+    spelled = key + DEGREES
+    if key in content:
+        raise InputError(f"{key} is given twice", where=where, fix=f"keep {key} or {spelled}")
+    angle = in_radians(value(bare, content[spelled], key=spelled, where=where))
+    for end in ends(angle):
+        _converted(float, notes, end, key=key, where=where)
+    return angle
+
+
+def _converted(bare: Any, notes: list[Any], given: Any, *, key: str, where: str) -> Any:
+    """Converts a value to a type with bounds; raises as `read`."""
+    bounds = [note for note in notes if isinstance(note, Meta)]
+    if bare is int and not bounds:
+        bounds = [Meta(ge=0, le=WHOLE_LIMIT)]
+    kind = bare
+    for bound in bounds:
+        kind = Annotated[kind, bound]
+    try:
+        made = msgspec.convert(_exact(given), kind)
+    except msgspec.ValidationError:
+        raise _refusal(bare, bounds, given, key=key, where=where) from None
+    if _Mark.ANGLE in notes and abs(made) > _TURN:
+        raise InputError(
+            f"{key} is {made:.4g} rad, more than a whole turn",
+            where=where,
+            fix=f"give radians, or degrees as {key}{DEGREES} = {made:.4g}",
+        )
+    for note in notes:
+        if isinstance(note, Named) and made not in note.known:
+            raise UnknownNameError.of(note.noun, made, note.known, where=where)
+    return made
+
+
+def _refusal(bare: Any, bounds: list[Meta], given: Any, *, key: str, where: str) -> Exception:
+    if isinstance(bare, EnumMeta):
+        return UnknownNameError.of(key, str(given), [option.value for option in bare], where=where)  # pyright: ignore[reportAttributeAccessIssue]
+    most = min((bound.le for bound in bounds if bound.le is not None), default=math.inf)
+    if bare is int and isinstance(given, int) and given > most:
+        return LimitError(f"{key} is {_excerpt(given)}", where=where, fix=f"give at most {most}")
+    return InputError(f"{key} is {_excerpt(given)}", where=where, fix=f"give {_wanted(bare, bounds)}")
+
+
+def _wanted(bare: Any, bounds: list[Meta]) -> str:
+    """Returns what a value of a type looks like, in words."""
+    if get_origin(bare) in (Union, UnionType):
+        return " or ".join(_wanted(*_stripped(kind)) for kind in get_args(bare))
+    if get_origin(bare) is Literal:
+        return " or ".join(f'"{name}"' for name in get_args(bare))
+    if get_origin(bare) is tuple:
+        return f"a list, {_example(bare)}"
+    limits = [
+        f"{word} {bound:g}" if isinstance(bound, float) else f"{word} {bound}"
+        for meta in bounds
+        for word, bound in (("above", meta.gt), ("of at least", meta.ge), ("of at most", meta.le))
+        if bound is not None
+    ]
+    return " ".join([_WORDS[bare], " and ".join(limits)]).strip()
+
+
+def _example(kind: Any) -> str:
+    bare = _stripped(kind)[0]
+    if get_origin(bare) is tuple:
+        return f"[{', '.join('…' if item is ... else _example(item) for item in get_args(bare))}]"
+    return _EXAMPLES.get(bare, "{…}")
+
+
+def _stripped(kind: Any) -> tuple[Any, list[Any]]:
+    """Splits a type into itself without None, and what `Annotated` says of it."""
+    notes: list[Any] = []
+    while True:
+        if get_origin(kind) is Annotated:
+            kind, *more = get_args(kind)
+            notes += more
+        elif NoneType in get_args(kind):
+            kind = Union[tuple(each for each in get_args(kind) if each is not NoneType)]  # noqa: UP007
+        else:
+            return kind, notes
+
+
+def _exact(given: Any) -> Any:
+    """Returns a value with floats for their subclasses, such as NumPy's, which msgspec refuses.
+
+    Raises:
+        msgspec.ValidationError: a number that is not finite.
+    """
+    if isinstance(given, float) and not math.isfinite(given):
+        raise msgspec.ValidationError(given)
+    if isinstance(given, list | tuple):
+        return [_exact(item) for item in given]
+    return float(given) if isinstance(given, float) else given
+
+
+def _excerpt(given: Any) -> str:
     """The value as the recipe has it; of a long one, its beginning."""
-    text = repr(value)
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+    text = repr(given)
+    return text if len(text) <= _EXCERPT else f"{text[:_EXCERPT]}…"
 
 
-_SHOWN = 60
+_EXCERPT = 60
+_WORDS = {float: "a finite number", int: "a whole number", str: "text in quotes", bool: "true or false"}
+_EXAMPLES = {float: "0.0", int: "0", str: '"…"'}

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import InputError
+from flagdata.tables import NotNegative, Positive
 from sim.cloth import Cloth
 from sim.mesh import Mesh
 
@@ -47,9 +48,9 @@ class Contact:
         InputError: a value that is negative, not finite, or a thickness or stiffness of 0.
     """
 
-    thickness: float = 0.01
-    stiffness: float = 1e6
-    friction: float = 0.6
+    thickness: Positive = 0.01
+    stiffness: Positive = 1e6
+    friction: NotNegative = 0.6
 
     def __post_init__(self) -> None:
         for name, value in (("thickness", self.thickness), ("stiffness", self.stiffness)):

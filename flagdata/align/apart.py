@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.timebase import NANOSECONDS, iso
 
 HOURS_APART = 1800.0
@@ -23,10 +23,9 @@ def by_spans(film: tuple[int, int], log: tuple[int, int], *, names: tuple[str, s
     gap = max(before, after)
     if gap < HOURS_APART:
         return None
-    return Finding(
-        kind="clocks-hours-apart",
-        severity=Severity.WARNING,
-        what=f"{names[0]} is stamped {iso(film[0])} to {iso(film[1])}, and {names[1]} {iso(log[0])} to {iso(log[1])}: "
+    return Finding.of(
+        "clocks-hours-apart",
+        f"{names[0]} is stamped {iso(film[0])} to {iso(film[1])}, and {names[1]} {iso(log[0])} to {iso(log[1])}: "
         f"{names[1]} {'begins' if before > after else 'ends'} {_length(gap)} "
         f"{'after' if before > after else 'before'} {names[0]}",
         value=gap if before > after else -gap,
@@ -45,10 +44,9 @@ def by_offset(offset: float, *, names: tuple[str, str]) -> Finding | None:
         return None
     rest = abs(abs(offset) - round(abs(offset) / _QUARTER) * _QUARTER)
     zone = ", about what zones differ by" if rest <= _NEAR else ""
-    return Finding(
-        kind="clocks-hours-apart",
-        severity=Severity.WARNING,
-        what=f"the clocks of {names[0]} and {names[1]} are {_length(abs(offset))} apart{zone}",
+    return Finding.of(
+        "clocks-hours-apart",
+        f"the clocks of {names[0]} and {names[1]} are {_length(abs(offset))} apart{zone}",
         value=offset,
         fix="ingest the one anew whose --zone, --start or --date is wrong: the day of its clips may be wrong too",
     )

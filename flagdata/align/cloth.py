@@ -17,7 +17,7 @@ from flagdata.align.present import find_made, provenance
 from flagdata.align.recording import RecordingResult, copy_frames, recorded
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import UsageError
-from flagdata.findings import Finding, Severity, quality_flags
+from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake
 from flagdata.provenance import canonical
 from flagdata.record import Record, RecordWriter
@@ -81,11 +81,10 @@ def cloth_recording(
             where=camera.id,
             fix="name a camera artifact; see flagdata ls",
         )
-    stated = Finding(
-        kind="cloth-declared",
-        severity=Severity.NOTE,
+    stated = Finding.of(
+        "cloth-declared",
+        f"the cloth is {cloth.fabric}, of {cloth.density:g} kg/m²: measured by itself, as the table says",
         value=cloth.density,
-        what=f"the cloth is {cloth.fabric}, of {cloth.density:g} kg/m²: measured by itself, as the table says",
     )
     if cloth.wind is None:
         return _without_wind(lake, camera, cloth, stated, branch=branch, progress=progress)

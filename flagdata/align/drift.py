@@ -11,7 +11,7 @@ from flagdata.align.declared import PRIOR_DRIFT, QUARTZ
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
 from flagdata.align.motion import MotionSeries
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.signals import Series, WindAverage
 from flagdata.timebase import NANOSECONDS
 
@@ -109,13 +109,10 @@ def line_through(parts: tuple[LagEstimate, ...], whole: LagEstimate) -> ClockLin
     findings: tuple[Finding, ...] = ()
     if abs(residual[worst]) > _DISAGREEMENT:
         findings = (
-            Finding(
-                kind="crooked-clock",
-                severity=Severity.ERROR,
-                what=(
-                    f"the offset of part {worst + 1} of {len(parts)} is {offset[worst]:+.2f} ± {sigma[worst]:.2f} s,"
-                    f" {abs(residual[worst]):.0f} σ off a steady clock: one of the clocks was set or stalled"
-                ),
+            Finding.of(
+                "crooked-clock",
+                f"the offset of part {worst + 1} of {len(parts)} is {offset[worst]:+.2f} ± {sigma[worst]:.2f} s,"
+                f" {abs(residual[worst]):.0f} σ off a steady clock: one of the clocks was set or stalled",
                 value=float(offset[worst]),
                 fix="cut the recording there and align the pieces",
             ),

@@ -292,10 +292,9 @@ def _too_good(pair: Pair, sigma: float) -> tuple[Finding, ...]:
     if sigma >= period:
         return ()
     return (
-        Finding(
-            kind="sigma-below-frame",
-            severity=Severity.WARNING,
-            what=f"the offset's σ of {sigma:.2g} s is below the {period:.2g} s between frames: implausibly small",
+        Finding.of(
+            "sigma-below-frame",
+            f"the offset's σ of {sigma:.2g} s is below the {period:.2g} s between frames: implausibly small",
             value=sigma,
             fix="give the σ with which the two clocks were really compared",
         ),

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.signals import Instants, Series
 from flagdata.timebase import NANOSECONDS
 
@@ -179,23 +179,21 @@ def _findings(energies: list[float], shifts: list[float], gains: list[float]) ->
     shake = math.sqrt(float(np.mean(np.square(shifts)))) if shifts else 0.0
     if shake > _SHAKE:
         found.append(
-            Finding(
-                kind="camera-shake",
-                severity=Severity.WARNING,
-                what=f"the whole picture moves by {shake:.1f} pixels a frame (rms); taken out to first order",
+            Finding.of(
+                "camera-shake",
+                f"the whole picture moves by {shake:.1f} pixels a frame (rms); taken out to first order",
                 value=shake,
             )
         )
     flicker = float(np.std(gains)) if gains else 0.0
     if flicker > 0.02:
         found.append(
-            Finding(
-                kind="brightness-flicker",
-                severity=Severity.NOTE,
-                what=f"the brightness of the whole picture varies by {100 * flicker:.1f} % a frame; taken out",
+            Finding.of(
+                "brightness-flicker",
+                f"the brightness of the whole picture varies by {100 * flicker:.1f} % a frame; taken out",
                 value=flicker,
             )
         )
     if energies and not np.nanmax(np.array([0.0, *energies])) > 0:
-        found.append(Finding(kind="no-motion", severity=Severity.ERROR, what="no motion is found in the picture"))
+        found.append(Finding.of("no-motion", "no motion is found in the picture"))
     return tuple(found)

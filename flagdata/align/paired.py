@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from flagdata.align.declared import PRIOR_DRIFT, stamp_sigma
 from flagdata.clock import NINETY, ClockModel, Segment
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.signals import Instants, Series, WindSeries
 from flagdata.timebase import NANOSECONDS, iso
 
@@ -226,14 +226,11 @@ def _findings(model: ClockModel, delay: float, worst: float) -> tuple[Finding, .
     first = model.segments[0]
     half = NINETY * first.sigma_offset
     found = [
-        Finding(
-            kind="clocks-paired",
-            severity=Severity.NOTE,
-            what=(
-                f"{model.device} clock {first.offset:+.4f} s [{first.offset - half:.4f}, {first.offset + half:.4f}]"
-                f" 90 % to {model.reference}, drift {1e6 * first.drift:+.1f} ± {1e6 * first.sigma_drift:.1f} ppm;"
-                f" delays {1e3 * delay:.1f} ms (median), {1e3 * worst:.0f} ms (longest)"
-            ),
+        Finding.of(
+            "clocks-paired",
+            f"{model.device} clock {first.offset:+.4f} s [{first.offset - half:.4f}, {first.offset + half:.4f}]"
+            f" 90 % to {model.reference}, drift {1e6 * first.drift:+.1f} ± {1e6 * first.sigma_drift:.1f} ppm;"
+            f" delays {1e3 * delay:.1f} ms (median), {1e3 * worst:.0f} ms (longest)",
             value=first.offset,
         )
     ]
@@ -242,10 +239,9 @@ def _findings(model: ClockModel, delay: float, worst: float) -> tuple[Finding, .
         step = after.offset + after.drift * (after.start - after.origin) / NANOSECONDS
         step -= before.offset + before.drift * elapsed
         found.append(
-            Finding(
-                kind="clock-jump",
-                severity=Severity.WARNING,
-                what=f"the {model.device} and {model.reference} clocks step apart by {step:+.3f} s",
+            Finding.of(
+                "clock-jump",
+                f"the {model.device} and {model.reference} clocks step apart by {step:+.3f} s",
                 where=iso(after.start),
                 value=step,
             )

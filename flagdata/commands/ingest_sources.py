@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 from flagdata.commands.ingest_options import Given, check_applies
 from flagdata.console import document, fail, progress, say
 from flagdata.errors import FlagdataError, UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 
 if TYPE_CHECKING:
     from flagdata.ingest.anemometer import Guess
@@ -439,12 +439,8 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
     if not results:
         raise dead[0][1]
     left_out = [
-        Finding(
-            kind="anemometer-left-out",
-            severity=Severity.WARNING,
-            what=f"the anemometer {label!r}: {error.what}",
-            where=error.where,
-            fix=error.fix,
+        Finding.of(
+            "anemometer-left-out", f"the anemometer {label!r}: {error.what}", where=error.where, fix=error.fix
         ).as_dict()
         for label, error in dead
     ]

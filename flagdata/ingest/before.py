@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from flagdata.errors import FlagdataError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.lake import Artifact, Lake
 from flagdata.printable import SHORT
 from flagdata.record import Record
@@ -50,7 +50,7 @@ def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping
         else:
             continue
         fix = f"if that one is wrong, take it off: flagdata withdraw {artifact.id[:SHORT]} -m 'read otherwise'"
-        found.append(Finding(kind="ingested-before", severity=Severity.NOTE, what=what, fix=fix))
+        found.append(Finding.of("ingested-before", what, fix=fix))
     return tuple(found)
 
 
@@ -80,11 +80,10 @@ def earlier(
 def unconfirmed(artifacts: Iterable[Artifact]) -> tuple[Finding, ...]:
     """A warning for each artifact of a log that an older version read by a draft of its own, which nobody confirmed."""
     return tuple(
-        Finding(
-            kind="draft-unconfirmed",
-            severity=Severity.WARNING,
+        Finding.of(
+            "draft-unconfirmed",
+            "an older version drafted how to read this log, and nobody confirmed it",
             where=f"artifact {artifact.id} {artifact.name!r}",
-            what="an older version drafted how to read this log, and nobody confirmed it",
             fix="ingest the file again, confirm what is shown, and withdraw this artifact",
         )
         for artifact in artifacts

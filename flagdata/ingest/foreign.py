@@ -145,12 +145,11 @@ def _lerobot(folder: Path) -> Examination:
             steady = np.abs(seconds - rows["frame_index"].to_numpy() / fps).max()
             if steady > _STEADY:
                 findings.append(
-                    Finding(
-                        kind="timing-uneven",
-                        severity=Severity.WARNING,
+                    Finding.of(
+                        "timing-uneven",
+                        f"its stamps lie up to {steady:.3f} s from frame / fps, where LeRobot looks for its films",
                         where=stream.name,
                         value=float(steady),
-                        what=f"its stamps lie up to {steady:.3f} s from frame / fps, where LeRobot looks for its films",
                         fix="check it with LeRobot's own reader",
                     )
                 )
@@ -165,39 +164,36 @@ def _lerobot(folder: Path) -> Examination:
     missing = [name for name in ("tasks.parquet", "stats.json") if not (folder / "meta" / name).is_file()]
     if missing:
         what = f"meta/ lacks {', '.join(missing)}"
-        findings.append(Finding(kind="files-missing", severity=Severity.WARNING, what=what, fix="copy it again"))
+        findings.append(Finding.of("files-missing", what, fix="copy it again"))
     if len(streams) != info.get("total_episodes", len(streams)):
         what = f"{len(streams)} episodes are there, its description states {info['total_episodes']}"
-        findings.append(Finding(kind="episodes-missing", severity=Severity.ERROR, what=what, fix="copy it again"))
+        findings.append(Finding.of("episodes-missing", what, fix="copy it again"))
     return Examination(format=f"LeRobot {info['codebase_version']}", streams=tuple(streams), findings=tuple(findings))
 
 
 def _judged(stream: Stream) -> Iterator[Finding]:
     if stream.backward:
-        yield Finding(
-            kind="stamps-disordered",
-            severity=Severity.ERROR,
+        yield Finding.of(
+            "stamps-disordered",
+            f"{stream.backward} of {stream.count} stamps are not after the one before",
             where=stream.name,
             count=stream.backward,
-            what=f"{stream.backward} of {stream.count} stamps are not after the one before",
             fix="an ingest leaves such frames out, and sorts or asks about rows; mend the recorder's clock",
         )
     if stream.gaps:
-        yield Finding(
-            kind="gaps",
-            severity=Severity.WARNING,
+        yield Finding.of(
+            "gaps",
+            f"{stream.gaps} gaps, the longest of {stream.longest:.3f} s, at a usual {stream.rate or 0:.4g} Hz",
             where=stream.name,
             count=stream.gaps,
             value=stream.longest,
-            what=f"{stream.gaps} gaps, the longest of {stream.longest:.3f} s, at a usual {stream.rate or 0:.4g} Hz",
             fix="none needed: gaps are kept as such, and clips never span one",
         )
     if stream.start < _EARLIEST:
-        yield Finding(
-            kind="not-a-date",
-            severity=Severity.WARNING,
+        yield Finding.of(
+            "not-a-date",
+            f"its stamps begin at {iso(stream.start)}: they count from a start, or the clock was not set",
             where=stream.name,
-            what=f"its stamps begin at {iso(stream.start)}: they count from a start, or the clock was not set",
             fix="give --start when you ingest a film",
         )
 

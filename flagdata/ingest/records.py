@@ -23,7 +23,7 @@ from flagdata.clock import ClockModel
 from flagdata.dataset.clips import clip_rows
 from flagdata.documents import column_json, from_json
 from flagdata.errors import CorruptError, InputError
-from flagdata.findings import Finding, Severity, quality_flags
+from flagdata.findings import Finding, quality_flags
 from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
 from flagdata.ingest.store import IngestResult, Labels, find_same, kept, result_of
@@ -229,12 +229,11 @@ def _alone(artifact: Artifact, source: Source) -> Artifact:
 
 
 def _without(absent: list[str]) -> Finding:
-    return Finding(
-        kind="parents-absent",
-        severity=Severity.NOTE,
-        count=len(absent),
-        what=f"what it was made from is not on the branch ({', '.join(one[:SHORT] for one in absent)}): it came in as "
+    return Finding.of(
+        "parents-absent",
+        f"what it was made from is not on the branch ({', '.join(one[:SHORT] for one in absent)}): it came in as "
         "a recording without parents",
+        count=len(absent),
         fix="to restore it whole, export and ingest the camera and the wind first, then withdraw this one",
     )
 
@@ -242,10 +241,9 @@ def _without(absent: list[str]) -> Finding:
 def _unreported(labels: Labels) -> Finding:
     unknown = [label for label, given in (("name", labels.name), ("session", labels.session)) if given is None]
     fix = "take it off (flagdata withdraw), then ingest the file in the folder that flagdata export wrote"
-    return Finding(
-        kind="report-absent",
-        severity=Severity.WARNING,
-        what=f"there is no {ROWS} with its row beside the record: unknown are its {', '.join(unknown)}"
+    return Finding.of(
+        "report-absent",
+        f"there is no {ROWS} with its row beside the record: unknown are its {', '.join(unknown)}"
         f"{' and ' if unknown else ''}quality flags",
         fix=fix + (f", or give {' and '.join(f'--{label}' for label in unknown)}" if unknown else ""),
     )

@@ -193,10 +193,9 @@ def _is_among(path: Place, foreign: Collection[Path]) -> bool:
 
 
 def _linked(path: Path) -> Finding:
-    return Finding(
-        kind="link",
-        severity=Severity.ERROR,
-        what="a link or special file, or a folder that holds one: its content lies elsewhere, where it may change",
+    return Finding.of(
+        "link",
+        "a link or special file, or a folder that holds one: its content lies elsewhere, where it may change",
         where=str(path),
         fix="put in its place what the link leads to; commands that write refuse a lake whose folders are links",
     )
@@ -211,10 +210,9 @@ def _rows(lake: Lake, marked: Marked, foreign: Collection[Path]) -> list[Finding
         known = set(ids)
         if len(known) < len(ids):
             findings.append(
-                Finding(
-                    kind="identity-twice",
-                    severity=Severity.ERROR,
-                    what=f"{len(ids) - len(known)} rows have an identity that another row has",
+                Finding.of(
+                    "identity-twice",
+                    f"{len(ids) - len(known)} rows have an identity that another row has",
                     where=f"ref {ref}",
                     fix="this is a defect of the lake: keep a copy and report it",
                 )
@@ -268,7 +266,7 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
 
 
 def _log_damaged(error: FlagdataError) -> Finding:
-    return Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
+    return Finding.of("log-damaged", error.what, where=error.where, fix=error.fix)
 
 
 def _gone(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
@@ -289,13 +287,12 @@ def _erased(lake: Lake, marked: Marked) -> list[Finding]:
         if names:
             version, message = max(gone[name] for name in names)
             findings.append(
-                Finding(
-                    kind="erased",
-                    severity=Severity.NOTE,
+                Finding.of(
+                    "erased",
+                    f"{len(names)} rows have no data any more: they were erased, the last by version {version} "
+                    f"({message})",
                     count=len(names),
                     where=f"ref {ref}",
-                    what=f"{len(names)} rows have no data any more: they were erased, the last by version {version} "
-                    f"({message})",
                     fix="none needed; exports of this ref leave them out by --where, or fail",
                 )
             )
@@ -303,12 +300,11 @@ def _erased(lake: Lake, marked: Marked) -> list[Finding]:
 
 
 def _unfinished(lake: Lake, name: str, version: int, message: str) -> Finding:
-    return Finding(
-        kind="erasure-unfinished",
-        severity=Severity.ERROR,
-        where=str(lake.objects.path(name)),
-        what=f"version {version} erased what {name} holds ({message}), and its bytes are still there: the erasure was "
+    return Finding.of(
+        "erasure-unfinished",
+        f"version {version} erased what {name} holds ({message}), and its bytes are still there: the erasure was "
         "interrupted, or the disk refused it",
+        where=str(lake.objects.path(name)),
         fix="run flagdata gc, which deletes it at once; or the same flagdata withdraw --everywhere again",
     )
 
@@ -316,13 +312,12 @@ def _unfinished(lake: Lake, name: str, version: int, message: str) -> Finding:
 def _expired(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
     """A note for each commit that let versions expire, of which data went."""
     return [
-        Finding(
-            kind="expired",
-            severity=Severity.NOTE,
+        Finding.of(
+            "expired",
+            f"{len(gone)} of the objects that these versions show went when they expired, by version "
+            f"{removal.version} ({removal.reason})",
             count=len(gone),
             where=f"versions up to {up_to}",
-            what=f"{len(gone)} of the objects that these versions show went when they expired, by version "
-            f"{removal.version} ({removal.reason})",
             fix=f"none needed; all branches and tags, and versions from {removal.version} on, are whole without them",
         )
         for removal in removals(lake.catalog.history())
@@ -344,10 +339,9 @@ def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Find
     if last is None:
         return []
     return [
-        Finding(
-            kind="withdrawn-collected",
-            severity=Severity.NOTE,
-            what=f"gc deleted what was withdrawn: {len(gone)} of the objects that older versions show; the last were"
+        Finding.of(
+            "withdrawn-collected",
+            f"gc deleted what was withdrawn: {len(gone)} of the objects that older versions show; the last were"
             f" withdrawn by version {last.version} ({last.reason})",
             where=f"versions before {last.version}",
             count=len(gone),
@@ -379,10 +373,9 @@ def _left_uploads(lake: Lake, states: Sequence[LeaseState], limit: float, grace:
         return [_left_upload(upload, limit, grace) for upload in left_uploads(lake, states)]
     except StoreError as error:
         return [
-            Finding(
-                kind="uploads-unlisted",
-                severity=Severity.NOTE,
-                what=f"the store does not say whether parts of unfinished uploads are left: {error.strerror}",
+            Finding.of(
+                "uploads-unlisted",
+                f"the store does not say whether parts of unfinished uploads are left: {error.strerror}",
                 where=str(lake.path),
                 fix=f"{error.fix}; or give the bucket a lifecycle rule that aborts incomplete multipart uploads",
             )
@@ -415,10 +408,9 @@ def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
     ]
     strays = [path for path in strays if not is_beside(path.name)]
     return [
-        Finding(
-            kind="stray-file",
-            severity=Severity.WARNING,
-            what="not an object: its name is not a content hash",
+        Finding.of(
+            "stray-file",
+            "not an object: its name is not a content hash",
             where=str(path),
             fix="flagdata did not put it there: move it out of the lake (and flagdata ingest it from there, if it is"
             " a recording)",
@@ -447,10 +439,9 @@ def _beside(lake: Lake) -> list[Finding]:
 def _abandoned(state: LeaseState) -> Finding:
     records = sorted(state.folder.glob("*.mcap"))
     saved = f"; to save its unfinished record first: flagdata recover {records[0]}" if records else ""
-    return Finding(
-        kind="staging-left",
-        severity=Severity.WARNING,
-        what=f"a transaction ended without finishing ({state.owner})",
+    return Finding.of(
+        "staging-left",
+        f"a transaction ended without finishing ({state.owner})",
         where=str(state.folder),
         fix=f"run flagdata gc{saved}",
     )

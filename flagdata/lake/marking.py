@@ -98,9 +98,7 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
         hashes = lake.catalog.file_hashes()
         changed = lake.catalog.changed_entries()
     except FlagdataError as error:
-        return (
-            Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix),
-        )
+        return (Finding.of("log-damaged", error.what, where=error.where, fix=error.fix),)
     findings = [_damaged("log-damaged", "an entry of the catalog's log has changed", path) for path in changed]
     for path, noted in sorted(hashes.items(), key=lambda item: str(item[0])):
         try:
@@ -117,10 +115,9 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
     unchecked = list(hashes.values()).count(None)
     if unchecked:
         findings.append(
-            Finding(
-                kind="catalog-unhashed",
-                severity=Severity.NOTE,
-                what=f"{unchecked} of {len(hashes)} files of the catalog were written before their hashes were noted, "
+            Finding.of(
+                "catalog-unhashed",
+                f"{unchecked} of {len(hashes)} files of the catalog were written before their hashes were noted, "
                 "and are not checked",
                 where=str(lake.catalog.path),
                 count=unchecked,
@@ -136,10 +133,9 @@ def _damaged(kind: str, what: str, path: Place) -> Finding:
 def _lost(head: pa.Table, known: list[str], where: str) -> list[Finding]:
     rows = Counter(head["branch"].to_pylist())
     return [
-        Finding(
-            kind="branch-lost",
-            severity=Severity.ERROR,
-            what=f"{count} rows are on branch {name!r}, which is not among the refs: no ref shows them",
+        Finding.of(
+            "branch-lost",
+            f"{count} rows are on branch {name!r}, which is not among the refs: no ref shows them",
             where=f"ref {name}",
             count=count,
             fix="give the flagdata push or pull that was stopped again, which goes on with it (for a clone: flagdata "
@@ -182,4 +178,4 @@ def _unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
 def _unreadable(error: FlagdataError, where: str) -> Finding:
     """The finding of what is to blame, where the error names a file, else of what was read."""
     at = error.where or where
-    return Finding(kind="ref-unreadable", severity=Severity.ERROR, what=error.what, where=at, fix=error.fix)
+    return Finding.of("ref-unreadable", error.what, where=at, fix=error.fix)

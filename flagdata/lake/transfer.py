@@ -139,12 +139,11 @@ def _unprintable(source: Lake, marked: Marked, *, versions: int) -> Iterator[Fin
             found[name] += sum(not text.isprintable() for text in texts)
     columns = [name for name, count in found.items() if count]
     if columns:
-        yield Finding(
-            kind="control-characters",
-            severity=Severity.WARNING,
-            count=found.total(),
-            what=f"{counted(found.total(), 'text')} of {', '.join(columns)} hold control characters or marks of "
+        yield Finding.of(
+            "control-characters",
+            f"{counted(found.total(), 'text')} of {', '.join(columns)} hold control characters or marks of "
             "direction: they came as they are, and are shown escaped",
+            count=found.total(),
             where=str(source.path),
             fix="none needed for flagdata; give other programs what flagdata prints, not the files of the catalog",
         )

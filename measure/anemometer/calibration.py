@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, RefusedError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.signals import Sensor
 from measure.anemometer.features import SUMMARY, Features, features_of
 from measure.anemometer.intervals import half_width
@@ -287,34 +287,30 @@ def _noticed(recordings: Sequence[Recording], seconds: float, offset: float, clo
     found = []
     if seconds < ENOUGH:
         found.append(
-            Finding(
-                kind="short-calibration",
-                severity=Severity.WARNING,
-                value=seconds,
-                what=f"{seconds:.0f} s of film beside a log are few: the intervals rest on {seconds / BLOCK:.0f} "
+            Finding.of(
+                "short-calibration",
+                f"{seconds:.0f} s of film beside a log are few: the intervals rest on {seconds / BLOCK:.0f} "
                 "blocks of time",
+                value=seconds,
                 fix=f"give {ENOUGH / 60:.0f} minutes or more",
             )
         )
     if abs(offset) > 1.5 * clock > 0:
         found.append(
-            Finding(
-                kind="clock-at-limit",
-                severity=Severity.WARNING,
+            Finding.of(
+                "clock-at-limit",
+                f"the log fits best {offset:+.2f} s later than its stamps, whose uncertainty is {clock:.2f} s",
                 value=offset,
-                what=f"the log fits best {offset:+.2f} s later than its stamps, whose uncertainty is {clock:.2f} s",
                 fix="check the clocks with flagdata align",
             )
         )
     accuracy = max((one.sensor.accuracy or 0.0 for one in recordings), default=0.0)
     if accuracy:
         found.append(
-            Finding(
-                kind="anemometer-accuracy",
-                severity=Severity.NOTE,
+            Finding.of(
+                "anemometer-accuracy",
+                f"the anemometer states ±{accuracy:g} m/s, which the reading model takes over and no interval contains",
                 value=accuracy,
-                what=f"the anemometer states ±{accuracy:g} m/s, which the reading model takes over and no interval "
-                "contains",
             )
         )
     return found

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.rng import stream
 from measure.anemometer.features import Features, features_of
 from measure.anemometer.intervals import half_width, mean_errors
@@ -144,12 +144,11 @@ def _size_reason(given: FlagSize | None, model: ReadingModel) -> list[Finding]:
     if given is None or max(abs(given.length / own.length - 1), abs(given.height / own.height - 1)) <= _SAME_SIZE:
         return []
     return [
-        Finding(
-            kind="another-size",
-            severity=Severity.WARNING,
-            value=given.length / own.length,
-            what=f"the flag is stated as {given.length:g} m × {given.height:g} m, that of the calibration as "
+        Finding.of(
+            "another-size",
+            f"the flag is stated as {given.length:g} m × {given.height:g} m, that of the calibration as "
             f"{own.length:g} m × {own.height:g} m",
+            value=given.length / own.length,
             fix="check --flag-size, or calibrate this flag",
         )
     ]
@@ -219,24 +218,22 @@ def _about(winds: Floats, features: Features, model: ReadingModel) -> list[Findi
     beyond = int(np.count_nonzero((winds < low) | (winds > high)))
     if beyond:
         found.append(
-            Finding(
-                kind="beyond-calibration",
-                severity=Severity.WARNING,
+            Finding.of(
+                "beyond-calibration",
+                f"{beyond} of {len(winds)} windows read winds beyond those of the calibration ({low:.1f} to "
+                f"{high:.1f} m/s), where nothing checked the intervals",
                 count=beyond,
                 value=beyond / len(winds),
-                what=f"{beyond} of {len(winds)} windows read winds beyond those of the calibration ({low:.1f} to "
-                f"{high:.1f} m/s), where nothing checked the intervals",
                 fix="calibrate in stronger and weaker winds as well",
             )
         )
     missing = len(features.starts) - len(winds)
     if missing:
         found.append(
-            Finding(
-                kind="windows-left-out",
-                severity=Severity.WARNING,
+            Finding.of(
+                "windows-left-out",
+                f"{missing} of {len(features.starts)} windows lack frames and were left out",
                 count=missing,
-                what=f"{missing} of {len(features.starts)} windows lack frames and were left out",
             )
         )
     return found

@@ -545,10 +545,10 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
         found.extend(one.observed.findings)
         if one.unlike is not None:
             what = f"{_unlike(one)}. The weight is withheld"
-            found.append(Finding(kind="unlike-simulations", severity=Severity.WARNING, what=what, fix=_LOOK))
+            found.append(Finding.of("unlike-simulations", what, fix=_LOOK))
         if one.failed > 0.1 * calibration.options.simulations:
             what = f"{one.failed} of {calibration.options.simulations} simulations of {one.observed.name} were left out"
-            found.append(Finding(kind="failed-simulations", severity=Severity.WARNING, what=what))
+            found.append(Finding.of("failed-simulations", what))
     if not calibration.draws.together:
         found.append(TAKEN_APART)
     check, level = calibration.check, calibration.options.level
@@ -558,12 +558,12 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
             f"{check.count * level:.0f} are expected: they are too narrow"
         )
         fix = "give more simulations with --simulations"
-        found.append(Finding(kind="narrow-intervals", severity=Severity.WARNING, what=what, fix=fix))
+        found.append(Finding.of("narrow-intervals", what, fix=fix))
     found.extend(_leaning(calibration))
     undetermined = [q.name.replace("_", " ") for q in calibration.cloth if q.value is None and not q.bounded]
     if undetermined:
         what = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
-        found.append(Finding(kind="not-determined", severity=Severity.NOTE, what=what))
+        found.append(Finding.of("not-determined", what))
     return tuple(found)
 
 
@@ -591,5 +591,5 @@ def _leaning(calibration: Calibration) -> list[Finding]:
         fix = "check the flag's size and where the camera stood" + (
             ", or weigh a piece of the cloth on a scale" if own is calibration.weight else ""
         )
-        found.append(Finding(kind="leans-on-prior", severity=Severity.WARNING, what=what, fix=fix))
+        found.append(Finding.of("leans-on-prior", what, fix=fix))
     return found

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from flagdata.errors import InputError, RefusedError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.rng import stream
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
@@ -186,7 +186,7 @@ def constant_wind(recordings: Sequence[Observed]) -> tuple[Finding, ...]:
         "what is assumed of the others"
     )
     fix = "add recordings in other winds: flagdata calibrate takes several of one flag"
-    return (Finding(kind="constant-wind", severity=Severity.WARNING, what=what, fix=fix),)
+    return (Finding.of("constant-wind", what, fix=fix),)
 
 
 def cut(found: Observed, first: float, last: float | None) -> Observed:
@@ -242,4 +242,4 @@ def check_in_all(seconds: float, *, where: str, left_out: Sequence[Finding] = ()
 def first_part(duration: float) -> Finding:
     """What a recording of that duration [s] above `LONGEST` is reported with."""
     what = f"of {duration:.1f} s the first {LONGEST:g} are used"
-    return Finding(kind="first-part", severity=Severity.NOTE, what=what, fix="choose others with --start and --end")
+    return Finding.of("first-part", what, fix="choose others with --start and --end")

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import gammaln
 
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.calibrate.emulator import Emulator
 from measure.calibrate.prior import Floats
 
@@ -25,10 +25,9 @@ FEWEST_FREEDOM = 20
 """Degrees of freedom below which recordings are taken as independent."""
 HEAVY = 10.0
 """Most degrees of freedom of the t distribution: residuals of simulations have a kurtosis of 4, 3 + 6/(ν − 4)."""
-TAKEN_APART = Finding(
-    kind="recordings-taken-apart",
-    severity=Severity.WARNING,
-    what="too few simulations for so many recordings: the cloth was taken as a different one in each, so that "
+TAKEN_APART = Finding.of(
+    "recordings-taken-apart",
+    "too few simulations for so many recordings: the cloth was taken as a different one in each, so that "
     "intervals are too narrow and probabilities too sure",
     fix="give fewer recordings, or more simulations with --simulations",
 )

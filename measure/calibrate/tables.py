@@ -18,7 +18,7 @@ import numpy as np
 
 from flagdata.clock import ClockModel
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.provenance import file_hash
 from flagdata.signals import Instants, WindSeries
 from flagdata.timebase import NANOSECONDS
@@ -225,4 +225,4 @@ def _of_rows(table: Columns, step: float) -> tuple[Finding, ...]:
         "the tracker has to have formed them"
     )
     fix = "check the length of the tracker's own window; give rows of 2.5 s where it is shorter"
-    return (Finding(kind="short-rows", severity=Severity.NOTE, what=what, fix=fix),)
+    return (Finding.of("short-rows", what, fix=fix),)

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
 from measure.estimate.answer import Quantity, quantities
@@ -155,11 +155,10 @@ class Joint:
         if abs(winds[1] - winds[0]) < _MATTERS * (wind.span.high - wind.span.low):
             return None
         light, heavy = (f"at {weight:g} kg/m² {own:.1f} m/s" for weight, own in zip(weights, winds, strict=True))
-        return Finding(
-            kind="weight-open",
-            severity=Severity.NOTE,
+        return Finding.of(
+            "weight-open",
+            f"the wind depends on the weight of the cloth, which was not given: {light}, {heavy}",
             value=winds[1] - winds[0],
-            what=f"the wind depends on the weight of the cloth, which was not given: {light}, {heavy}",
             fix="weigh the cloth and give --area-weight",
         )
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import FlagdataError, RefusedError, UsageError
 from flagdata.film import Film
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
 from measure.estimate.answer import Quantity, sentence
 from measure.estimate.combine import OWN, Dependence
@@ -266,48 +266,44 @@ def _about_windows(seen: Sequence[Look], judged: Verdict, used: Sequence[int], d
     factor = float(np.median([np.exp(one.log_factor).mean() for one in seen]))
     if factor < CONTRADICTION:
         found.append(
-            Finding(
-                kind="area-weight-contradicted",
-                severity=Severity.WARNING,
-                value=factor,
-                what=f"the area weight that was given makes the film much less probable (Bayes factor {factor:.2g}): "
+            Finding.of(
+                "area-weight-contradicted",
+                f"the area weight that was given makes the film much less probable (Bayes factor {factor:.2g}): "
                 "either it is wrong, or the flag's size is, or the model errs on this film",
+                value=factor,
                 fix="check --area-weight and --flag-size",
             )
         )
     excluded = float(np.isneginf(seen[0].log_factor).mean())
     if excluded > EXCLUDED:
         found.append(
-            Finding(
-                kind="sizes-excluded-by-weight",
-                severity=Severity.WARNING,
-                value=excluded,
-                what=f"{excluded:.0%} of the sizes that were taken as possible were left out: of a flag of these the "
+            Finding.of(
+                "sizes-excluded-by-weight",
+                f"{excluded:.0%} of the sizes that were taken as possible were left out: of a flag of these the "
                 "network does not know the area weight that was given",
+                value=excluded,
                 fix="give --flag-size LENGTHxHEIGHT",
             )
         )
     strange = int(judged.strange.sum())
     if strange and not judged.refused:
         found.append(
-            Finding(
-                kind="strange-windows",
-                severity=Severity.WARNING,
-                count=strange,
-                what=f"{strange} of {len(seen)} windows are unlike what the network was trained on, p at most "
+            Finding.of(
+                "strange-windows",
+                f"{strange} of {len(seen)} windows are unlike what the network was trained on, p at most "
                 f"{judged.level:.2g}, and were left out of the answer; {judged.refusing} would refuse the film",
+                count=strange,
                 fix="choose a part of the film without them by --start and --end",
             )
         )
     if len(used) > 1:
         found.append(
-            Finding(
-                kind="windows-combined",
-                severity=Severity.NOTE,
-                count=len(used),
-                what=f"the answer combines {len(used)} windows of one cloth, each with its own wind; their errors "
+            Finding.of(
+                "windows-combined",
+                f"the answer combines {len(used)} windows of one cloth, each with its own wind; their errors "
                 f"count as correlated by {dependence.wind:.2f} in wind and {dependence.cloth:.2f} in cloth "
                 f"({dependence.source})",
+                count=len(used),
             )
         )
     return found
@@ -319,12 +315,11 @@ def _at_ends(found: Sequence[Quantity], windows: Sequence[WindowAnswer]) -> list
     bounded = [one.quantity(name).value is None for one in windows for name in OWN]
     if any(bounded) and not any(quantity.value is None for quantity in found if quantity.name in OWN):
         own.append(
-            Finding(
-                kind="windows-at-end",
-                severity=Severity.WARNING,
-                count=sum(bounded),
-                what=f"{sum(bounded)} of {len(windows)} windows bound the wind on one side only: theirs may lie beyond "
+            Finding.of(
+                "windows-at-end",
+                f"{sum(bounded)} of {len(windows)} windows bound the wind on one side only: theirs may lie beyond "
                 "what the model knows, and so may the mean over all windows lie beyond its interval",
+                count=sum(bounded),
                 fix="give the wind of single windows by --windows",
             )
         )

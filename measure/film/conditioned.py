@@ -84,11 +84,10 @@ class CutOff:
         )
         done = "; those are left out" if self.partly else ""
         return (
-            Finding(
-                kind="flag-cut-off",
-                severity=Severity.WARNING,
+            Finding.of(
+                "flag-cut-off",
+                f"the flag reaches beyond the picture at {where} of the film's frames{done}",
                 value=share,
-                what=f"the flag reaches beyond the picture at {where} of the film's frames{done}",
                 fix="film so that the whole flag is in the picture",
             ),
         )
@@ -277,42 +276,35 @@ def _chosen(rate: float, duration: float) -> Callable[[int], bool]:
 def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:
     if not found.camera.known:
         return [
-            Finding(
-                kind="camera-unknown",
-                severity=Severity.NOTE,
-                what="no feature of the background shows the camera's motion; no frame was moved",
-            )
+            Finding.of("camera-unknown", "no feature of the background shows the camera's motion; no frame was moved")
         ]
     if not found.camera.moves:
         return [
-            Finding(
-                kind="camera-still",
-                severity=Severity.NOTE,
+            Finding.of(
+                "camera-still",
+                f"the camera is still: {found.camera.evidence} stay in place",
                 count=found.camera.support,
-                what=f"the camera is still: {found.camera.evidence} stay in place",
             )
         ]
     motion = follower.motion()
     notes = [
-        Finding(
-            kind="camera-moves",
-            severity=Severity.NOTE,
+        Finding.of(
+            "camera-moves",
+            f"the camera drifts {motion['drift']:.1f} px and shakes {motion['shake']:.2f} px from frame to frame, "
+            f"by {found.camera.evidence}; the frames were moved back",
             value=motion["drift"],
             count=found.camera.support,
-            what=f"the camera drifts {motion['drift']:.1f} px and shakes {motion['shake']:.2f} px from frame to frame, "
-            f"by {found.camera.evidence}; the frames were moved back",
         )
     ]
     total = len(follower.path)
     if follower.lost > _LOST * total:
         notes.append(
-            Finding(
-                kind="camera-lost",
-                severity=Severity.WARNING,
+            Finding.of(
+                "camera-lost",
+                f"in {follower.lost} of {total} frames the background's features were not found, and the place of "
+                "the frame before was used",
                 count=follower.lost,
                 value=follower.lost / total,
-                what=f"in {follower.lost} of {total} frames the background's features were not found, and the place of "
-                "the frame before was used",
                 fix="choose a part of the film without cuts by --start and --end",
             )
         )
@@ -327,24 +319,22 @@ def _of_flag(found: Conditioning, reference: NDArray[np.uint8] | None, *, given:
     left, top, right, bottom = (round(edge / found.scale) for edge in found.region.box)
     square, beyond = found.square, found.square.beyond(width, height)
     notes = [
-        Finding(
-            kind="flag-found",
-            severity=Severity.NOTE,
-            count=len(found.regions),
-            value=found.region.share,
-            what=f"{len(found.regions)} moving {'cloths' if len(found.regions) > 1 else 'cloth'}; number "
+        Finding.of(
+            "flag-found",
+            f"{len(found.regions)} moving {'cloths' if len(found.regions) > 1 else 'cloth'}; number "
             f"{found.chosen + 1} visits {right - left} × {bottom - top} px and is shown in a square of {square.side} px"
             + (f", {beyond:.0%} of which lie beyond the picture and were padded" if beyond > 0 else ""),
+            count=len(found.regions),
+            value=found.region.share,
         )
     ]
     if len(found.regions) > 1 and not given:
         notes.append(
-            Finding(
-                kind="several-flags-found",
-                severity=Severity.WARNING,
-                count=len(found.regions),
-                what=f"{len(found.regions)} regions move like cloth; number {found.chosen + 1} was measured, with "
+            Finding.of(
+                "several-flags-found",
+                f"{len(found.regions)} regions move like cloth; number {found.chosen + 1} was measured, with "
                 f"{found.region.share:.0%} of the motion",
+                count=len(found.regions),
                 fix="choose another by --flag, as numbered on the page of --report",
             )
         )
@@ -366,12 +356,11 @@ def _of_aspect(found: Conditioning, given: float | None) -> list[Finding]:
     if given is None or region is None or region.hoist == "top" or region.aspect <= _LONGER * given:
         return []
     return [
-        Finding(
-            kind="flag-size-contradicted",
-            severity=Severity.WARNING,
-            value=region.aspect,
-            what=f"the flag's outline is {region.aspect:.2f} times as long as high at the hoist; a flag of the size "
+        Finding.of(
+            "flag-size-contradicted",
+            f"the flag's outline is {region.aspect:.2f} times as long as high at the hoist; a flag of the size "
             f"given would be at most {given:.2f} times",
+            value=region.aspect,
             fix="check --flag-size: length along the wind times height along the pole",
         )
     ]

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.gate.reasons import REASONS
 from models.targets import ASPECT, Cloth, Target
 
@@ -113,13 +113,12 @@ class FlagSize:
         if least * (1 - _ASPECT_SLACK) <= aspect <= most * (1 + _ASPECT_SLACK):
             return ()
         return (
-            Finding(
-                kind="aspect-ratio",
-                severity=Severity.WARNING,
-                value=aspect,
-                what=f"the {trained.noun} is {aspect:.2f} times as long as it is high, those of the training "
+            Finding.of(
+                "aspect-ratio",
+                f"the {trained.noun} is {aspect:.2f} times as long as it is high, those of the training "
                 + (f"{least:.2f}" if least == most else f"{least:.2f} to {most:.2f}")
                 + " times: similarity is exact for one shape only, so that intervals may be too narrow",
+                value=aspect,
             ),
         )
 
@@ -194,13 +193,12 @@ class Sizes:
         left_out = [place for place in range(len(self.scale)) if place not in chosen]
         if not left_out:
             return self
-        finding = Finding(
-            kind="sizes-left-out",
-            severity=Severity.WARNING,
-            count=len(left_out),
-            what=f"{len(left_out)} of {len(self.scale)} sizes of flag were left out of the answer: at "
+        finding = Finding.of(
+            "sizes-left-out",
+            f"{len(left_out)} of {len(self.scale)} sizes of flag were left out of the answer: at "
             + " and ".join(f"{self.scale[place]:.2f}" for place in left_out)
             + " times the size of the training's flags the film is unlike what the network was trained on",
+            count=len(left_out),
             fix="give --flag-size LENGTHxHEIGHT",
         )
         return replace(self, scale=self.scale[chosen], draws=self.draws[chosen], findings=(*self.findings, finding))
@@ -264,23 +262,21 @@ def sizes(
     within = edges[:-1, None] + (edges[1:] - edges[:-1])[:, None] * generator.uniform(size=(STRATA, draws))
     low, high = prior.quantile(np.array([below + 0.05 * admitted, 1 - 0.05 * admitted]))
     found = [
-        Finding(
-            kind="size-assumed",
-            severity=Severity.WARNING,
-            value=prior.median,
-            what=f"the {trained.noun}'s size was not given: lengths from {low:.2f} to {high:.2f} m (90 %) were taken "
+        Finding.of(
+            "size-assumed",
+            f"the {trained.noun}'s size was not given: lengths from {low:.2f} to {high:.2f} m (90 %) were taken "
             "as possible and widen the intervals",
+            value=prior.median,
             fix="give --flag-size LENGTHxHEIGHT",
         )
     ]
     if below > 0.01:
         found.append(
-            Finding(
-                kind="small-sizes-left-out",
-                severity=Severity.WARNING,
-                value=below,
-                what=f"at {rate:.4g} frames a second {trained.noun}s shorter than {least:.2f} m cannot be judged; "
+            Finding.of(
+                "small-sizes-left-out",
+                f"at {rate:.4g} frames a second {trained.noun}s shorter than {least:.2f} m cannot be judged; "
                 f"{below:.0%} of what was assumed of the size was left out",
+                value=below,
                 fix="give --flag-size, or film faster",
             )
         )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.film import Film
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.film.similarity import spacing
 from models.conditioning.grain import grained
 from models.conditioning.instants import Interpolator, TimedFrame, at_instants
@@ -251,35 +251,32 @@ def findings_of(layout: Layout, *, found: int, interpolated: int, frames: int, r
     """
     shown = found * layout.frames * len(layout.spacings)
     notes = [
-        Finding(
-            kind="resampled",
-            severity=Severity.NOTE,
-            value=interpolated / max(shown, 1),
-            count=interpolated,
-            what=f"windows of {layout.frames} frames, "
+        Finding.of(
+            "resampled",
+            f"windows of {layout.frames} frames, "
             + " or ".join(f"{spacing * 1e3:.1f}" for spacing in layout.spacings)
             + f" ms apart, out of a film of {1 / layout.period:.4g} frames a second; {interpolated} of {shown} lie "
             "between two frames and were interpolated by the motion of the picture",
+            value=interpolated / max(shown, 1),
+            count=interpolated,
         )
     ]
     if found < layout.count:
         notes.append(
-            Finding(
-                kind="windows-left-out",
-                severity=Severity.WARNING,
+            Finding.of(
+                "windows-left-out",
+                f"{layout.count - found} of {layout.count} windows lack frames and were left out",
                 count=layout.count - found,
-                what=f"{layout.count - found} of {layout.count} windows lack frames and were left out",
             )
         )
     if repeated:
         notes.append(
-            Finding(
-                kind="frames-repeated",
-                severity=Severity.WARNING,
+            Finding.of(
+                "frames-repeated",
+                f"{repeated} of {frames} frames ({repeated / frames:.0%}) repeat the one before and were left "
+                f"out: {(1 - repeated / frames) / layout.period:.3g} different pictures a second are left",
                 count=repeated,
                 value=repeated / frames,
-                what=f"{repeated} of {frames} frames ({repeated / frames:.0%}) repeat the one before and were left "
-                f"out: {(1 - repeated / frames) / layout.period:.3g} different pictures a second are left",
             )
         )
     return tuple(notes)

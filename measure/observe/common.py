@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import KDTree
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Floats, Trajectory
 
@@ -47,13 +47,12 @@ def at_same_rate(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ..
         seen = None if own.seen is None else own.seen[before] & own.seen[before + 1]
         moved.append(replace(own, rate=rate, positions=CubicSpline(own.times, own.positions)(times), seen=seen))
         found.append(
-            Finding(
-                kind="recording-resampled",
-                severity=Severity.NOTE,
+            Finding.of(
+                "recording-resampled",
+                f"its {own.rate:.4g} frames a second are not those of the other recordings: it is followed at "
+                f"{rate:.4g} Hz",
                 where=f"recording {own.name!r}",
                 value=rate,
-                what=f"its {own.rate:.4g} frames a second are not those of the other recordings: it is followed at "
-                f"{rate:.4g} Hz",
             )
         )
     return tuple(moved), tuple(found)
@@ -92,13 +91,12 @@ def at_same_points(
         seen = None if own.seen is None else own.seen @ np.abs(weights).T >= _NEAR * np.abs(weights).sum(axis=1)
         moved.append(replace(own, markers=points, positions=positions, noise=own.noise * grown, seen=seen))
         found.append(
-            Finding(
-                kind="markers-resampled",
-                severity=Severity.NOTE,
+            Finding.of(
+                "markers-resampled",
+                f"its {count} markers are not those of the other recordings: all are followed at {len(points)} "
+                "points of the cloth",
                 where=where,
                 count=len(points),
-                what=f"its {count} markers are not those of the other recordings: all are followed at {len(points)} "
-                "points of the cloth",
             )
         )
     return tuple(moved), tuple(found)
@@ -125,12 +123,11 @@ def _shared(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], t
         )
         for own, place in zip(recordings, places, strict=True)
     ]
-    found = Finding(
-        kind="markers-shared",
-        severity=Severity.WARNING,
+    found = Finding.of(
+        "markers-shared",
+        f"the {int(there.sum())} of {len(there)} markers that are in all recordings are followed",
         where="experiment",
         count=int(there.sum()),
-        what=f"the {int(there.sum())} of {len(there)} markers that are in all recordings are followed",
         fix="track them again, if they matter",
     )
     return tuple(made), (found,)

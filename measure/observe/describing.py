@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.meshes.store import scene_wind
 from flagdata.lake import Artifact
 from measure.observe.observation import Known
@@ -144,23 +144,21 @@ def _arcsim_findings(scene: Mapping[str, Any], entry: Mapping[str, Any], where: 
     if isinstance(steps, int) and steps > 0 and isinstance(frame, int | float):
         step = float(frame) / steps
         found.append(
-            Finding(
-                kind="simulated-with-numerical-damping",
-                severity=Severity.NOTE,
+            Finding.of(
+                "simulated-with-numerical-damping",
+                f"ArcSim ran with implicit steps of {1e3 * step:.3g} ms, which damp the cloth by {5e2 * step:.3g} "
+                "ms beside its own damping",
                 where=where,
                 value=step / 2,
-                what=f"ArcSim ran with implicit steps of {1e3 * step:.3g} ms, which damp the cloth by {5e2 * step:.3g} "
-                "ms beside its own damping",
             )
         )
     if acting:
         found.append(
-            Finding(
-                kind="simulated-with-other-stages",
-                severity=Severity.NOTE,
+            Finding.of(
+                "simulated-with-other-stages",
+                f"ArcSim ran with {', '.join(acting)}, which the base model is without",
                 where=where,
                 count=len(acting),
-                what=f"ArcSim ran with {', '.join(acting)}, which the base model is without",
             )
         )
     return tuple(found)

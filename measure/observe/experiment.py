@@ -26,7 +26,7 @@ from scipy.spatial import KDTree
 from scipy.stats import chi2
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.observe import cloth
 from measure.observe.anchors import anchors_of, carried
 from measure.observe.checks import attachment, frames, inertia, shape, surroundings
@@ -342,12 +342,11 @@ def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[Floats,
         markers = np.concatenate([seen.markers for seen in observations])
         edge = cloth.hull(markers, where="cloth")
         size = np.ptp(edge, axis=0)
-        found = Finding(
-            kind="cloth-assumed-to-end-at-markers",
-            severity=Severity.WARNING,
-            where="cloth",
-            what=f"the size of the cloth is not given; it is taken to be {size[0]:.4g} m × {size[1]:.4g} m, as far "
+        found = Finding.of(
+            "cloth-assumed-to-end-at-markers",
+            f"the size of the cloth is not given; it is taken to be {size[0]:.4g} m × {size[1]:.4g} m, as far "
             "as the markers reach",
+            where="cloth",
             fix="give its width and height, or its rest mesh",
         )
         return edge, (found,)

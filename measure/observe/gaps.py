@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.observe.trajectory import Floats, Trajectory
 
 LONGEST = 0.12
@@ -94,12 +94,11 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
     cut = len(tracked) - (frames.stop - frames.start)
     if cut:
         found.append(
-            Finding(
-                kind="recording-cut",
-                severity=Severity.WARNING,
+            Finding.of(
+                "recording-cut",
+                f"{cut} frames at its ends are left out, in which clearly fewer markers were tracked than usually",
                 where=where,
                 count=cut,
-                what=f"{cut} frames at its ends are left out, in which clearly fewer markers were tracked than usually",
             )
         )
     tracked = tracked[frames]
@@ -114,12 +113,11 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
         )
     if lost:
         found.append(
-            Finding(
-                kind="markers-left-out",
-                severity=Severity.WARNING,
+            Finding.of(
+                "markers-left-out",
+                f"{lost} of {len(kept)} markers were tracked in fewer than half of the frames: left out",
                 where=f"{where}, marker {int(np.argmin(kept))}",
                 count=lost,
-                what=f"{lost} of {len(kept)} markers were tracked in fewer than half of the frames: left out",
                 fix="track them again, if they matter",
             )
         )
@@ -134,14 +132,13 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
             findings=tuple(found),
         )
     found.append(
-        Finding(
-            kind="markers-missing",
-            severity=Severity.WARNING,
+        Finding.of(
+            "markers-missing",
+            f"{missing} positions ({100 * missing / there.size:.2g} %) were not tracked; predictions are not "
+            "compared with them",
             where=f"{where}, frame {frames.start + _first(~there)}",
             count=missing,
             value=missing / there.size,
-            what=f"{missing} positions ({100 * missing / there.size:.2g} %) were not tracked; predictions are not "
-            "compared with them",
         )
     )
     whole = _filled(positions[frames][:, kept], there, markers[kept], frames_of(LONGEST, period))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.meshes import read_folder
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, read_meshes
@@ -137,12 +137,11 @@ def from_folder(
     stated = scene.get("frame_time") if isinstance(scene, Mapping) else None
     if rate is None or not isinstance(stated, int | float) or abs(rate * stated - 1) < _SAME_RATE:
         return seen
-    found = Finding(
-        kind="rate-not-as-described",
-        severity=Severity.WARNING,
+    found = Finding.of(
+        "rate-not-as-described",
+        f"frames are taken at {rate:.6g} Hz, conf.json says {1 / stated:.6g} Hz",
         where=f"recording {seen.name!r}",
         value=1 / stated,
-        what=f"frames are taken at {rate:.6g} Hz, conf.json says {1 / stated:.6g} Hz",
         fix="leave the rate out, if conf.json is right",
     )
     return replace(seen, findings=(*seen.findings, found))
@@ -210,10 +209,9 @@ def _described(attributes: Mapping[str, Any], rest: Any, where: str) -> tuple[Kn
 
 def _resampled(count: int, *, remeshed: bool, where: str) -> Finding:
     why = "its topology changes" if remeshed else f"it has more than {MARKERS} vertices"
-    return Finding(
-        kind="mesh-resampled",
-        severity=Severity.NOTE,
+    return Finding.of(
+        "mesh-resampled",
+        f"the mesh is followed at {count} fixed points of the cloth, since {why}",
         where=where,
         count=count,
-        what=f"the mesh is followed at {count} fixed points of the cloth, since {why}",
     )

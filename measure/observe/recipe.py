@@ -23,10 +23,14 @@ description says may be left out. Paths are relative to the file.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated, Any, TypeAlias, cast
 
-from flagdata import timebase
+from msgspec import Meta
+
+from flagdata import tables, timebase
 from flagdata.addresses import local_path
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.findings import Finding
@@ -37,17 +41,20 @@ from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
 from flagdata.recipes import parsed, read_recipe
 from flagdata.schema import Kind
-from flagdata.tables import DEGREES, NOT_NEGATIVE, POSITIVE, Table
+from flagdata.tables import WHOLE_LIMIT, Angle, Count, NotNegative, Positive
 from measure.observe import markers, meshes, wind
-from measure.observe.cloth import VERTICES, outline
+from measure.observe.cloth import VERTICES, Points, outline
 from measure.observe.experiment import Observed, observe
 from measure.observe.observation import Observation, Up
 from measure.observe.setup import Hold, Setup, sheet
 from measure.observe.trajectory import DENSITY_UNCERTAINTY, WindTrack
 from measure.observe.wind import LogPlacement
 from sim.air import QuadraticNormal
-from sim.material import MATERIALS, Material, named
+from sim.material import Material, named
 from sim.run.reading import material_file
+
+Triple: TypeAlias = tuple[float, float, float]
+"""(x, y, z), z up."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,10 +98,10 @@ class RecordingSource:
     source: str
     take: str = ""
     name: str = ""
-    rate: float | None = None
+    rate: Positive | None = None
     unit: str = "m"
     rest_unit: str | None = None
-    noise: float | None = None
+    noise: NotNegative | None = None
     wind: WindSource | None = None
 
 
@@ -143,21 +150,102 @@ def parse(path: Path) -> ExperimentRecipe:
         InputError: a value that does not fit.
         UsageError: values that do not fit together.
     """
-    top = Table(parsed(read_recipe(path).text, where=str(path)), where=str(path))
-    folder = path.parent
-    test = top.table("test")
-    recipe = ExperimentRecipe(
-        title=top.text("title", path.stem) or path.stem,
-        up=top.choice("up", Up.Z),
+    where, folder = str(path), path.parent
+    form = tables.read(_Form, parsed(read_recipe(path).text, where=where), where=where)
+    return ExperimentRecipe(
+        title=form.title or path.stem,
+        up=form.up,
         folder=folder,
-        setup=_setup(top, folder),
-        recordings=tuple(_recording(table, folder) for table in top.tables("recording")),
-        level=test.number("level", 0.0, above=0.0) if "level" in test else None,
-        nulls=test.whole("nulls", 0, least=1) if "nulls" in test else None,
+        setup=_setup(form, folder, where=where),
+        recordings=tuple(
+            _recording(content, folder, where=f"{where} [[recording]] {number}")
+            for number, content in enumerate(form.recording, start=1)
+        ),
+        level=form.test.level,
+        nulls=form.test.nulls,
     )
-    test.done()
-    top.done()
-    return recipe
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Form:
+    """The tables of an experiment; those that depend on others are read after them."""
+
+    title: str = ""
+    up: Up = Up.Z
+    test: _Test
+    cloth: _Cloth
+    material: Mapping[str, Any]
+    pins: _Pins
+    air: Mapping[str, Any]
+    recording: tuple[Mapping[str, Any], ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Test:
+    level: Positive | None = None
+    nulls: Count | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Cloth:
+    width: Positive | None = None
+    height: Positive | None = None
+    mesh: str | None = None
+    vertices: Annotated[int, Meta(ge=16, le=WHOLE_LIMIT)] = VERTICES
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Pins:
+    at: Hold | None = None
+    points: tuple[tuple[float, float], ...] = ()
+    rigid: bool = False
+    stiffness: Positive | None = None
+    carried: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Wind:
+    """[recording.wind], the keys of every wind."""
+
+    gain_sigma: NotNegative | None = None
+    direction_sigma: Angle | None = None
+    clock_sigma: NotNegative | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Velocity(_Wind):
+    velocity: Triple
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Speed(_Wind):
+    speed: NotNegative
+    toward: Angle = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Log(_Wind):
+    log: str
+    axis: Triple | None = None
+    north: Angle | None = None
+    offset: float | None = None
+    start: str | None = None
+    sensor: str | None = None
+    zone: str | None = None
+    accept: str | None = None
+
+
+_AIR = {"gravity": NotNegative, "density": NotNegative, "drag": NotNegative}
+_MATERIAL = {"name": str, "file": str, "mass-unknown": bool, "density-uncertainty": Positive}
+_CHANGES = {
+    "thicken": Positive,
+    "stretching-factor": Positive,
+    "bending-factor": NotNegative,
+    "density": Positive,
+    "damping": NotNegative,
+}
+"""Keys of [material] that need a name or a file."""
+_WINDS: Mapping[str, type[_Wind]] = {"velocity": _Velocity, "speed": _Speed, "log": _Log}
 
 
 def read(recipe: ExperimentRecipe, lake: Lake | None = None) -> Observed:
@@ -173,165 +261,105 @@ def read(recipe: ExperimentRecipe, lake: Lake | None = None) -> Observed:
     return observe([_observation(source, recipe, lake) for source in recipe.recordings], recipe.setup)
 
 
-def _setup(top: Table, folder: Path) -> Setup:
-    flat = top.table("cloth")
-    width, height, mesh = (
-        flat.number("width", 0.0, above=0.0) if "width" in flat else None,
-        flat.number("height", 0.0, above=0.0) if "height" in flat else None,
-        flat.text("mesh", None),
-    )
-    if (width is None) != (height is None) or (mesh is not None and width is not None):
-        raise UsageError("a cloth of half a size, or of two", where=flat.where, fix="give width and height, or a mesh")
-    corners = None
-    if width is not None and height is not None:
-        corners = sheet(width, height)
-    elif mesh is not None:
-        shape = read_obj(folder / local_path(mesh))
-        corners = outline(shape.rest, shape.faces, where=str(folder / mesh))
-    vertices = flat.whole("vertices", VERTICES, least=16)
-    flat.done()
-    pins, stiffness, carried = _pins(top.table("pins"))
-    stuff = top.table("material")
-    mass_known, uncertainty = _weighed(stuff)
-    air = top.table("air")
-    gravity = air.number("gravity", 0.0, least=0.0) if "gravity" in air else None
-    force = None
-    if "density" in air or "drag" in air:
-        base = QuadraticNormal()
-        force = QuadraticNormal(
-            density=air.number("density", base.density, least=0.0), drag=air.number("drag", base.drag, least=0.0)
-        )
-    air.done()
-    return Setup(
-        material=_material(stuff, folder),
-        mass_known=mass_known,
-        density_uncertainty=uncertainty,
-        outline=corners,
-        pins=pins,
-        carried=carried,
-        stiffness=stiffness,
-        gravity=gravity,
-        air=force,
-        vertices=vertices,
-    )
-
-
-def _weighed(stuff: Table) -> tuple[bool, float]:
-    """Whether the cloth's mass is known, and the relative standard uncertainty of its density."""
-    unknown = stuff.flag("mass-unknown")
-    if "density-uncertainty" not in stuff:
-        return not unknown, DENSITY_UNCERTAINTY
-    if unknown:
+def _setup(form: _Form, folder: Path, *, where: str) -> Setup:
+    cloth, pins, inside = form.cloth, form.pins, f"{where} [material]"
+    named = "name" in form.material or "file" in form.material
+    material = tables.entries(_MATERIAL | (_CHANGES if named else {}), form.material, where=inside)
+    air = tables.entries(_AIR, form.air, where=f"{where} [air]")
+    gravity = air.pop("gravity", None)
+    if material.get("mass-unknown") and "density-uncertainty" in material:
         raise UsageError(
             "both mass-unknown and a density-uncertainty are given",
-            where=stuff.where,
+            where=inside,
             fix="keep mass-unknown for a cloth that nobody weighed, density-uncertainty for one whose density is known",
         )
-    return True, stuff.number("density-uncertainty", DENSITY_UNCERTAINTY, above=0.0)
+    return Setup(
+        material=_material(material, folder, where=inside),
+        mass_known=not material.get("mass-unknown", False),
+        density_uncertainty=material.get("density-uncertainty", DENSITY_UNCERTAINTY),
+        outline=_outline(cloth, folder, where=f"{where} [cloth]"),
+        pins=pins.at or pins.points or None,
+        carried=pins.carried,
+        stiffness=_stiffness(pins, where=f"{where} [pins]"),
+        gravity=gravity,
+        air=QuadraticNormal(**air) if air else None,
+        vertices=cloth.vertices,
+    )
 
 
-def _pins(table: Table) -> tuple[Hold | tuple[tuple[float, float], ...] | None, float | None, bool]:
-    """Where they are, their stiffness, and whether they move."""
-    points = tuple((u, v) for u, v in table.points("points"))
-    at = table.choice("at", Hold.HOIST_CORNERS) if "at" in table else None
-    if points and at is not None:
-        raise UsageError("both at and points are given", where=table.where, fix="keep one of them")
-    rigid = table.flag("rigid")
-    stiffness = table.number("stiffness", 0.0, above=0.0) if "stiffness" in table else None
-    if rigid and stiffness is not None:
-        raise UsageError("both rigid and a stiffness are given", where=table.where, fix="keep one of them")
-    carried = table.flag("carried")
-    if carried and stiffness is not None:
-        raise UsageError("pins that are carried hold rigidly", where=table.where, fix="leave the stiffness out")
-    table.done()
-    return at or points or None, math.inf if rigid else stiffness, carried
+def _outline(cloth: _Cloth, folder: Path, *, where: str) -> Points | None:
+    if (cloth.width is None) != (cloth.height is None) or (cloth.mesh is not None and cloth.width is not None):
+        raise UsageError(
+            "a cloth of half a size, or of two, is given", where=where, fix="give width and height, or a mesh"
+        )
+    if cloth.width is not None and cloth.height is not None:
+        return sheet(cloth.width, cloth.height)
+    if cloth.mesh is None:
+        return None
+    shape = read_obj(folder / local_path(cloth.mesh))
+    return outline(shape.rest, shape.faces, where=str(folder / cloth.mesh))
 
 
-def _material(table: Table, folder: Path) -> Material | None:
-    name, file = table.text("name", None), table.text("file", None)
+def _stiffness(pins: _Pins, *, where: str) -> float | None:
+    """Stiffness of the pins [N/m]; None for the usual one."""
+    if pins.points and pins.at is not None:
+        raise UsageError("both at and points are given", where=where, fix="keep one of them")
+    if pins.rigid and pins.stiffness is not None:
+        raise UsageError("both rigid and a stiffness are given", where=where, fix="keep one of them")
+    if pins.carried and pins.stiffness is not None:
+        raise UsageError("pins that are carried hold rigidly", where=where, fix="leave the stiffness out")
+    return math.inf if pins.rigid else pins.stiffness
+
+
+def _material(given: Mapping[str, Any], folder: Path, *, where: str) -> Material | None:
+    name, file = given.get("name"), given.get("file")
     if name is None and file is None:
-        table.done()
         return None
     if name is not None and file is not None:
-        raise UsageError("both name and file are given", where=table.where, fix="keep one of them")
-    if name is not None and name not in MATERIALS.names():
-        raise UnknownNameError.of("material", name, MATERIALS.names(), where=table.where)
-    base = named(name) if name is not None else material_file(folder / local_path(file or ""))
-    thicken = table.number("thicken", 1.0, above=0.0)
+        raise UsageError("both name and file are given", where=where, fix="keep one of them")
+    base = named(name, where=where) if name is not None else material_file(folder / local_path(file))
+    thicken = given.get("thicken", 1.0)
     made = base.scaled(
         density=thicken,
-        stretching=thicken * table.number("stretching-factor", 1.0, above=0.0),
-        bending=thicken * table.number("bending-factor", 1.0, least=0.0),
+        stretching=thicken * given.get("stretching-factor", 1.0),
+        bending=thicken * given.get("bending-factor", 1.0),
     )
-    made = replace(
-        made,
-        density=table.number("density", made.density, above=0.0),
-        damping=table.number("damping", made.damping, least=0.0),
-    )
-    table.done()
-    return made
+    return replace(made, **{key: given[key] for key in ("density", "damping") if key in given})
 
 
-def _recording(table: Table, folder: Path) -> RecordingSource:
-    if not table.text("source", None):
-        raise InputError("no source is named", where=table.where, fix="add source, an artifact's id or a path")
-    return table.record(
-        RecordingSource,
-        {"wind": lambda: _wind(table.table("wind"), folder) if "wind" in table else None},
-        rate=POSITIVE,
-        noise=NOT_NEGATIVE,
-    )
+def _recording(content: Mapping[str, Any], folder: Path, *, where: str) -> RecordingSource:
+    blows = _wind(content["wind"], folder, where=f"{where} [wind]") if "wind" in content else None
+    return tables.read(RecordingSource, content, where=where, wind=blows)
 
 
-def _wind(table: Table, folder: Path) -> WindSource:
-    velocity, log = table.numbers("velocity"), table.text("log", "") or ""
-    gain, clock = (
-        table.number(f"{name}-sigma", 0.0, least=0.0) if f"{name}-sigma" in table else None
-        for name in ("gain", "clock")
-    )
-    direction = table.one_angle("direction-sigma", 0.0) if _stated(table, "direction-sigma") else None
-    if direction is not None and direction < 0:
-        raise InputError(f"direction-sigma is {direction:g}", where=table.where, fix="give a number of at least 0")
-    given = [bool(velocity), "speed" in table, bool(log)]
-    if sum(given) != 1:
-        raise UsageError(f"{sum(given)} winds", where=table.where, fix="give one of velocity, speed and log")
-    if log:
-        axis = _triple(table, "axis", table.numbers("axis"))
-        start = table.text("start", None)
-        placement = LogPlacement(
-            axis=axis,
-            north=table.one_angle("north", 0.0) if _stated(table, "north") else None,
-            offset=table.number("offset", 0.0) if "offset" in table else None,
-            start=timebase.parse(start, where=f"{table.where} start") if start is not None else None,
+def _wind(content: Any, folder: Path, *, where: str) -> WindSource:
+    tables.check_keys(content, content if isinstance(content, Mapping) else (), where=where)
+    kinds = [key for key in _WINDS if content.get(key) not in (None, "", [])]
+    if len(kinds) != 1:
+        raise UsageError(f"{len(kinds)} winds are given", where=where, fix="give one of velocity, speed and log")
+    given = tables.read(_WINDS[kinds[0]], content, where=where)
+    if given.direction_sigma is not None and given.direction_sigma < 0:
+        raise InputError(
+            f"direction-sigma is {given.direction_sigma:g}", where=where, fix="give a number of at least 0"
         )
-        sensor = table.text("sensor", None)
+    source = WindSource(gain=given.gain_sigma, direction=given.direction_sigma, clock=given.clock_sigma)
+    if isinstance(given, _Log):
+        start = given.start
+        placement = LogPlacement(
+            axis=given.axis,
+            north=given.north,
+            offset=given.offset,
+            start=timebase.parse(start, where=f"{where} start") if start is not None else None,
+        )
+        sensor = given.sensor
         if sensor is not None and (folder / local_path(sensor)).is_file():
             sensor = str(folder / sensor)
-        options = WindOptions(recipe=sensor, zone=table.text("zone", None))
-        confirm = Accepting(table.text("accept", None))
-        table.done()
-        return WindSource(
-            log=log, placement=placement, options=options, confirm=confirm, gain=gain, direction=direction, clock=clock
-        )
-    if not velocity:
-        speed, toward = table.number("speed", 0.0, least=0.0), table.one_angle("toward", 0.0)
-        velocity = (speed * math.cos(toward), speed * math.sin(toward), 0.0)
-    source = WindSource(velocity=_triple(table, "velocity", velocity), gain=gain, direction=direction, clock=clock)
-    table.done()
-    return source
-
-
-def _stated(table: Table, angle: str) -> bool:
-    """Whether an angle is given, in radians or degrees."""
-    return any(key in table for key in (angle, angle + DEGREES))
-
-
-def _triple(table: Table, key: str, values: tuple[float, ...]) -> tuple[float, float, float] | None:
-    if not values:
-        return None
-    if len(values) != 3:
-        raise InputError(f"{key} has {len(values)} numbers", where=table.where, fix="give [x, y, z]")
-    return values[0], values[1], values[2]
+        options, confirm = WindOptions(recipe=sensor, zone=given.zone), Accepting(given.accept)
+        return replace(source, log=given.log, placement=placement, options=options, confirm=confirm)
+    if isinstance(given, _Speed):
+        x, y = given.speed * math.cos(given.toward), given.speed * math.sin(given.toward)
+        return replace(source, velocity=(x, y, 0.0))
+    return replace(source, velocity=cast("_Velocity", given).velocity)
 
 
 def _observation(source: RecordingSource, recipe: ExperimentRecipe, lake: Lake | None) -> Observation:

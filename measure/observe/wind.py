@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer.confirm import UNASKED, Answers, Confirm, confirmed
 from flagdata.lake import Artifact, Lake
@@ -77,34 +77,31 @@ def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[W
     found: list[Finding] = []
     if placement.offset is None and placement.start is None:
         found.append(
-            Finding(
-                kind="clock-of-wind-assumed",
-                severity=Severity.WARNING,
+            Finding.of(
+                "clock-of-wind-assumed",
+                f"the first frame is taken to be at the log's first sample, {iso(begin)}",
                 where=where,
-                what=f"the first frame is taken to be at the log's first sample, {iso(begin)}",
                 fix="give the first frame's instant on the log's clock",
             )
         )
     left = int((~good).sum())
     if left:
         found.append(
-            Finding(
-                kind="wind-samples-left-out",
-                severity=Severity.NOTE,
+            Finding.of(
+                "wind-samples-left-out",
+                f"{left} of {len(good)} samples of the wind are unusable and left out",
                 where=where,
                 count=left,
-                what=f"{left} of {len(good)} samples of the wind are unusable and left out",
             )
         )
     gap = float(np.diff(times).max(initial=0.0))
     if gap > _LONG_GAP:
         found.append(
-            Finding(
-                kind="wind-gap",
-                severity=Severity.WARNING,
+            Finding.of(
+                "wind-gap",
+                f"no usable sample of the wind for {gap:.3g} s; it is taken to change evenly",
                 value=gap,
                 where=f"{where}, {times[int(np.diff(times).argmax())]:.4g} s after the first frame",
-                what=f"no usable sample of the wind for {gap:.3g} s; it is taken to change evenly",
             )
         )
     return WindTrack(times=times, velocity=velocity[good]), tuple(found)
@@ -139,7 +136,7 @@ def _typed(answers: Answers) -> tuple[Finding, ...]:
     if not answers:
         return ()
     texts = (f"{name} {', '.join(given) if isinstance(given, tuple) else given}" for name, given in answers.items())
-    return (Finding(kind="answers-given", severity=Severity.NOTE, what=f"given at the terminal: {'; '.join(texts)}"),)
+    return (Finding.of("answers-given", f"given at the terminal: {'; '.join(texts)}"),)
 
 
 def from_artifact(lake: Lake, artifact: Artifact, placement: LogPlacement) -> tuple[WindTrack, tuple[Finding, ...]]:

@@ -383,34 +383,25 @@ class _Run:
         out: list[Finding] = []
         failed = sum(int((~np.isfinite(g.embedding).all(axis=1)).sum()) for group in groups for g in group)
         if failed:
-            out.append(
-                Finding(
-                    kind="failed-simulations",
-                    severity=Severity.WARNING,
-                    count=failed,
-                    what=f"{failed} simulations failed and were left out",
-                )
-            )
+            out.append(Finding.of("failed-simulations", f"{failed} simulations failed and were left out", count=failed))
         if not reached:
             near = _nearest(metrics, groups, embedded)
             floor = float(np.mean([m.floor for m in metrics]))
             out.append(
-                Finding(
-                    kind="above-noise-floor",
-                    severity=Severity.WARNING,
-                    value=near / floor,
-                    what=f"the nearest parameters are {near / floor:.1f} times as far from the target as replicates "
+                Finding.of(
+                    "above-noise-floor",
+                    f"the nearest parameters are {near / floor:.1f} times as far from the target as replicates "
                     "are from each other: something of the target is in no simulation",
+                    value=near / floor,
                     fix="give the camera and light it was filmed with, or more evaluations",
                 )
             )
         if found.effective < 100:
             out.append(
-                Finding(
-                    kind="few-effective-draws",
-                    severity=Severity.WARNING,
+                Finding.of(
+                    "few-effective-draws",
+                    f"the cloth's posterior rests on {found.effective:.0f} effective draws of the prior",
                     value=found.effective,
-                    what=f"the cloth's posterior rests on {found.effective:.0f} effective draws of the prior",
                 )
             )
         out += [
@@ -425,20 +416,18 @@ class _Run:
         ]
         if not self.evaluators[0].simulator.draws_damping:
             out.append(
-                Finding(
-                    kind="damping-assumed",
-                    severity=Severity.WARNING,
-                    what="clips were simulated with the material's own damping: the intervals are too narrow for a "
+                Finding.of(
+                    "damping-assumed",
+                    "clips were simulated with the material's own damping: the intervals are too narrow for a "
                     "cloth that is damped more",
                     fix="rely on the model's own interval, which allows for any damping, where that is not known",
                 )
             )
         if not all(knows_view(target) for target in self.targets):
             out.append(
-                Finding(
-                    kind="view-drawn",
-                    severity=Severity.NOTE,
-                    what="camera and light of a target are not known: they were drawn anew for each simulated clip",
+                Finding.of(
+                    "view-drawn",
+                    "camera and light of a target are not known: they were drawn anew for each simulated clip",
                 )
             )
         return tuple(out)

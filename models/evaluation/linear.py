@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from models.evaluation.bootstrap import Estimate, Resamples, estimate
 from models.evaluation.scores import SCORES
 
@@ -118,7 +118,7 @@ def _admissible(
         return components, ()
     reason = f"the embedding has {dimension} dimensions" if most == dimension else f"{training} clips train a fold"
     what = f"{most} principal components are kept, not {components}: {reason}"
-    return most, (Finding(kind="fewer-components", severity=Severity.WARNING, what=what, value=float(most)),)
+    return most, (Finding.of("fewer-components", what, value=float(most)),)
 
 
 def leave_one_group_out(

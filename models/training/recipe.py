@@ -21,9 +21,10 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, TypeAlias, cast
 
 import torch
+from msgspec import Meta
 
 from flagdata.dataset.splits import ExplicitSplit
 from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
@@ -32,7 +33,7 @@ from flagdata.lake.matching import Values
 from flagdata.provenance import recipe_hash
 from flagdata.recipes import Shelf, is_name, parsed
 from flagdata.schema import Kind
-from flagdata.tables import COUNT, Bounds, Table
+from flagdata.tables import WHOLE_LIMIT, Count, Named, Whole, read
 from models.conditioning.conditioning import VERSION
 from models.crops import Cropping
 from models.frontend import RATE_LIMIT, FrontEnd, Maps
@@ -48,6 +49,7 @@ FILM_LIMIT = 1 << 28
 """Most values that are prepared of a film: 512 MiB of maps."""
 _LARGEST_STEP = 10.0
 """Largest learning rate and weight decay; the catalog's are of 10⁻³ and 10⁻⁴."""
+_Side: TypeAlias = Annotated[int, Meta(ge=4, le=WHOLE_LIMIT)]
 _MAPS: tuple[Maps, ...] = ("frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3")
 
 
@@ -128,10 +130,10 @@ class LossSpec:
     margin: of the contrastive loss.
     """
 
-    name: Loss
-    targets: tuple[str, ...] = ()
-    components: int = 6
-    margin: float = 1.0
+    name: Loss = Loss.REGRESSION
+    targets: tuple[Annotated[str, Named("target", TARGETS)], ...] = ()
+    components: Count = 6
+    margin: Annotated[float, Meta(gt=0.0, le=NUMBER_LIMIT)] = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,15 +151,15 @@ class OptimiserSpec:
         patience: epochs.
     """
 
-    rate: float = 1e-2
-    decay: float = 2e-3
-    batch: int = 32
-    epochs: int = 40
+    rate: Annotated[float, Meta(gt=0.0, le=_LARGEST_STEP)] = 1e-2
+    decay: Annotated[float, Meta(ge=0.0, le=_LARGEST_STEP)] = 2e-3
+    batch: Annotated[int, Meta(ge=2, le=WHOLE_LIMIT)] = 32
+    epochs: Count = 40
     schedule: Schedule = Schedule.STEPS
-    drop_after: int = 20
-    clip_norm: float | None = None
+    drop_after: Count = 20
+    clip_norm: Annotated[float, Meta(gt=0.0, le=NUMBER_LIMIT)] | None = None
     precision: Precision = Precision.FLOAT32
-    patience: int = 10
+    patience: Count = 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -251,132 +253,118 @@ def load(source: str) -> TrainingRecipe:
     return parse(found.text, name=found.name, where=found.where, folder=found.folder)
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Form:
+    """The tables of a training recipe."""
+
+    title: str = ""
+    seed: Whole = 0
+    data: _Data
+    input: _Input
+    network: Mapping[str, Any]
+    loss: Mapping[str, Any]
+    optimiser: Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Data:
+    dataset: str | tuple[str, ...]
+    sequences: Count | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Input:
+    maps: Annotated[str, Named("kind of maps", _MAPS)] = "spectral-maps"
+    size: _Side = 224
+    frames: _Side = 30
+    rate: Annotated[float, Meta(gt=0.0, le=RATE_LIMIT)] = 25.0
+    scales: tuple[float, ...] = ()
+    mirror: bool = True
+    variants: Count = 4
+    conditioned: bool = False
+    augment: Mapping[Annotated[str, Named("disturbance", DISTURBANCES)], Strength]
+
+
 def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> TrainingRecipe:
     """A recipe from its text; raises as `load`."""
-    top = Table(parsed(text, where=where), where=where)
-    front_end, cropping, variants, augment = _input(top.table("input"))
-    recipe = TrainingRecipe(
+    form = read(_Form, parsed(text, where=where), where=where)
+    front_end, cropping = _input(form.input, where=f"{where} [input]")
+    return TrainingRecipe(
         name=name,
-        title=top.text("title", name) or name,
-        seed=top.whole("seed", 0, least=0),
-        data=_data(top.table("data")),
+        title=form.title or name,
+        seed=form.seed,
+        data=_data(form.data, where=f"{where} [data]"),
         front_end=front_end,
         cropping=cropping,
-        variants=variants,
-        augment=augment,
-        network=_network(top.table("network"), front_end),
-        loss=_loss(top.table("loss")),
-        optimiser=_optimiser(top.table("optimiser")),
+        variants=form.input.variants,
+        augment=Augment(strengths=form.input.augment),
+        network=_network(form.network, front_end, where=f"{where} [network]"),
+        loss=_loss(form.loss, where=f"{where} [loss]"),
+        optimiser=_optimiser(form.optimiser, where=f"{where} [optimiser]"),
     )
-    top.done()
-    return recipe
 
 
-def _data(table: Table) -> DataSpec:
-    named = table.value("dataset")
-    datasets = [named] if isinstance(named, str) else named
-    if not isinstance(datasets, list) or not datasets or not all(is_name(dataset) for dataset in datasets):
+def _data(data: _Data, *, where: str) -> DataSpec:
+    datasets = (data.dataset,) if isinstance(data.dataset, str) else data.dataset
+    if not datasets or not all(map(is_name, datasets)):
         raise InputError(
-            f"the data set is {named!r}",
-            where=table.where,
+            f"the dataset is {data.dataset!r}",
+            where=where,
             fix='name one, or several in a list: dataset = "flagsim-wide"',
         )
-    sequences = table.whole("sequences", 1, least=1) if "sequences" in table else None
-    table.done()
-    return DataSpec(datasets=tuple(datasets), sequences=sequences)
+    return DataSpec(datasets=datasets, sequences=data.sequences)
 
 
-def _input(table: Table) -> tuple[FrontEnd, Cropping, int, Augment]:
-    maps = cast("Maps", table.named("maps", "spectral-maps", _MAPS, noun="kind of maps"))
-    size, frames = table.whole("size", 224, least=4), table.whole("frames", 30, least=4)
-    front_end = FrontEnd(
-        maps=maps, size=size, frames=frames, rate=table.number("rate", 25.0, above=0.0, most=RATE_LIMIT)
-    )
-    scales = table.numbers("scales") or Cropping.scales
-    mirror = table.flag("mirror") if "mirror" in table else True
-    variants = table.whole("variants", 4, least=1)
-    if (values := variants * math.prod(front_end.shape)) > FILM_LIMIT:
+def _input(given: _Input, *, where: str) -> tuple[FrontEnd, Cropping]:
+    front_end = FrontEnd(maps=cast("Maps", given.maps), size=given.size, frames=given.frames, rate=given.rate)
+    if (values := given.variants * math.prod(front_end.shape)) > FILM_LIMIT:
         raise LimitError(
-            f"{variants} variants of {math.prod(front_end.shape)} values are {values:.3g} values of each film",
-            where=table.where,
+            f"{given.variants} variants of {math.prod(front_end.shape)} values are {values:.3g} values of each film",
+            where=where,
             fix=f"at most {FILM_LIMIT} are kept: give fewer variants or a smaller size",
         )
-    conditioned = table.flag("conditioned")
-    augment = _augment(table.table("augment"))
-    if augment.strengths and not conditioned:
+    if given.augment and not given.conditioned:
         raise UsageError(
             "disturbances of films that are not conditioned",
-            where=f"{table.where} [augment]",
+            where=f"{where} [augment]",
             fix="write conditioned = true in [input], or leave them out",
         )
-    table.done()
-    cropping = Cropping(frames=frames, size=size, scales=scales, mirror=mirror, conditioned=conditioned)
-    return front_end, cropping, variants, augment
+    scales = given.scales or Cropping.scales
+    return front_end, Cropping(
+        frames=given.frames, size=given.size, scales=scales, mirror=given.mirror, conditioned=given.conditioned
+    )
 
 
-def _augment(table: Table) -> Augment:
-    strengths = {}
-    for name in table.names():
-        if name not in DISTURBANCES:
-            raise UnknownNameError.of("disturbance", name, DISTURBANCES, where=table.where)
-        strengths[name] = table.table(name).record(Strength)
-    table.done()
-    return Augment(strengths=strengths)
-
-
-def _network(table: Table, front_end: FrontEnd) -> NetworkSpec:
-    name = table.text("name", None)
-    if name is None:
-        raise InputError("no network is named", where=table.where, fix=f"add name, one of {', '.join(NETWORKS)}")
+def _network(content: Mapping[str, Any], front_end: FrontEnd, *, where: str) -> NetworkSpec:
+    name, options = content.get("name"), {key: each for key, each in content.items() if key != "name"}
+    if not isinstance(name, str):
+        raise InputError("no name is given", where=where, fix=f"add name, one of {', '.join(NETWORKS)}")
     takes = NETWORKS[name].takes
     if takes != front_end.maps:
         raise UsageError(
             f"the network {name} takes {takes}, not {front_end.maps}",
-            where=table.where,
+            where=where,
             fix=f'write maps = "{takes}" in [input]',
         )
-    options = {
-        key.replace("-", "_"): value
-        for key, value in ((key, table.value(key)) for key in table.names() if key != "name")
-    }
-    return NetworkSpec(name=name, options=options)
+    return NetworkSpec(name=name, options={key.replace("-", "_"): option for key, option in options.items()})
 
 
-def _loss(table: Table) -> LossSpec:
-    name = table.choice("name", Loss.REGRESSION)
-    targets = table.texts("targets")
-    for target in targets:
-        if target not in TARGETS:
-            raise UnknownNameError.of("target", target, TARGETS, where=table.where)
-    if (name is Loss.CONTRASTIVE) == bool(targets):
+def _loss(content: Mapping[str, Any], *, where: str) -> LossSpec:
+    loss = read(LossSpec, content, where=where)
+    if (loss.name is Loss.CONTRASTIVE) == bool(loss.targets):
         raise UsageError(
             "the contrastive loss has no targets, the others have at least one",
-            where=table.where,
+            where=where,
             fix='write targets = ["wind_speed"], or leave them out',
         )
-    if name is not Loss.POSTERIOR and "components" in table:
-        raise UsageError(f"components have no effect on {name.value}", where=table.where, fix="leave them out")
-    if name is not Loss.CONTRASTIVE and "margin" in table:
-        raise UsageError(f"a margin has no effect on {name.value}", where=table.where, fix="leave it out")
-    return table.record(
-        LossSpec,
-        {"name": lambda: name, "targets": lambda: targets},
-        components=COUNT,
-        margin=Bounds(above=0.0, most=NUMBER_LIMIT),
-    )
+    for key, needed in (("components", Loss.POSTERIOR), ("margin", Loss.CONTRASTIVE)):
+        if loss.name is not needed and key in content:
+            raise UsageError(f"{key} has no effect on {loss.name.value}", where=where, fix="leave it out")
+    return loss
 
 
-def _optimiser(table: Table) -> OptimiserSpec:
-    schedule = table.choice("schedule", Schedule.STEPS)
-    if schedule is not Schedule.STEPS and "drop-after" in table:
-        raise UsageError(f"drop-after says nothing of {schedule.value}", where=table.where, fix="leave it out")
-    return table.record(
-        OptimiserSpec,
-        rate=Bounds(above=0.0, most=_LARGEST_STEP),
-        decay=Bounds(least=0.0, most=_LARGEST_STEP),
-        batch=Bounds(least=2),
-        epochs=COUNT,
-        drop_after=COUNT,
-        patience=COUNT,
-        clip_norm=Bounds(above=0.0, most=NUMBER_LIMIT),
-    )
+def _optimiser(content: Mapping[str, Any], *, where: str) -> OptimiserSpec:
+    optimiser = read(OptimiserSpec, content, where=where)
+    if optimiser.schedule is not Schedule.STEPS and "drop-after" in content:
+        raise UsageError(f"drop-after has no effect on {optimiser.schedule.value}", where=where, fix="leave it out")
+    return optimiser

@@ -19,22 +19,25 @@ recording draws its own value.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated, Any, TypeAlias
+
+from msgspec import Meta
 
 from flagdata.addresses import local_path
 from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
 from flagdata.recipes import Shelf, parsed
 from flagdata.record.writer import Coding
 from flagdata.schema import TRUTH_WINDOW
-from flagdata.tables import COUNT, NOT_NEGATIVE, POSITIVE, SEED_LIMIT, Bounds, Quantity, Table
+from flagdata.tables import Count, Named, PositiveQuantity, Quantity, Seed, entries, read, value, within
 from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, GroupSpec, SessionSpec, Side, Truth
 from sim.effects import EFFECTS, SENSOR_EFFECTS
 from sim.effects.effect import FlowEffect, WindEffect
 from sim.effects.sensor import AnemometerEffect
 from sim.render import RENDERERS
 from sim.render import prior as priors
-from sim.render.prior import RenderPrior
 from sim.run import Recipe as Simulation
 from sim.run import load as load_simulation
 from sim.run.recipe import Attachment, Shape
@@ -48,6 +51,47 @@ _RATE_LIMIT = 1000.0
 SAMPLES_LIMIT = 10_000_000
 """Most samples of a recording's anemometer."""
 _SIZES = ("width", "height", "raster_samples", "cycles_samples")
+_Size: TypeAlias = Annotated[int, Meta(ge=1, le=_SIZE_LIMIT)]
+_GROUPS = {"height": PositiveQuantity, "rates": tuple[float, ...], "attachments": tuple[Attachment, ...]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Form:
+    """The tables of a data set's recipe; those that depend on others are read after them."""
+
+    title: str = ""
+    licence: str = ""
+    seed: Seed = 0
+    simulation: _Scene
+    render: _Render
+    sides: Mapping[Annotated[str, Named("side", SIDES)], _Side]
+    sessions: SessionSpec | None = None
+    groups: Mapping[str, Any] | None = None
+    camera: Mapping[str, Any]
+    anemometer: Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Scene:
+    scene: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Render:
+    prior: str
+    renderer: Annotated[str, Named("renderer", RENDERERS)] = "raster"
+    photos: str | None = None
+    width: _Size | None = None
+    height: _Size | None = None
+    raster_samples: _Size | None = None
+    cycles_samples: _Size | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Side:
+    sequences: Count
+    renders: Count | None = None
+    sessions: Count | None = None
 
 
 def load(source: str) -> DatasetRecipe:
@@ -71,31 +115,28 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
     Raises:
         UnknownNameError, InputError, UsageError: as `load`.
     """
-    top = Table(parsed(text, where=where), where=where)
-    if "sessions" in top and "groups" in top:
-        raise UsageError("both sessions and groups", where=where, fix="keep one of the tables")
-    render = top.table("render")
-    renderer = render.named("renderer", "raster", RENDERERS, noun="renderer")
-    photos = render.text("photos", None)
-    sessions = top.table("sessions").record(SessionSpec, spread=NOT_NEGATIVE) if "sessions" in top else None
-    simulation = _simulation(top.table("simulation"), folder)
-    groups = _groups(top.table("groups"), simulation) if "groups" in top else None
+    form = read(_Form, parsed(text, where=where), where=where)
+    if form.sessions is not None and form.groups is not None:
+        raise UsageError("both sessions and groups are given", where=where, fix="keep one of the tables")
+    scene = form.simulation.scene
+    simulation = load_simulation(str(folder / local_path(scene)) if scene.endswith(".toml") else scene)
+    render, source = form.render, f"{where} [render]"
+    sizes = {key: float(size) for key in _SIZES if (size := getattr(render, key)) is not None}
     recipe = DatasetRecipe(
         name=name,
-        title=top.text("title", name) or name,
-        licence=top.text("licence", None) or "",
-        seed=top.whole("seed", 0, least=0, most=SEED_LIMIT),
-        renderer=renderer,
+        title=form.title or name,
+        licence=form.licence,
+        seed=form.seed,
+        renderer=render.renderer,
         simulation=simulation,
-        prior=_prior(render),
-        sessions=sessions,
-        groups=groups,
-        photos=None if photos is None else folder / local_path(photos),
-        sides=_sides(top.table("sides"), sessions),
-        camera=_camera(top.table("camera")),
-        anemometer=_anemometer(top.table("anemometer")),
+        prior=priors.named(render.prior).with_quantities(sizes, source=source),
+        sessions=form.sessions,
+        groups=None if form.groups is None else _groups(form.groups, simulation, where=f"{where} [groups]"),
+        photos=None if render.photos is None else folder / local_path(render.photos),
+        sides=_sides(form.sides, form.sessions, where=f"{where} [sides]"),
+        camera=_camera(form.camera, where=f"{where} [camera]"),
+        anemometer=_anemometer(form.anemometer, where=f"{where} [anemometer]"),
     )
-    top.done()
     _check(recipe, where=where)
     return recipe
 
@@ -113,113 +154,71 @@ def with_renderer(recipe: DatasetRecipe, renderer: str) -> DatasetRecipe:
     return replace(recipe, renderer=renderer, name=f"{recipe.name}-{renderer}")
 
 
-def _simulation(table: Table, folder: Path) -> Simulation:
-    scene = table.text("scene", None)
-    table.done()
-    if scene is None:
-        raise InputError("no scene is named", where=table.where, fix='add scene = "flag-search-space", or a .toml file')
-    return load_simulation(str(folder / local_path(scene)) if scene.endswith(".toml") else scene)
-
-
-def _groups(table: Table, simulation: Simulation) -> GroupSpec:
-    scene, time = simulation.scene, simulation.time
+def _groups(content: Mapping[str, Any], simulation: Simulation, *, where: str) -> GroupSpec:
+    scene = simulation.scene
     if scene.shape is not Shape.FLAG:
-        raise UsageError(f"groups of a {scene.shape.value}", where=table.where, fix="give them to a flag's scene")
-    rates, attachments = table.numbers("rates") or (time.rate,), table.texts("attachments") or (scene.attachment,)
+        raise UsageError(f"groups of a {scene.shape.value} are given", where=where, fix="give them to a flag's scene")
+    values = {"height": scene.height, **entries(_GROUPS, content, where=where)}
+    rates, attachments = (
+        values.get("rates") or (simulation.time.rate,),
+        values.get("attachments") or (scene.attachment,),
+    )
     wrong = next((rate for rate in rates if not 1.0 <= rate <= _RATE_LIMIT), None)
     if wrong is not None:
-        raise InputError(f"a rate of {wrong:g} Hz", where=table.where, fix=f"give rates of 1 to {_RATE_LIMIT:g} Hz")
-    known = [attachment.value for attachment in Attachment]
-    for name in attachments:
-        if name not in known:
-            raise UnknownNameError.of("attachment", name, known, where=table.where)
-    spec = GroupSpec(
-        height=table.quantity("height", scene.height, above=0.0),
-        rates=rates,
-        attachments=tuple(Attachment(name) for name in attachments),
-    )
-    table.done()
-    return spec
+        raise InputError(f"rates has {wrong:g} Hz", where=where, fix=f"give rates of 1 to {_RATE_LIMIT:g} Hz")
+    return GroupSpec(height=values["height"], rates=rates, attachments=attachments)
 
 
-def _prior(table: Table) -> RenderPrior:
-    name = table.text("prior", None)
-    if name is None:
-        known = ", ".join(priors.PRIORS.names())
-        raise InputError("no prior of ζ is named", where=table.where, fix=f"add prior, one of {known}")
-    changes: dict[str, Quantity] = {}
-    for key in _SIZES:
-        spelled = key.replace("_", "-")
-        if spelled in table:
-            changes[key] = float(table.whole(spelled, 1, least=1, most=_SIZE_LIMIT))
-    table.done()
-    return priors.named(name).with_quantities(changes, source=table.where)
-
-
-def _sides(table: Table, sessions: SessionSpec | None) -> tuple[Side, ...]:
+def _sides(sides: Mapping[str, _Side], sessions: SessionSpec | None, *, where: str) -> tuple[Side, ...]:
     found: list[Side] = []
-    for name in table.names():
-        if name not in SIDES:
-            raise UnknownNameError.of("side", name, SIDES, where=table.where)
-        inner = table.table(name)
-        sequences = inner.whole("sequences", 0, least=1)
-        side = Side(
-            name=name,
-            sequences=sequences,
-            renders=inner.whole("renders", sequences, least=sequences),
-            sessions=inner.whole("sessions", 0, least=1) if sessions is not None else 0,
-        )
-        if side.sessions > side.sequences:
+    for name, side in sides.items():
+        inside = f"{where} [{name}]"
+        renders = side.renders or side.sequences
+        if renders < side.sequences:
             raise InputError(
-                f"{side.sessions} sessions of {side.sequences} sequences", where=inner.where, fix="have fewer sessions"
+                f"renders is {renders} of {side.sequences} sequences",
+                where=inside,
+                fix="have one of each at least",
             )
-        inner.done()
-        found.append(side)
+        if (side.sessions is None) != (sessions is None):
+            raise UsageError(
+                "sessions are of a side and of the data set",
+                where=inside,
+                fix="give the key sessions and the table [sessions], or neither",
+            )
+        if (side.sessions or 0) > side.sequences:
+            raise InputError(
+                f"{side.sessions} sessions of {side.sequences} sequences", where=inside, fix="have fewer sessions"
+            )
+        found.append(Side(name=name, sequences=side.sequences, renders=renders, sessions=side.sessions or 0))
     if not found:
-        raise InputError("no sides", where=table.where, fix="add [sides.train] with sequences and renders")
-    table.done()
+        raise InputError("no sides are given", where=where, fix="add [sides.train] with sequences and renders")
     return tuple(found)
 
 
-def _camera(table: Table) -> CameraSpec:
-    coding = table.choice("coding", Coding.JPEG)
-    idle = "jpeg-quality" if coding is Coding.H264 else "rate-factor"
-    if idle in table:
-        raise InputError(f"{idle} has no effect on {coding.value}", where=table.where, fix="leave it out")
-    noise = Bounds(least=0.0, most=128.0)
-    return table.record(
-        CameraSpec,
-        jpeg_quality=Bounds(least=1.0, most=100.0),
-        rate_factor=Bounds(least=0.0, most=51.0),
-        read_noise=noise,
-        shot_noise=noise,
-        frame_slot=COUNT,
-    )
+def _camera(content: Mapping[str, Any], *, where: str) -> CameraSpec:
+    camera = read(CameraSpec, content, where=where)
+    idle = "jpeg-quality" if camera.coding is Coding.H264 else "rate-factor"
+    if idle in content:
+        raise InputError(f"{idle} has no effect on {camera.coding.value}", where=where, fix="leave it out")
+    return camera
 
 
-def _anemometer(table: Table) -> AnemometerSpec:
+def _anemometer(content: Mapping[str, Any], *, where: str) -> AnemometerSpec:
     effects: dict[str, dict[str, Quantity]] = {}
-    chosen = table.table("effects")
     known = [name for name in SENSOR_EFFECTS if issubclass(SENSOR_EFFECTS[name], AnemometerEffect)]
-    for name in chosen.names():
-        if name not in known:
-            raise UnknownNameError.of("effect of an anemometer", name, known, where=chosen.where)
-        inner = chosen.table(name)
-        effects[name] = {
-            key: inner.quantity(key.replace("_", "-"), entry.null, least=entry.admissible[0], most=entry.admissible[1])
-            for key, entry in SENSOR_EFFECTS[name].parameters().items()
-        }
-        inner.done()
-    chosen.done()
-    return table.record(
-        AnemometerSpec,
-        {"effects": lambda: effects},
-        rate=POSITIVE,
-        before=NOT_NEGATIVE,
-        noise=NOT_NEGATIVE,
-        resolution=POSITIVE,
-        accuracy=NOT_NEGATIVE,
+    chosen = value(
+        Mapping[Annotated[str, Named("effect of an anemometer", known)], Mapping[str, Any]],
+        content.get("effects", {}),
+        key="effects",
+        where=where,
     )
+    for name, given in chosen.items():
+        described = SENSOR_EFFECTS[name].parameters()
+        types = {key.replace("_", "-"): within(Quantity, *entry.admissible) for key, entry in described.items()}
+        values = entries(types, given, where=f"{where} [effects] [{name}]")
+        effects[name] = {key: values.get(key.replace("_", "-"), entry.null) for key, entry in described.items()}
+    return read(AnemometerSpec, content, where=where, effects=effects)
 
 
 def _check(recipe: DatasetRecipe, *, where: str) -> None:

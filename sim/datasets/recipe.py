@@ -7,16 +7,19 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta
 
 from flagdata.provenance import canonical, digest, file_hash, recipe_hash
 from flagdata.record.writer import Coding
-from flagdata.tables import Quantity, plain
+from flagdata.tables import Count, NotNegative, NotNegativeQuantity, Positive, Quantity, plain
 from sim.assets.photos import Photos
 from sim.render.prior import RenderPrior
 from sim.run.recipe import Attachment
 from sim.run.recipe import Recipe as Simulation
 
+_NOISE = Meta(ge=0.0, le=128.0)
 RECIPE_VERSION = 2
 """Raised whenever the same recipe makes other bytes."""
 
@@ -62,11 +65,11 @@ class CameraSpec:
     """
 
     coding: Coding = Coding.JPEG
-    jpeg_quality: Quantity = 90.0
-    rate_factor: Quantity = 20.0
-    read_noise: Quantity = 0.0
-    shot_noise: Quantity = 0.0
-    frame_slot: int = 32768
+    jpeg_quality: Annotated[Quantity, Meta(ge=1.0, le=100.0)] = 90.0
+    rate_factor: Annotated[Quantity, Meta(ge=0.0, le=51.0)] = 20.0
+    read_noise: Annotated[Quantity, _NOISE] = 0.0
+    shot_noise: Annotated[Quantity, _NOISE] = 0.0
+    frame_slot: Count = 32768
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,11 +87,11 @@ class AnemometerSpec:
     """
 
     truth: Truth = Truth.STATED
-    rate: float = 1.0
-    before: float = 75.0
-    noise: Quantity = 0.0
-    resolution: float = 0.1
-    accuracy: float = 0.2
+    rate: Positive = 1.0
+    before: NotNegative = 75.0
+    noise: NotNegativeQuantity = 0.0
+    resolution: Positive = 0.1
+    accuracy: NotNegative = 0.2
     effects: Mapping[str, Mapping[str, Quantity]]
 
 
@@ -100,7 +103,7 @@ class SessionSpec:
         spread: the sequences' winds lie within this share of the session's mean, either way.
     """
 
-    spread: float = 0.25
+    spread: NotNegative = 0.25
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from typing import Any
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.recipes import Shelf, parsed
 from flagdata.rng import stream
-from flagdata.tables import DEGREES, Quantity, Range, Table, ends, in_radians, plain
+from flagdata.tables import DEGREES, NotNegative, Quantity, Range, ends, entries, in_radians, plain
 from sim.assets import Assets
 from sim.render.parameters import RenderParameters
 
@@ -125,37 +125,38 @@ def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:
     Raises:
         InputError: missing, unknown or ill-typed entries, or a parameter that is given twice.
     """
-    table = Table(content, where=f"render prior {name!r}")
-    table.text("title", None)
-    least_angle = math.radians(table.number("least-angle-deg", 0.0, least=0.0))
-    textures, backgrounds = table.texts("textures"), table.texts("backgrounds")
+    where = f"render prior {name!r}"
+    sections = {key: each for key, each in content.items() if key not in _GENERAL}
+    general = entries(_GENERAL, {key: each for key, each in content.items() if key in _GENERAL}, where=where)
+    described = RenderParameters.described()
+    keys = {key: key.replace("_", "-") + (DEGREES if entry.unit == "rad" else "") for key, entry in described.items()}
     quantities: dict[str, Quantity] = {}
     sources: dict[str, str] = {}
-    for section in table.names():
-        if section in ("title", "least-angle-deg", "textures", "backgrounds"):
-            continue
-        part = table.table(section)
-        source = part.text("source", None)
+    for section, part in sections.items():
+        inside = f"{where} [{section}]"
+        values = entries({"source": str, **dict.fromkeys(keys.values(), Quantity)}, part, where=inside)
+        source = values.pop("source", None)
         if not source:
-            raise InputError("no source", where=part.where, fix='say where the ranges are from: source = "…"')
-        for parameter, entry in RenderParameters.described().items():
-            key = parameter.replace("_", "-") + (DEGREES if entry.unit == "rad" else "")
-            if key not in part:
+            raise InputError("no source is given", where=inside, fix='say where the ranges are from: source = "…"')
+        for parameter, key in keys.items():
+            if key not in values:
                 continue
             if parameter in quantities:
-                raise InputError(f"{key} is given twice", where=part.where, fix="keep one")
-            given = part.quantity(key, 0.0)
-            quantities[parameter] = in_radians(given) if entry.unit == "rad" else given
+                raise InputError(f"{key} is given twice", where=inside, fix="keep one")
+            quantities[parameter] = in_radians(values[key]) if key.endswith(DEGREES) else values[key]
             sources[parameter] = source
-        part.done()
     return RenderPrior(
         name=name,
         quantities=quantities,
         sources=sources,
-        textures=textures,
-        backgrounds=backgrounds,
-        least_angle=least_angle,
+        textures=general.get("textures", ()),
+        backgrounds=general.get("backgrounds", ()),
+        least_angle=math.radians(general.get("least-angle-deg", 0.0)),
     )
+
+
+_GENERAL = {"title": str, "least-angle-deg": NotNegative, "textures": tuple[str, ...], "backgrounds": tuple[str, ...]}
+"""Keys of a prior beside its tables of quantities."""
 
 
 def _at(quantity: Quantity, share: float) -> float:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import torch
@@ -15,7 +15,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.provenance import canonical, digest
 from flagdata.series import Wind
 from flagdata.signals import WindSeries
-from flagdata.tables import Table
+from flagdata.tables import Angle, value
 from sim.wind.sampled import Beyond, Floats, SampledWind, about_mean, usable
 
 Logs: TypeAlias = Callable[[str], tuple[str, WindSeries]]
@@ -61,34 +61,50 @@ class WindSamples:
         return digest(canonical([self.times.tolist(), self.velocity.tolist()]))
 
 
-def read(table: Table, *, before: float, duration: float, logs: Logs | None) -> WindSamples | None:
-    """Reads `log`, `log-start` and `toward`, or `samples`, and `beyond` of a recipe's [wind]; None where neither is.
+TYPES: Mapping[str, Mapping[str, Any]] = {
+    "log": {"log": Any, "log-start": float, "toward": Angle, "beyond": Beyond},
+    "samples": {"samples": Any, "beyond": Beyond},
+}
+"""Where samples come from → its keys in [wind]."""
+
+
+def source(content: Mapping[str, Any], *, where: str) -> str | None:
+    """Returns where the samples of a recipe's [wind] come from, a key of `TYPES`; None for a steady wind.
+
+    Raises:
+        UsageError: a speed beside them, or both.
+    """
+    stated = [key for key in ("speed", *TYPES) if key in content]
+    if len(stated) > 1:
+        raise UsageError(f"{' and '.join(stated)} are given", where=where, fix="keep one of them")
+    return stated[0] if stated and stated[0] in TYPES else None
+
+
+def read(values: Mapping[str, Any], *, before: float, duration: float, logs: Logs | None, where: str) -> WindSamples:
+    """Returns the samples of the part of a wind that a run needs.
 
     Args:
+        values: key → value, of the source's types in `TYPES`.
         before: how long the run lasts before the first frame that is kept [s].
         duration: from that frame to the last one [s].
         logs: of the lake; None where there is no lake.
 
     Raises:
-        UsageError: a speed beside them, or both; a log by name without a lake.
+        UsageError: a log by name without a lake.
         InputError: samples that do not fit, that are not ascending in time or do not cover the run.
     """
-    stated = [key for key in ("speed", "log", "samples") if key in table]
-    if len(stated) > 1:
-        raise UsageError(f"{' and '.join(stated)} are given", where=table.where, fix="keep one of them")
-    if stated in ([], ["speed"]):
-        return None
     artifact = ""
-    if stated == ["log"]:
-        artifact, series = _log(table, logs)
-        times, velocity = _velocity(table, series)
+    if "log" in values:
+        artifact, series = _log(values["log"], logs, where=where)
+        times, velocity = _velocity(values, series, where=where)
     else:
-        times, velocity = _array(table)
-    if table.choice("beyond", Beyond.REFUSE) is Beyond.REFUSE and (times[0] > -before or times[-1] < duration):
+        times, velocity = _array(values["samples"], where=where)
+    refused = values.get("beyond", Beyond.REFUSE) is Beyond.REFUSE
+    if refused and (times[0] > -before or times[-1] < duration):
         raise InputError(
             f"the wind is known from {times[0]:g} to {times[-1]:g} s and the run lasts from {-before:g} to "
             f"{duration:g} s, counted from the first frame that is kept",
-            where=table.where,
+            where=where,
             fix='give a longer series, or beyond = "hold", with which the first and the last sample last on',
         )
     low = max(int(np.searchsorted(times, -before, side="right")) - 1, 0)
@@ -97,25 +113,24 @@ def read(table: Table, *, before: float, duration: float, logs: Logs | None) -> 
     return WindSamples(times=times[low:high], velocity=velocity[low:high], artifact=artifact)
 
 
-def _log(table: Table, logs: Logs | None) -> tuple[str, WindSeries | Wind]:
-    log = table.value("log")
+def _log(log: Any, logs: Logs | None, *, where: str) -> tuple[str, WindSeries | Wind]:
     if isinstance(log, Wind | WindSeries):
         return "", log
-    name = table.text("log", None) or ""
+    name = value(str, log, key="log", where=where)
     if logs is None:
         raise UsageError(
             f"the log {name!r} is looked for in a lake, and there is none",
-            where=table.where,
+            where=where,
             fix="give the log itself, as flagdata.wind returns it",
         )
     return logs(name)
 
 
-def _velocity(table: Table, series: WindSeries | Wind) -> tuple[Floats, Floats]:
+def _velocity(values: Mapping[str, Any], series: WindSeries | Wind, *, where: str) -> tuple[Floats, Floats]:
     """Returns times (n,) [s] and velocities (n, 3) [m/s] of a log whose vector mean goes where `toward` says."""
     start = int(series.time[0]) if isinstance(series, WindSeries) else 0
     if isinstance(series, WindSeries):
-        time, speed, direction = usable(series, start=start, where=table.where)
+        time, speed, direction = usable(series, start=start, where=where)
     else:
         good = np.isfinite(series.speed)
         direction = None
@@ -123,22 +138,22 @@ def _velocity(table: Table, series: WindSeries | Wind) -> tuple[Floats, Floats]:
             good &= np.isfinite(series.direction)
             direction = series.direction[good]
         time, speed = series.time[good], series.speed[good]
-    times, mean, relative = about_mean(time, speed, direction, where=table.where)
-    toward = mean * np.exp(1j * table.one_angle("toward", 0.0)) * (1 + relative)
-    return times - table.number("log-start", 0.0), np.stack([toward.real, toward.imag, 0.0 * times], axis=1)
+    times, mean, relative = about_mean(time, speed, direction, where=where)
+    toward = mean * np.exp(1j * values.get("toward", 0.0)) * (1 + relative)
+    return times - values.get("log-start", 0.0), np.stack([toward.real, toward.imag, 0.0 * times], axis=1)
 
 
-def _array(table: Table) -> tuple[Floats, Floats]:
+def _array(samples: Any, *, where: str) -> tuple[Floats, Floats]:
     try:
-        rows = np.array(table.value("samples"), dtype=np.float64)
+        rows = np.array(samples, dtype=np.float64)
     except (TypeError, ValueError):
         rows = np.zeros(0)
     if rows.ndim != 2 or rows.shape[1] != 4 or len(rows) < 2 or not np.isfinite(rows).all():
         raise InputError(
             "samples of the wind are no table of numbers",
-            where=table.where,
+            where=where,
             fix="give two rows or more, [[time, x, y, z], …], in s since the first frame that is kept and m/s",
         )
     if not (np.diff(rows[:, 0]) > 0).all():
-        raise InputError("times of the wind's samples do not ascend", where=table.where, fix="sort the rows by time")
+        raise InputError("times of the wind's samples do not ascend", where=where, fix="sort the rows by time")
     return rows[:, 0], rows[:, 1:]

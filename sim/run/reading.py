@@ -32,22 +32,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta
 
 from flagdata.addresses import local_path
-from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.errors import InputError, UsageError
 from flagdata.provenance import canonical, digest
 from flagdata.recipes import Shelf, parsed, read_recipe
-from flagdata.tables import COUNT, NOT_NEGATIVE, POSITIVE, SEED_LIMIT, Quantity, Range, Table
+from flagdata.tables import (
+    AngleQuantity,
+    Count,
+    Index,
+    Named,
+    NotNegative,
+    NotNegativeQuantity,
+    Positive,
+    PositiveQuantity,
+    Quantity,
+    Range,
+    Seed,
+    entries,
+    read,
+    value,
+    within,
+)
 from sim import material
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
 from sim.arcsim import SWEEPS, ArcsimScene, read_material, read_scene
 from sim.contact import Contact
 from sim.effects import EFFECTS
 from sim.handles import ARCSIM_STIFFNESS
-from sim.integrate import INTEGRATORS
 from sim.integrate.backend import Backend
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
@@ -106,6 +123,90 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
     return of_content(parsed(text, where=where), name=name, folder=folder, where=where)
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Form:
+    """The tables of a recipe; those that depend on others are read after them."""
+
+    title: str = ""
+    seed: Seed = 0
+    count: Count = 1
+    batch: Count = 16
+    precision: Annotated[str, Named("precision", DTYPES)] = "float32"
+    scene: Mapping[str, Any]
+    material: _Cloth
+    wind: Mapping[str, Any]
+    contact: Contact | None = None
+    limits: Mapping[str, Any] | None = None
+    integrator: IntegratorSpec
+    time: TimeSpec
+    effects: Mapping[Annotated[str, Named("effect", EFFECTS)], Mapping[str, Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Cloth:
+    """[material]."""
+
+    name: str | None = None
+    names: tuple[str, ...] = ()
+    file: str | None = None
+    table: Mapping[str, Any]
+    density: PositiveQuantity | None = None
+    density_factor: PositiveQuantity = 1.0
+    stretching_factor: PositiveQuantity = 1.0
+    bending_factor: NotNegativeQuantity = 1.0
+    bending_factors: NotNegativeQuantity = 1.0
+    damping: NotNegativeQuantity | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Scene:
+    """[scene], the keys of every shape."""
+
+    shape: Shape = Shape.FLAG
+    evaluation: Evaluation = Evaluation.ARCSIM
+    start_noise: NotNegative = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SceneFile(_Scene):
+    file: str
+    root: str | None = None
+    accept: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _HandledScene(_Scene):
+    rigid: bool = False
+    stiffness: Positive | None = None
+    gravity: float = -GRAVITY[2]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Sheet(_HandledScene):
+    width: Positive | None = None
+    height: Positive | None = None
+    columns: Count | None = None
+    attachment: Attachment = Attachment.CORNERS
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Mesh(_HandledScene):
+    rest: tuple[tuple[float, float], ...] = ()
+    faces: tuple[tuple[Index, Index, Index], ...] = ()
+    held: tuple[Index, ...] = ()
+    anchors: tuple[tuple[float, float, float], ...] = ()
+
+
+_FORCES: Mapping[str, Mapping[str, Any]] = {
+    "quadratic-normal": {"density": NotNegative, "drag": NotNegative},
+    "stokes": {"viscosity": NotNegative},
+}
+"""Force of the air → its keys in [wind]."""
+_STEADY = {"speed": Annotated[Quantity, Meta(ge=0.0, le=100.0)], "toward": AngleQuantity, "vertical": float}
+"""Keys of a steady wind."""
+_LIMITS = {"low": float, "high": float, "sweeps": Count}
+
+
 def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: str, logs: Logs | None = None) -> Recipe:
     """A recipe from what its TOML holds.
 
@@ -116,103 +217,78 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
     Raises:
         UnknownNameError, InputError: as `load`.
     """
-    top = Table(content, where=where)
-    scene = _scene(top.table("scene"), folder)
-    integrator = _integrator(top.table("integrator"))
+    form = read(_Form, content, where=where)
+    scene = _scene(form.scene, folder, where=f"{where} [scene]")
     given = None if scene.arcsim is None else scene.arcsim.scene
-    contact = given and given.contact
-    if "contact" in top:
-        contact = top.table("contact").record(Contact, thickness=POSITIVE, stiffness=POSITIVE, friction=NOT_NEGATIVE)
-    bounds = given and given.limits
-    limits = _limits(top.table("limits"), bounds, integrator) if bounds is not None or "limits" in top else None
-    time = top.table("time").record(TimeSpec, settle=NOT_NEGATIVE, frames=COUNT, rate=POSITIVE)
-    recipe = Recipe(
+    limits = given and given.limits
+    if form.limits is not None or limits is not None:
+        # Small steps need one sweep.
+        base = replace(limits or StrainLimits(), sweeps=SWEEPS if form.integrator.name == "implicit" else 1)
+        limits = replace(base, **entries(_LIMITS, form.limits or {}, where=f"{where} [limits]"))
+    return Recipe(
         name=name,
-        title=top.text("title", name) or name,
-        seed=top.whole("seed", 0, least=0, most=SEED_LIMIT),
-        count=top.whole("count", 1, least=1),
-        batch=top.whole("batch", 16, least=1),
-        precision=top.named("precision", "float32", DTYPES, noun="precision"),
+        title=form.title or name,
+        seed=form.seed,
+        count=form.count,
+        batch=form.batch,
+        precision=form.precision,
         scene=scene,
-        material=_material(top.table("material"), folder, scene),
-        wind=_wind(top.table("wind"), scene, time, logs),
-        contact=contact,
+        material=_material(form.material, folder, scene, where=f"{where} [material]"),
+        wind=_wind(form.wind, scene, form.time, logs, where=f"{where} [wind]"),
+        contact=form.contact or (given and given.contact),
         limits=limits,
-        integrator=integrator,
-        time=time,
-        effects=_effects(top.table("effects")),
+        integrator=_integrator(form.integrator, content.get("integrator", {}), where=f"{where} [integrator]"),
+        time=form.time,
+        effects={key: _effect(key, each, where=f"{where} [effects] [{key}]") for key, each in form.effects.items()},
     )
-    top.done()
-    return recipe
 
 
-def _scene(table: Table, folder: Path) -> SceneSpec:
-    shape = table.choice("shape", Shape.FLAG)
-    evaluation = table.choice("evaluation", Evaluation.ARCSIM)
-    noise = table.number("start-noise", 0.0, least=0.0)
+def _scene(content: Mapping[str, Any], folder: Path, *, where: str) -> SceneSpec:
+    shape = value(Shape, content.get("shape", Shape.FLAG.value), key="shape", where=where)
     if shape is Shape.ARCSIM:
-        file, root = table.text("file", None), table.text("root", None)
-        accept = table.texts("accept")
-        table.done()
-        if file is None:
-            raise InputError("no file is named", where=table.where, fix='add file = "scene.json"')
-        content = read_scene(
-            folder / local_path(file), root=None if root is None else folder / local_path(root), accept=accept
-        )
-        return _arcsim(content, noise=noise, evaluation=evaluation)
-    stiffness = _stiffness(table)
+        named = read(_SceneFile, content, where=where)
+        root = None if named.root is None else folder / local_path(named.root)
+        file = read_scene(folder / local_path(named.file), root=root, accept=named.accept)
+        return _arcsim(file, noise=named.start_noise, evaluation=named.evaluation)
     if shape is Shape.MESH:
-        return _given(table, noise=noise, evaluation=evaluation, stiffness=stiffness)
-    square = shape is Shape.HANGING_CLOTH
-    width = table.number("width", 1.0 if square else 1.5, above=0.0)
-    height = table.number("height", width if square else width * 2 / 3, above=0.0)
-    columns = table.whole("columns", 20 if square else 30, least=1)
-    attachment = table.choice("attachment", Attachment.CORNERS)
-    gravity = table.number("gravity", -GRAVITY[2])
-    table.done()
-    if square and attachment is Attachment.HOIST:
-        raise UsageError("a hanging cloth has no hoist", where=table.where, fix='take attachment = "corners"')
+        return _given(read(_Mesh, content, where=where), where=where)
+    sheet, square = read(_Sheet, content, where=where), shape is Shape.HANGING_CLOTH
+    width = sheet.width or (1.0 if square else 1.5)
+    if square and sheet.attachment is Attachment.HOIST:
+        raise UsageError("a hanging cloth has no hoist", where=where, fix='take attachment = "corners"')
     return SceneSpec(
         shape=shape,
         width=width,
-        height=height,
-        columns=columns,
-        attachment=attachment,
-        start_noise=noise,
-        evaluation=evaluation,
-        gravity=gravity,
-        stiffness=stiffness,
+        height=sheet.height or (width if square else width * 2 / 3),
+        columns=sheet.columns or (20 if square else 30),
+        attachment=sheet.attachment,
+        start_noise=sheet.start_noise,
+        evaluation=sheet.evaluation,
+        gravity=sheet.gravity,
+        stiffness=_stiffness(sheet, where=where),
     )
 
 
-def _stiffness(table: Table) -> float:
+def _stiffness(scene: _HandledScene, *, where: str) -> float:
     """Stiffness of the handles [N/m]."""
-    rigid, given = table.flag("rigid"), "stiffness" in table
-    if rigid and given:
-        raise UsageError("both rigid and a stiffness are given", where=table.where, fix="keep one of them")
-    return math.inf if rigid else table.number("stiffness", ARCSIM_STIFFNESS, above=0.0)
+    if scene.rigid and scene.stiffness:
+        raise UsageError("both rigid and a stiffness are given", where=where, fix="keep one of them")
+    return math.inf if scene.rigid else scene.stiffness or ARCSIM_STIFFNESS
 
 
-def _given(table: Table, *, noise: float, evaluation: Evaluation, stiffness: float) -> SceneSpec:
-    cloth = GivenCloth(
-        rest=tuple((u, v) for u, v in table.points("rest")),
-        faces=tuple((a, b, c) for a, b, c in table.indices("faces", 3)),
-        held=tuple(vertex for (vertex,) in table.indices("held", 1)),
-        anchors=tuple((x, y, z) for x, y, z in table.points("anchors", 3)),
-    )
-    gravity = table.number("gravity", -GRAVITY[2])
-    table.done()
+def _given(mesh: _Mesh, *, where: str) -> SceneSpec:
+    cloth = GivenCloth(rest=mesh.rest, faces=mesh.faces, held=mesh.held, anchors=mesh.anchors)
     used = [vertex for face in cloth.faces for vertex in face]
     if not cloth.rest or not cloth.faces or not cloth.held or len(cloth.held) != len(cloth.anchors):
         raise InputError(
             f"a mesh of {len(cloth.rest)} vertices and {len(cloth.faces)} faces, {len(cloth.held)} of them held at "
             f"{len(cloth.anchors)} anchors",
-            where=table.where,
+            where=where,
             fix="give rest, faces, held, an anchor for each held",
         )
     if max(*used, *cloth.held) >= len(cloth.rest):
         raise InputError(
-            f"a vertex {max(*used, *cloth.held)} of {len(cloth.rest)}", where=table.where, fix="number them from 0"
+            f"a vertex {max(*used, *cloth.held)} of {len(cloth.rest)}", where=where, fix="number them from 0"
         )
     width, height = (max(axis) - min(axis) for axis in zip(*cloth.rest, strict=True))
     return SceneSpec(
@@ -221,10 +297,10 @@ def _given(table: Table, *, noise: float, evaluation: Evaluation, stiffness: flo
         height=height,
         columns=0,
         attachment=Attachment.CORNERS,
-        start_noise=noise,
-        evaluation=evaluation,
-        gravity=gravity,
-        stiffness=stiffness,
+        start_noise=mesh.start_noise,
+        evaluation=mesh.evaluation,
+        gravity=mesh.gravity,
+        stiffness=_stiffness(mesh, where=where),
         given=cloth,
         content=digest(canonical(vars(cloth).copy())),
     )
@@ -255,38 +331,31 @@ def _arcsim(scene: ArcsimScene, *, noise: float, evaluation: Evaluation) -> Scen
     )
 
 
-def _material(table: Table, folder: Path, scene: SceneSpec) -> MaterialSpec:
-    bases = _bases(table, folder, scene)
-    spec = MaterialSpec(
-        bases=bases,
-        density=table.quantity("density", bases[0].density, above=0.0) if "density" in table else None,
-        density_factor=table.quantity("density-factor", 1.0, above=0.0),
-        stretching=table.quantity("stretching-factor", 1.0, above=0.0),
-        bending=table.quantity("bending-factor", 1.0, least=0.0),
-        bending_each=table.quantity("bending-factors", 1.0, least=0.0),
-        damping=table.quantity("damping", bases[0].damping, least=0.0) if "damping" in table else None,
+def _material(cloth: _Cloth, folder: Path, scene: SceneSpec, *, where: str) -> MaterialSpec:
+    return MaterialSpec(
+        bases=_bases(cloth, folder, scene, where=where),
+        density=cloth.density,
+        density_factor=cloth.density_factor,
+        stretching=cloth.stretching_factor,
+        bending=cloth.bending_factor,
+        bending_each=cloth.bending_factors,
+        damping=cloth.damping,
     )
-    table.done()
-    return spec
 
 
-def _bases(table: Table, folder: Path, scene: SceneSpec) -> tuple[Material, ...]:
-    name, names_, file = table.text("name", None), table.texts("names"), table.text("file", None)
-    inline = table.mapping("table")
-    if sum(bool(given) for given in (name, names_, file, inline)) > 1:
-        raise UsageError(
-            "more than one of name, names, file and table is given", where=table.where, fix="keep one of them"
-        )
-    if inline:
-        return (Material.from_mapping(inline, name=str(inline.get("title", "material"))),)
-    chosen = (name,) if name is not None else names_
+def _bases(cloth: _Cloth, folder: Path, scene: SceneSpec, *, where: str) -> tuple[Material, ...]:
+    if sum(map(bool, (cloth.name, cloth.names, cloth.file, cloth.table))) > 1:
+        raise UsageError("more than one of name, names, file and table is given", where=where, fix="keep one of them")
+    if cloth.table:
+        return (Material.from_mapping(cloth.table, name=str(cloth.table.get("title", "material"))),)
+    chosen = (cloth.name,) if cloth.name is not None else cloth.names
     if chosen:
-        return tuple(material.named(each, where=table.where) for each in chosen)
-    if file is not None:
-        return (material_file(folder / local_path(file)),)
+        return tuple(material.named(each, where=where) for each in chosen)
+    if cloth.file is not None:
+        return (material_file(folder / local_path(cloth.file)),)
     if scene.arcsim is not None:
         return (scene.arcsim.scene.material,)
-    raise InputError("no material is named", where=table.where, fix='add name = "camel-ponte-roma", or a file')
+    raise InputError("no material is named", where=where, fix='add name = "camel-ponte-roma", or a file')
 
 
 def material_file(path: Path) -> Material:
@@ -301,96 +370,72 @@ def material_file(path: Path) -> Material:
     return Material.from_mapping(parsed(read_recipe(path).text, where=str(path)), name=path.stem)
 
 
-def _wind(table: Table, scene: SceneSpec, time: TimeSpec, logs: Logs | None = None) -> WindSpec:
-    if scene.arcsim is not None and not table.names():
+def _wind(
+    content: Mapping[str, Any], scene: SceneSpec, time: TimeSpec, logs: Logs | None = None, *, where: str
+) -> WindSpec:
+    if scene.arcsim is not None and not content:
         x, y, z = scene.arcsim.scene.wind
         return WindSpec(speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=scene.arcsim.scene.air)
-    name = table.named("force", "quadratic-normal", AIR_FORCES, noun="wind force")
-    force: AirForce
-    if name == "stokes":
-        force = Stokes(viscosity=table.number("viscosity", Stokes().viscosity, least=0.0))
-    else:
-        base = QuadraticNormal()
-        force = QuadraticNormal(
-            density=table.number("density", base.density, least=0.0), drag=table.number("drag", base.drag, least=0.0)
+    name = content.get("force")
+    types = {
+        "force": Annotated[str, Named("wind force", AIR_FORCES)],
+        **_FORCES.get(str(name), _FORCES["quadratic-normal"]),
+    }
+    source = blowing.source(content, where=where)
+    values = entries(types | (blowing.TYPES[source] if source else _STEADY), content, where=where)
+    air = {key: values[key] for key in types if key in values and key != "force"}
+    force: AirForce = Stokes(**air) if name == "stokes" else QuadraticNormal(**air)
+    if source:
+        samples = blowing.read(
+            values, before=time.first, duration=(time.frames - 1) / time.rate, logs=logs, where=where
         )
-    samples = blowing.read(table, before=time.first, duration=(time.frames - 1) / time.rate, logs=logs)
-    if samples is not None:
-        table.done()
         x, y, z = samples.mean(time.frames, time.rate).tolist()
         return WindSpec(speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=force, samples=samples)
-    spec = WindSpec(
-        speed=table.quantity("speed", 0.0, least=0.0, most=100.0),
-        toward=table.angle("toward", 0.0),
-        vertical=table.number("vertical", 0.0),
-        force=force,
-    )
-    table.done()
-    if "speed" not in table:
+    if "speed" not in values:
         raise InputError(
-            "no wind speed is given", where=table.where, fix="add speed = 4.0 (m/s), or a range; a log or samples"
+            "no wind speed is given", where=where, fix="add speed = 4.0 (m/s), or a range; a log or samples"
         )
-    return spec
-
-
-def _limits(table: Table, given: StrainLimits | None, integrator: IntegratorSpec) -> StrainLimits:
-    """Those of the table, in what it leaves out those of an ArcSim scene; small steps need one sweep."""
-    base = replace(given or StrainLimits(), sweeps=SWEEPS if integrator.name == "implicit" else 1)
-    limits = StrainLimits(
-        low=table.number("low", base.low),
-        high=table.number("high", base.high),
-        sweeps=table.whole("sweeps", base.sweeps, least=1),
+    return WindSpec(
+        **{"toward": 0.0, "vertical": 0.0, "force": force} | {key: values[key] for key in _STEADY if key in values}
     )
-    table.done()
-    return limits
 
 
-def _integrator(table: Table) -> IntegratorSpec:
-    name = table.named("name", "symplectic", INTEGRATORS, noun="integrator")
-    step = table.number("step", 0.0, above=0.0) if "step" in table else None
-    air_shape = AirShape.CURRENT
-    if name == "implicit":
-        step = 5e-3 if step is None else step
-        air_shape = table.choice("air-shape", AirShape.CURRENT)
-    backend = table.choice("backend", Backend.AUTO)
-    if name == "implicit" and backend is Backend.WARP:
+def _integrator(spec: IntegratorSpec, content: Mapping[str, Any], *, where: str) -> IntegratorSpec:
+    if spec.name != "implicit":
+        if "air-shape" in content:
+            raise UsageError(f"air-shape has no effect on {spec.name}", where=where, fix="leave it out")
+        return spec
+    if spec.backend is Backend.WARP:
         raise UsageError(
             "the Warp kernel has only leapfrog steps, no implicit integration",
-            where=table.where,
+            where=where,
             fix='name = "symplectic", or another backend',
         )
-    table.done()
-    return IntegratorSpec(name=name, step=step, air_shape=air_shape, backend=backend)
+    return replace(spec, step=5e-3 if spec.step is None else spec.step)
 
 
-def _effects(table: Table) -> dict[str, EffectSpec]:
-    specs: dict[str, EffectSpec] = {}
-    for name in table.names():
-        if name not in EFFECTS:
-            raise UnknownNameError.of("effect", name, EFFECTS, where=table.where)
-        if name == "logged-gusts":
-            raise UsageError(
-                "logged gusts need a log, which an effect of a recipe cannot name",
-                where=table.where,
-                fix='name the log in [wind], as log = "NAME"',
-            )
-        inner = table.table(name)
-        length = inner.number("length", _GUST_LENGTH, above=0.0) if name == "gusts" else None
-        parameters: dict[str, Quantity] = {}
-        for key, described in EFFECTS[name].parameters().items():
-            spelled = key.replace("_", "-")
-            if spelled not in inner:
-                parameters[key] = described.null
-                continue
-            least, most = described.admissible
-            if inner.says(spelled, "prior"):
-                parameters[key] = Range(low=described.prior[0], high=described.prior[1])
-            else:
-                parameters[key] = inner.quantity(spelled, described.null, least=least, most=most)
-        inner.done()
-        specs[name] = EffectSpec(parameters=parameters, length=length)
-    table.done()
-    return specs
+def _effect(name: str, content: Mapping[str, Any], *, where: str) -> EffectSpec:
+    if name == "logged-gusts":
+        raise UsageError(
+            "logged gusts need a log, which an effect of a recipe cannot name",
+            where=where,
+            fix='name the log in [wind], as log = "NAME"',
+        )
+    described = EFFECTS[name].parameters()
+    keys = {key: key.replace("_", "-") for key in described}
+    types = {
+        keys[key]: Literal["prior"] if content.get(keys[key]) == "prior" else within(Quantity, *entry.admissible)
+        for key, entry in described.items()
+    }
+    if name == "gusts":
+        types["length"] = Positive
+    values = entries(types, content, where=where)
+    length = values.pop("length", _GUST_LENGTH) if name == "gusts" else None
+    parameters: dict[str, Quantity] = {}
+    for key, entry in described.items():
+        drawn = values.get(keys[key], entry.null)
+        parameters[key] = Range(low=entry.prior[0], high=entry.prior[1]) if drawn == "prior" else drawn
+    return EffectSpec(parameters=parameters, length=length)
 
 
 def _of_scene_file(path: Path) -> Recipe:
@@ -407,8 +452,8 @@ def _of_scene_file(path: Path) -> Recipe:
         batch=1,
         precision="float64",
         scene=scene,
-        material=_material(Table({}, where=where), path.parent, scene),
-        wind=_wind(Table({}, where=where), scene, time),
+        material=_material(_Cloth(table={}), path.parent, scene, where=where),
+        wind=_wind({}, scene, time, where=where),
         contact=file.scene.contact,
         limits=file.scene.limits,
         integrator=IntegratorSpec(name="implicit", step=file.step, air_shape=AirShape.PREVIOUS),

@@ -9,17 +9,18 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any
 
 import torch
 
 from flagdata.errors import LimitError
 from flagdata.provenance import canonical, digest
-from flagdata.tables import Quantity, plain
+from flagdata.tables import Count, Named, NotNegative, Positive, Quantity, plain
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.arcsim import ArcsimScene
 from sim.contact import Contact
 from sim.handles import ARCSIM_STIFFNESS
+from sim.integrate import INTEGRATORS
 from sim.integrate.backend import Backend
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
@@ -165,8 +166,8 @@ class IntegratorSpec:
     `backend` is what computes the steps.
     """
 
-    name: str = "symplectic"
-    step: float | None = None
+    name: Annotated[str, Named("integrator", INTEGRATORS)] = "symplectic"
+    step: Positive | None = None
     air_shape: AirShape = AirShape.CURRENT
     backend: Backend = Backend.AUTO
 
@@ -175,9 +176,9 @@ class IntegratorSpec:
 class TimeSpec:
     """What is kept: `frames` at `rate` [Hz] after `settle` [s] that are not."""
 
-    settle: float = 4.0
-    frames: int = 60
-    rate: float = 25.0
+    settle: NotNegative = 4.0
+    frames: Count = 60
+    rate: Positive = 25.0
 
     @property
     def settling(self) -> int:

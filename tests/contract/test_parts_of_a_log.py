@@ -63,6 +63,8 @@ def test_every_kind_of_finding_is_named_by_a_test() -> None:
 def _makes_a_finding(call: ast.Call) -> bool:
     """Whether a call is one of Finding, or of a function to which the kind of one is given."""
     name = call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
+    if name == "of" and isinstance(call.func, ast.Attribute):
+        name = getattr(call.func.value, "id", "")
     return name in ("Finding", "_of_cells", "note", "marked", "_report")
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from flagdata.addresses import local_path
 from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageError, ZoneMissingError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer import untimed
 from flagdata.ingest.anemometer.draft import doubts
@@ -224,12 +224,11 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
         raise NothingMeasuredError(f"nothing to measure: {what}", where=f"{where}, line {reading.line[0]}", fix=fix)
     text = f"{what}; kept for {', '.join(others)}: no ground truth comes of it"
     return (
-        Finding(
-            kind="no-usable-wind",
-            severity=Severity.ERROR,
+        Finding.of(
+            "no-usable-wind",
+            text,
             count=len(reading.time),
             where=f"line {reading.line[0]}",
-            what=text,
             fix="check the sensor and the recipe's columns",
         ),
     )

@@ -137,10 +137,9 @@ class Reading:
 
 def described(by: str) -> Finding:
     """The finding that a reader follows a description and was never tested on a real file."""
-    return Finding(
-        kind="read-by-description",
-        severity=Severity.NOTE,
-        what=f"read as {by} describes it; never tested on a real file",
+    return Finding.of(
+        "read-by-description",
+        f"read as {by} describes it; never tested on a real file",
         fix="compare the first rows with the file",
     )
 

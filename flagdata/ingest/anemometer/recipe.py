@@ -20,10 +20,12 @@ A recipe may leave open what the heading of the file states: see `OpenRecipe`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from functools import partial
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal, TypeAlias
 
+from msgspec import Meta
+
+from flagdata import tables
 from flagdata.errors import FlagdataError, InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer.instants import dates
 from flagdata.ingest.anemometer.instants.stamps import EPOCH, pattern
@@ -31,7 +33,7 @@ from flagdata.ingest.anemometer.options import ZeroOffset, check_zero_offset
 from flagdata.recipes import Shelf, parsed
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
-from flagdata.tables import NOT_NEGATIVE, Table
+from flagdata.tables import Named, Spelled
 from flagdata.timebase import zone
 from flagdata.units import unit
 
@@ -40,9 +42,10 @@ SENSORS = Shelf(folder="sensors", noun="sensor recipe")
 DELIMITERS: Mapping[str, str] = {",": ",", ";": ";", "tab": "\t", "|": "|", "space": " "}
 COLUMNS_LIMIT = 10_000
 """Highest number of a column."""
+Column: TypeAlias = str | Annotated[int, Meta(ge=1, le=COLUMNS_LIMIT)]
+ChannelName: TypeAlias = Annotated[str, Named("channel", CHANNELS)]
 MISSING = ("", "nan", "na", "n/a", "n.a.", "#n/a", "#value!", "null", "none", "m", "mm", "missing", "no data")
 """Spellings of "no value" that every recipe knows, lower-case."""
-_SENSOR = [entry.name for entry in fields(Sensor) if entry.name != "name"]
 MISSING_SIGNS = r"^[-–—_./*#]+$"
 """Cells of signs alone ("----", "--.-", "/////", "***") are no value either."""
 
@@ -69,10 +72,12 @@ class FileLayout:
     preamble: int = 0
     header: int = 1
     comment: str = ""
-    missing: tuple[str, ...] = ()
+    missing: Spelled = ()
     host: str = ""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "delimiter", DELIMITERS.get(self.delimiter or ",", self.delimiter))
+        object.__setattr__(self, "missing", tuple(code.lower() for code in self.missing))
         if self.host and (self.preamble or self.comment or self.delimiter == " "):
             raise UsageError(
                 "a host stamp goes with neither preamble, comment nor blanks",
@@ -83,8 +88,6 @@ class FileLayout:
             pattern(self.host)
         if self.delimiter not in DELIMITERS.values():
             raise UnknownNameError.of("delimiter", self.delimiter, DELIMITERS, where="[file] delimiter")
-        if self.decimal not in (".", ","):
-            raise UsageError(f"decimal mark {self.decimal!r}", where="[file] decimal", fix='give "." or ","')
         if self.decimal == self.delimiter:
             raise UsageError("the decimal mark is also the delimiter", where="[file]", fix="correct one of the two")
         if not 0 <= self.preamble <= 1000 or not 0 <= self.header <= 10:
@@ -102,7 +105,7 @@ class TimeLayout:
         zone: of wall-clock stamps; `None` leaves it to the user.
     """
 
-    columns: tuple[str | int, ...]
+    columns: tuple[Column, ...] = ()
     format: str
     zone: str | None = None
 
@@ -128,7 +131,7 @@ class ChannelLayout:
         suffix: text behind every number of the column, such as its unit; numbers with another are unreadable.
     """
 
-    column: str | int
+    column: Column
     unit: str
     gain: float = 1.0
     offset: float = 0.0
@@ -144,9 +147,6 @@ class ChannelLayout:
             raise UsageError("a gain of 0", where=f"column {self.column}", fix="give the factor of the calibration")
         if self.range is not None and not self.range[0] < self.range[1]:
             raise UsageError("a range that is empty", where=f"column {self.column}", fix="give [lowest, highest]")
-        if self.convention not in ("from", "to"):
-            where = f"column {self.column}"
-            raise UsageError(f"convention {self.convention!r}", where=where, fix='give "from" or "to"')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,7 +156,7 @@ class RowsLayout:
     For tables that list several sites or sensors one below the other.
     """
 
-    column: str | int
+    column: Column
     value: str
 
 
@@ -170,8 +170,8 @@ class CheckLayout:
         about: what the column is ("status", "unit").
     """
 
-    column: str | int
-    values: tuple[str, ...]
+    column: Column
+    values: Spelled
     about: str
 
     def __post_init__(self) -> None:
@@ -194,8 +194,8 @@ class QualityRules:
 
     zero_offset: ZeroOffset = "report"
     stale_after: float | None = None
-    frame_rate_of: tuple[str, ...] = ()
-    fault_where_zero: tuple[str, ...] = ()
+    frame_rate_of: tuple[ChannelName, ...] = ()
+    fault_where_zero: tuple[ChannelName, ...] = ()
 
     def __post_init__(self) -> None:
         check_zero_offset(self.zero_offset, where="[quality] zero-offset")
@@ -237,6 +237,28 @@ class Recipe:
         named += [self.rows.column] if self.rows is not None else []
         if (self.file.header == 0 or self.file.host) and any(isinstance(column, str) for column in named):
             raise UsageError("columns by name where no header names them", where=self.name, fix="give their numbers")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Expect:
+    confirmed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Form:
+    """The tables of a complete recipe."""
+
+    name: str
+    about: str
+    source: str
+    file: FileLayout
+    time: TimeLayout
+    rows: RowsLayout | None = None
+    channels: Mapping[str, ChannelLayout]
+    sensor: Sensor
+    quality: QualityRules
+    check: tuple[CheckLayout, ...] = ()
+    expect: _Expect
 
 
 MATCH = "header first-line within mark cell units groups stacked row averaged starts"
@@ -298,7 +320,20 @@ def of_data(data: Mapping[str, Any], *, where: str) -> Recipe:
         UnknownNameError: a key, channel, unit or zone that is not known, with the nearest.
     """
     try:
-        return _recipe(Table(data, where=where))
+        form = tables.read(_Form, data, where=where)
+        return Recipe(
+            name=form.name,
+            about=form.about,
+            source=form.source,
+            file=form.file,
+            time=form.time,
+            channels=form.channels,
+            sensor=form.sensor,
+            quality=form.quality,
+            rows=form.rows,
+            expect=frozenset(form.expect.confirmed),
+            checks=form.check,
+        )
     except UnknownNameError as error:
         raise UnknownNameError(error.what, where=_inside(where, error.where), fix=error.fix) from None
     except FlagdataError as error:
@@ -318,24 +353,25 @@ def _is_open(data: Mapping[str, Any]) -> bool:
 
 def _opened(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
     """An open recipe, every key of which is checked, as far as it can be without a file."""
-    table = Table(data, where=where)
-    match = table.table("match")
-    match.texts("header")
-    match.only(*MATCH.split())
+    tables.entries(
+        {"header": tuple[str, ...], **dict.fromkeys(MATCH.split()[1:], Any)},
+        data.get("match", {}),
+        where=f"{where} [match]",
+    )
     channels: dict[str, Any] = {}
-    for name, layout in table.mapping("channels").items():
+    for name, layout in _table(data, "channels", where).items():
         own = dict(layout) if isinstance(layout, Mapping) else {}
         names, stated = own.get("column"), own.get("unit")
         if isinstance(names, list) and names and all(isinstance(one, str) for one in names):
             own["column"] = names[0]
         if isinstance(stated, Mapping):
-            inside = Table(stated, where=f"{where} [channels.{name}] unit")
-            inside.only("in", "else", "whole")
+            inside = f"{where} [channels.{name}] unit"
+            tables.check_keys(stated, ("in", "else", "whole"), where=inside)
             if stated.get("in") != "heading":
-                raise InputError("the unit is in no heading", where=inside.where, fix='write { in = "heading" }')
+                raise InputError("the unit is in no heading", where=inside, fix='write { in = "heading" }')
             own["unit"] = CHANNELS[name].unit if name in CHANNELS else "m/s"
         channels[name] = own
-    time, sensor = (_without_facts(table.mapping(key)) for key in ("time", "sensor"))
+    time, sensor = (_without_facts(_table(data, key, where)) for key in ("time", "sensor"))
     time["format"] = time["format"] if isinstance(time.get("format"), str) else "iso"
     closed = {key: data[key] for key in data.keys() - {"match", "facts", "described-by"}}
     checked = of_data({**closed, "channels": channels, "time": time, "sensor": sensor}, where=where)
@@ -353,96 +389,5 @@ def _inside(file: str, place: str | None) -> str:
     return place if place is not None and place.startswith(file) else f"{file}: {place}" if place else file
 
 
-def _recipe(table: Table) -> Recipe:
-    table.only("name", "about", "source", "file", "time", "rows", "channels", "sensor", "quality", "check", "expect")
-    text = {key: _text(table, key) for key in ("name", "about", "source")}
-    channels, rows, expect = table.table("channels"), table.table("rows"), table.table("expect")
-    confirmed = expect.texts("confirmed")
-    expect.done()
-    return Recipe(
-        name=text["name"],
-        about=text["about"],
-        source=text["source"],
-        file=_file(table.table("file")),
-        time=_time(table.table("time")),
-        channels={name: _channel(channels.table(name)) for name in channels.names()},
-        sensor=table.table("sensor").record(Sensor, None, **dict.fromkeys(_SENSOR, NOT_NEGATIVE)),
-        quality=_quality(table.table("quality")),
-        rows=rows.record(RowsLayout, {"column": partial(_column, rows)}) if rows.names() else None,
-        expect=frozenset(confirmed),
-        checks=tuple(map(_check, table.tables("check"))),
-    )
-
-
-def _file(table: Table) -> FileLayout:
-    def delimiter() -> str:
-        given = table.text("delimiter", None) or ","
-        return DELIMITERS.get(given, given)
-
-    def missing() -> tuple[str, ...]:
-        return tuple(str(code).strip().lower() for code in _list(table, "missing"))
-
-    return table.record(FileLayout, {"delimiter": delimiter, "missing": missing})
-
-
-def _time(table: Table) -> TimeLayout:
-    columns = partial(_list, table, "columns")
-    return table.record(TimeLayout, {"columns": lambda: tuple(_column_of(one, table.where) for one in columns())})
-
-
-def _channel(table: Table) -> ChannelLayout:
-    def bounds() -> tuple[float, float] | None:
-        given = table.numbers("range")
-        if "range" in table and len(given) != 2:
-            raise InputError("range is not two numbers", where=table.where, fix="give [lowest, highest]")
-        return (given[0], given[1]) if given else None
-
-    return table.record(ChannelLayout, {"column": partial(_column, table), "range": bounds})
-
-
-def _quality(table: Table) -> QualityRules:
-    def offset() -> Any:
-        return table.value("zero-offset") if "zero-offset" in table else "report"
-
-    rules = table.record(QualityRules, {"zero_offset": offset})
-    for key, channels in (("frame-rate-of", rules.frame_rate_of), ("fault-where-zero", rules.fault_where_zero)):
-        for name in channels:
-            if name not in CHANNELS:
-                raise UnknownNameError.of("channel", name, CHANNELS, where=f"[quality] {key}")
-    return rules
-
-
-def _check(table: Table) -> CheckLayout:
-    def values() -> tuple[str, ...]:
-        return tuple(str(value).strip() for value in _list(table, "values"))
-
-    return table.record(CheckLayout, {"column": partial(_column, table), "values": values})
-
-
-def _list(table: Table, key: str) -> list[Any]:
-    value = table.value(key) if key in table else []
-    if not isinstance(value, list):
-        raise InputError(f"{key} = {value!r} is not a list", where=table.where, fix="write it as [ … ]")
-    return value
-
-
-def _text(table: Table, key: str) -> str:
-    value = table.text(key, None)
-    if value is None or not value.strip():
-        raise InputError(f"no {key}", where=table.where, fix=f'add {key} = "…"')
-    return value
-
-
-def _column(table: Table) -> str | int:
-    if "column" not in table:
-        raise InputError("no column", where=table.where, fix="name the column or give its number (from 1)")
-    return _column_of(table.value("column"), table.where)
-
-
-def _column_of(value: object, where: str) -> str | int:
-    if isinstance(value, bool) or not isinstance(value, (str, int)):
-        raise InputError(f"column {value!r} is neither a name nor a number", where=where, fix="correct it")
-    if isinstance(value, int) and not 1 <= value <= COLUMNS_LIMIT:
-        fix = f"columns are counted from 1, at most {COLUMNS_LIMIT} are read"
-        raise InputError(f"column number {str(value)[:20]}", where=where, fix=fix)
-    return value
+def _table(data: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
+    return tables.value(Mapping[str, Any], data.get(key, {}), key=key, where=where)

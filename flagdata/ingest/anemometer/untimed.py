@@ -153,9 +153,9 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
     days = (day - date).days
     if year_alone(source):
         what = f"dates without a year before each line; the first is of {date.isoformat()}, as given"
-        return TableText.of(source, text, [Finding(kind="date-given", severity=Severity.NOTE, what=what)])
+        return TableText.of(source, text, [Finding.of("date-given", what)])
     what = f"times of day before each line; the first is of {date.isoformat()}, as given, and {days} midnights follow"
-    found = Finding(kind="date-given", severity=Severity.NOTE, what=what)
+    found = Finding.of("date-given", what)
     return TableText.of(source, text, [found])
 
 

@@ -15,7 +15,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from flagdata.errors import FlagdataError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.camera.container import open_container
 from flagdata.ingest.camera.options import Limits
 
@@ -64,20 +64,17 @@ def chapter_of(path: Path) -> Chapter | None:
         if found[0] != own[0]:
             return None
         before += found[1]
-    placed = Finding(
-        kind="chapter-placed",
-        severity=Severity.NOTE,
-        value=float(before),
-        what=f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it begins "
+    placed = Finding.of(
+        "chapter-placed",
+        f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it begins "
         f"{float(before):.3f} s later, after {', '.join(earlier)}",
+        value=float(before),
     )
     return Chapter(before=float(before), finding=placed)
 
 
 def _not_placed(what: str, *, fix: str) -> Chapter:
-    return Chapter(
-        before=0.0, finding=Finding(kind="chapter-not-placed", severity=Severity.WARNING, what=what, fix=fix)
-    )
+    return Chapter(before=0.0, finding=Finding.of("chapter-not-placed", what, fix=fix))
 
 
 def place_by_name(name: str) -> tuple[str, int] | None:

@@ -16,7 +16,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 
 COUNTERS = {"mpegts": 1 << 33, "mpeg": 1 << 33, "flv": 1 << 32, "asf": 1 << 32}
 """Containers, by FFmpeg's names, whose stamps are counted modulo so many ticks."""
@@ -88,10 +88,9 @@ def restarted(*, frame: int, after: float, count: int) -> Finding:
         after: time from the first frame to there [s].
         count: frames that are left out.
     """
-    return Finding(
-        kind="clock-reset",
-        severity=Severity.ERROR,
-        what=f"the camera's clock started anew after {after:.2f} s; nothing states how long it was interrupted, so "
+    return Finding.of(
+        "clock-reset",
+        f"the camera's clock started anew after {after:.2f} s; nothing states how long it was interrupted, so "
         f"that the {count} frames after it have no known time and were left out",
         where=f"frame {frame}",
         count=count,

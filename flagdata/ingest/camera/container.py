@@ -60,10 +60,9 @@ def truncation(
         ]
     if 0 < stream.frames < read:
         return [
-            Finding(
-                kind="index-damaged",
-                severity=Severity.WARNING,
-                what=f"the file states {stream.frames} frames and holds {read}: its index is damaged",
+            Finding.of(
+                "index-damaged",
+                f"the file states {stream.frames} frames and holds {read}: its index is damaged",
                 count=read - stream.frames,
             )
         ]
@@ -89,10 +88,9 @@ def _of_mp4(path: Path, stream: VideoStream, read: int) -> list[Finding]:
         return [cut_off(f"the file ends inside one of its boxes: it is cut off{said}", read, max(1, missing))]
     if missing > 0:
         return [
-            Finding(
-                kind="frames-not-shown",
-                severity=Severity.WARNING,
-                what=f"the file states {stream.frames} frames; its edit list, or damage of its index, leaves {read}",
+            Finding.of(
+                "frames-not-shown",
+                f"the file states {stream.frames} frames; its edit list, or damage of its index, leaves {read}",
                 count=missing,
             )
         ]
@@ -356,10 +354,9 @@ def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Findin
 
 
 def _edit_list(shows: str) -> Finding:
-    return Finding(
-        kind="edit-list-passed-over",
-        severity=Severity.WARNING,
-        what=f"the file's edit list shows {shows}; it was left aside, and each frame is read once, at the time at "
+    return Finding.of(
+        "edit-list-passed-over",
+        f"the file's edit list shows {shows}; it was left aside, and each frame is read once, at the time at "
         "which it was recorded",
         fix="to measure what the edit list shows, export the film from the program that made it",
     )
@@ -419,10 +416,9 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
         what = f"the container cannot be read any further ({error.strerror})"
         tally.problem = cut_off(what, tally.frames, 1)
     except IndexError:
-        tally.problem = Finding(
-            kind="stream-appeared",
-            severity=Severity.WARNING,
-            what="another stream appears in the middle of the file, which is damaged or was joined from several",
+        tally.problem = Finding.of(
+            "stream-appeared",
+            "another stream appears in the middle of the file, which is damaged or was joined from several",
         )
     return tally
 

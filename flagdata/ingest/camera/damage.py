@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 
 
 @dataclass
@@ -36,10 +36,9 @@ class Damage:
         found = []
         if self.packets:
             found.append(
-                Finding(
-                    kind="corrupt-packets",
-                    severity=Severity.ERROR,
-                    what=f"{self.packets} packets could not be decoded and were skipped",
+                Finding.of(
+                    "corrupt-packets",
+                    f"{self.packets} packets could not be decoded and were skipped",
                     where=f"packet {self.first_packet}",
                     count=self.packets,
                     fix="copy the file from the camera again",
@@ -47,20 +46,18 @@ class Damage:
             )
         if self.corrupt:
             found.append(
-                Finding(
-                    kind="corrupt-frames",
-                    severity=Severity.ERROR,
-                    what=f"{self.corrupt} frames came out damaged and were left out",
+                Finding.of(
+                    "corrupt-frames",
+                    f"{self.corrupt} frames came out damaged and were left out",
                     count=self.corrupt,
                     fix="copy the file from the camera again",
                 )
             )
         if self.suspect:
             found.append(
-                Finding(
-                    kind="damaged-references",
-                    severity=Severity.WARNING,
-                    what=f"{self.suspect} frames between damage and the next key frame may show traces of it",
+                Finding.of(
+                    "damaged-references",
+                    f"{self.suspect} frames between damage and the next key frame may show traces of it",
                     count=self.suspect,
                 )
             )
@@ -68,10 +65,9 @@ class Damage:
         missing = expected - self.packets - self.shown
         if missing > 0:
             found.append(
-                Finding(
-                    kind="frames-undecoded",
-                    severity=Severity.WARNING,
-                    what=f"the file announces {expected} frames, the decoder gave {self.shown}",
+                Finding.of(
+                    "frames-undecoded",
+                    f"the file announces {expected} frames, the decoder gave {self.shown}",
                     count=missing,
                 )
             )
@@ -88,12 +84,11 @@ def undecoded(count: int, *, total: int, first: str | None = None) -> list[Findi
     if not count:
         return []
     return [
-        Finding(
-            kind="corrupt-frames",
-            severity=Severity.ERROR,
+        Finding.of(
+            "corrupt-frames",
+            f"{count} of {total} frames cannot be decoded and were left out",
             count=count,
             where=first,
-            what=f"{count} of {total} frames cannot be decoded and were left out",
             fix="copy the recording from the camera again",
         )
     ]
@@ -110,11 +105,7 @@ def resized(
     if not count:
         return []
     return [
-        Finding(
-            kind="size-changed",
-            severity=Severity.ERROR,
-            count=count,
-            what=f"{count} frames have another size than {than} and were left out",
-            fix=fix,
+        Finding.of(
+            "size-changed", f"{count} frames have another size than {than} and were left out", count=count, fix=fix
         )
     ]

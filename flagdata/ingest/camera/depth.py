@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 
 _DEPTHS = (10, 12, 14, 16)
 """Bits of gray of the cameras that store it in 16."""
@@ -27,12 +27,11 @@ def white(brightest: int, *, which: str, otherwise: str = "") -> tuple[float, tu
     if not brightest or bits == _DEPTHS[-1]:
         return WHITE, ()
     most = 2**bits - 1
-    found = Finding(
-        kind="depth-by-content",
-        severity=Severity.WARNING,
-        value=float(bits),
-        what=f"no pixel of {which}, of 16 bits, is brighter than {brightest}: they are read as gray of {bits} bits, 0 "
+    found = Finding.of(
+        "depth-by-content",
+        f"no pixel of {which}, of 16 bits, is brighter than {brightest}: they are read as gray of {bits} bits, 0 "
         f"to {most}",
+        value=float(bits),
         fix=f"if they are only dark, convert them to 8 bits first{otherwise}",
     )
     return float(most), (found,)

@@ -18,7 +18,7 @@ import numpy as np
 
 from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
 from flagdata.files import is_folder, is_mcap
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.camera.chapters import place_by_name
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
@@ -146,11 +146,10 @@ class JoinedSource:
         lengths = [_length(part.facts.timing) for part in self._parts]
         names = ", ".join(path.name for path in self._paths)
         by_name = [place_by_name(path.name) for path in self._paths]
-        joined = Finding(
-            kind="chapters-joined",
-            severity=Severity.NOTE,
+        joined = Finding.of(
+            "chapters-joined",
+            f"{len(self._paths)} chapters of one recording were joined: {names}",
             count=len(self._paths),
-            what=f"{len(self._paths)} chapters of one recording were joined: {names}",
         )
         known = [one for one in by_name if one is not None]
         if len(known) == len(by_name) and len(set(stated)) == 1 and stated[0] is not None:
@@ -176,10 +175,9 @@ class JoinedSource:
         if None in stated:
             return [
                 joined,
-                Finding(
-                    kind="chapters-unproven",
-                    severity=Severity.WARNING,
-                    what="nothing in the files states that each begins where the one before ends; it is taken as given",
+                Finding.of(
+                    "chapters-unproven",
+                    "nothing in the files states that each begins where the one before ends; it is taken as given",
                 ),
             ]
         return [joined]

@@ -30,7 +30,7 @@ from PIL import Image
 from flagdata.documents import read_json
 from flagdata.errors import CorruptError, InputError, LimitError, NotFoundError, TimeError, UnknownNameError
 from flagdata.files import LEROBOT_INFO, is_beside
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.camera.container import open_container
 from flagdata.ingest.camera.damage import undecoded
 from flagdata.ingest.camera.geometry import Orientation
@@ -337,9 +337,8 @@ def _table(path: Path, columns: list[str], episode: int) -> pa.Table:
 
 
 def _counted() -> Finding:
-    return Finding(
-        kind="stamps-synthetic",
-        severity=Severity.WARNING,
-        what="LeRobot counts a frame's time as its number / fps: gaps and jitter of the camera are not in the data set",
+    return Finding.of(
+        "stamps-synthetic",
+        "LeRobot counts a frame's time as its number / fps: gaps and jitter of the camera are not in the data set",
         fix="where the original recording exists, ingest that",
     )

@@ -21,7 +21,7 @@ from pathlib import PurePath
 from statistics import median
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.timebase import NANOSECONDS
 
 _FRACTION = 3  # digits from which on a number behind the seconds is a fraction of one
@@ -211,10 +211,9 @@ def ordered(names: Sequence[str], *, rate: Fraction, where: str) -> Ordered:
         return Ordered(order=(0,), places=(0,))
     if not any(_NUMBER.search(stem) for stem in stems):
         order = tuple(sorted(range(len(stems)), key=lambda i: stems[i]))
-        note = Finding(
-            kind="order-by-name",
-            severity=Severity.WARNING,
-            what="the file names have no numbers: the images are taken in the order of their names, none as missing",
+        note = Finding.of(
+            "order-by-name",
+            "the file names have no numbers: the images are taken in the order of their names, none as missing",
             fix="if it is not the order of the recording, number them in it",
         )
         return Ordered(order=order, places=tuple(range(len(order))), findings=(note,))
@@ -451,29 +450,26 @@ def _findings(
         instants: that the names state [ns], to `resolution`; None where they state none.
     """
     if reading.ranked:
-        yield Finding(
-            kind="order-by-time",
-            severity=Severity.WARNING,
-            what="the names state times that say the order of the pictures and not how far apart they are: they are "
+        yield Finding.of(
+            "order-by-time",
+            "the names state times that say the order of the pictures and not how far apart they are: they are "
             "taken as evenly spaced, none as missing",
         )
     elif reading.steps:
         unit = " ns" if reading.clock else ""
-        yield Finding(
-            kind="numbered-by-steps",
-            severity=Severity.NOTE,
-            what=f"the file names count in steps of {reading.steps}{unit}; one step is taken as one frame",
+        yield Finding.of(
+            "numbered-by-steps",
+            f"the file names count in steps of {reading.steps}{unit}; one step is taken as one frame",
             value=float(reading.steps) if reading.steps.isdigit() else None,
         )
     if instants is None:
         return
     stated, taken = instants[-1] - instants[0], reading.places[-1] / rate * NANOSECONDS
     if stated > 0 and abs(stated - taken) > _PACE * max(stated, taken) + resolution:
-        yield Finding(
-            kind="rate-unlike-names",
-            severity=Severity.WARNING,
-            value=stated / NANOSECONDS,
-            what=f"by the times in their names the pictures span {stated / NANOSECONDS:.6g} s, at the rate that was "
+        yield Finding.of(
+            "rate-unlike-names",
+            f"by the times in their names the pictures span {stated / NANOSECONDS:.6g} s, at the rate that was "
             f"given {float(taken) / NANOSECONDS:.6g} s",
+            value=stated / NANOSECONDS,
             fix=f"if the times are right, the rate is {reading.places[-1] / stated * NANOSECONDS:.4g} Hz",
         )

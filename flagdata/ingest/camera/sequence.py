@@ -17,7 +17,7 @@ from PIL import Image
 
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.files import is_beside
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.camera import depth
 from flagdata.ingest.camera.damage import resized, undecoded
 from flagdata.ingest.camera.geometry import Orientation
@@ -224,11 +224,10 @@ class SequenceSource:
         if not others:
             return paths, []
         return paths, [
-            Finding(
-                kind="files-not-read",
-                severity=Severity.NOTE,
+            Finding.of(
+                "files-not-read",
+                f"{others.total()} files beside the images were not read: {beside}",
                 count=others.total(),
-                what=f"{others.total()} files beside the images were not read: {beside}",
             )
         ]
 
@@ -342,30 +341,27 @@ def _shown_otherwise(found: Sequence[Head]) -> list[Finding]:
     findings = []
     if alpha:
         findings.append(
-            Finding(
-                kind="alpha-ignored",
-                severity=Severity.WARNING,
+            Finding.of(
+                "alpha-ignored",
+                f"transparency of {alpha} images was left aside: the picture below it is read",
                 count=alpha,
-                what=f"transparency of {alpha} images was left aside: the picture below it is read",
             )
         )
     if pages:
         findings.append(
-            Finding(
-                kind="pages-not-read",
-                severity=Severity.ERROR,
+            Finding.of(
+                "pages-not-read",
+                f"{pages} files hold several pictures each, of which the first was read",
                 count=pages,
-                what=f"{pages} files hold several pictures each, of which the first was read",
                 fix="write each picture to a file of its own, numbered",
             )
         )
     if turned:
         findings.append(
-            Finding(
-                kind="orientation-changed",
-                severity=Severity.WARNING,
+            Finding.of(
+                "orientation-changed",
+                f"{turned} images are to be turned otherwise than the rest, by their Exif; they were turned so",
                 count=turned,
-                what=f"{turned} images are to be turned otherwise than the rest, by their Exif; they were turned so",
                 fix="if the camera did not turn, remove the tag Orientation from all of them",
             )
         )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from datetime import tzinfo
 
 from flagdata.errors import TimeError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.camera.chapters import Chapter
 from flagdata.timebase import NANOSECONDS, iso, parse, zone
 
@@ -69,10 +69,9 @@ def find_start(
         TimeError: nothing usable was found.
     """
     if option == UNKNOWN:
-        finding = Finding(
-            kind="start-unknown",
-            severity=Severity.WARNING,
-            what=f"nobody knows when the recording began; it is stamped from {iso(UNKNOWN)} on",
+        finding = Finding.of(
+            "start-unknown",
+            f"nobody knows when the recording began; it is stamped from {iso(UNKNOWN)} on",
             fix="declare its wind (flagdata declare), or give the clock's offset (flagdata align --by given)",
         )
         return Start(instant=UNKNOWN, source="unknown", sigma=None, findings=(finding,))
@@ -101,7 +100,7 @@ def find_start(
                 found = _checked(parse(text, default=default, where=where), key, _WHOLE_SECOND)
         except TimeError as error:
             what = f"{key} {text!r} is unusable ({error.what})"
-            passed_over.append(Finding(kind="start-passed-over", severity=Severity.NOTE, what=what))
+            passed_over.append(Finding.of("start-passed-over", what))
             continue
         return replace(found, findings=(*passed_over, *found.findings))
     tried = "; ".join(finding.what for finding in passed_over) or "its metadata name none"
@@ -120,7 +119,7 @@ def _from_gps(instant: int, sigma: float, *, created: str | None, default: tzinf
             beside = (parse(created, default=default) - instant) / NANOSECONDS
             what += f"; the camera's own clock, creation_time {created}, is {abs(beside):.1f} s "
             what += "ahead" if beside > 0 else "behind"
-    finding = Finding(kind="start-by-gps", severity=Severity.NOTE, what=what, value=sigma)
+    finding = Finding.of("start-by-gps", what, value=sigma)
     return Start(instant=instant, source="telemetry: GPS", sigma=sigma, findings=(finding,))
 
 
@@ -132,10 +131,9 @@ def _from_creation_time(
     duration += before
     # Uniform from start to end of the recording, as far as it is known, and over the second it is cut to.
     sigma = (1 / 12 + duration**2 / 12) ** 0.5
-    finding = Finding(
-        kind="start-unsure",
-        severity=Severity.WARNING,
-        what=f"the start is by creation_time {text}, taken as the start of the recording in the zone it names; some "
+    finding = Finding.of(
+        "start-unsure",
+        f"the start is by creation_time {text}, taken as the start of the recording in the zone it names; some "
         f"cameras write their local time as UTC, and some write the end (then it is {duration:.1f} s late)",
         value=sigma,
         fix="give --start with a zone, or align the recording by its contents",

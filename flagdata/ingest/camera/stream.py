@@ -124,11 +124,10 @@ class CameraStream:
             return []
         edges = " and ".join(f"{pixels} px at the {edge}" for edge, pixels in beyond.items())
         return [
-            Finding(
-                kind="crop-cuts-motion",
-                severity=Severity.WARNING,
+            Finding.of(
+                "crop-cuts-motion",
+                f"what moves reaches beyond the crop, by {edges}: a part of it is cut off",
                 value=float(max(beyond.values())),
-                what=f"what moves reaches beyond the crop, by {edges}: a part of it is cut off",
                 fix=f"--crop {proposal.box} takes it whole",
             )
         ]
@@ -246,10 +245,9 @@ class CameraStream:
         if self._options.exposure is None:
             half = self._period / 2 / NANOSECONDS
             found.append(
-                Finding(
-                    kind="exposure-unknown",
-                    severity=Severity.NOTE,
-                    what=f"the exposure time is unknown: stamps count as mid-exposure, to within {half * 1e3:.3g} ms",
+                Finding.of(
+                    "exposure-unknown",
+                    f"the exposure time is unknown: stamps count as mid-exposure, to within {half * 1e3:.3g} ms",
                     value=half,
                 )
             )
@@ -257,10 +255,9 @@ class CameraStream:
             timing = self._source.facts.timing
             tick = float(timing.tick * self._scale) * 1e3
             found.append(
-                Finding(
-                    kind="variable-rate",
-                    severity=Severity.NOTE,
-                    what=f"the frame rate varies: {timing.shortest * tick:.3g} to {timing.longest * tick:.3g} ms from "
+                Finding.of(
+                    "variable-rate",
+                    f"the frame rate varies: {timing.shortest * tick:.3g} to {timing.longest * tick:.3g} ms from "
                     "frame to frame",
                     value=float(timing.longest * timing.tick * self._scale),
                 )
@@ -269,10 +266,9 @@ class CameraStream:
 
 
 def _proposed(proposal: CropProposal) -> Finding:
-    return Finding(
-        kind="crop-proposed",
-        severity=Severity.NOTE,
-        what=f"automatic crop {proposal.box}, with {proposal.share:.0%} of the motion; check it by --crop-picture",
+    return Finding.of(
+        "crop-proposed",
+        f"automatic crop {proposal.box}, with {proposal.share:.0%} of the motion; check it by --crop-picture",
         value=proposal.share,
     )
 
@@ -282,21 +278,19 @@ def _rescaled(variable: bool, scale: Fraction, true_fps: float, container: float
         f"the camera ran at {true_fps:g} Hz, the container states {container:g}: times are scaled by {float(scale):.6g}"
     )
     if variable:
-        return Finding(
-            kind="true-rate-of-variable",
-            severity=Severity.WARNING,
-            what=f"{what}; its frame rate varies, so the mean of it was set to the true one",
+        return Finding.of(
+            "true-rate-of-variable",
+            f"{what}; its frame rate varies, so the mean of it was set to the true one",
             value=float(scale),
         )
-    return Finding(kind="true-rate", severity=Severity.NOTE, what=what, value=float(scale))
+    return Finding.of("true-rate", what, value=float(scale))
 
 
 def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
     found = [
-        Finding(
-            kind="resampled",
-            severity=Severity.NOTE,
-            what=f"{report.picks} frames at {rate:g} Hz out of {report.sources}, the nearest by time stamp; worst "
+        Finding.of(
+            "resampled",
+            f"{report.picks} frames at {rate:g} Hz out of {report.sources}, the nearest by time stamp; worst "
             f"stamp error {report.worst_error / 1e6:.3f} ms",
             count=report.picks,
             value=report.worst_error / NANOSECONDS,
@@ -304,21 +298,18 @@ def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
     ]
     if report.repeats:
         found.append(
-            Finding(
-                kind="frames-repeated",
-                severity=Severity.WARNING,
-                what=f"{report.repeats} frames show the same source frame as the one before: the camera is slower than "
+            Finding.of(
+                "frames-repeated",
+                f"{report.repeats} frames show the same source frame as the one before: the camera is slower than "
                 f"{rate:g} Hz or its frames are uneven",
                 count=report.repeats,
             )
         )
     if report.used and report.unused > report.sources // 2:
         found.append(
-            Finding(
-                kind="frames-dropped",
-                severity=Severity.NOTE,
-                what=f"{report.unused} of {report.sources} source frames are left out at this rate; "
-                "--rate native keeps all",
+            Finding.of(
+                "frames-dropped",
+                f"{report.unused} of {report.sources} source frames are left out at this rate; --rate native keeps all",
                 count=report.unused,
             )
         )
@@ -329,10 +320,9 @@ def _gap_findings(report: GridReport) -> list[Finding]:
     if not report.left_out:
         return []
     return [
-        Finding(
-            kind="frames-missing",
-            severity=Severity.WARNING,
-            what=f"{report.left_out} frames are missing, in {report.gaps} gaps of up to "
+        Finding.of(
+            "frames-missing",
+            f"{report.left_out} frames are missing, in {report.gaps} gaps of up to "
             f"{report.longest_gap / NANOSECONDS:.3f} s; none was made up",
             where=f"frame {report.first_left_out}",
             count=report.left_out,

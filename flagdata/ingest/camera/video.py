@@ -36,7 +36,7 @@ from av.sidedata.sidedata import SideData, Type
 from av.video.stream import VideoStream
 
 from flagdata.errors import InputError, TimeError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.camera.boxes import edits, is_cut
 from flagdata.ingest.camera.clock import COUNTERS
 from flagdata.ingest.camera.container import (
@@ -94,12 +94,11 @@ def check(path: Path, timing: Timing, *, true_fps: float | None) -> list[Finding
         return []  # delays of 3, 3 and 4 hundredths keep a mean
     low, high = float(1 / (period + HALF)), float(1 / (period - HALF))
     return [
-        Finding(
-            kind="gif-delays",
-            severity=Severity.WARNING,
-            value=float(1 / period),
-            what=f"a GIF states times in hundredths of a second: delays of {float(period):g} s say that the rate is "
+        Finding.of(
+            "gif-delays",
+            f"a GIF states times in hundredths of a second: delays of {float(period):g} s say that the rate is "
             f"between {low:.3g} and {high:.3g} Hz, and {float(1 / period):.4g} Hz is assumed",
+            value=float(1 / period),
             fix="if the camera's rate is known, give it: --true-fps HZ",
         )
     ]
@@ -214,57 +213,45 @@ class VideoSource:
             found += check(self._path, self._timing, true_fps=self._options.true_fps)
         if first.interlaced_frame:
             found.append(
-                Finding(
-                    kind="interlaced",
-                    severity=Severity.WARNING,
-                    what="the video is interlaced: each frame mixes two instants, half a frame period apart; it was "
+                Finding.of(
+                    "interlaced",
+                    "the video is interlaced: each frame mixes two instants, half a frame period apart; it was "
                     "not deinterlaced",
                 )
             )
         if _orientation(first).mirrored:
-            found.append(Finding(kind="mirrored", severity=Severity.NOTE, what="the file asks to be shown mirrored"))
+            found.append(Finding.of("mirrored", "the file asks to be shown mirrored"))
         if not _orientation(first).exact:
             found.append(
-                Finding(
-                    kind="odd-rotation",
-                    severity=Severity.WARNING,
-                    what="the file asks for a rotation that is not a multiple of 90°; the nearest one was taken",
+                Finding.of(
+                    "odd-rotation",
+                    "the file asks for a rotation that is not a multiple of 90°; the nearest one was taken",
                 )
             )
         if int(first.color_trc) in (16, 18):
             found.append(
-                Finding(
-                    kind="hdr-transfer",
-                    severity=Severity.WARNING,
-                    what="the video is HDR (PQ or HLG): its grays are not those of an ordinary camera",
+                Finding.of(
+                    "hdr-transfer", "the video is HDR (PQ or HLG): its grays are not those of an ordinary camera"
                 )
             )
         if _has_alpha(first) or self._metadata().get("alpha_mode") == "1":  # VP8 and VP9 code it beside
-            found.append(
-                Finding(
-                    kind="alpha-ignored",
-                    severity=Severity.WARNING,
-                    what="transparency was left aside: the picture below it is read",
-                )
-            )
+            found.append(Finding.of("alpha-ignored", "transparency was left aside: the picture below it is read"))
         found += self._capture_findings()
         others = len(self._container.streams.video) - 1
         if others:
             found.append(
-                Finding(
-                    kind="more-video-streams",
-                    severity=Severity.NOTE,
-                    what=f"stream {self._stream.index} was taken, {others} other video streams were not",
+                Finding.of(
+                    "more-video-streams",
+                    f"stream {self._stream.index} was taken, {others} other video streams were not",
                     count=others,
                     fix="choose another with --stream",
                 )
             )
         if self._options.start is None and telemetry_of(self._container) is not None and self._gps is None:
             found.append(
-                Finding(
-                    kind="telemetry-without-time",
-                    severity=Severity.NOTE,
-                    what="the telemetry in the file (GPMF) states no GPS time with a fix; the start is the camera's own"
+                Finding.of(
+                    "telemetry-without-time",
+                    "the telemetry in the file (GPMF) states no GPS time with a fix; the start is the camera's own"
                     " clock",
                     fix="if that clock was not set, give --start",
                 )
@@ -283,12 +270,11 @@ class VideoSource:
         if not math.isfinite(taken) or taken <= 0 or abs(taken / stated - 1) <= _RATES_AGREE:
             return []
         return [
-            Finding(
-                kind="capture-rate",
-                severity=Severity.WARNING,
-                value=taken,
-                what=f"the file says that the camera took {taken:g} frames a second, its time stamps say {stated:.4g}: "
+            Finding.of(
+                "capture-rate",
+                f"the file says that the camera took {taken:g} frames a second, its time stamps say {stated:.4g}: "
                 f"time runs {taken / stated:.3g} times too slow in it",
+                value=taken,
                 fix=f"give the camera's rate: --true-fps {taken:g}",
             )
         ]

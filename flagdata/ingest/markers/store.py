@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from flagdata.findings import Finding, Severity, quality_flags
+from flagdata.findings import Finding, quality_flags
 from flagdata.ingest.markers.table import MarkerOptions, read_table
 from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
@@ -86,12 +86,8 @@ def _findings(sequence: MarkerSequence) -> tuple[Finding, ...]:
     if not lost:
         return ()
     return (
-        Finding(
-            kind="markers-not-tracked",
-            severity=Severity.WARNING,
-            count=lost,
-            value=lost / total,
-            what=f"{lost} of {total} positions were not tracked",
+        Finding.of(
+            "markers-not-tracked", f"{lost} of {total} positions were not tracked", count=lost, value=lost / total
         ),
     )
 

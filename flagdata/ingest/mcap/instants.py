@@ -146,14 +146,13 @@ def _late(stamps: NDArray[np.int64]) -> bool:
 def _disordered(stamps: NDArray[np.int64], logged: NDArray[np.int64], where: str) -> Finding:
     back = float((np.maximum.accumulate(stamps) - stamps).max()) / NANOSECONDS
     steps = int((np.diff(logged) < -SLIP).sum())
-    return Finding(
-        kind="log-disordered",
-        severity=Severity.WARNING,
+    return Finding.of(
+        "log-disordered",
+        f"the file goes back by up to {back:.3f} s from message to message, by the log as by the stamps: its "
+        "parts are in another order, or the computer's clock was set back; the messages were ordered by their instants",
         where=where,
         count=steps,
         value=back,
-        what=f"the file goes back by up to {back:.3f} s from message to message, by the log as by the stamps: its "
-        "parts are in another order, or the computer's clock was set back; the messages were ordered by their instants",
         fix="if the clock was set back, ingest what was recorded before and after it as files of their own",
     )
 
@@ -186,12 +185,10 @@ def clock_findings(
         return
     apart = float(np.abs(stamps.astype(float) - logged).max()) / NANOSECONDS
     if apart > APART:
-        yield Finding(
-            kind="clocks-apart",
-            severity=Severity.WARNING,
+        yield Finding.of(
+            "clocks-apart",
+            f"the stamps of its messages lie up to {apart:.3f} s from when they were logged: a delay, or another clock",
             where=where,
             value=apart,
-            what=f"the stamps of its messages lie up to {apart:.3f} s from when they were logged: a delay, or another "
-            "clock",
             fix="compare it with another topic; align it after it is ingested",
         )

@@ -22,7 +22,7 @@ from mcap.records import Channel, Chunk, Header, Schema, Statistics
 
 from flagdata.errors import CorruptError, LimitError
 from flagdata.files import MCAP, check_input
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.record.container import CHUNK_HEAD, RECORD_HEAD, parse
 from flagdata.record.salvage import CHUNK_LIMIT
 from flagdata.record.unpacking import check_stated, unpacked
@@ -87,11 +87,10 @@ class Layout:
             return ()
         what = f"{lost} messages are of a channel that the file does not define, and were not read"
         return (
-            Finding(
-                kind="messages-undefined",
-                severity=Severity.WARNING,
+            Finding.of(
+                "messages-undefined",
+                what,
                 count=lost,
-                what=what,
                 where=self.path.name,
                 fix="copy the file again, or write it again with the program that made it",
             ),

@@ -23,7 +23,7 @@ import numpy as np
 from PIL import Image
 
 from flagdata.errors import InputError, LimitError, TimeError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.camera import depth
 from flagdata.ingest.camera.clock import restart, restarted
 from flagdata.ingest.camera.damage import resized, undecoded
@@ -324,22 +324,20 @@ def _data(values: Mapping[str, Any]) -> bytes | None:
 
 def _joined(files: Sequence[Path]) -> Iterator[Finding]:
     if len(files) > 1:
-        yield Finding(
-            kind="chapters-joined",
-            severity=Severity.NOTE,
-            count=len(files),
-            what=f"{len(files)} parts of one recording were joined: {', '.join(one.name for one in files[:8])}"
+        yield Finding.of(
+            "chapters-joined",
+            f"{len(files)} parts of one recording were joined: {', '.join(one.name for one in files[:8])}"
             + (", …" if len(files) > 8 else ""),
+            count=len(files),
         )
 
 
 def _others(present: tuple[Topic, ...], chosen: Topic) -> Iterator[Finding]:
     others = [topic for topic in present if topic.name != chosen.name]
     if others:
-        yield Finding(
-            kind="topics-not-read",
-            severity=Severity.NOTE,
+        yield Finding.of(
+            "topics-not-read",
+            f"{chosen.name} was read, {len(others)} other topics were not: {', '.join(map(str, others[:8]))}",
             count=len(others),
-            what=f"{chosen.name} was read, {len(others)} other topics were not: {', '.join(map(str, others[:8]))}",
             fix="ingest the file again with --topic NAME for another",
         )

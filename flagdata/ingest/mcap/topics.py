@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from flagdata.documents import from_stored_json
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError, UnknownNameError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.mcap import cdr
 from flagdata.ingest.mcap.bags import is_described, parts_of
 from flagdata.ingest.mcap.instants import Stamp, checked, clock_findings, few_without_date, order_of, stamp_of
@@ -342,12 +342,11 @@ def _missing(path: Path, topic: str) -> Iterator[Finding]:
     lost = sum(layouts[part].missing([number]) for part, number in chosen)
     if lost:
         count = sum(layouts[part].counts.get(number, 0) for part, number in chosen)
-        yield Finding(
-            kind="messages-missing",
-            severity=Severity.ERROR,
+        yield Finding.of(
+            "messages-missing",
+            f"the summary counts {count + lost} messages of {topic}, {count} are there: {lost} are lost",
             where=topic,
             count=lost,
-            what=f"the summary counts {count + lost} messages of {topic}, {count} are there: {lost} are lost",
             fix="copy the file again, or record it again",
         )
     for layout in layouts:

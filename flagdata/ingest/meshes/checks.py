@@ -45,13 +45,12 @@ def _stretched(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]
         return
     where = np.flatnonzero(counts)
     frames = f"frame {where[0]}" if len(where) == 1 else f"{len(where)} frames, the first frame {where[0]}"
-    yield Finding(
-        kind="edges-stretched",
-        severity=Severity.WARNING,
+    yield Finding.of(
+        "edges-stretched",
+        f"{counts[worst]} edges are more than {_STRETCHED:g} times as long as in the material ({frames}): "
+        "vertices that change places, a tear, or texture coordinates that are not the cloth's own lengths",
         count=int(counts[worst]),
         where=f"frame {worst}",
-        what=f"{counts[worst]} edges are more than {_STRETCHED:g} times as long as in the material ({frames}): "
-        "vertices that change places, a tear, or texture coordinates that are not the cloth's own lengths",
         fix="export all frames with the vertices in one order, and texture coordinates in metres",
     )
 
@@ -77,14 +76,13 @@ def _jumps(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
     sudden: NDArray[np.int64] = np.flatnonzero((ways > _SUDDEN * usual) & (ways > _FAR * size))
     if len(sudden):
         first = int(sudden[0])
-        yield Finding(
-            kind="cloth-jumps",
-            severity=Severity.WARNING,
+        yield Finding.of(
+            "cloth-jumps",
+            f"half of the vertices move {ways[first]:.3g} m or more from frame {first} to frame {first + 1}, and "
+            f"{usual:.2g} m between others: vertices that are numbered anew, or frames of another run",
             count=len(sudden),
             where=f"frame {first + 1}",
             value=float(ways[first]),
-            what=f"half of the vertices move {ways[first]:.3g} m or more from frame {first} to frame {first + 1}, and "
-            f"{usual:.2g} m between others: vertices that are numbered anew, or frames of another run",
             fix="export all frames of one run, with the vertices in one order",
         )
 
@@ -102,13 +100,12 @@ def _changes(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
             and np.array_equal(frames[index].rest, frames[index - 1].rest)
         )
     ]
-    yield Finding(
-        kind="topology-changes",
-        severity=Severity.NOTE,
+    yield Finding.of(
+        "topology-changes",
+        f"the mesh changes at {len(other)} of {len(frames) - 1} frames: {vertices.min()} to {vertices.max()} "
+        f"vertices, {faces.min()} to {faces.max()} faces",
         count=len(other),
         where=f"frame {other[0]}",
-        what=f"the mesh changes at {len(other)} of {len(frames) - 1} frames: {vertices.min()} to {vertices.max()} "
-        f"vertices, {faces.min()} to {faces.max()} faces",
         fix="none needed, if the simulator remeshes; else export all frames with one mesh",
     )
 
@@ -127,13 +124,12 @@ def t_joints(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
         return ()
     first = int(joints[worst][0])
     return (
-        Finding(
-            kind="t-joints",
-            severity=Severity.WARNING,
+        Finding.of(
+            "t-joints",
+            f"{len(joints[worst])} vertices lie on an edge of a face that they are no corner of (the first is "
+            f"vertex {first}): the cloth is open there",
             count=len(joints[worst]),
             where=f"frame {worst}",
-            what=f"{len(joints[worst])} vertices lie on an edge of a face that they are no corner of (the first is "
-            f"vertex {first}): the cloth is open there",
             fix="split those faces at the vertex, or subdivide both sides alike, and export it anew",
         ),
     )

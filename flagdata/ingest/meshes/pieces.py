@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.lake.meshes import Mesh, MeshSequence, RaggedMeshSequence
 
 _NEXT = 1e-2
@@ -47,12 +47,11 @@ def welded(
     )
     gone = int((~kept).sum())
     return merged, (
-        Finding(
-            kind="vertices-merged",
-            severity=Severity.NOTE,
-            count=gone,
-            what=f"{gone} of {len(kept)} vertices have the texture coordinates of another one and its place in every "
+        Finding.of(
+            "vertices-merged",
+            f"{gone} of {len(kept)} vertices have the texture coordinates of another one and its place in every "
             f"frame, and were merged with it; the {int(kept.sum())} that stay are numbered anew, in their order",
+            count=gone,
         ),
     )
 
@@ -71,12 +70,11 @@ def in_pieces(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...
         "texture coordinates"
     )
     return (
-        Finding(
-            kind="cloth-in-pieces",
-            severity=Severity.WARNING,
+        Finding.of(
+            "cloth-in-pieces",
+            f"the cloth is in {pieces[worst]} pieces that share no vertex" + (between if touching else ""),
             count=pieces[worst],
             where=f"frame {worst}",
-            what=f"the cloth is in {pieces[worst]} pieces that share no vertex" + (between if touching else ""),
             fix="merge vertices by distance before the export, or export one sheet",
         ),
     )
@@ -92,14 +90,13 @@ def slits(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
     if not len(found):
         return ()
     return (
-        Finding(
-            kind="cloth-slit",
-            severity=Severity.WARNING,
-            count=len(found),
-            where=f"frame {worst}",
-            what=f"{len(found)} vertices lie within {100 * _NEXT:g} % of an edge's length of another one that they "
+        Finding.of(
+            "cloth-slit",
+            f"{len(found)} vertices lie within {100 * _NEXT:g} % of an edge's length of another one that they "
             f"are not joined to, in the material or in space (the first is vertex {found[0]}): the cloth has a slit "
             "there, or a seam that is not closed",
+            count=len(found),
+            where=f"frame {worst}",
             fix="if it is a seam, merge its vertices by distance before the export; a slit may stay",
         ),
     )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.observe import cloth
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Experiment, Floats, Specimen, Trajectory
@@ -45,13 +45,12 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
     seen = away <= _SEEN * size
     if not seen and moved[worst] <= usual:
         return (
-            Finding(
-                kind="pins-not-observed",
-                severity=Severity.WARNING,
+            Finding.of(
+                "pins-not-observed",
+                f"the pin (u, v) = ({u:.3g}, {v:.3g}) m is {away:.3g} m beyond the outermost markers; its "
+                f"place is guessed from them and moves by {1e3 * moved[worst]:.3g} mm",
                 where=where,
                 value=away,
-                what=f"the pin (u, v) = ({u:.3g}, {v:.3g}) m is {away:.3g} m beyond the outermost markers; its "
-                f"place is guessed from them and moves by {1e3 * moved[worst]:.3g} mm",
                 fix="track a point at each pin",
             ),
         )
@@ -62,13 +61,12 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
             fix=f"name the pins where it is held; it moves least at (u, v) = {still} m",
         )
     return (
-        Finding(
-            kind="pins-move",
-            severity=Severity.WARNING,
+        Finding.of(
+            "pins-move",
+            f"{what}: is it held there? It moves least at (u, v) = {still} m",
             where=where,
             value=float(moved[worst]),
             count=len(moved),
-            what=f"{what}: is it held there? It moves least at (u, v) = {still} m",
             fix="correct the pins, or look whether they have play",
         ),
     )
@@ -82,13 +80,11 @@ def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...
         return ()
     u, v = recording.markers[others[int(away[others].argmax())]]
     return (
-        Finding(
-            kind="still-away-from-pins",
-            severity=Severity.WARNING,
+        Finding.of(
+            "still-away-from-pins",
+            f"{len(others)} markers away from the pins stand as still as these, one at (u, v) = ({u:.3g}, {v:.3g}) m",
             where=f"recording {recording.name!r}",
             count=len(others),
-            what=f"{len(others)} markers away from the pins stand as still as these, one at (u, v) = ({u:.3g}, "
-            f"{v:.3g}) m",
             fix="if the cloth is held there, name it with the pins",
         ),
     )

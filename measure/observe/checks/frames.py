@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.observe.gaps import LONGEST, frames_of
 from measure.observe.observation import Observation
 from measure.observe.trajectory import Floats
@@ -77,12 +77,11 @@ def even(seen: Observation) -> Observation:
         )
     positions = np.full((len(times), *seen.positions.shape[1:]), np.nan)
     positions[index] = seen.positions
-    found = Finding(
-        kind="frames-missing",
-        severity=Severity.WARNING,
+    found = Finding.of(
+        "frames-missing",
+        f"{lost} frames are missing between others and are interpolated",
         where=f"{where}, frame {gap}",
         count=lost,
-        what=f"{lost} frames are missing between others and are interpolated",
     )
     return replace(seen, times=times, positions=positions, findings=(*seen.findings, found))
 
@@ -118,12 +117,11 @@ def without_repeats(seen: Observation, sigma: float) -> Observation:
         )
     positions = np.array(seen.positions)
     positions[repeat] = np.nan
-    found = Finding(
-        kind="repeated-frames",
-        severity=Severity.WARNING,
+    found = Finding.of(
+        "repeated-frames",
+        f"{count} frames repeat the one before; they are interpolated",
         where=f"{where}, frame {int(repeat.argmax())}",
         count=count,
-        what=f"{count} frames repeat the one before; they are interpolated",
         fix="find out whether the camera or the tracker lost frames there",
     )
     return replace(seen, positions=positions, findings=(*seen.findings, found))
@@ -154,13 +152,12 @@ def without_stuck_markers(seen: Observation) -> Observation:
     positions = np.array(seen.positions)
     positions[stuck] = np.nan
     frame, marker = np.argwhere(stuck)[0]
-    found = Finding(
-        kind="positions-stuck",
-        severity=Severity.WARNING,
+    found = Finding.of(
+        "positions-stuck",
+        f"{count} positions are exactly those of the frame before while the markers around move on, or are "
+        "(0, 0, 0): not tracked",
         count=count,
         where=f"recording {seen.name!r}, frame {int(frame)}, marker {int(marker)}",
-        what=f"{count} positions are exactly those of the frame before while the markers around move on, or are "
-        "(0, 0, 0): not tracked",
     )
     return replace(seen, positions=positions, findings=(*seen.findings, found))
 
@@ -204,12 +201,11 @@ def lost_frames(positions: Floats, *, where: str) -> tuple[Finding, ...]:
     if not len(jumps):
         return ()
     return (
-        Finding(
-            kind="frames-lost",
-            severity=Severity.WARNING,
+        Finding.of(
+            "frames-lost",
+            f"{len(jumps)} steps are about twice as long as those before and after: frames seem to be missing",
             where=f"{where}, frame {int(jumps[0]) + 1}",
             count=len(jumps),
-            what=f"{len(jumps)} steps are about twice as long as those before and after: frames seem to be missing",
             fix="give the frames' times or numbers, so that the gap is known",
         ),
     )

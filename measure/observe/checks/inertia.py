@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Floats, Specimen, Trajectory
 
@@ -72,13 +72,12 @@ def check_inertia(recording: Trajectory, specimen: Specimen) -> tuple[Finding, .
         return ()
     speed = recording.wind.speed
     return (
-        Finding(
-            kind="inertia-does-not-fit",
-            severity=Severity.WARNING,
+        Finding.of(
+            "inertia-does-not-fit",
+            f"by its accelerations the cloth moves as in {factor * speed:.2g} m/s, {factor:.2g} times the wind "
+            f"given, {speed:.3g} m/s",
             where=f"recording {recording.name!r}",
             value=factor,
-            what=f"by its accelerations the cloth moves as in {factor * speed:.2g} m/s, {factor:.2g} times the wind "
-            f"given, {speed:.3g} m/s",
             fix=f"check the unit of the wind (km/h are {1 / 3.6:.2g} m/s), the frame rate ({recording.rate:.4g} Hz; "
             f"{recording.rate / factor:.3g} Hz would fit) and the cloth's density",
         ),
@@ -144,12 +143,11 @@ def _check_swing(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ..
     if ratio is None or _SWING[0] <= ratio <= _SWING[1]:
         return ()
     return (
-        Finding(
-            kind="inertia-does-not-fit",
-            severity=Severity.WARNING,
+        Finding.of(
+            "inertia-does-not-fit",
+            f"in calm air the swinging cloth gains {ratio:.2g} times the energy that its height loses",
             where=f"recording {recording.name!r}",
             value=ratio,
-            what=f"in calm air the swinging cloth gains {ratio:.2g} times the energy that its height loses",
             fix=f"check the frame rate ({recording.rate:.4g} Hz; {recording.rate / ratio**0.5:.3g} Hz would fit)",
         ),
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, KDTree, QhullError
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.observe import cloth
 from measure.observe.observation import Observation
 from measure.observe.trajectory import Floats
@@ -114,12 +114,11 @@ def check_scale(seen: Observation, edges: Edges, sigma: float) -> tuple[Finding,
     if whole <= _LONG:
         return ()
     return (
-        Finding(
-            kind="cloth-longer-than-rest",
-            severity=Severity.WARNING,
+        Finding.of(
+            "cloth-longer-than-rest",
+            f"taut, the cloth is {100 * (whole - 1):.1f} % longer than at rest, more than wind stretches it",
             where=where,
             value=whole,
-            what=f"taut, the cloth is {100 * (whole - 1):.1f} % longer than at rest, more than wind stretches it",
             fix="measure its width and height again",
         ),
     )
@@ -142,12 +141,11 @@ def without_strays(seen: Observation, edges: Edges, sigma: float) -> Observation
     positions = np.array(seen.positions)
     positions[stray] = np.nan
     frame, marker = np.argwhere(stray)[0]
-    found = Finding(
-        kind="markers-astray",
-        severity=Severity.WARNING,
+    found = Finding.of(
+        "markers-astray",
+        f"{count} positions are further from the markers around than cloth can stretch; they are left out",
         count=count,
         where=f"recording {seen.name!r}, frame {int(frame)}, marker {int(marker)}",
-        what=f"{count} positions are further from the markers around than cloth can stretch; they are left out",
         fix="look at the track there: was the marker exchanged with another?",
     )
     return replace(seen, positions=positions, findings=(*seen.findings, found))
@@ -169,12 +167,11 @@ def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Findin
         return ()
     hole = points[int(away.argmax())]
     return (
-        Finding(
-            kind="cloth-not-covered",
-            severity=Severity.WARNING,
+        Finding.of(
+            "cloth-not-covered",
+            f"the nearest marker is {away.max():.3g} m away: what the cloth does there is guessed",
             where=f"{where}, (u, v) = ({hole[0]:.3g}, {hole[1]:.3g}) m",
             value=float(away.max()),
-            what=f"the nearest marker is {away.max():.3g} m away: what the cloth does there is guessed",
             fix="track markers there, or correct the outline",
         ),
     )

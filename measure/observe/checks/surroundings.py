@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from measure.observe.checks.attachment import centre_of_pins
 from measure.observe.trajectory import Floats, Specimen, Trajectory, WindTrack
 
@@ -101,13 +101,8 @@ def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding,
     if angle <= _ASIDE:
         return ()
     return (
-        Finding(
-            kind="flies-aside",
-            severity=Severity.WARNING,
-            where=where,
-            value=angle,
-            what=what,
-            fix="check the direction of the wind in the recording's axes",
+        Finding.of(
+            "flies-aside", what, where=where, value=angle, fix="check the direction of the wind in the recording's axes"
         ),
     )
 
@@ -126,12 +121,11 @@ def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, 
         return ()
     motion = "flies nearly flat, though its wind" if calm else "hangs limp, though its wind"
     return (
-        Finding(
-            kind="wind-does-not-fit",
-            severity=Severity.WARNING,
+        Finding.of(
+            "wind-does-not-fit",
+            f"the cloth {motion} of {recording.wind.speed:.3g} m/s has {ratio:.2g} times the force of its weight",
             where=f"recording {recording.name!r}",
             value=ratio,
-            what=f"the cloth {motion} of {recording.wind.speed:.3g} m/s has {ratio:.2g} times the force of its weight",
             fix="check the unit of the wind, and the clock of its log",
         ),
     )
@@ -144,12 +138,11 @@ def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
     if slope[1, 2] > -_DOWNWARD:
         return ()
     return (
-        Finding(
-            kind="rest-upside-down",
-            severity=Severity.WARNING,
+        Finding.of(
+            "rest-upside-down",
+            "the markers' v runs downward as the cloth hangs: what the answer calls the top is the bottom",
             where=f"recording {recording.name!r}",
             value=float(slope[1, 2]),
-            what="the markers' v runs downward as the cloth hangs: what the answer calls the top is the bottom",
             fix="let v run from the bottom to the top, and u from the hoist to the fly",
         ),
     )

@@ -116,7 +116,7 @@ def test_what_is_wrong_is_refused_with_its_place() -> None:
         (MINIMAL.replace("[wind]", "density = 0.0\n[wind]"), InputError, "above 0"),
         (MINIMAL.replace("[wind]", "file = 'x.toml'\n[wind]"), UsageError, "more than one of name"),
         (MINIMAL.replace("[wind]", "names = ['paper']\n[wind]"), UsageError, "more than one of name"),
-        ("[scene]\nshape = 'arcsim'\n" + MINIMAL, InputError, "no file is named"),
+        ("[scene]\nshape = 'arcsim'\n" + MINIMAL, InputError, "the key file is missing"),
         ("scene = 3\n" + MINIMAL, InputError, "not a table"),
         ("[wind\n", InputError, "not TOML"),
         (MINIMAL + "[limits]\nhgih = 1.1\n", UnknownNameError, "did you mean 'high'"),

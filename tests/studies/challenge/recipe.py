@@ -23,16 +23,20 @@ All values are SI. A *range* is `{ low = …, high = …, scale = "linear" | "lo
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import lcm
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeAlias
 
+from msgspec import Meta
+
+from flagdata import tables
 from flagdata.errors import InputError, LimitError
 from flagdata.recipes import Shelf, parsed
 from flagdata.registry import Registry
-from flagdata.tables import NOT_NEGATIVE, POSITIVE, Bounds, Range, Table
+from flagdata.tables import POSITIVE, WHOLE_LIMIT, Count, Named, NotNegative, Positive, Range
 from sim import material
 
 
@@ -47,6 +51,11 @@ class _Beside(Shelf):
 CHALLENGES = _Beside(folder="recipes", noun="challenge")
 CELLS_LIMIT = 100_000
 """Most cells of a mesh, and most markers."""
+_Mesh: TypeAlias = Annotated[int, Meta(ge=3, le=WHOLE_LIMIT)]
+_Spots: TypeAlias = Annotated[int, Meta(ge=4, le=WHOLE_LIMIT)]
+_Pixels: TypeAlias = Annotated[int, Meta(ge=64, le=WHOLE_LIMIT)]
+_Draw: TypeAlias = Annotated[Range, POSITIVE]
+_NOMINAL, _SPEED, _INTENSITY = (Range(low=number, high=number) for number in (1.0, 5.0, 0.1))
 TICKS_LIMIT = 10_000_000
 """Most instants of a recording, at the rate that all its rates divide."""
 
@@ -86,32 +95,32 @@ class Numerics:
         damping: of the cloths it takes [s].
     """
 
-    columns: int = 20
-    rows: int = 14
+    columns: _Mesh = 20
+    rows: _Mesh = 14
     diagonals: Diagonals = Diagonals.ALTERNATE
     integrator: Method = Method.SYMPLECTIC
-    step: float = 0.0
-    thickness: float = 0.0
-    damping: Range = field(default_factory=lambda: Range(low=1e-3, high=1e-3))
+    step: NotNegative = 0.0
+    thickness: NotNegative = 0.0
+    damping: Annotated[Range, POSITIVE] = field(default_factory=lambda: Range(low=1e-3, high=1e-3))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Filming:
     """How sets are filmed; attributes as in the module's description."""
 
-    rate: int = 25
-    width: int = 320
-    pixels_high: int = 240
-    view: float = 24.0
-    samples: int = 4
+    rate: Count = 25
+    width: _Pixels = 320
+    pixels_high: _Pixels = 240
+    view: Positive = 24.0
+    samples: Count = 4
     azimuth: float = 80.0
-    azimuth_sigma: float = 5.0
+    azimuth_sigma: NotNegative = 5.0
     elevation: float = 0.0
-    elevation_sigma: float = 2.0
-    distance: float = 8.0
-    distance_sigma: float = 0.02
-    height: float = 3.0
-    weight_sigma: float = 0.03
+    elevation_sigma: NotNegative = 2.0
+    distance: Positive = 8.0
+    distance_sigma: NotNegative = 0.02
+    height: Positive = 3.0
+    weight_sigma: NotNegative = 0.03
     backgrounds: tuple[str, ...] = ("sky", "hills", "foliage", "buildings")
 
 
@@ -229,100 +238,139 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
     from sim.effects import EFFECTS
     from tests.studies.challenge.outside import OUTSIDE
 
-    top = Table(parsed(text, where=where), where=where)
-    shares, flag, run = top.table("composition"), top.table("flag"), top.table("recordings")
-    log, markers, numerics = top.table("log"), top.table("markers"), top.table("numerics")
-    effects, outside, title = top.table("effects"), top.table("outside"), top.text("title", where) or where
-    materials = flag.texts("materials")
-    for name in materials:
-        material.named(name, where=flag.where)
-    films = None
-    if "films" in top.names():
-        films = top.table("films").record(
-            Filming,
-            rate=POSITIVE,
-            width=Bounds(least=64),
-            pixels_high=Bounds(least=64),
-            view=POSITIVE,
-            samples=POSITIVE,
-            distance=POSITIVE,
-            azimuth_sigma=NOT_NEGATIVE,
-            elevation_sigma=NOT_NEGATIVE,
-            distance_sigma=NOT_NEGATIVE,
-            height=POSITIVE,
-            weight_sigma=NOT_NEGATIVE,
-        )
-    top.done()
-    rates = tuple(_whole(run, "rates", rate) for rate in run.numbers("rates")) if films is None else (films.rate,)
-    recipe = ChallengeRecipe(
-        title=title,
+    form = tables.read(_Form, parsed(text, where=where), where=where)
+    flag, run, log, films = form.flag, form.recordings, form.log, form.films
+    for name in flag.materials:
+        material.named(name, where=f"{where} [flag]")
+    if films is None:
+        rates = tuple(_whole("rates", rate, where=f"{where} [recordings]") for rate in run.rates)
+    else:
+        rates = (films.rate,)
+    for name, numerics in form.numerics.items():
+        _check(numerics, where=f"{where} [numerics] [{name}]")
+    return ChallengeRecipe(
+        title=form.title or where,
         films=films,
-        composition={kind: shares.number(kind.value, 0.0, least=0) for kind in Kind},
-        width=flag.number("width", 1.5, above=0),
-        height=flag.number("height", 1.0, above=0),
-        materials=materials,
-        density=flag.range("density", 1.0, above=0),
-        bending=flag.range("bending", 1.0, above=0),
-        count=run.whole("count", 3, least=1),
-        duration=run.number("duration", 10.0, above=0),
-        settle=run.number("settle", 4.0, above=0),
+        composition={kind: getattr(form.composition, kind.value) for kind in Kind},
+        width=flag.width,
+        height=flag.height,
+        materials=flag.materials,
+        density=flag.density,
+        bending=flag.bending,
+        count=run.count,
+        duration=run.duration,
+        settle=run.settle,
         rates=rates,
-        noises=run.numbers("noises") if films is None else (0.0,),
-        speed=run.range("speed", 5.0, above=0),
-        apart=run.number("apart", 0.0, least=0),
-        varying=log.number("share", 0.0, least=0),
-        log_rate=log.whole("rate", 10, least=1),
-        intensity=log.range("intensity", 0.1, above=0),
-        length=log.number("length", 40.0, above=0),
-        marker_columns=markers.whole("columns", 17, least=4),
-        marker_rows=markers.whole("rows", 11, least=4),
-        jitter=markers.number("jitter", 0.0, least=0),
-        numerics={name: _numerics(numerics.table(name)) for name in numerics.names()},
-        effects=_strengths(effects, EFFECTS),
-        outside=_strengths(outside, OUTSIDE),
+        noises=run.noises if films is None else (0.0,),
+        speed=run.speed,
+        apart=run.apart,
+        varying=log.share,
+        log_rate=log.rate,
+        intensity=log.intensity,
+        length=log.length,
+        marker_columns=form.markers.columns,
+        marker_rows=form.markers.rows,
+        jitter=form.markers.jitter,
+        numerics=dict(form.numerics),
+        effects=_strengths(form.effects, EFFECTS, where=f"{where} [effects]"),
+        outside=_strengths(form.outside, OUTSIDE, where=f"{where} [outside]"),
     )
-    for table in (shares, flag, run, log, markers, numerics):
-        table.done()
-    return recipe
 
 
-def _whole(table: Table, key: str, value: float) -> int:
+@dataclass(frozen=True, kw_only=True)
+class _Form:
+    """The tables of a challenge."""
+
+    title: str = ""
+    composition: _Composition
+    flag: _Flag
+    recordings: _Recordings
+    log: _Log
+    markers: _Markers
+    films: Filming | None = None
+    numerics: Mapping[str, Numerics]
+    effects: Mapping[str, Mapping[str, Any]]
+    outside: Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Composition:
+    null: NotNegative = 0.0
+    one: NotNegative = 0.0
+    pair: NotNegative = 0.0
+    outside: NotNegative = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Flag:
+    width: Positive = 1.5
+    height: Positive = 1.0
+    materials: tuple[str, ...] = ()
+    density: _Draw = _NOMINAL
+    bending: _Draw = _NOMINAL
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Recordings:
+    count: Count = 3
+    duration: Positive = 10.0
+    settle: Positive = 4.0
+    rates: tuple[float, ...] = ()
+    noises: tuple[float, ...] = ()
+    speed: _Draw = _SPEED
+    apart: NotNegative = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Log:
+    share: NotNegative = 0.0
+    rate: Count = 10
+    intensity: _Draw = _INTENSITY
+    length: Positive = 40.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Markers:
+    columns: _Spots = 17
+    rows: _Spots = 11
+    jitter: NotNegative = 0.0
+
+
+def _whole(key: str, value: float, *, where: str) -> int:
     if value < 1 or value != int(value):
-        raise InputError(f"{key} has {value!r}", where=table.where, fix="give whole numbers of at least 1")
+        raise InputError(f"{key} has {value!r}", where=where, fix="give whole numbers of at least 1")
     return int(value)
 
 
-def _numerics(table: Table) -> Numerics:
-    mesh = Bounds(least=3)
-    found = table.record(Numerics, columns=mesh, rows=mesh, step=NOT_NEGATIVE, thickness=NOT_NEGATIVE, damping=POSITIVE)
-    if found.integrator is Method.IMPLICIT and not found.step:
-        raise InputError("the implicit integrator without a step", where=table.where, fix="give step in seconds")
-    if found.integrator is Method.SYMPLECTIC and found.step:
+def _check(numerics: Numerics, *, where: str) -> None:
+    if numerics.integrator is Method.IMPLICIT and not numerics.step:
+        raise InputError("the implicit integrator has no step", where=where, fix="give step in seconds")
+    if numerics.integrator is Method.SYMPLECTIC and numerics.step:
         raise InputError(
-            "a step beside the symplectic integrator, which finds its own",
-            where=table.where,
-            fix="leave it out",
+            "a step stands beside the symplectic integrator, which finds its own", where=where, fix="leave it out"
         )
-    return found
 
 
-def _strengths(table: Table, known: Registry) -> dict[str, Strengths]:
+def _strengths(effects: Mapping[str, Mapping[str, Any]], known: Registry, *, where: str) -> dict[str, Strengths]:
     found: dict[str, Strengths] = {}
-    for name in table.names():
-        inner = table.table(name)
+    for name, content in effects.items():
         strengths: tuple[str, ...] = known[name].strengths()
-        parameter = inner.named("parameter", strengths[0], strengths, noun="strength")
-        values, drawn = inner.numbers("values"), inner.range("range", 1.0, above=0)
-        if any(value <= 0 for value in values):
+        types = {
+            "parameter": Annotated[str, Named("strength", strengths)],
+            "values": tuple[float, ...],
+            "range": _Draw,
+            "negative": NotNegative,
+        }
+        inside = f"{where} [{name}]"
+        usual = {"parameter": strengths[0], "range": _NOMINAL, "negative": 0.0}
+        made = Strengths(**{**usual, **tables.entries(types, content, where=inside)})
+        if any(value <= 0 for value in made.values):
             raise InputError(
-                "values has magnitudes that are not above 0", where=inner.where, fix="say by negative which sets differ"
+                "values has magnitudes that are not above 0", where=inside, fix="say by negative which sets differ"
             )
-        if values and "range" in inner.names():
-            raise InputError("values and a range", where=inner.where, fix="give one of them")
-        found[name] = Strengths(
-            parameter=parameter, range=drawn, negative=inner.number("negative", 0.0, least=0), values=values
-        )
-        inner.done()
+        if made.values and "range" in content:
+            raise InputError("values and a range are given", where=inside, fix="give one of them")
+        found[name] = made
     return found
 
 

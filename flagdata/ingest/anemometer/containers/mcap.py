@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
 from flagdata.ingest.mcap.topics import Decoded, Topic, choose, index, messages, topics
@@ -80,7 +80,7 @@ def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
     lines = [",".join(["time", *(headings.get(one, one) for one in names)])]
     lines += [",".join([iso(stamp), *(row.get(one, "") for one in names)]) for stamp, row in timed]
     what = f"the topic {topic.name}: {len(rows)} messages of {topic.schema or topic.encoding}, a row each"
-    read = Finding(kind="topic-read", severity=Severity.NOTE, what=what, count=len(rows))
+    read = Finding.of("topic-read", what, count=len(rows))
     return TableText(path=path, encoding="utf-8", lines=len(lines), findings=(read, *found.findings), text=tuple(lines))
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, LimitError, TimeError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, snapped
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
@@ -141,9 +141,7 @@ def instants(
     if step > NANOSECONDS / 1000:
         what = f"the times are numbers of {8 * kept.dtype.itemsize} bits, which are {step / NANOSECONDS:.3g} s apart"
         fix = "write them as numbers of 64 bits"
-        found = (
-            Finding(kind="coarse-stamps", severity=Severity.WARNING, value=step / NANOSECONDS, what=what, fix=fix),
-        )
+        found = (Finding.of("coarse-stamps", what, value=step / NANOSECONDS, fix=fix),)
     return np.where(absent, NOT_A_TIME, time), found
 
 
@@ -220,5 +218,5 @@ def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
         for stamp, *row in rows
     ]
     what = f"variables that are not read: {', '.join(left)}"
-    found = (*found, Finding(kind="columns-not-read", severity=Severity.NOTE, what=what)) if left else found
+    found = (*found, Finding.of("columns-not-read", what)) if left else found
     return TableText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=tuple(lines))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from flagdata.bounded import Child, EndedError
 from flagdata.errors import InputError, LimitError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
 from flagdata.workbook import Sheet
@@ -52,10 +52,10 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
         count = 1 + len(sheet.others)
         text = f"the sheet {sheet.title!r} is read, the first of {count}; not {', '.join(map(repr, sheet.others))}"
         fix = "save another sheet as a file of its own to read it"
-        found = (Finding(kind="several-sheets", severity=Severity.WARNING, count=count, what=text, fix=fix),)
+        found = (Finding.of("several-sheets", text, count=count, fix=fix),)
     if sheet.of_1904:
         text = "the workbook counts days from 1904-01-01: so its dates are read, and so is excel-days"
-        found = (*found, Finding(kind="days-since-1904", severity=Severity.NOTE, what=text))
+        found = (*found, Finding.of("days-since-1904", text))
     lines, days = tuple(sheet.text.splitlines()), "excel-days-1904" if sheet.of_1904 else "excel-days"
     return TableText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=lines, serial_days=days)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants.stamps import DAY
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
@@ -108,7 +108,7 @@ def reported(reading: Reading, answered: frozenset[str]) -> tuple[Finding, ...]:
     written = {"wind_speed": reading.channels[speed], "wind_direction": np.full(len(reading.time), np.nan)}
     seen = _seen(reading, written, "m/s", assumed=False, left_out=0, now=0)
     return tuple(
-        Finding(kind="doubtful-numbers", severity=Severity.WARNING, what=f"{speed}: {text}", fix=CHECKS[key][1])
+        Finding.of("doubtful-numbers", f"{speed}: {text}", fix=CHECKS[key][1])
         for key in _OF_THE_COLUMN
         if key not in answered and (text := CHECKS[key][0](seen))
     )

@@ -32,7 +32,7 @@ import numpy as np
 
 from flagdata.documents import to_toml
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.formats.headings import Column, Heading, find, fits, stamp_format
 from flagdata.ingest.anemometer.instants.stamps import parse
@@ -130,7 +130,7 @@ class Described:
             reading = replace(reading, sensor=replace(reading.sensor, averaging=period))
         if done.starts and reading.sensor.averaging:
             text = f"stamps are of the beginning of averages over {reading.sensor.averaging:g} s; kept as written"
-            found.append(Finding(kind="stamps-at-start", severity=Severity.NOTE, what=text))
+            found.append(Finding.of("stamps-at-start", text))
         if "described-by" in self.open.data:
             found.append(described(self.open.data["described-by"]))
         reading = with_horizontal(reading.with_findings(tuple(found)), options.azimuth, where=where)
@@ -357,10 +357,10 @@ def _with_units(
     notes: list[Finding] = []
     if borrowed:
         what = f"speeds carry no unit: taken to be in {borrowed}, which is stated above the heading"
-        notes.append(Finding(kind="unit-from-preamble", severity=Severity.WARNING, what=what))
+        notes.append(Finding.of("unit-from-preamble", what))
     if repaired:
         text = "; ".join(repaired)
-        notes.append(Finding(kind="units-repaired", severity=Severity.NOTE, count=len(repaired), what=text))
+        notes.append(Finding.of("units-repaired", text, count=len(repaired)))
     return columns, _Units(notes=tuple(notes), inferred=inferred)
 
 
@@ -437,12 +437,11 @@ def column_findings(done: Completed) -> tuple[Finding, ...]:
     if done.rivals:
         used = next(done.channels[name].name for name in ("wind_speed", "wind_x") if name in done.channels)
         found.append(
-            Finding(
-                kind="several-anemometers",
-                severity=Severity.WARNING,
-                count=len(done.rivals),
-                what=f"wind is read from {used!r}, the first of {len(done.rivals) + 1} columns of wind; not from "
+            Finding.of(
+                "several-anemometers",
+                f"wind is read from {used!r}, the first of {len(done.rivals) + 1} columns of wind; not from "
                 f"{', '.join(column.name for column in done.rivals)}",
+                count=len(done.rivals),
                 fix="to read the others, too, ingest the file with --as delimited, which asks for what the headings do "
                 "not state (such as --unit); where it does not read them, describe the file by a recipe that names "
                 "the column",
@@ -453,7 +452,7 @@ def column_findings(done: Completed) -> tuple[Finding, ...]:
         names = sorted((column.name for column in done.unread), key=lambda name: "wind" not in name.lower())
         more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
         what = ", ".join(name[:_WIDE] for name in names[:_NAMED]) + more
-        found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, count=len(names), what=what))
+        found.append(Finding.of("columns-not-read", what, count=len(names)))
     return tuple(found)
 
 

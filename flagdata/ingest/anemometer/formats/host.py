@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
@@ -169,11 +169,10 @@ class HostRows:
                 fix="check the recipe, or the device's settings",
             )
         return (
-            Finding(
-                kind="non-data-lines",
-                severity=Severity.WARNING,
+            Finding.of(
+                "non-data-lines",
+                f"{other} lines without the fields of a reading (counters, menus, fragments); left out",
                 count=other,
                 where=f"line {self._other[0]}",
-                what=f"{other} lines without the fields of a reading (counters, menus, fragments); left out",
             ),
         )

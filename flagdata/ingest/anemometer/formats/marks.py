@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import TimeError, UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer.formats.sentences import TimeMark
 from flagdata.ingest.anemometer.instants import clock as clocks
 from flagdata.ingest.anemometer.instants.clock import ClockChoice
@@ -197,7 +197,7 @@ class TimeLine:
         day = np.cumsum(np.concatenate(([0], np.diff(clock) < -DAY // 2)).astype(np.int64))
         if day[-1]:
             text = f"{day[-1]} times the clock passes midnight: the day is counted on"
-            found.append(Finding(kind="midnight", severity=Severity.NOTE, count=int(day[-1]), what=text))
+            found.append(Finding.of("midnight", text, count=int(day[-1])))
         marks = (self._start(at, clock, day, date, where) + day) * DAY + clock
         marks, reported = _one_clock(marks, at, choice)
         found.extend(reported)
@@ -241,7 +241,7 @@ class TimeLine:
             f"the stream carries one time, in line {at[0]}: {len(lines)} wind sentences are taken as of the second "
             "about it, in their order"
         )
-        found = (Finding(kind="one-time", severity=Severity.WARNING, count=len(lines), what=what, fix=_STEADY_FIX),)
+        found = (Finding.of("one-time", what, count=len(lines), fix=_STEADY_FIX),)
         return Placed(time=mark + (lines - at[0]) * pace, spacing=1.0, marks=1, kind=kind, findings=found)
 
     def _kind(self, where: str) -> str:
@@ -303,7 +303,7 @@ def _one_clock(
 
 
 def _backwards(count: int, where: str, what: str) -> Finding:
-    return Finding(kind="time-backwards", severity=Severity.WARNING, count=count, where=where, what=what)
+    return Finding.of("time-backwards", what, count=count, where=where)
 
 
 def _interpolate(lines: NDArray[np.int64], at: NDArray[np.int64], marks: NDArray[np.int64]) -> Instants:

@@ -327,7 +327,7 @@ def _kinds(stream: Stream, time: Instants) -> tuple[Finding, ...]:
     if len(parts) < 2:
         return ()
     text = f"{len(stream.line)} wind sentences of {len(parts)} kinds: {'; '.join(parts)}"
-    return (Finding(kind="wind-kinds", severity=Severity.NOTE, count=len(stream.line), what=text),)
+    return (Finding.of("wind-kinds", text, count=len(stream.line)),)
 
 
 def _sources(stream: Stream, wind: str) -> str:

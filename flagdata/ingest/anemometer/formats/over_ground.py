@@ -52,7 +52,7 @@ def settled(
     if fix is not None:
         what = f"wind over ground ({source}): if its platform moves, the instrument computed it from that platform's "
         what += "heading and speed"
-    return dict(channels), Finding(kind="computed-true-wind", severity=Severity.WARNING, what=what, fix=fix)
+    return dict(channels), Finding.of("computed-true-wind", what, fix=fix)
 
 
 def _fixed(
@@ -70,4 +70,4 @@ def _fixed(
             raise UsageError(f"an azimuth was given, but {what}", where=where, fix="leave out --azimuth")
         out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
     what = f"the wind over ground is that of {source}" if stated else f"{kind} wind is wind over ground"
-    return out, Finding(kind="fixed-platform", severity=Severity.NOTE, what=f"fixed platform, as given: {what}")
+    return out, Finding.of("fixed-platform", f"fixed platform, as given: {what}")

@@ -278,7 +278,7 @@ def turned(reading: Reading, azimuth: float | None, *, where: str) -> Reading:
         channels["wind_direction"] = np.mod(channels["wind_direction"] + azimuth, 2 * np.pi)
         text = f"directions are turned by the azimuth of the north mark, {np.degrees(azimuth):.1f}°, as given"
         fix = None
-    finding = Finding(kind="north-mark", severity=Severity.NOTE, what=text, fix=fix)
+    finding = Finding.of("north-mark", text, fix=fix)
     return replace(reading, channels=channels).with_findings((finding,))
 
 
@@ -345,9 +345,7 @@ def _findings(
     places = {defect: [n for n in numbers if n > 1] for defect, numbers in gathered.defects.items()}
     if places[Defect.CUT] and places[Defect.CUT][-1] == gathered.last:
         text = "the last line is incomplete, as when the logger lost power; left out"
-        found.append(
-            Finding(kind="cut-off", severity=Severity.WARNING, what=text, where=f"line {places[Defect.CUT].pop()}")
-        )
+        found.append(Finding.of("cut-off", text, where=f"line {places[Defect.CUT].pop()}"))
 
     def note(numbers: Sequence[int], kind: str, severity: Severity, what: str) -> None:
         if len(numbers):

@@ -86,7 +86,7 @@ class StampedNmea:
         keep(stream, timed)
         if dropped:
             what = f"{dropped} wind sentences without a stamp; left out"
-            found = (*found, Finding(kind="no-stamp", severity=Severity.ERROR, count=dropped, what=what))
+            found = (*found, Finding.of("no-stamp", what, count=dropped))
         reading = reading_of(stream, np.array([at[number] for number in stream.line], np.int64), options, where=where)
         found = (*found, *reading.findings, *_receiver(at, marks))
         return replace(reading, step=stamps.step, findings=found)

@@ -105,7 +105,7 @@ def _mean_of_angles(name: str, names: Sequence[str]) -> Finding:
     beside = f"; {', '.join(repr(other) for other in vectors)} may be the mean of vectors" if vectors else ""
     what = f"{name!r} is the mean of a vane's readings as numbers, which is wrong where they pass north{beside}"
     fix = "have the program average the wind as a vector (WindVector), or read that column: --as delimited --columns"
-    return Finding(kind="direction-mean-of-numbers", severity=Severity.WARNING, what=what, fix=fix)
+    return Finding.of("direction-mean-of-numbers", what, fix=fix)
 
 
 def _continuity(record: NDArray[np.float64], line: NDArray[np.int64]) -> tuple[Finding, ...]:

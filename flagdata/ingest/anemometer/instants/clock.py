@@ -221,7 +221,7 @@ def sorted_as_given(
     count = int(moved.sum())
     what = f"{count} of {len(time)} rows are out of order in the file; sorted by their stamps, as given"
     where = f"line {line[moved][0]}"
-    found = Finding(kind="rows-sorted", severity=Severity.NOTE, count=count, where=where, what=what)
+    found = Finding.of("rows-sorted", what, count=count, where=where)
     return np.argsort(time, kind="stable"), found
 
 

@@ -17,7 +17,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from flagdata.errors import TimeError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants import stamps
 from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, Stamps
 from flagdata.timebase import NANOSECONDS, iso
@@ -198,7 +198,7 @@ def completed(
 
 def _date_given(what: str, date: dt.date, follow: str) -> tuple[Finding, ...]:
     text = f"{what}; the first row is of {date.isoformat()}, as given, and {follow} follow"
-    return (Finding(kind="date-given", severity=Severity.NOTE, what=text),)
+    return (Finding.of("date-given", text),)
 
 
 def since_start(
@@ -220,15 +220,7 @@ def since_start(
     over = np.concatenate(([False], np.diff(count) < -0.9 * span if span else np.zeros(len(count) - 1, dtype=bool)))
     if span and over.any():
         what = f"the counter of 32 bits runs over {int(over.sum())} times; the rows after it go on"
-        found.append(
-            Finding(
-                kind="counter-overflow",
-                severity=Severity.NOTE,
-                count=int(over.sum()),
-                what=what,
-                where=f"line {line[over][0]}",
-            )
-        )
+        found.append(Finding.of("counter-overflow", what, count=int(over.sum()), where=f"line {line[over][0]}"))
         count = count + np.cumsum(over) * span
     steps = np.diff(count)
     usual = int(np.median(steps[steps > 0])) if np.any(steps > 0) else 0
@@ -244,5 +236,5 @@ def since_start(
     if int(count[0]) > max(int(np.diff(count[:2]).max(initial=0)), NANOSECONDS):
         what += f", its count being {count[0] / NANOSECONDS:g} s; if that was the zero of the count instead, "
         what += f"give --start {iso(start + int(count[0]))}"
-    found.append(Finding(kind="elapsed-time", severity=Severity.NOTE, what=what))
+    found.append(Finding.of("elapsed-time", what))
     return count - count[0] + start, tuple(found)

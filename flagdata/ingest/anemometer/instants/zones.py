@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import FlagdataError, TimeError, ZoneMissingError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants.clock import usual
 from flagdata.ingest.anemometer.instants.stamps import HOUR
 from flagdata.signals import Instants
@@ -81,15 +81,7 @@ def to_utc(
         offset[late] = after
         what = f"the hour from {_show(start)} occurs twice in {place}; by their order {len(rows) - len(late)} rows are "
         what += f"of its first pass, {len(late)} of its second"
-        found.append(
-            Finding(
-                kind="clocks-set-back",
-                severity=Severity.NOTE,
-                count=len(rows),
-                where=f"line {lines[rows[0]]}",
-                what=what,
-            )
-        )
+        found.append(Finding.of("clocks-set-back", what, count=len(rows), where=f"line {lines[rows[0]]}"))
     return wall - offset, tuple(found)
 
 
@@ -219,4 +211,4 @@ def contradiction(says: str, theirs: str, given: str, time: Instants) -> tuple[F
         return ()
     what = f"{says} that the stamps are of {theirs}; {given} was given and is used, {abs(apart):g} h away"
     fix = f"give --zone {theirs}, unless the file is known to be wrong"
-    return (Finding(kind="zone-contradicts", severity=Severity.WARNING, value=apart, what=what, fix=fix),)
+    return (Finding.of("zone-contradicts", what, value=apart, fix=fix),)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.averaging import average
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants.clock import span
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
@@ -53,13 +53,12 @@ def hours_off(series: WindSeries, other: WindSeries, *, name: str) -> Finding | 
     if best == 0 or score < SCORE or score < scores[0][0] + LEAD:
         return None
     when = f"{span(abs(best) * NANOSECONDS)} {'later' if best > 0 else 'earlier'}"
-    return Finding(
-        kind="hours-off",
-        severity=Severity.WARNING,
+    return Finding.of(
+        "hours-off",
+        f"its wind is that of {name} if its stamps were {when} (correlation {correlation:.2f} over {n} means of "
+        f"{length} s; as stamped {scores[0][1]:.2f}): off by hours, as by a wrong zone",
         value=float(best),
         count=n,
-        what=f"its wind is that of {name} if its stamps were {when} (correlation {correlation:.2f} over {n} means of "
-        f"{length} s; as stamped {scores[0][1]:.2f}): off by hours, as by a wrong zone",
         fix="check --zone of both logs: a logger may stay on winter time, or keep UTC; then ingest the wrong one again",
     )
 

@@ -79,7 +79,7 @@ def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None)
         one.kind for one in reading.findings
     ):
         what = f"the rows are in the order of their stamps, and no clock was set: --clock {choice} is not used"
-        reading = reading.with_findings((Finding(kind="clock-not-set", severity=Severity.NOTE, what=what),))
+        reading = reading.with_findings((Finding.of("clock-not-set", what),))
     return _distinct(reading, where)
 
 

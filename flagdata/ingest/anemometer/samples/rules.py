@@ -362,15 +362,14 @@ def gaps(reading: Reading) -> Reading:
             continue
         longest = int(wide[np.argmax(steps[wide])])
         lost, seconds = float((steps[wide] - usual).sum()) / NANOSECONDS, float(steps[longest]) / NANOSECONDS
-        found = Finding(
-            kind="gaps",
-            severity=Severity.WARNING,
+        found = Finding.of(
+            "gaps",
+            f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'}{of} longer than the usual "
+            f"{usual / NANOSECONDS:.4g} s, {lost:.3f} s lost in all; the longest interval, {seconds:.3f} s, ends at "
+            "the line named",
             count=len(wide),
             value=seconds,
             where=f"line {reading.line[rows[longest + 1]]}",
-            what=f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'}{of} longer than the usual "
-            f"{usual / NANOSECONDS:.4g} s, {lost:.3f} s lost in all; the longest interval, {seconds:.3f} s, ends at "
-            "the line named",
         )
         reading = reading.with_findings((found,))
     return reading
@@ -395,7 +394,7 @@ def steady(reading: Reading) -> Reading:
         f"the speed varies by {100 * intensity:.2g} % about its mean of {values.mean():.3g} m/s: as steady as in a "
         "wind tunnel, and steadier than wind outdoors; if it was outdoors, the column is likely another quantity"
     )
-    found = Finding(kind="steady-wind", severity=Severity.NOTE, value=intensity, what=what)
+    found = Finding.of("steady-wind", what, value=intensity)
     return reading.with_findings((found,))
 
 

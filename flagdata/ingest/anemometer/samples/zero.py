@@ -131,7 +131,7 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
     elif choice != "report":
         shift = float(choice)
         what = f"a zero offset of {shift:+.3f} m/s was given and subtracted from every speed"
-        found = Finding(kind="zero-offset-given", severity=Severity.NOTE, value=shift, count=len(speed), what=what)
+        found = Finding.of("zero-offset-given", what, value=shift, count=len(speed))
         reading = reading.with_findings((found,))
     if zero is not None and abs(zero.offset) > max(0.5 * step, 1e-6):
         reading = _reported(reading, zero, shift)

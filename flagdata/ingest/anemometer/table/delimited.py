@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.draft.doubts import KEYS, doubts
 from flagdata.ingest.anemometer.draft.drafting import Draft, draft
@@ -140,7 +140,7 @@ def _refuse_new_names(source: TextFile, recipe: Recipe, where: str) -> None:
 
 def _unused(found: Draft) -> tuple[Finding, ...]:
     what = f"columns that are not used: {', '.join(found.unused)}"
-    return (Finding(kind="columns-not-read", severity=Severity.NOTE, what=what),) if found.unused else ()
+    return (Finding.of("columns-not-read", what),) if found.unused else ()
 
 
 def _states_its_unit(recipe: Recipe) -> bool:

@@ -12,7 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants import clock, dates, stamps, zones
 from flagdata.ingest.anemometer.instants.clock import ClockChoice
 from flagdata.ingest.anemometer.instants.stamps import Stamps
@@ -89,7 +89,7 @@ class RowClock:
         found: tuple[Finding, ...] = ()
         if turned:
             text = "the newest row comes first: read from the end"
-            found = (Finding(kind="newest-first", severity=Severity.NOTE, count=len(wall), what=text),)
+            found = (Finding.of("newest-first", text, count=len(wall)),)
         if dates.is_elapsed(self.form) or dates.needs_date(self.form):
             return order, found  # the order of the rows is what gives their days
         sorting = clock.sorted_as_given(wall[order], line[order], choice)
@@ -115,7 +115,7 @@ class RowClock:
             raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")
         if self.bare_dates:
             what = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
-            bare = Finding(kind="bare-dates", severity=Severity.NOTE, count=self.bare_dates, what=what)
+            bare = Finding.of("bare-dates", what, count=self.bare_dates)
             found = (*found, bare)
         time, further = zones.instants(wall, utc, line=line, zone_name=zone_name, where=where)
         return time, (*found, *further)

@@ -97,7 +97,7 @@ class _Check:
         count, values = int(fault.sum()), ", ".join(self.layout.values)
         what = f"{count} rows whose {self.layout.about} is not {values}; left out of averages"
         where = f"line {line[fault][0]}"
-        return fault, (Finding(kind="sensor-fault", severity=Severity.WARNING, count=count, where=where, what=what),)
+        return fault, (Finding.of("sensor-fault", what, count=count, where=where),)
 
 
 @dataclass
@@ -266,7 +266,7 @@ def read_table(
             else "the stamps state their own zone"
         )
         text = f"{why}: {zone_name} is not used"
-        findings.append(Finding(kind="zone-not-needed", severity=Severity.NOTE, what=text))
+        findings.append(Finding.of("zone-not-needed", text))
         zone_name = None
     named, zone_name = zone_name, zone_name or recipe.time.zone
     time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where, given=given)
@@ -366,16 +366,15 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
     refuse_if_most(len(bad) - blank, count, f"rows without a stamp as {form}", where)
     unset = f"{blank} rows before the first stamp have none: the clock was not set; left out"
     return (
-        Finding(
-            kind="unreadable-stamps",
-            severity=Severity.ERROR,
-            count=len(bad),
-            where=f"line {bad[0]}",
-            what=f"{len(bad)} rows whose stamp is {years}: a clock that was not set; left out"
+        Finding.of(
+            "unreadable-stamps",
+            f"{len(bad)} rows whose stamp is {years}: a clock that was not set; left out"
             if distant == len(bad)
             else unset
             if blank == len(bad)
             else f"{len(bad)} rows whose stamp is not {form} or no date; left out{far}",
+            count=len(bad),
+            where=f"line {bad[0]}",
         ),
     )
 
@@ -498,5 +497,5 @@ def with_horizontal(reading: Reading, azimuth: float | None, *, where: str) -> R
         towards = np.mod(azimuth - np.arctan2(y, x), 2 * np.pi)
         added["wind_direction"] = np.where(added["wind_speed"] == 0, np.nan, towards)  # calm air comes from nowhere
         text += f", wind_direction is from the azimuth {np.degrees(azimuth):.1f}° given"
-    finding = Finding(kind="speed-from-components", severity=Severity.NOTE, count=len(x), what=text, fix=fix)
+    finding = Finding.of("speed-from-components", text, count=len(x), fix=fix)
     return replace(reading, channels={**channels, **added}, findings=(*reading.findings, finding))

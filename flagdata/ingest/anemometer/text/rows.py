@@ -181,11 +181,10 @@ class RowReader:
         if self._last_malformed and malformed:
             last = malformed.pop()
             found.append(
-                Finding(
-                    kind="cut-off",
-                    severity=Severity.WARNING,
+                Finding.of(
+                    "cut-off",
+                    "the last line is incomplete, as when the logger lost power; left out",
                     where=f"line {last}",
-                    what="the last line is incomplete, as when the logger lost power; left out",
                 )
             )
         if malformed:

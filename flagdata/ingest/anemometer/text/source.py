@@ -21,7 +21,7 @@ import numpy as np
 
 from flagdata.errors import InputError, LimitError, UsageError
 from flagdata.files import MCAP, check_input
-from flagdata.findings import Finding, Severity
+from flagdata.findings import Finding
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.mcap.bags import is_bag
 
@@ -336,11 +336,10 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
                     fix="name the encoding it is in, e.g. --encoding cp1252",
                 ) from None
             return "latin-1", (
-                Finding(
-                    kind="encoding-assumed",
-                    severity=Severity.WARNING,
+                Finding.of(
+                    "encoding-assumed",
+                    "not valid UTF-8, read as Latin-1: letters beyond ASCII may be wrong, numbers are not",
                     where=f"line {done + 1}",
-                    what="not valid UTF-8, read as Latin-1: letters beyond ASCII may be wrong, numbers are not",
                     fix="name the encoding, e.g. --encoding cp1252",
                 ),
             )
@@ -383,16 +382,13 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
         return lines, ()
     if sum(1 for count in kinds.values() if count) > 1:
         text = ", ".join(f"{count} {name}" for name, count in kinds.items() if count)
-        found.append(
-            Finding(kind="mixed-line-ends", severity=Severity.NOTE, what=f"line ends of several kinds: {text}")
-        )
+        found.append(Finding.of("mixed-line-ends", f"line ends of several kinds: {text}"))
     if nul and nul * 3 < size:
         found.append(
-            Finding(
-                kind="nul-bytes",
-                severity=Severity.WARNING,
+            Finding.of(
+                "nul-bytes",
+                f"{nul} NUL bytes, as a logger leaves behind when it loses power; lines holding them are left out",
                 count=nul,
-                what=f"{nul} NUL bytes, as a logger leaves behind when it loses power; lines holding them are left out",
             )
         )
     return lines, tuple(found)
