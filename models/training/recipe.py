@@ -268,7 +268,7 @@ class _Form:
 
 @dataclass(frozen=True, kw_only=True)
 class _Data:
-    dataset: str | tuple[str, ...]
+    dataset: Any = None
     sequences: Count | None = None
 
 
@@ -305,14 +305,14 @@ def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> Trainin
 
 
 def _data(data: _Data, *, where: str) -> DataSpec:
-    datasets = (data.dataset,) if isinstance(data.dataset, str) else data.dataset
-    if not datasets or not all(map(is_name, datasets)):
+    datasets = [data.dataset] if isinstance(data.dataset, str) else data.dataset
+    if not isinstance(datasets, list) or not datasets or not all(map(is_name, datasets)):
         raise InputError(
-            f"the dataset is {data.dataset!r}",
+            f"the data set is {data.dataset!r}",
             where=where,
             fix='name one, or several in a list: dataset = "flagsim-wide"',
         )
-    return DataSpec(datasets=datasets, sequences=data.sequences)
+    return DataSpec(datasets=tuple(datasets), sequences=data.sequences)
 
 
 def _input(given: _Input, *, where: str) -> tuple[FrontEnd, Cropping]:

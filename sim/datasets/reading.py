@@ -64,7 +64,7 @@ class _Form:
     seed: Seed = 0
     simulation: _Scene
     render: _Render
-    sides: Mapping[Annotated[str, Named("side", SIDES)], _Side]
+    sides: Mapping[Annotated[str, Named("side", SIDES)], Mapping[str, Any]]
     sessions: SessionSpec | None = None
     groups: Mapping[str, Any] | None = None
     camera: Mapping[str, Any]
@@ -91,7 +91,11 @@ class _Render:
 class _Side:
     sequences: Count
     renders: Count | None = None
-    sessions: Count | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SessionsSide(_Side):
+    sessions: Count
 
 
 def load(source: str) -> DatasetRecipe:
@@ -165,32 +169,27 @@ def _groups(content: Mapping[str, Any], simulation: Simulation, *, where: str) -
     )
     wrong = next((rate for rate in rates if not 1.0 <= rate <= _RATE_LIMIT), None)
     if wrong is not None:
-        raise InputError(f"rates has {wrong:g} Hz", where=where, fix=f"give rates of 1 to {_RATE_LIMIT:g} Hz")
+        raise InputError(
+            f"a rate of {wrong:g} Hz is too low or too high", where=where, fix=f"give rates of 1 to {_RATE_LIMIT:g} Hz"
+        )
     return GroupSpec(height=values["height"], rates=rates, attachments=attachments)
 
 
-def _sides(sides: Mapping[str, _Side], sessions: SessionSpec | None, *, where: str) -> tuple[Side, ...]:
+def _sides(sides: Mapping[str, Any], sessions: SessionSpec | None, *, where: str) -> tuple[Side, ...]:
     found: list[Side] = []
-    for name, side in sides.items():
+    for name, content in sides.items():
         inside = f"{where} [{name}]"
-        renders = side.renders or side.sequences
+        side = read(_Side if sessions is None else _SessionsSide, content, where=inside)
+        renders, dealt = side.renders or side.sequences, getattr(side, "sessions", 0)
         if renders < side.sequences:
             raise InputError(
-                f"renders is {renders} of {side.sequences} sequences",
-                where=inside,
-                fix="have one of each at least",
+                f"renders is {renders}, of {side.sequences} sequences", where=inside, fix="give at least one of each"
             )
-        if (side.sessions is None) != (sessions is None):
-            raise UsageError(
-                "sessions are of a side and of the data set",
-                where=inside,
-                fix="give the key sessions and the table [sessions], or neither",
-            )
-        if (side.sessions or 0) > side.sequences:
+        if dealt > side.sequences:
             raise InputError(
-                f"{side.sessions} sessions of {side.sequences} sequences", where=inside, fix="have fewer sessions"
+                f"sessions is {dealt}, of {side.sequences} sequences", where=inside, fix="have fewer sessions"
             )
-        found.append(Side(name=name, sequences=side.sequences, renders=renders, sessions=side.sessions or 0))
+        found.append(Side(name=name, sequences=side.sequences, renders=renders, sessions=dealt))
     if not found:
         raise InputError("no sides are given", where=where, fix="add [sides.train] with sequences and renders")
     return tuple(found)

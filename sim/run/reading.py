@@ -39,7 +39,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from flagdata.addresses import local_path
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
 from flagdata.recipes import Shelf, parsed, read_recipe
 from flagdata.tables import (
@@ -403,7 +403,7 @@ def _wind(
 def _integrator(spec: IntegratorSpec, content: Mapping[str, Any], *, where: str) -> IntegratorSpec:
     if spec.name != "implicit":
         if "air-shape" in content:
-            raise UsageError(f"air-shape has no effect on {spec.name}", where=where, fix="leave it out")
+            raise UnknownNameError.of("key", "air-shape", ("name", "step", "backend"), where=where)
         return spec
     if spec.backend is Backend.WARP:
         raise UsageError(

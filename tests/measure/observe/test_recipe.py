@@ -156,10 +156,15 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
     ("text", "kind", "what"),
     [
         ("title = 'none'", InputError, "no recording"),
-        ("[[recording]]\nsorce = 'a'", InputError, "no source"),
+        ("[[recording]]\nsorce = 'a'", UnknownNameError, "did you mean 'source'"),
+        ("[[recording]]\nname = 'a'", InputError, "the key source is missing"),
         ("[[recording]]\nsource = 'a'\nnoize = 1", UnknownNameError, "did you mean 'noise'"),
         ("[[recording]]\nsource = 'a'\nwind = { speed = 1, velocity = [1, 0, 0] }", UsageError, "2 winds"),
-        ("[[recording]]\nsource = 'a'\nwind = { velocity = [1, 0] }", InputError, "2 numbers"),
+        (
+            "[[recording]]\nsource = 'a'\nwind = { velocity = [1, 0] }",
+            InputError,
+            r"velocity is \[1, 0\]; give a list, \[0.0, 0.0, 0.0\]",
+        ),
         ("[[recording]]\nsource = 'a'\nwind = { log = 'b', speed = 1 }", UsageError, "2 winds"),
         (
             "[[recording]]\nsource = 'a'\nwind = { speed = 5, toward = 90 }",

@@ -239,13 +239,15 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
     from tests.studies.challenge.outside import OUTSIDE
 
     form = tables.read(_Form, parsed(text, where=where), where=where)
-    flag, run, log, films = form.flag, form.recordings, form.log, form.films
+    flag, log, films, inside = form.flag, form.log, form.films, f"{where} [recordings]"
     for name in flag.materials:
         material.named(name, where=f"{where} [flag]")
     if films is None:
-        rates = tuple(_whole("rates", rate, where=f"{where} [recordings]") for rate in run.rates)
+        run = marked = tables.read(_MarkerRecordings, form.recordings, where=inside)
+        rates, noises = tuple(_whole("rates", rate, where=inside) for rate in marked.rates), marked.noises
     else:
-        rates = (films.rate,)
+        run = tables.read(_Recordings, form.recordings, where=inside)
+        rates, noises = (films.rate,), (0.0,)
     for name, numerics in form.numerics.items():
         _check(numerics, where=f"{where} [numerics] [{name}]")
     return ChallengeRecipe(
@@ -261,7 +263,7 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
         duration=run.duration,
         settle=run.settle,
         rates=rates,
-        noises=run.noises if films is None else (0.0,),
+        noises=noises,
         speed=run.speed,
         apart=run.apart,
         varying=log.share,
@@ -284,7 +286,7 @@ class _Form:
     title: str = ""
     composition: _Composition
     flag: _Flag
-    recordings: _Recordings
+    recordings: Mapping[str, Any]
     log: _Log
     markers: _Markers
     films: Filming | None = None
@@ -315,10 +317,14 @@ class _Recordings:
     count: Count = 3
     duration: Positive = 10.0
     settle: Positive = 4.0
-    rates: tuple[float, ...] = ()
-    noises: tuple[float, ...] = ()
     speed: _Draw = _SPEED
     apart: NotNegative = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _MarkerRecordings(_Recordings):
+    rates: tuple[float, ...] = ()
+    noises: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
