@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from flagdata.cli import GROUPS, VERBS, root
-from flagdata.commands.sections import LongCommand
+from flagdata.options import LongCommand
 
 PAGE = Path(__file__).with_name("cli.md")
 _HEAD = """\
@@ -33,9 +33,8 @@ def commands() -> Iterator[tuple[str, click.Command]]:
         if command is None:
             raise LookupError(verb)
         yield f"flagdata {verb}", command
-        if isinstance(command, click.Group):
-            for name, below in command.commands.items():
-                yield f"flagdata {verb} {name}", below
+        for name, below in getattr(command, "commands", {}).items():
+            yield f"flagdata {verb} {name}", below
 
 
 def reference() -> str:
@@ -55,8 +54,10 @@ def _section(name: str, command: click.Command) -> str:
     level = "##" if name.count(" ") == 1 else "###"
     usage = " ".join([name, *command.collect_usage_pieces(context)])
     lines = [f"{level} {name}", "", f"`{usage}`", "", _prose(inspect.cleandoc(command.help or ""))]
-    options = [entry for entry in command.params if isinstance(entry, click.Option)]
-    for title, part in (command.sections() if isinstance(command, LongCommand) else {"option": options}).items():
+    sections = {"option": [entry for entry in command.params if isinstance(entry, click.Option)]}
+    if isinstance(command, LongCommand) and len(command.sections()) > 1:
+        sections = command.sections()
+    for title, part in sections.items():
         if part:
             lines += [f"| {title} | meaning |", "|---|---|", *(_row(option, context) for option in part), ""]
     return "\n".join(lines)

@@ -17,38 +17,50 @@ from typing import TYPE_CHECKING, Any
 from flagdata.installed_names import step_aside
 
 if TYPE_CHECKING:
-    from flagdata.api.lakes import open, pairs, query  # noqa: A004  read as flagdata.open
-    from flagdata.api.physics import calibrate, close_loop, measure, render, simulate
+    from flagdata.api.lake_verbs import export, query, tag
+    from flagdata.api.lakes import open, pairs  # noqa: A004  read as flagdata.open
+    from flagdata.api.measuring import calibrate, close_loop, measure, observe
+    from flagdata.api.physics import render, simulate
+    from flagdata.api.recording_verbs import align, ingest
     from flagdata.api.recordings import frames, meshes, motion, wind
     from flagdata.examples import example
 
 step_aside()
 
 __all__ = [
+    "align",
     "calibrate",
     "close_loop",
     "example",
+    "export",
     "frames",
+    "ingest",
     "measure",
     "meshes",
     "motion",
+    "observe",
     "open",
     "pairs",
     "query",
     "render",
     "simulate",
+    "tag",
     "wind",
 ]
 
 _PLACES = {
-    **dict.fromkeys(("open", "pairs", "query"), "flagdata.api.lakes"),
-    **dict.fromkeys(("calibrate", "close_loop", "measure", "render", "simulate"), "flagdata.api.physics"),
+    **dict.fromkeys(("query", "tag"), "flagdata.api.lake_verbs"),
+    **dict.fromkeys(("open", "pairs"), "flagdata.api.lakes"),
+    **dict.fromkeys(("render", "simulate"), "flagdata.api.physics"),
+    **dict.fromkeys(("calibrate", "close_loop", "measure", "observe"), "flagdata.api.measuring"),
     **dict.fromkeys(("frames", "meshes", "motion", "wind"), "flagdata.api.recordings"),
     "example": "flagdata.examples",
 }
 
 
 def __getattr__(name: str) -> Any:
+    if name in ("align", "export", "ingest"):  # packages that are called as verbs
+        return import_module(f"flagdata.{name}")
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(_PLACES[name]), name)

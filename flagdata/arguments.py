@@ -94,7 +94,7 @@ def checked(call: Callable[P, R]) -> Callable[P, R]:
     """
     signature = inspect.signature(call)
     kinds = {name: str(one.annotation) for name, one in signature.parameters.items()}
-    converts = {name: convert for name, kind in kinds.items() if (convert := _convert(kind)) is not None}
+    converts = {name: convert for name, kind in kinds.items() if (convert := converter(kind)) is not None}
 
     @functools.wraps(call)
     def door(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -107,17 +107,17 @@ def checked(call: Callable[P, R]) -> Callable[P, R]:
     return door
 
 
-def _convert(annotation: str) -> Convert | None:
-    """What makes values of an annotation plain; `None` where they stay as they are."""
+def converter(annotation: str) -> Convert | None:
+    """Returns what makes values of an annotation plain; `None` where they stay as they are."""
     kinds = [kind for kind in annotation.split(" | ") if kind != "None"]
     found: Convert | None = None
     if kinds == ["int"]:
         found = whole
     elif kinds and set(kinds) <= {"int", "float"}:
         found = real
-    elif len(kinds) == 1 and (numbers := _TUPLE.fullmatch(kinds[0])):
+    elif kinds and set(kinds[1:]) <= {"str"} and (numbers := _TUPLE.fullmatch(kinds[0])):
         each = whole if numbers["kind"] == "int" else real
-        found = functools.partial(_several, each=each, count=1 + numbers["more"].count(","))
+        found = functools.partial(_several, each=each, count=1 + numbers["more"].count(","), text="str" in kinds)
     elif kinds == ["str"]:
         found = _text
     elif kinds == ["Sequence[str]"]:
@@ -141,7 +141,9 @@ def _plain(value: object, name: str) -> Any:
     return plain(value)
 
 
-def _several(values: object, name: str, *, each: Callable[[object, str], Any], count: int) -> tuple[Any, ...]:
+def _several(values: object, name: str, *, each: Callable[[object, str], Any], count: int, text: bool = False) -> Any:
+    if text and isinstance(values, str):
+        return str(values)
     try:
         if isinstance(values, str | bytes):
             raise TypeError

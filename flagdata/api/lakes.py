@@ -1,14 +1,12 @@
-"""A lake from Python: opened, its catalog asked, its pairs taken."""
+"""A lake from Python: opened, its pairs taken."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from flagdata.arguments import checked
 from flagdata.dataset.source import Source
 from flagdata.lake import Lake
-from flagdata.rows import Rows
 from flagdata.storage import Place
 
 if TYPE_CHECKING:
@@ -41,42 +39,6 @@ def open(path: Place | str) -> Source:  # noqa: A001  read as flagdata.open
         NotFoundError: no lake there.
     """
     return Source.open(path)
-
-
-@checked
-def query(
-    lake: AnyLake,
-    where: str | Mapping[str, Any] | None = None,
-    *,
-    sql: str | None = None,
-    columns: Sequence[str] | None = None,
-    order: str | None = None,
-    limit: int | None = None,
-    at: str | None = None,
-) -> Rows:
-    """Rows of a lake's catalog, as `flagdata query` selects them.
-
-    ```python
-    rows = flagdata.query("field.lake", "kind = 'clip' and wind between 3 and 6", order="wind desc")
-    rows["wind"]  # (n,) array [m/s]
-    ```
-
-    Args:
-        lake: an open lake, or where it is.
-        where: an SQL condition over the catalog's columns, or values that columns must have; None is every row.
-        sql: one SELECT over the table `catalog`, instead of `where`, `columns` and `order`.
-        columns: wanted, in order; None is every stored column. `flagdata query --describe` lists them with their units.
-        order: SQL order terms, as in "wind desc, start".
-        limit: rows at most.
-        at: tag, branch, version number or commit; None is the head of main.
-
-    Raises:
-        UsageError: SQL that cannot be run.
-        UnknownNameError: a column that is not there.
-        NotFoundError: no such lake, or no such version.
-        LimitError: it takes longer, or gives more, than it may.
-    """
-    return opened(lake).query(where, sql=sql, columns=columns, order=order, limit=limit, at=at)
 
 
 @checked
@@ -120,3 +82,8 @@ def opened(lake: AnyLake) -> Source:
     if isinstance(lake, Source):
         return lake
     return Source(lake) if isinstance(lake, Lake) else Source.open(lake)
+
+
+def lake_of(lake: AnyLake | None) -> Lake | None:
+    """Returns the lake that a verb was given, open; None where it was given none."""
+    return None if lake is None else opened(lake).lake

@@ -2,45 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-import click
+from flagdata.api.lake_verbs import Exporting
+from flagdata.console import document, echo, progress, say
+from flagdata.options import command, options
+from flagdata.shared_options import AsJson
 
-from flagdata.console import LocalPath, at_option, document, echo, json_option, lake_option, progress, say
-from flagdata.errors import UsageError
+
+@options
+class ExportCommand(AsJson, Exporting):
+    """The same on the command line."""
 
 
-@click.command()
-@click.argument("format_name", metavar="FORMAT")
-@click.option("--to", "target", required=True, type=LocalPath(), help="New folder to write.")
-@click.option("--where", metavar="EXPR", help="SQL condition as in flagdata query; all rows by default.")
-@at_option
-@click.option("--split", metavar="SIDE", help="Only this side of the leakage-safe split: train, validation or test.")
-@click.option("--salt", default="", metavar="TEXT", help="Another text gives another split.")
-@click.option(
-    "--frames",
-    metavar="FORM",
-    help="webdataset: jpg (default) or npy; parquet: none (default) or jpg; lerobot: av1 (default) or png.",
-)
-@click.option("--shard-bytes", type=click.IntRange(min=1), help="webdataset, parquet: size of a file at most.")
-@click.option("--shuffle", type=int, metavar="SEED", help="webdataset: order the samples at random.")
-@click.option("--crf", type=int, help="mp4: constant rate factor, 0 (lossless) to 51; 18 by default.")
-@json_option
-@lake_option
-def export(
-    format_name: str,
-    target: Path,
-    where: str | None,
-    at: str | None,
-    split: str | None,
-    salt: str,
-    frames: str | None,
-    shard_bytes: int | None,
-    shuffle: int | None,
-    crf: int | None,
-    as_json: bool,
-    lake_path: str,
-) -> None:
+@command(ExportCommand)
+def export(chosen: ExportCommand) -> None:
     """Write a selection as WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.
 
     FORMAT is webdataset, parquet, lerobot, zarr, mp4, mcap, csv for every sample of an anemometer or, for mesh
@@ -54,38 +32,44 @@ def export(
       flagdata export csv --where "kind = 'wind'" --to winds
       flagdata export obj --where "kind = 'meshes' and wind > 5" --to meshes
     """
-    from flagdata.export import Export, prepare
-    from flagdata.lake import Lake
-    from flagdata.outputs import check_folder
-
-    if salt and split is None:
-        raise UsageError("--salt without --split", fix="name the side by --split, or leave out --salt")
-    check_folder(target)
-    given = {"frames": frames, "shard_bytes": shard_bytes, "shuffle": shuffle, "crf": crf}
-    request = Export(
-        format=format_name,
-        where=where,
-        at=at,
-        split=split,
-        salt=salt,
-        options={name: value for name, value in given.items() if value is not None},
-    )
-    prepared = prepare(Lake.open(lake_path), request)
-    with progress(len(prepared), label=f"export {format_name}", unit="artifact") as advance:
-        manifest = prepared.write(target, advance=advance).manifest
-    if as_json:
-        document("export-result", {"folder": str(target), "manifest": manifest})
+    manifest = exported(chosen)
+    if chosen.as_json:
+        document("export-result", {"folder": str(chosen.to), "manifest": manifest})
         return
     files = manifest["files"]
     size = sum(file["bytes"] for file in files)
     left_out = len(manifest["superseded"])
     if left_out:
         say(f"left out: {_count(left_out, 'recording')} that a later alignment of the same files replaces")
-    files = manifest["files"]
-    size = sum(file["bytes"] for file in files)
     artifacts = _count(manifest["artifacts"], "artifact")
     say(f"{artifacts} of version {manifest['version']} in {_count(len(files), 'file')}, {size:,} B")
-    echo(target)
+    echo(chosen.to)
+
+
+def exported(chosen: Exporting) -> Mapping[str, Any]:
+    """Writes a selection; returns the manifest of its folder.
+
+    Raises:
+        FlagdataError: see `flagdata.export`.
+    """
+    from flagdata.api.lakes import opened
+    from flagdata.export import Export, prepare
+    from flagdata.outputs import check_folder
+
+    target = Path(chosen.to)
+    check_folder(target)
+    given = {key: getattr(chosen, key) for key in ("frames", "shard_bytes", "shuffle", "crf")}
+    request = Export(
+        format=chosen.format,
+        where=chosen.where,
+        at=chosen.at,
+        split=chosen.split,
+        salt=chosen.salt,
+        options={name: value for name, value in given.items() if value is not None},
+    )
+    prepared = prepare(opened(chosen.lake).lake, request)
+    with progress(len(prepared), label=f"export {chosen.format}", unit="artifact") as advance:
+        return prepared.write(target, advance=advance).manifest
 
 
 def _count(number: int, noun: str) -> str:

@@ -3,195 +3,100 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
-from click.core import ParameterSource
 
+from flagdata.api.recording_verbs import SOURCE, FromAnemometer, FromCamera, FromFrames, Ingesting
 from flagdata.commands.confirm import on_command_line
-from flagdata.commands.ingest_options import (
-    SNIFF,
-    Given,
-    camera_options,
-    labels,
-    length_unit,
-    marker_options,
-    mesh_options,
-    option,
-    wind_options,
-)
+from flagdata.commands.ingest_options import SNIFF, Given
 from flagdata.commands.ingest_sources import ingest_sources, sniff_sources
-from flagdata.commands.sections import LongCommand
-from flagdata.console import LocalPath, json_option, lake_option
+from flagdata.console import LocalPath
 from flagdata.errors import UsageError
+from flagdata.options import LongCommand, argument, command, described, option, options, typed
+from flagdata.shared_options import AsJson
 
 
-@click.command(cls=LongCommand)
-@click.argument("sources", nargs=-1, required=True, type=LocalPath(), metavar="SOURCE...")
-@click.option("--sniff", is_flag=True, help="Only say what each source seems to be, and why; the lake is not touched.")
-@click.option(
-    "--as",
-    "--format",
-    "format_name",
-    metavar="FORMAT",
-    help="camera, meshes, markers, or an anemometer format; by content if not given.",
-)
-@click.option(
-    "--session", metavar="NAME", help="One set-up at one place; its clips are always on the same side of a split."
-)
-@click.option("--name", help="What people call the artifact; the file's name by default.")
-@click.option(
-    "--topic",
-    metavar="NAME",
-    help="MCAP of other programs: the topic of pictures or numbers to read. LeRobot: the camera.",
-)
-@click.option("--episode", type=click.IntRange(min=0), metavar="N", help="LeRobot: the episode to read.")
-@click.option(
-    "--join", is_flag=True, help="Camera: the SOURCEs are the chapters of one recording, which become one artifact."
-)
-@click.option(
-    "--stream",
-    type=click.IntRange(min=0),
-    metavar="N",
-    help="Camera: number of the video stream in its file; the first by default.",
-)
-@click.option("--zone", metavar="ZONE", help="Zone of a clock that does not say: Europe/Amsterdam, +02:00, UTC.")
-@click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
-@click.option(
-    "--start",
-    metavar="TIME",
-    help="Camera: instant of the first frame, ISO 8601. Wind: of the first row, where stamps count from a start.",
-)
-@click.option("--true-fps", type=float, metavar="HZ", help="Camera: rate at which a high-speed camera really ran.")
-@click.option("--sequence-fps", type=float, metavar="HZ", help="Camera: rate of pictures that carry no time stamps.")
-@click.option(
-    "--rate",
-    default="25",
-    show_default=True,
-    metavar="HZ|STEP|native",
-    help="Camera: frames per second to keep; native keeps all. Meshes, markers: frames per second of a source that "
-    "does not state them. Wind: readings per second of a log without timestamps, counted from --start. Also the time "
-    "from one to the next, as in 10min.",
-)
-@click.option(
-    "--crop",
-    default="whole",
-    show_default=True,
-    metavar="BOX",
-    help="Camera: x,y,width,height in px of the upright image; whole, square, or auto (where the motion is).",
-)
-@click.option(
-    "--crop-picture",
-    type=LocalPath(dir_okay=False),
-    metavar="PATH",
-    help="Camera: write the picture that shows --crop auto.",
-)
-@click.option("--exposure", type=float, metavar="S", help="Camera: exposure time, to stamp mid-exposure.")
-@click.option(
-    "--archive",
-    type=click.Choice(["jpeg", "h264"]),
-    default="jpeg",
-    show_default=True,
-    help="Camera: how frames are stored; h264 is smaller and slower to reach.",
-)
-@click.option(
-    "--sensor", "--recipe", "sensor", metavar="RECIPE", help="Wind: a recipe of catalogs/sensors, or a TOML file."
-)
-@click.option(
-    "--date", metavar="YYYY-MM-DD", help="Wind: day of the first sample, where the log has times of day only."
-)
-@click.option("--date-order", type=click.Choice(["dmy", "mdy", "ymd"]), help="Wind: order in dates of numbers only.")
-@click.option(
-    "--platform",
-    type=click.Choice(["fixed", "moving", "corrected"]),
-    help="Wind: fixed, as on a mast; moving, as on a boat; corrected, if a moving one logs the wind over ground.",
-)
-@click.option("--talker", metavar="ID", help="Wind: NMEA 0183 talker to read, where several share a stream.")
-@click.option(
-    "--azimuth", type=float, metavar="DEG", help="Wind: bearing of the sensor's north or bow, clockwise from north."
-)
-@click.option(
-    "--clock",
-    type=click.Choice(["first", "last", "sort"]),
-    help="Wind: the clock was changed during the log: first = the time before the change is right, last = the time "
-    "after it; sort = the clock is right, only sort the rows.",
-)
-@click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
-@click.option("--encoding", metavar="CODEC", help="Wind: encoding of the text, where the file does not show it.")
-@click.option(
-    "--unit",
-    metavar="UNIT",
-    help="Wind: unit of a speed whose heading has none (m/s, km/h, mph, kn). Meshes, markers: of positions, else m.",
-)
-@click.option(
-    "--wind",
-    metavar="LABEL",
-    help="Wind: the one anemometer to read of a table that holds several, or the column of its speed.",
-)
-@click.option(
-    "--columns",
-    metavar="LIST",
-    help="Wind: what the columns of a table are, in their order or by heading or number, such as "
-    "'date,time,wind_speed[km/h],,wind_direction[deg]' or '1=time,7=wind_speed[kn]'. Names: time, date, year, month, "
-    "day, day_of_year, hour, minute, second, wind_speed, wind_direction, wind_direction_to, wind_x, wind_y, wind_z, "
-    "apparent_wind_speed, apparent_wind_direction, air_temperature, relative_humidity, air_pressure, site. What is "
-    "measured has its unit in brackets. A name that is not known is refused with the list of all.",
-)
-@click.option(
-    "--missing", multiple=True, metavar="TEXT", help="Wind: a cell that means no value, such as -99.9; repeatable."
-)
-@click.option(
-    "--expect",
-    multiple=True,
-    metavar="KEY",
-    help="Wind: a check of a draft that you have answered with yes, by the key that the refusal names; repeatable.",
-)
-@click.option(
-    "--accept",
-    metavar="HASH",
-    help="Wind: confirms what was drafted from a table that no recipe describes, by the hash that the refusal shows.",
-)
-@json_option
-@lake_option
-@click.pass_context
-def ingest(
-    context: click.Context,
-    sources: tuple[Path, ...],
-    sniff: bool,
-    format_name: str | None,
-    session: str | None,
-    name: str | None,
-    topic: str | None,
-    episode: int | None,
-    join: bool,
-    stream: int | None,
-    zone: str | None,
-    branch: str,
-    start: str | None,
-    true_fps: float | None,
-    sequence_fps: float | None,
-    rate: str,
-    crop: str,
-    crop_picture: Path | None,
-    exposure: float | None,
-    archive: str,
-    sensor: str | None,
-    date: str | None,
-    date_order: str | None,
-    platform: str | None,
-    talker: str | None,
-    azimuth: float | None,
-    clock: str | None,
-    zero_offset: str | None,
-    encoding: str | None,
-    unit: str | None,
-    wind: str | None,
-    columns: str | None,
-    missing: tuple[str, ...],
-    expect: tuple[str, ...],
-    accept: str | None,
-    as_json: bool,
-    lake_path: str,
-) -> None:
+@options
+class Sources(AsJson):
+    """The sources on the command line."""
+
+    sources: tuple[Path, ...] = argument("Files or folders.", "SOURCE...", type=LocalPath())
+
+
+@options
+class IngestCommand(Sources, Ingesting):
+    """The same on the command line, or a look at what a source is."""
+
+    sniff: bool = option(
+        "Only say what each source seems to be, and why; the lake is not touched.", default=False, section=SOURCE
+    )
+
+
+@options
+class FilmCommand(Sources, FromCamera):
+    """How films are read."""
+
+
+@options
+class WindCommand(Sources, FromAnemometer):
+    """How logs are read."""
+
+    format: str | None = option(
+        "An anemometer format; by content if not given.", "--as", default=None, section=SOURCE, metavar="FORMAT"
+    )
+
+
+@options
+class FramesCommand(Sources, FromFrames):
+    """How meshes or markers are read."""
+
+
+@command(FilmCommand)
+def film(chosen: FilmCommand) -> None:
+    """Bring camera files, folders of pictures and videos of other data sets in."""
+    _ingest(chosen, kind="camera")
+
+
+@command(WindCommand)
+def wind(chosen: WindCommand) -> None:
+    """Bring the logs of anemometers in."""
+    _ingest(chosen, kind="anemometer")
+
+
+@command(FramesCommand)
+def meshes(chosen: FramesCommand) -> None:
+    """Bring mesh sequences in: folders of OBJ files, as ArcSim or flagdata export writes them."""
+    _ingest(chosen, kind="meshes")
+
+
+@command(FramesCommand)
+def markers(chosen: FramesCommand) -> None:
+    """Bring tables of tracked markers in."""
+    _ingest(chosen, kind="markers")
+
+
+class Kinds(LongCommand):
+    """A command that does what one of others does where its first word names that and sources follow.
+
+    Attributes:
+        commands: the others, by their names.
+    """
+
+    commands = {str(one.name): one for one in (film, wind, meshes, markers)}  # noqa: RUF012  of a class, not changed
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+    ) -> click.Context:
+        below = self.commands.get(args[0]) if args else None
+        if below is None or (len(args) == 1 and Path(args[0]).exists()):
+            return super().make_context(info_name, args, parent, **extra)
+        defaults = None if parent is None else parent.lookup_default(str(info_name))
+        return below.make_context(f"{info_name} {args[0]}", args[1:], parent, default_map=defaults, **extra)
+
+
+@command(IngestCommand, cls=Kinds)
+def ingest(chosen: IngestCommand) -> None:
     """Bring camera files, anemometer logs, mesh sequences and marker tables in.
 
     Whether a SOURCE is a camera's, an anemometer's, a folder of meshes, a table of markers or a record that flagdata
@@ -209,77 +114,24 @@ def ingest(
       flagdata ingest drive.mcap --topic /camera/front
       flagdata ingest pusht --episode 3 --start 2026-05-01T12:00:00Z
       flagdata ingest drive.mcap --topic /mast --columns 'time=time,speed=wind_speed[m/s]'
+
+    `flagdata ingest film | wind | meshes | markers SOURCE...` takes sources of that kind and its options alone.
     """
-    from flagdata.outputs import check_file
-    from flagdata.timebase import names_zone
-
-    given = frozenset(
-        parameter
-        for parameter in context.params
-        if context.get_parameter_source(parameter) is ParameterSource.COMMANDLINE
-    )
-    if crop_picture is not None and crop.strip().lower() != "auto":
-        raise UsageError("--crop-picture without --crop auto", where=str(crop_picture), fix="add --crop auto")
-    if crop_picture is not None:
-        check_file(crop_picture, command="ingest")
-    chapters: tuple[Path, ...] = ()
-    if join:
-        from flagdata.ingest.camera.joined import in_order
-
-        first, *later = in_order(sources)
-        sources, chapters = (first,), tuple(later)
-    options = Given(
-        camera=camera_options(
-            start=start,
-            zone_name=zone,
-            true_fps=true_fps,
-            sequence_fps=sequence_fps,
-            rate=rate,
-            crop=crop,
-            exposure=exposure,
-            archive=archive,
-            topic=topic,
-            episode=episode,
-            stream=stream,
-            chapters=chapters,
-        ),
-        wind=wind_options(
-            format_name=None if format_name in ("camera", "meshes", "markers") else format_name,
-            sensor=sensor,
-            zone_name=zone,
-            date=date,
-            date_order=date_order,
-            platform=platform,
-            talker=talker,
-            azimuth=azimuth,
-            clock=clock,
-            zero_offset=zero_offset,
-            encoding=encoding,
-            unit=unit,
-            start=start,
-            wind=wind,
-            columns=columns,
-            rate=rate if "rate" in given else None,
-            missing=missing,
-            expect=expect,
-            topic=topic,
-        ),
-        meshes=mesh_options(rate=rate if "rate" in given else None, length=length_unit(unit)),
-        markers=marker_options(rate=rate if "rate" in given else None, length=length_unit(unit)),
-        labels=labels(name, session),
-        branch=branch,
-        crop_picture=crop_picture,
-        zoned_start=start is not None and names_zone(start),
-        unit=unit,
-        confirm=on_command_line(accept, as_json=as_json),
-    )
-    if sniff:
-        for parameter in sorted(given - {*SNIFF, "as_json", "lake_path"}):
-            raise UsageError(f"{option(parameter)} means nothing to --sniff", fix="leave it out")
-        sniff_sources(sources, options, given=given, as_json=as_json)
+    if not chosen.sniff:
+        _ingest(chosen)
         return
-    from flagdata.lake import Lake
+    for name in sorted(typed(chosen) - {*SNIFF, "as_json", "lake"}):
+        spelled = described(type(chosen))[name][1].spelled(name)
+        raise UsageError(f"{spelled} means nothing to --sniff", fix="leave it out")
+    given = Given.of(chosen, confirm=on_command_line(chosen.accept, as_json=chosen.as_json))
+    sniff_sources(given, as_json=chosen.as_json)
 
-    lake = Lake.open(lake_path)
+
+def _ingest(chosen: IngestCommand | FilmCommand | WindCommand | FramesCommand, *, kind: str | None = None) -> None:
+    from flagdata.api.lakes import opened
+
+    accept = chosen.accept if isinstance(chosen, FromAnemometer) else None
+    given = Given.of(chosen, kind=kind, confirm=on_command_line(accept, as_json=chosen.as_json))
+    lake = opened(chosen.lake).lake
     lake.check_writable()
-    ingest_sources(lake, sources, options, given=given, format_name=format_name, as_json=as_json)
+    ingest_sources(lake, given, as_json=chosen.as_json)

@@ -8,45 +8,28 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flagdata.commands.durations import written_seconds
+from flagdata.api.recording_verbs import Clocked, FromAnemometer, FromCamera, FromFrames, Recorded, Scaled
 from flagdata.errors import TimeError, UsageError
+from flagdata.option_types import written_seconds
+from flagdata.options import described, typed
 
 if TYPE_CHECKING:
     from datetime import tzinfo
 
-    from flagdata.commands.confirm import OnCommandLine
+    from flagdata.ingest.anemometer.confirm import Confirm
     from flagdata.ingest.markers import MarkerOptions
     from flagdata.ingest.meshes.store import MeshIngest
     from flagdata.ingest.store import CameraIngest, Labels, WindIngest
 
-# Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
-CAMERA_ONLY = ("episode", "join", "stream", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
-WIND_ONLY = (
-    "sensor",
-    "date",
-    "date_order",
-    "platform",
-    "talker",
-    "azimuth",
-    "clock",
-    "zero_offset",
-    "encoding",
-    "wind",
-    "columns",
-    "missing",
-    "expect",
-    "accept",
-)
-LENGTHS = ("unit",)
-"""Options that meshes and markers share with the wind's speed."""
-FOREIGN = {
-    "camera": ("a camera file", (*WIND_ONLY, *LENGTHS)),
-    "anemometer": ("an anemometer log", CAMERA_ONLY),
-    "meshes": ("a mesh sequence", (*CAMERA_ONLY, *WIND_ONLY, "zone", "start")),
-    "markers": ("a marker table", (*CAMERA_ONLY, *WIND_ONLY, "zone", "start")),
-    "record": ("a record of flagdata", (*CAMERA_ONLY, *WIND_ONLY, *LENGTHS, "zone", "start", "rate")),
+KINDS: dict[str, tuple[str, type]] = {
+    "camera": ("a camera file", FromCamera),
+    "anemometer": ("an anemometer log", FromAnemometer),
+    "meshes": ("a mesh sequence", FromFrames),
+    "markers": ("a marker table", FromFrames),
+    "record": ("a record of flagdata", Recorded),
 }
-"""What each kind of source is called, and the options that mean nothing for it."""
+"""What each kind of source is called, and the options that mean something for it."""
+_OF_ALL = frozenset({"format", "sniff", "as_json"})
 SNIFF = (
     "sources",
     "sniff",
@@ -67,45 +50,89 @@ SNIFF = (
     "encoding",
 )
 ONE_SOURCE = ("start", "date", "name", "crop_picture", "accept")
+"""Options that name or time one source."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Given:
-    """The command line, read."""
+    """The options of an ingest, read.
 
+    Attributes:
+        chosen: the options.
+        sources: what is ingested; of chapters that are joined the first.
+        format: that of all sources; None to recognise each by its content.
+        kind: that all sources are to be; None for any.
+        camera, wind, meshes, markers: how each kind of source is read.
+        labels: what the artifacts are called.
+        confirm: asks whether drafted readings are right.
+    """
+
+    chosen: Recorded
+    sources: tuple[Path, ...]
+    format: str | None
+    kind: str | None
     camera: CameraIngest
     wind: WindIngest
     meshes: MeshIngest
     markers: MarkerOptions
     labels: Labels
-    branch: str
-    crop_picture: Path | None
-    zoned_start: bool
-    confirm: OnCommandLine
-    unit: str | None = None
+    confirm: Confirm
+
+    @classmethod
+    def of(cls, chosen: Recorded, *, kind: str | None = None, confirm: Confirm) -> Given:
+        """Reads the options.
+
+        Args:
+            kind: that all sources are to be; None for any.
+
+        Raises:
+            UsageError: a value that cannot be read, or options that contradict each other.
+        """
+        from flagdata.ingest.markers import MarkerOptions
+        from flagdata.ingest.meshes.store import MeshIngest
+        from flagdata.ingest.store import CameraIngest, Labels, WindIngest
+
+        several = chosen.sources
+        sources = (Path(several),) if isinstance(several, Path | str) else tuple(map(Path, several))
+        chapters: tuple[Path, ...] = ()
+        if isinstance(chosen, FromCamera):
+            _check_picture(chosen)
+            if chosen.join:
+                from flagdata.ingest.camera.joined import in_order
+
+                first, *later = in_order(sources)
+                sources, chapters = (first,), tuple(later)
+        unit = chosen.unit if isinstance(chosen, Scaled) else None
+        rate = chosen.rate if isinstance(chosen, Clocked | FromFrames) else None
+        return cls(
+            chosen=chosen,
+            sources=sources,
+            format=getattr(chosen, "format", kind),
+            kind=kind,
+            camera=camera_options(chosen, chapters) if isinstance(chosen, FromCamera) else CameraIngest(),
+            wind=wind_options(chosen) if isinstance(chosen, FromAnemometer) else WindIngest(),
+            meshes=MeshIngest(rate=frame_rate(rate), unit=_length_unit(unit)),
+            markers=MarkerOptions(rate=frame_rate(rate), unit=_length_unit(unit)),
+            labels=Labels(name=chosen.name, session=chosen.session),
+            confirm=confirm,
+        )
 
 
-def option(parameter: str) -> str:
-    """How a parameter is spelled on the command line."""
-    return "--as" if parameter == "format_name" else f"--{parameter.replace('_', '-')}"
+def _check_picture(chosen: FromCamera) -> None:
+    from flagdata.outputs import check_file
+
+    if chosen.crop_picture is None:
+        return
+    if chosen.crop.strip().lower() != "auto":
+        raise UsageError("--crop-picture without --crop auto", where=str(chosen.crop_picture), fix="add --crop auto")
+    check_file(Path(chosen.crop_picture), command="ingest")
 
 
-def camera_options(
-    *,
-    start: str | None,
-    zone_name: str | None,
-    true_fps: float | None,
-    sequence_fps: float | None,
-    rate: str,
-    crop: str,
-    exposure: float | None,
-    archive: str,
-    topic: str | None = None,
-    episode: int | None = None,
-    stream: int | None = None,
-    chapters: tuple[Path, ...] = (),
-) -> CameraIngest:
-    """Those of a camera.
+def camera_options(chosen: FromCamera, chapters: tuple[Path, ...] = ()) -> CameraIngest:
+    """Returns how a camera's file is read.
+
+    Args:
+        chapters: files that the first continues in.
 
     Raises:
         UsageError: a start, zone, rate or crop that cannot be read.
@@ -116,25 +143,26 @@ def camera_options(
     from flagdata.ingest.store import CameraIngest
     from flagdata.record import Coding
 
+    start, zone, rate = chosen.start, chosen.zone, chosen.rate or "25"
     try:
-        place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
+        place = timebase.zone(zone, where="--zone") if zone is not None else None
         instant = UNKNOWN if _unknown(start) else _instant(start, place)
     except TimeError as error:
         raise UsageError(error.what, where=error.where, fix=error.fix) from None
     options = CameraOptions(
         start=instant,
-        zone=None if start is not None and timebase.names_zone(start) else zone_name,
-        true_fps=true_fps,
-        sequence_fps=sequence_fps,
+        zone=None if start is not None and timebase.names_zone(start) else zone,
+        true_fps=chosen.true_fps,
+        sequence_fps=chosen.sequence_fps,
         rate="native" if rate.strip().lower() == "native" else _rate(rate, "frames a second, or native"),
-        crop=parse_crop(crop),
-        exposure=exposure,
-        topic=topic,
-        episode=episode,
-        stream=stream,
+        crop=parse_crop(chosen.crop),
+        exposure=chosen.exposure,
+        topic=chosen.topic,
+        episode=chosen.episode,
+        stream=chosen.stream,
         chapters=chapters,
     )
-    return CameraIngest(camera=options, coding=Coding(archive))
+    return CameraIngest(camera=options, coding=Coding(chosen.archive))
 
 
 def _unknown(start: str | None) -> bool:
@@ -148,31 +176,8 @@ def _instant(start: str | None, place: tzinfo | None) -> int | None:
     return None if start is None else timebase.parse(start, default=place, where="--start")
 
 
-def wind_options(
-    *,
-    format_name: str | None,
-    sensor: str | None,
-    zone_name: str | None,
-    date: str | None,
-    date_order: Any,
-    platform: Any,
-    talker: str | None,
-    azimuth: float | None,
-    clock: Any,
-    zero_offset: str | None,
-    encoding: str | None,
-    unit: str | None,
-    start: str | None,
-    wind: str | None,
-    rate: str | None,
-    columns: str | None,
-    missing: tuple[str, ...] = (),
-    expect: tuple[str, ...] = (),
-    topic: str | None = None,
-) -> WindIngest:
-    """Those of an anemometer; `rate` is `None` where none is given.
-
-    `unit` is heeded where it is one of speed, since meshes have units, too.
+def wind_options(chosen: FromAnemometer) -> WindIngest:
+    """Returns how an anemometer's log is read. A unit is heeded where it is one of speed, since meshes have units, too.
 
     Raises:
         UsageError: a date, start or zero offset that cannot be read.
@@ -184,8 +189,9 @@ def wind_options(
     from flagdata.ingest.store import WindIngest
     from flagdata.units import unit as unit_of
 
+    start, date, unit, rate = chosen.start, chosen.date, chosen.unit, chosen.rate
     try:
-        place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
+        place = timebase.zone(chosen.zone, where="--zone") if chosen.zone is not None else None
         instant = None if _unknown(start) else _instant(start, place)
     except TimeError as error:
         raise UsageError(error.what, where=error.where, fix=error.fix) from None
@@ -193,50 +199,47 @@ def wind_options(
         day = dt.date.fromisoformat(date) if date is not None else None
     except ValueError:
         raise UsageError(f"{date!r} is not a date", where="--date", fix="write it as 2026-05-01") from None
-    offset: Any = zero_offset
-    if zero_offset is not None and zero_offset not in ("report", "estimate"):
-        offset = _number(zero_offset, "--zero-offset", "a speed in m/s, report or estimate")
+    offset: Any = chosen.zero_offset
+    if offset is not None and offset not in ("report", "estimate"):
+        offset = _number(offset, "--zero-offset", "a speed in m/s, report or estimate")
+    name = getattr(chosen, "format", None)
+    words: dict[str, Any] = {key: getattr(chosen, key) for key in _WORDS}
     return WindIngest(
         wind=WindOptions(
-            format=format_name,
-            recipe=sensor,
-            zone=zone_name,
-            encoding=encoding,
+            format=None if name in ("camera", "meshes", "markers") else name,
+            recipe=chosen.sensor,
             date=day,
-            date_order=date_order,
-            platform=platform,
-            talker=talker,
-            azimuth=float(unit_of("deg").to_si(azimuth)) if azimuth is not None else None,
-            clock=clock,
+            azimuth=float(unit_of("deg").to_si(chosen.azimuth)) if chosen.azimuth is not None else None,
             zero_offset=offset,
             unit=unit if unit is not None and unit_of(unit, where="--unit").si == "m/s" else None,
             start=instant,
             rate=None if rate in (None, "native") else _rate(rate, "readings a second, or the time between two: 10min"),
-            wind=wind,
-            columns=columns,
-            missing=missing,
-            expect=expect,
-            topic=topic,
+            **words,
         )
     )
 
 
-def mesh_options(*, rate: str | None, length: str) -> MeshIngest:
-    """Those of a mesh sequence; `rate` None for the source's own."""
-    from flagdata.ingest.meshes.store import MeshIngest
+_WORDS = (
+    "zone",
+    "encoding",
+    "date_order",
+    "platform",
+    "talker",
+    "clock",
+    "wind",
+    "columns",
+    "missing",
+    "expect",
+    "topic",
+)
+"""Options that the reader of logs takes as they are."""
 
+
+def frame_rate(rate: str | None) -> float | None:
+    """Returns the rate of a mesh sequence or a table of markers [Hz]; None for the source's own."""
     if rate is None or rate.strip().lower() == "native":
-        return MeshIngest(unit=length)
-    return MeshIngest(rate=_rate(rate, "frames a second, or the time between two, e.g. 40ms"), unit=length)
-
-
-def marker_options(*, rate: str | None, length: str) -> MarkerOptions:
-    """Those of a table of markers; `rate` None for the source's own."""
-    from flagdata.ingest.markers import MarkerOptions
-
-    if rate is None or rate.strip().lower() == "native":
-        return MarkerOptions(unit=length)
-    return MarkerOptions(rate=_rate(rate, "frames a second, or the time between two, e.g. 40ms"), unit=length)
+        return None
+    return _rate(rate, "frames a second, or the time between two, e.g. 40ms")
 
 
 def _rate(text: str, wanted: str) -> float:
@@ -255,13 +258,6 @@ def _number(text: str, option: str, wanted: str) -> float:
         raise UsageError(f"{text!r} is not a number", where=option, fix=f"give {wanted}") from None
 
 
-def labels(name: str | None, session: str | None) -> Labels:
-    """What the artifacts are called."""
-    from flagdata.ingest.store import Labels
-
-    return Labels(name=name, session=session)
-
-
 def _check_unit(kinds: Sequence[str | None], name: str | None) -> None:
     """Refuse a unit that is one of no source's: of speed for a log, of length for meshes and markers."""
     from flagdata.units import unit
@@ -275,38 +271,41 @@ def _check_unit(kinds: Sequence[str | None], name: str | None) -> None:
     raise UsageError(f"{name!r} is no unit of speed", where="--unit", fix="give m/s, km/h, mph, kn or ft/s")
 
 
-def length_unit(name: str | None) -> str:
-    """The unit of positions: metres where none is given, or one of speed for a log beside."""
+def _length_unit(name: str | None) -> str:
+    """Returns the unit of positions: metres where none is given, or one of speed for a log beside."""
     from flagdata.units import unit
 
     return "m" if name is None or unit(name, where="--unit").si == "m/s" else name
 
 
-def check_applies(kinds: Sequence[str | None], options: Given, *, given: frozenset[str]) -> None:
-    """Refuse options that mean nothing for any source, or that time or name more than one, before anything is written.
+def check_applies(kinds: Sequence[str | None], given: Given) -> None:
+    """Refuses options that mean nothing for any source, or that time or name more than one, before anything is written.
 
     Args:
         kinds: of the sources; one that is not recognised may be any.
     """
-    foreign = dict(FOREIGN)
-    if options.zoned_start:
-        what, parameters = foreign["camera"]
-        foreign["camera"] = (f"{what} whose --start names its zone", (*parameters, "zone"))
+    from flagdata.timebase import names_zone
+
+    chosen = given.chosen
+    names, rows = typed(chosen), described(type(chosen))
+    ignored = {kind: names - _OF_ALL - described(form).keys() for kind, (_, form) in KINDS.items()}
+    called = {kind: name for kind, (name, _) in KINDS.items()}
+    if isinstance(chosen, FromCamera) and chosen.start is not None and names_zone(chosen.start):
+        called["camera"] += " whose --start names its zone"
+        ignored["camera"] |= names & {"zone"}
     if "camera" in kinds:
         # Of a camera and a log together, start and rate are the camera's.
-        what, parameters = foreign["anemometer"]
-        foreign["anemometer"] = (what, (*parameters, "start", "rate"))
-    if options.wind.wind.rate is None:
-        what, parameters = foreign["anemometer"]
-        foreign["anemometer"] = (what, (*parameters, "rate"))
-    _check_unit(kinds, options.unit)
-    for parameter in sorted(given):
-        strange = [kind in foreign and parameter in foreign[kind][1] for kind in kinds]
-        if all(strange):
-            whose = " or ".join(sorted({foreign[kind][0] for kind in kinds if kind is not None}))
-            raise UsageError(f"{option(parameter)} means nothing for {whose}", fix="leave it out")
-        if parameter in ONE_SOURCE and strange.count(False) > 1:
+        ignored["anemometer"] |= names & {"start", "rate"}
+    if given.wind.wind.rate is None:
+        ignored["anemometer"] |= names & {"rate"}
+    _check_unit(kinds, chosen.unit if isinstance(chosen, Scaled) else None)
+    for name in sorted(names):
+        foreign = [kind is not None and name in ignored.get(kind, ()) for kind in kinds]
+        spelled = rows[name][1].spelled(name)
+        if all(foreign):
+            whose = " or ".join(sorted({called[kind] for kind in kinds if kind is not None}))
+            raise UsageError(f"{spelled} means nothing for {whose}", fix="leave it out")
+        if name in ONE_SOURCE and foreign.count(False) > 1:
             raise UsageError(
-                f"{option(parameter)} with {strange.count(False)} sources",
-                fix="ingest the source it belongs to by itself",
+                f"{spelled} with {foreign.count(False)} sources", fix="ingest the source it belongs to by itself"
             )

@@ -6,15 +6,16 @@ What `flagdata ingest` prints for people: the report of an ingest, and what a so
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
-from flagdata.commands.ingest_options import Given, check_applies
-from flagdata.console import document, fail, progress, say
-from flagdata.errors import FlagdataError, UsageError
+from flagdata.api.recording_verbs import FromCamera, Ingesting
+from flagdata.commands.ingest_options import KINDS, Given, check_applies
+from flagdata.console import document, echo, echo_lines, fail, progress, say
+from flagdata.errors import FlagdataError, InputError, UsageError
 from flagdata.findings import Finding
 
 if TYPE_CHECKING:
@@ -22,13 +23,6 @@ if TYPE_CHECKING:
     from flagdata.ingest.anemometer.confirm import Answers
     from flagdata.ingest.store import IngestResult
     from flagdata.lake import Lake
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
-from flagdata.console import echo, echo_lines
-
-if TYPE_CHECKING:
-    from flagdata.ingest.store import IngestResult
 
 _ONCE = frozenset({"why", "note"})
 """What is printed of one artifact alone where another of the same source has it, too."""
@@ -179,46 +173,15 @@ Recognised = TypeVar("Recognised")
 Done = TypeVar("Done")
 
 
-def ingest_sources(
-    lake: Lake,
-    sources: Sequence[Path],
-    options: Given,
-    *,
-    given: frozenset[str],
-    format_name: str | None,
-    as_json: bool,
-) -> None:
-    """Bring each source into the lake and report it; exits with 1 where one of several failed.
-
-    Args:
-        given: parameters that stand on the command line.
-        format_name: of all sources; None to recognise it by the content.
+def ingest_sources(lake: Lake, given: Given, *, as_json: bool) -> None:
+    """Brings each source into the lake and reports it; exits with 1 where one of several failed.
 
     Raises:
         FlagdataError: an option that means nothing for any source, or a single source that failed.
     """
-    from flagdata.ingest.classify import classify
-
-    wind = options.wind.wind
-
-    def kind_of(source: Path) -> Guess:
-        return classify(
-            source,
-            format_name=format_name,
-            recipe=wind.recipe,
-            columns=wind.columns,
-            topic=wind.topic,
-            encoding=wind.encoding,
-        )
-
-    kinds = _recognised(sources, kind_of)
-    if options.camera.camera.chapters:
-        _check_joined((*sources, *options.camera.camera.chapters), kind_of)
-    check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
-    if any(not isinstance(kind, FlagdataError) and kind.kind == "camera" for kind in kinds):
-        options = replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, start=None, rate=None)))
+    kinds, given = _kinds(given)
     results, failures = _each(
-        sources, kinds, lambda source, kind: _one(lake, source, kind, options), print_results, as_json=as_json
+        given.sources, kinds, lambda source, kind: _one(lake, source, kind, given), print_results, as_json=as_json
     )
     if as_json:
         document(
@@ -229,7 +192,65 @@ def ingest_sources(
                 "failures": _failures(failures),
             },
         )
-    _exit_on(failures, sources)
+    _exit_on(failures, given.sources)
+
+
+def ingested(chosen: Ingesting) -> tuple[IngestResult, ...]:
+    """Brings sources into a lake from Python; see `flagdata.ingest`.
+
+    Raises:
+        FlagdataError: see `flagdata.ingest`.
+    """
+    from flagdata.api.lakes import opened
+    from flagdata.ingest.anemometer.confirm import Accepting
+
+    lake = opened(chosen.lake).lake
+    lake.check_writable()
+    kinds, given = _kinds(Given.of(chosen, confirm=Accepting(accept=chosen.accept)))
+    results: list[IngestResult] = []
+    for source, kind in zip(given.sources, kinds, strict=True):
+        if isinstance(kind, FlagdataError):
+            raise kind
+        results += _one(lake, source, kind, given)
+    return tuple(results)
+
+
+def _kinds(given: Given) -> tuple[list[Guess | FlagdataError], Given]:
+    """Returns what each source is, or why it is not recognised; with the options as they are then read.
+
+    Raises:
+        FlagdataError: an option that means nothing for any source, or a source of another kind than all are to be.
+    """
+    from flagdata.ingest.classify import classify
+
+    log = given.wind.wind
+
+    def kind_of(source: Path) -> Guess:
+        kind = classify(
+            source,
+            format_name=given.format,
+            recipe=log.recipe,
+            columns=log.columns,
+            topic=log.topic or given.camera.camera.topic,
+            encoding=log.encoding,
+        )
+        if given.kind is not None and kind.kind != given.kind:
+            raise InputError(
+                f"this is {KINDS[kind.kind][0]}, not {KINDS[given.kind][0]}",
+                where=str(source),
+                fix="leave the kind out, which is then decided by the content",
+            )
+        return kind
+
+    kinds = _recognised(given.sources, kind_of)
+    chapters = given.camera.camera.chapters
+    if chapters:
+        _check_joined((*given.sources, *chapters), kind_of)
+    recognised = [None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds]
+    check_applies(recognised, given)
+    if "camera" in recognised:
+        given = replace(given, wind=replace(given.wind, wind=replace(log, start=None, rate=None)))
+    return kinds, given
 
 
 def _check_joined(paths: Sequence[Path], kind_of: Callable[[Path], Guess]) -> None:
@@ -251,32 +272,32 @@ def _check_joined(paths: Sequence[Path], kind_of: Callable[[Path], Guess]) -> No
 _NOT_JOINED = {"anemometer": "a wind log", "meshes": "a folder of meshes", "markers": "a table of markers"}
 
 
-def sniff_sources(sources: Sequence[Path], options: Given, *, given: frozenset[str], as_json: bool) -> None:
-    """Report what each source seems to be; exits with 1 where one of several is not recognised.
+def sniff_sources(given: Given, *, as_json: bool) -> None:
+    """Reports what each source seems to be; exits with 1 where one of several is not recognised.
 
     Raises:
         FlagdataError: as `ingest_sources`.
     """
     from flagdata.ingest.classify import guesses
 
-    topic, encoding = options.wind.wind.topic, options.wind.wind.encoding
+    topic, encoding = given.wind.wind.topic, given.wind.wind.encoding
     ranked = _recognised(
-        sources, lambda source: _completed(source, guesses(source, topic=topic, encoding=encoding), options)
+        given.sources, lambda source: _completed(source, guesses(source, topic=topic, encoding=encoding), given)
     )
-    check_applies([None if isinstance(r, FlagdataError) else r[0].kind for r in ranked], options, given=given)
+    check_applies([None if isinstance(one, FlagdataError) else one[0].kind for one in ranked], given)
     entries, failures = _each(
-        sources, ranked, lambda source, found: _look(source, found, options), print_sniffed, as_json=as_json
+        given.sources, ranked, lambda source, found: _look(source, found, given), print_sniffed, as_json=as_json
     )
     if as_json:
         document("sniff", {"sources": entries, "failures": _failures(failures)})
-    _exit_on(failures, sources)
+    _exit_on(failures, given.sources)
 
 
-def _completed(source: Path, ranked: tuple[Guess, ...], options: Given) -> tuple[Guess, ...]:
+def _completed(source: Path, ranked: tuple[Guess, ...], given: Given) -> tuple[Guess, ...]:
     """The guesses, a draft among them completed by the options beside --sniff."""
     from flagdata.ingest.anemometer import completed
 
-    wind = options.wind.wind
+    wind = given.wind.wind
     if wind.columns is not None and ranked[0].kind in ("anemometer", "other"):
         return (completed(source, wind) or ranked[0], *ranked[1:])
     said = wind.unit is not None or wind.wind is not None or wind.date_order is not None
@@ -285,7 +306,7 @@ def _completed(source: Path, ranked: tuple[Guess, ...], options: Given) -> tuple
     return (completed(source, wind) or ranked[0], *ranked[1:])
 
 
-def _look(source: Path, ranked: Sequence[Guess], options: Given) -> dict[str, Any]:
+def _look(source: Path, ranked: Sequence[Guess], given: Given) -> dict[str, Any]:
     """Guesses at a source; of a camera file, what its headers say and the crop if one was asked for."""
     from flagdata.ingest.camera import probe, propose_crop
 
@@ -293,14 +314,14 @@ def _look(source: Path, ranked: Sequence[Guess], options: Given) -> dict[str, An
     if ranked[0].kind != "camera":
         return entry
     try:
-        entry["camera"] = probe(source, options.camera.camera).as_dict()
+        entry["camera"] = probe(source, given.camera.camera).as_dict()
     except FlagdataError as error:
         entry["problem"] = error.as_dict()
         return entry
-    if options.camera.camera.crop == "auto":
-        proposal = propose_crop(source, options.camera.camera)
+    if given.camera.camera.crop == "auto":
+        proposal = propose_crop(source, given.camera.camera)
         entry["crop"] = {"box": list(proposal.box.as_tuple()), "share": proposal.share}
-        with _CropPicture(options.crop_picture) as picture:
+        with _CropPicture(_picture(given)) as picture:
             picture.write(proposal.picture)
     return entry
 
@@ -373,42 +394,47 @@ def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[P
         sys.exit(codes.pop() if len(codes) == 1 else 1)
 
 
-def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestResult, ...]:
+def _one(lake: Lake, source: Path, kind: Guess, given: Given) -> tuple[IngestResult, ...]:
     """Artifacts of a source: of a table of markers one a recording, of any other one."""
     from flagdata.ingest.markers.store import ingest_markers
     from flagdata.ingest.records import ingest_record
     from flagdata.ingest.store import ingest_camera
 
     if kind.kind == "record":
-        return (ingest_record(lake, source, labels=options.labels, branch=options.branch),)
+        return (ingest_record(lake, source, labels=given.labels, branch=given.chosen.branch),)
     if kind.kind == "markers":
         return ingest_markers(
-            lake, source, options.markers, labels=options.labels, branch=options.branch, reasons=kind.reasons
+            lake, source, given.markers, labels=given.labels, branch=given.chosen.branch, reasons=kind.reasons
         )
     if kind.kind == "meshes":
-        return (_meshes(lake, source, kind, options),)
+        return (_meshes(lake, source, kind, given),)
     if kind.kind != "camera":
-        return options.confirm.answered(lambda answers: _winds(lake, source, _with(options, answers)))
-    with progress(None, label=source.name, unit="frame") as advance, _CropPicture(options.crop_picture) as picture:
+        return given.confirm.answered(lambda answers: _winds(lake, source, _with(given, answers)))
+    with progress(None, label=source.name, unit="frame") as advance, _CropPicture(_picture(given)) as picture:
         result = ingest_camera(
             lake,
             source,
-            options.camera,
-            labels=options.labels,
-            branch=options.branch,
+            given.camera,
+            labels=given.labels,
+            branch=given.chosen.branch,
             reasons=kind.reasons,
             progress=advance,
-            crop_picture=picture.write if options.crop_picture else None,
+            crop_picture=picture.write if _picture(given) else None,
         )
     return (result,)
 
 
-def _with(options: Given, answers: Answers) -> Given:
+def _picture(given: Given) -> Path | None:
+    """The file of the picture that shows where the motion is."""
+    return given.chosen.crop_picture if isinstance(given.chosen, FromCamera) else None
+
+
+def _with(given: Given, answers: Answers) -> Given:
     """The options with the answers that were typed."""
-    return replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, **dict(answers))))  # type: ignore[arg-type]
+    return replace(given, wind=replace(given.wind, wind=replace(given.wind.wind, **dict(answers))))  # type: ignore[arg-type]
 
 
-def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]:
+def _winds(lake: Lake, source: Path, given: Given) -> tuple[IngestResult, ...]:
     """The artifact of a log; of a table that holds several anemometers one of each, named by its label.
 
     An anemometer none of whose values can be used is left out, and the report of the first of the others says so.
@@ -419,21 +445,23 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
     from flagdata.ingest.anemometer import anemometers
     from flagdata.ingest.store import IngestResult, ingest_wind, ingest_winds
 
-    found = anemometers(source, options.wind.wind)
-    stem = options.labels.name or source.name.removesuffix(".gz").rpartition(".")[0] or source.name
+    found = anemometers(source, given.wind.wind)
+    stem = given.labels.name or source.name.removesuffix(".gz").rpartition(".")[0] or source.name
     if not found:
-        one, labels = options.wind.wind.wind, options.labels
-        if one is not None and len(anemometers(source, replace(options.wind.wind, wind=None))) > 1:
+        one, labels = given.wind.wind.wind, given.labels
+        if one is not None and len(anemometers(source, replace(given.wind.wind, wind=None))) > 1:
             labels = replace(labels, name=f"{stem}:{one}")
-        return (ingest_wind(lake, source, options.wind, labels=labels, branch=options.branch, confirm=options.confirm),)
+        return (
+            ingest_wind(lake, source, given.wind, labels=labels, branch=given.chosen.branch, confirm=given.confirm),
+        )
     each = [
         (
-            replace(options.wind, wind=replace(options.wind.wind, wind=label)),
-            replace(options.labels, name=f"{stem}:{label}"),
+            replace(given.wind, wind=replace(given.wind.wind, wind=label)),
+            replace(given.labels, name=f"{stem}:{label}"),
         )
         for label in found
     ]
-    done = ingest_winds(lake, source, each, branch=options.branch, confirm=options.confirm)
+    done = ingest_winds(lake, source, each, branch=given.chosen.branch, confirm=given.confirm)
     results = [one for one in done if isinstance(one, IngestResult)]
     dead = [(label, one) for label, one in zip(found, done, strict=True) if not isinstance(one, IngestResult)]
     if not results:
@@ -449,16 +477,16 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
     return (replace(first, report=report), *results[1:])
 
 
-def _meshes(lake: Lake, source: Path, kind: Guess, options: Given) -> IngestResult:
+def _meshes(lake: Lake, source: Path, kind: Guess, given: Given) -> IngestResult:
     from flagdata.ingest.meshes.store import ingest_meshes
 
     with progress(None, label=source.name, unit="mesh") as advance:
         return ingest_meshes(
             lake,
             source,
-            options.meshes,
-            labels=options.labels,
-            branch=options.branch,
+            given.meshes,
+            labels=given.labels,
+            branch=given.chosen.branch,
             reasons=kind.reasons,
             progress=advance,
         )

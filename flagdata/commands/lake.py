@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
 
+from flagdata.api.lake_verbs import Naming
 from flagdata.commands.artifacts import relative
-from flagdata.console import at_option, document, echo, json_option, lake_option, say, table
+from flagdata.console import document, echo, json_option, lake_option, say, table
 from flagdata.errors import UsageError
+from flagdata.options import command, options
 from flagdata.printable import SHORT, counted
+from flagdata.shared_options import AsJson
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
     from flagdata.lake.refs import Ref
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 @click.command()
@@ -68,77 +69,43 @@ def log(limit: int | None, as_json: bool, lake_path: str) -> None:
         table(columns, [[entry[column] for column in columns] for entry in entries])
 
 
-def _deletion_options(command: F) -> F:
-    """Adds --delete, --discard and --message to the command of tags or of branches."""
-    for option in (
-        click.option("--message", "-m", help="--delete: why."),
-        click.option(
-            "--discard",
-            is_flag=True,
-            help="--delete: even if no other tag or branch shows its artifacts, which gc then deletes.",
-        ),
-        click.option("-d", "--delete", is_flag=True, help="Delete NAME; the log notes what it showed."),
-    ):
-        command = option(command)
-    return command
+@options
+class NamingCommand(AsJson, Naming):
+    """The same on the command line."""
 
 
-def _check_ref_options(name: str | None, given: Mapping[str, object], *, delete: bool) -> None:
-    allowed = () if name is None else ("--discard", "--message") if delete else ("--at",)
-    if name is None and delete:
-        raise UsageError("--delete without a NAME", fix="give the NAME of what is to be deleted")
-    for option, value in given.items():
-        if value and option not in allowed:
-            what = "without a NAME" if name is None else "with --delete" if delete else "without --delete"
-            raise UsageError(f"{option} {what}", fix="leave it out, or see --help")
-
-
-@click.command()
-@click.argument("name", required=False)
-@at_option
-@_deletion_options
-@json_option
-@lake_option
-def tag(
-    name: str | None, at: str | None, delete: bool, discard: bool, message: str | None, as_json: bool, lake_path: str
-) -> None:
+@command(NamingCommand)
+def tag(chosen: NamingCommand) -> None:
     """Name what REF shows, for good; without NAME, list the tags.
 
     The name of a tag that was deleted never shows anything else.
     """
-    from flagdata.lake import Lake
+    from flagdata.api.lakes import opened
 
-    _check_ref_options(name, {"--at": at, "--discard": discard, "--message": message}, delete=delete)
-    lake = Lake.open(lake_path)
-    if name is not None and delete:
-        _report_deletion("tag", name, lake.delete_tag(name, message, discard=discard), as_json=as_json)
+    lake = opened(chosen.lake).lake
+    if chosen.name is not None and chosen.delete:
+        version = lake.delete_tag(chosen.name, chosen.message, discard=chosen.discard)
+        _report_deletion("tag", chosen.name, version, as_json=chosen.as_json)
         return
-    refs = lake.refs.tags().values() if name is None else [lake.tag(name, at=at)]
-    _print_refs("tags", refs, as_json=as_json)
+    refs = lake.refs.tags().values() if chosen.name is None else [lake.tag(chosen.name, at=chosen.at)]
+    _print_refs("tags", refs, as_json=chosen.as_json)
 
 
-@click.command()
-@click.argument("name", required=False)
-@at_option
-@_deletion_options
-@json_option
-@lake_option
-def branch(
-    name: str | None, at: str | None, delete: bool, discard: bool, message: str | None, as_json: bool, lake_path: str
-) -> None:
+@command(NamingCommand)
+def branch(chosen: NamingCommand) -> None:
     """Begin a line of work NAME from what REF shows; without NAME, list the branches.
 
     A branch that is deleted leaves its commits to the log, to its tags and to branches made from it.
     """
-    from flagdata.lake import Lake
+    from flagdata.api.lakes import opened
 
-    _check_ref_options(name, {"--at": at, "--discard": discard, "--message": message}, delete=delete)
-    lake = Lake.open(lake_path)
-    if name is not None and delete:
-        _report_deletion("branch", name, lake.delete_branch(name, message, discard=discard), as_json=as_json)
+    lake = opened(chosen.lake).lake
+    if chosen.name is not None and chosen.delete:
+        version = lake.delete_branch(chosen.name, chosen.message, discard=chosen.discard)
+        _report_deletion("branch", chosen.name, version, as_json=chosen.as_json)
         return
-    refs = lake.refs.branches().values() if name is None else [lake.branch(name, at=at)]
-    _print_refs("branches", refs, as_json=as_json)
+    refs = lake.refs.branches().values() if chosen.name is None else [lake.branch(chosen.name, at=chosen.at)]
+    _print_refs("branches", refs, as_json=chosen.as_json)
 
 
 @click.command()

@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from flagdata.api.lake_verbs import Querying
 from flagdata.cells import plain
-from flagdata.console import LocalPath, at_option, csv_rows, document, json_option, lake_option, say, table
+from flagdata.console import LocalPath, csv_rows, document, say, table
 from flagdata.errors import UsageError
+from flagdata.options import command, option, options
 from flagdata.printable import SHORT
+from flagdata.shared_options import AsJson
 from flagdata.sql_process import sql_process
 
 if TYPE_CHECKING:
@@ -61,42 +64,26 @@ VIEWS: dict[str | None, tuple[str, ...]] = {
 }
 
 
-@click.command()
-@click.option("--where", metavar="EXPR", help="SQL condition, e.g. \"kind = 'clip' and wind between 3 and 6\".")
-@click.option("--sql", metavar="SELECT", help="One whole SELECT over the table catalog, instead of --where.")
-@at_option
-@click.option("--columns", metavar="A,B", help="Columns wanted, in order.")
-@click.option("--order", metavar="TERMS", help='SQL order, e.g. "wind desc, start".')
-@click.option(
-    "--limit", type=click.IntRange(min=0), help=f"Rows at most; {PEOPLE_LIMIT} in the table for people, else all."
-)
-@click.option(
-    "--time-limit",
-    type=click.FloatRange(min=0, min_open=True),
-    default=_TIME_LIMIT,
-    show_default=True,
-    metavar="SECONDS",
-    help="What the query may take, before it is stopped.",
-)
-@click.option("--arrow", metavar="FILE", type=LocalPath(), help="Write an Arrow IPC file.")
-@click.option("--csv", "as_csv", is_flag=True, help="Comma-separated values on stdout.")
-@click.option("--describe", is_flag=True, help="List the columns with their units.")
-@json_option
-@lake_option
-def query(
-    where: str | None,
-    sql: str | None,
-    at: str | None,
-    columns: str | None,
-    order: str | None,
-    limit: int | None,
-    time_limit: float,
-    arrow: Path | None,
-    as_csv: bool,
-    describe: bool,
-    as_json: bool,
-    lake_path: str,
-) -> None:
+@options
+class QueryCommand(AsJson, Querying):
+    """The same on the command line, how long it may take, and what is written."""
+
+    where: str | None = option(
+        "SQL condition, e.g. \"kind = 'clip' and wind between 3 and 6\".", default=None, metavar="EXPR"
+    )
+    time_limit: float = option(
+        "What the query may take, before it is stopped.",
+        default=_TIME_LIMIT,
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="SECONDS",
+    )
+    arrow: Path | None = option("Write an Arrow IPC file.", default=None, type=LocalPath(), metavar="FILE")
+    as_csv: bool = option("Comma-separated values on stdout.", "--csv", default=False)
+    describe: bool = option("List the columns with their units.", default=False)
+
+
+@command(QueryCommand)
+def query(chosen: QueryCommand) -> None:
     """Select rows of the catalog by filter or SQL.
 
     The SQL is DuckDB's, over one read-only table, catalog. Times are compared through start_time and end_time:
@@ -106,31 +93,37 @@ def query(
       flagdata query --where "start_time >= '2026-05-01 12:00+02:00'" --columns name,wind,wind_sigma
       flagdata query --sql "select session, count(*) n, avg(wind) wind from catalog group by session" --json
     """
-    if sum((as_json, as_csv, arrow is not None)) > 1:
+    if sum((chosen.as_json, chosen.as_csv, chosen.arrow is not None)) > 1:
         raise UsageError("more than one form of output", fix="choose one of --json, --csv and --arrow")
-    if describe:
-        _describe(as_json=as_json)
+    if chosen.describe:
+        _describe(as_json=chosen.as_json)
         return
     sql_process()  # starts while the lake is read
-    from flagdata.lake import Lake
+    from flagdata.api.lakes import opened
     from flagdata.lake.selection import Request, Selection
     from flagdata.outputs import check_file
 
-    if arrow is not None:
-        check_file(arrow)
-    lake = Lake.open(lake_path)
-    view = lake.view(at)
+    if chosen.arrow is not None:
+        check_file(chosen.arrow)
+    lake = opened(chosen.lake).lake
+    view = lake.view(chosen.at)
     version = view[0].version
-    names = None if columns is None else tuple(name.strip() for name in columns.split(","))
-    request = Request(where=where, sql=sql, columns=names, order=order, limit=limit, time_limit=time_limit)
+    request = Request(
+        where=chosen.where,
+        sql=chosen.sql,
+        columns=None if chosen.columns is None else tuple(chosen.columns),
+        order=chosen.order,
+        limit=chosen.limit,
+        time_limit=chosen.time_limit,
+    )
     catalog = lake.scan(view)
-    if arrow is not None:
-        count = write_arrow(Selection(catalog, request), arrow)
-        say(f"{count:,} rows of version {version} → {arrow}")
-    elif as_csv:
+    if chosen.arrow is not None:
+        count = write_arrow(Selection(catalog, request), chosen.arrow)
+        say(f"{count:,} rows of version {version} → {chosen.arrow}")
+    elif chosen.as_csv:
         _print_csv(Selection(catalog, request))
-    elif as_json:
-        document("query", as_document(Selection(catalog, request), at=at, version=version))
+    elif chosen.as_json:
+        document("query", as_document(Selection(catalog, request), at=chosen.at, version=version))
     else:
         _print_table(catalog, request)
 

@@ -104,8 +104,8 @@ def made(
     name: str | None,
     model: str | None,
     lake: Lake | None,
-    branch: str,
-    commit: bool,
+    at: str,
+    branch: str | None,
     first: float,
     last: float | None,
     level: float,
@@ -116,7 +116,8 @@ def made(
     Args:
         name: of the model; None for the first recording's with "-anemometer".
         model: network whose summary is used.
-        commit: whether it goes into the lake.
+        at: tag, branch or version of the lake to look at.
+        branch: of the lake on which the model is committed; None to keep it nowhere.
         first, last: part of the films [s].
         advance: called with the number of windows that were looked at.
 
@@ -126,10 +127,10 @@ def made(
     """
 
     def opened(source: str) -> Subject:
-        return subjects(source, query=None, lake=lake, at=branch, reading=reading)[0]
+        return subjects(source, query=None, lake=lake, at=at, reading=reading)[0]
 
     found, unopened = usable(sources, opened, name=str)
-    own = network(model, lake=lake, at=branch)
+    own = network(model, lake=lake, at=at)
     seconds = sum(min(one.film.duration, math.inf if last is None else last) - first for one in found)
     if seconds < LEAST:
         raise InputError(
@@ -149,6 +150,6 @@ def made(
     result = calibrated(recordings, network=own, size=size, level=level)
     result = replace(result, findings=(*unopened, *unread, *result.findings))
     title = name if name is not None else f"{recordings[0].name}-anemometer"
-    if lake is None or not commit:
+    if lake is None or branch is None:
         return Made(name=title, found=result, place=None)
     return Made(name=title, found=result, place=keep(lake, result, title, reading, branch=branch))

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flagdata.api.lakes import lake_of
+from flagdata.api.measuring import Calibrating, OfFlag
 from flagdata.caches import user_cache
 from flagdata.calibrated import Calibrated, Weighed
 from flagdata.errors import InputError
-from flagdata.ingest.camera import CropBox
 from flagdata.lake import Lake
 from flagdata.provenance import array_hash
 from flagdata.stated import Stated
@@ -22,7 +23,7 @@ from measure.calibrate.fabric import fabric
 from measure.calibrate.filmed import Opened, Sources, opened
 from measure.calibrate.known import known
 from measure.calibrate.observed import Observed, cut
-from measure.calibrate.prior import AZIMUTH, ELEVATION
+from measure.calibrate.prior import AZIMUTH, ELEVATION, Uncertain
 from measure.calibrate.simulation import Flag
 from measure.calibrate.tables import of_columns
 from measure.film.similarity import FlagSize
@@ -32,51 +33,49 @@ Arrays = Mapping[str, ArrayLike]
 Number = float | tuple[float, float] | str | Stated
 
 
-def calibrated(
-    recordings: Sequence[Arrays | Path | str],
-    *,
-    flag_size: tuple[float, float],
-    attachment: str,
-    azimuth_deg: Number | None,
-    elevation_deg: Number | None,
-    distance: float | None,
-    start: float,
-    end: float | None,
-    crop: tuple[int, int, int, int] | None,
-    flag: int | None,
-    material: str | None,
-    log: str | None,
-    offset: Number | None,
-    simulations: int,
-    level: float,
-    seed: int,
-    workers: int,
-    lake: Lake | None,
-    at: str | None,
-    cache: Path | None,
-) -> Calibrated:
-    """What `flagdata.calibrate` does; see there for what it takes.
+def options_of(chosen: OfFlag, size: FlagSize, *, simulations: int, level: float, seed: int) -> Options:
+    """Returns how a flag of such a size is calibrated.
+
+    Args:
+        simulations: for each recording.
+        level: of the intervals.
+        seed: of all draws.
 
     Raises:
-        FlagdataError: see `flagdata.calibrate`.
+        UsageError, UnknownNameError: angles or a material that no flag has.
     """
-    if not recordings:
-        raise InputError("no recordings", where="recordings", fix="give at least one")
-    size = FlagSize(length=flag_size[0], height=flag_size[1])
-    box = None if crop is None else CropBox(x=crop[0], y=crop[1], width=crop[2], height=crop[3])
-    reading = Reading(crop=box, flag=flag, aspect=size.aspect)
-    options = Options(
-        flag=Flag(length=size.length, height=size.height, attachment=attachment),
-        azimuth=AZIMUTH if azimuth_deg is None else known(AZIMUTH, Stated.of(azimuth_deg), where="azimuth_deg"),
-        elevation=(
-            ELEVATION if elevation_deg is None else known(ELEVATION, Stated.of(elevation_deg), where="elevation_deg")
-        ),
-        distance=FAR if distance is None else distance,
+
+    def angle(name: str, value: Number | None, usual: Uncertain) -> Uncertain:
+        return usual if value is None else known(usual, Stated.of(value), where=f"--{name}")
+
+    return Options(
+        flag=Flag(length=size.length, height=size.height, attachment=chosen.attachment),
+        azimuth=angle("azimuth", chosen.azimuth_deg, AZIMUTH),
+        elevation=angle("elevation", chosen.elevation_deg, ELEVATION),
+        distance=FAR if chosen.distance is None else chosen.distance,
         simulations=simulations,
         level=level,
         seed=seed,
-        material=None if material is None else fabric(material, where="material"),
+        material=None if chosen.material is None else fabric(chosen.material, where="--material"),
     )
+
+
+def folder_of(chosen: OfFlag) -> Path:
+    """Returns the folder in which simulations are kept."""
+    return user_cache() / "calibrate" if chosen.cache is None else Path(chosen.cache)
+
+
+def sources_of(
+    recordings: Sequence[Arrays | Path | str], chosen: OfFlag, size: FlagSize, lake: Lake | None, *, at: str
+) -> Sources:
+    """Opens recordings: tables that are given as arrays, paths of tables, and recordings of a lake.
+
+    Raises:
+        FlagdataError: see `Sources`.
+    """
+    first, last = chosen.start or 0.0, chosen.end
+    offset = None if chosen.clock_offset is None else Stated.of(chosen.clock_offset)
+    reading = Reading.of(chosen, size)
 
     def name(numbered: tuple[int, Arrays | Path | str]) -> str:
         number, one = numbered
@@ -86,26 +85,33 @@ def calibrated(
         _, one = numbered
         if isinstance(one, Mapping):
             rows = of_arrays(one, name=name(numbered))
-            cuts = tuple(cut(each, start, end) if each.place is None else each for each in rows)
+            cuts = tuple(cut(each, first, last) if each.place is None else each for each in rows)
             return Opened(name=name(numbered), parent=None, rows=cuts)
-        return opened(
-            str(one),
-            size,
-            reading,
-            lake=lake,
-            at=at or "main",
-            first=start,
-            last=end,
-            log=log,
-            offset=None if offset is None else Stated.of(offset),
-        )
+        part = {"first": first, "last": last, "log": chosen.log, "offset": offset}
+        return opened(str(one), size, reading, lake=lake, at=at, **part)
 
-    gathered = Sources.of(list(enumerate(recordings, start=1)), opening, name=name).read(size)
+    return Sources.of(list(enumerate(recordings, start=1)), opening, name=name)
+
+
+def calibrated(chosen: Calibrating) -> Calibrated:
+    """Calibrates a flag from Python; see `flagdata.calibrate`.
+
+    Raises:
+        FlagdataError: see `flagdata.calibrate`.
+    """
+    several = chosen.recordings
+    several = [several] if isinstance(several, Mapping | Path | str) else list(several)
+    if not several:
+        raise InputError("no recordings", where="recordings", fix="give at least one")
+    size = FlagSize.of(chosen.flag_size)
+    drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
+    options = options_of(chosen, size, **drawn)
+    gathered = sources_of(several, chosen, size, lake_of(chosen.lake), at=chosen.at or "main").read(size)
     found = calibrate(
         gathered.recordings,
         options,
-        folder=cache or user_cache() / "calibrate",
-        workers=workers,
+        folder=folder_of(chosen),
+        workers=chosen.workers,
         left_out=gathered.left_out,
     )
     return _answer(found)

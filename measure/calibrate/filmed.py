@@ -107,7 +107,7 @@ def declared(table: Columns, offset: Stated, *, names: tuple[str, str]) -> Clock
     """
     if offset.low < offset.high or not offset.sigma > 0:
         raise UsageError(
-            f"an offset of {offset.text} s", where="--offset", fix="state how well it is known, as in 0.3±0.1"
+            f"an offset of {offset.text} s", where="--clock-offset", fix="state how well it is known, as in 0.3±0.1"
         )
     times = instants(table)
     return given(names[1], names[0], start=int(times[0]), end=int(times[-1]) + 1, offset=offset.low, sigma=offset.sigma)
@@ -157,7 +157,7 @@ def estimated(
             error.what,
             where=error.where,
             fix="check that the table and the log are of one wind, or state what is added to the table's clock to "
-            "reach the log's: --offset 0.3±0.1",
+            "reach the log's: --clock-offset 0.3±0.1",
         ) from error
     segments = tuple(
         replace(
@@ -181,7 +181,7 @@ def follows(table: Columns) -> Floats:
     raise InputError(
         f"no observable that follows the wind: {', '.join(_FOLLOWS)}",
         where=table.where,
-        fix="state the offset of the clocks: --offset 0.3±0.1",
+        fix="state the offset of the clocks: --clock-offset 0.3±0.1",
     )
 
 
@@ -325,27 +325,6 @@ class Sources:
     left_out: tuple[Finding, ...]
 
     @classmethod
-    def open(
-        cls,
-        sources: Sequence[str],
-        size: FlagSize,
-        reading: Reading,
-        *,
-        lake: Lake | None,
-        at: str,
-        first: float,
-        last: float | None,
-        log: str | None = None,
-        offset: Stated | None = None,
-    ) -> Sources:
-        """Open sources by their names; as `opened` and `of`."""
-
-        def one(source: str) -> Opened:
-            return opened(source, size, reading, lake=lake, at=at, first=first, last=last, log=log, offset=offset)
-
-        return cls.of(sources, one, name=str)
-
-    @classmethod
     def of(cls, sources: Sequence[S], opening: Callable[[S], Opened], *, name: Callable[[S], str]) -> Sources:
         """Open sources and add up how long they are; as `usable`.
 
@@ -406,7 +385,7 @@ def opened(
     if log is not None or offset is not None:
         raise UsageError(
             "a recording has its log and its clock",
-            where="--log, --offset",
+            where="--log, --clock-offset",
             fix="give them with a table of observables",
         )
     (subject,) = subjects(source, query=None, lake=lake, at=at, reading=reading)
@@ -431,7 +410,9 @@ def _of_table(
             raise UsageError("a log of no lake", where="--log", fix="name the lake that it was ingested into: --lake")
         beside, parent = joined(path, size, lake=lake, log=log, at=at, offset=offset)
     elif offset is not None:
-        raise UsageError("an offset without a log", where="--offset", fix="name the log: --log ARTIFACT --lake LAKE")
+        raise UsageError(
+            "an offset without a log", where="--clock-offset", fix="name the log: --log ARTIFACT --lake LAKE"
+        )
     found = of_table(path, size, beside=beside)
     if found[0].place is None:
         return tuple(cut(one, first, last) for one in found), parent

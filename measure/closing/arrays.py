@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flagdata.api.measuring import Closing
 from flagdata.closed import Closed, Strength
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake.meshes import MeshSequence
@@ -29,61 +30,41 @@ from measure.verdict.record import Verdict
 from sim.material import MATERIALS, named
 
 Recordings: TypeAlias = ArrayLike | MeshSequence | Sequence[ArrayLike | MeshSequence]
-Pins: TypeAlias = str | Sequence[tuple[float, float]]
 
 
-def closed(
-    recordings: Recordings,
-    *,
-    wind: Any,
-    rest: ArrayLike | None,
-    rate: float | None,
-    material: str,
-    pins: Pins,
-    size: tuple[float, float] | None,
-    density_uncertainty: float | None,
-    noise: float | None,
-    level: float | None,
-    nulls: int | None,
-    seed: int,
-    workers: int,
-) -> Closed:
-    """What `flagdata.close_loop` does.
+def closed(chosen: Closing) -> Closed:
+    """Closes the loop on arrays; see `flagdata.close_loop`.
 
     Raises:
         FlagdataError: see `flagdata.close_loop`.
     """
     options = Options(
-        seed=seed,
-        workers=workers,
-        level=CRITERIA.level if level is None else level,
-        nulls=FEWEST_NULLS if nulls is None else nulls,
+        seed=chosen.seed,
+        workers=chosen.workers,
+        level=CRITERIA.level if chosen.level is None else chosen.level,
+        nulls=FEWEST_NULLS if chosen.nulls is None else chosen.nulls,
     )
-    tracked = _tracked(recordings, rest=rest, rate=rate, wind=wind, noise=noise)
-    observed = observe(tracked, _setup(material, pins, size, density_uncertainty))
+    observed = observe(_tracked(chosen), _setup(chosen))
     return _answer(with_warnings(close_loop(observed.experiment, options), checked(observed.findings)))
 
 
-def _setup(material: str, pins: Pins, size: tuple[float, float] | None, density_uncertainty: float | None) -> Setup:
-    if material not in MATERIALS.names():
-        raise UnknownNameError.of("material", material, MATERIALS.names(), where="material")
-    names = [one.value for one in Hold]
+def _setup(chosen: Closing) -> Setup:
+    if chosen.material not in MATERIALS.names():
+        raise UnknownNameError.of("material", chosen.material, MATERIALS.names(), where="material")
+    names, pins = [one.value for one in Hold], chosen.pins
     if isinstance(pins, str) and pins not in names:
         raise UnknownNameError.of("attachment", pins, names, where="pins")
-    places = Hold(pins) if isinstance(pins, str) else tuple((float(u), float(v)) for u, v in pins)
     return Setup(
-        material=named(material),
-        pins=places,
-        outline=None if size is None else sheet(*size),
-        density_uncertainty=DENSITY_UNCERTAINTY if density_uncertainty is None else density_uncertainty,
+        material=named(chosen.material),
+        pins=Hold(pins) if isinstance(pins, str) else tuple((float(u), float(v)) for u, v in pins),
+        outline=None if chosen.size is None else sheet(*chosen.size),
+        density_uncertainty=DENSITY_UNCERTAINTY if chosen.density_uncertainty is None else chosen.density_uncertainty,
     )
 
 
-def _tracked(
-    recordings: Recordings, *, rest: ArrayLike | None, rate: float | None, wind: Any, noise: float | None
-) -> list[Observation]:
+def _tracked(chosen: Closing) -> list[Observation]:
     """One of each recording, with the wind beside it."""
-    several = _several(recordings)
+    several, wind = _several(chosen.recordings), chosen.wind
     winds = wind if isinstance(wind, list) else [wind] * len(several)
     if len(winds) != len(several):
         raise UsageError(
@@ -92,7 +73,7 @@ def _tracked(
             fix="give one, or a list with one for each recording",
         )
     return [
-        _observation(one, name=f"recording {number}", rest=rest, rate=rate, wind=_track(own), noise=noise)
+        _observation(one, chosen, name=f"recording {number}", wind=_track(own))
         for number, (one, own) in enumerate(zip(several, winds, strict=True), start=1)
     ]
 
@@ -103,21 +84,13 @@ def _several(recordings: Recordings) -> list[ArrayLike | MeshSequence]:
     return list(recordings)  # type: ignore[arg-type]
 
 
-def _observation(
-    one: ArrayLike | MeshSequence,
-    *,
-    name: str,
-    rest: ArrayLike | None,
-    rate: float | None,
-    wind: WindTrack,
-    noise: float | None,
-) -> Observation:
+def _observation(one: ArrayLike | MeshSequence, chosen: Closing, *, name: str, wind: WindTrack) -> Observation:
     if isinstance(one, MeshSequence):
-        return replace(from_sequence(one, name=name), wind=wind, noise=noise)
-    if rest is None or rate is None:
+        return replace(from_sequence(one, name=name), wind=wind, noise=chosen.noise)
+    if chosen.rest is None or chosen.rate is None:
         raise UsageError("positions without rest coordinates and rate", where=name, fix="give rest= and rate=")
-    positions, places = (np.asarray(values, dtype=np.float64) for values in (one, rest))
-    return from_arrays(name=name, positions=positions, rest=places, rate=rate, wind=wind, noise=noise)
+    positions, places = (np.asarray(values, dtype=np.float64) for values in (one, chosen.rest))
+    return from_arrays(name=name, positions=positions, rest=places, rate=chosen.rate, wind=wind, noise=chosen.noise)
 
 
 def _track(wind: Any) -> WindTrack:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,8 @@ import click
 from flagdata.console import LocalPath, say
 from flagdata.errors import UsageError
 from flagdata.findings import Finding
+from flagdata.option_types import POSITIVE, SHARE
+from flagdata.options import option, options
 from flagdata.printable import printable
 from measure.closing.findings import checked, finding_text
 
@@ -18,55 +21,49 @@ if TYPE_CHECKING:
     from measure.forecasting.setting import Stage
     from measure.observe.recipe import ExperimentRecipe
 
-_Command = Callable[..., Any]
+TEST = "The test"
 
 
-def null_options(*, level: str) -> Callable[[_Command], _Command]:
-    """The options `--nulls`, `--bank`, `--level`, `--seed` and `--workers` of a command.
+@options
+class ByNulls:
+    """By which null experiments is tested, and at which level."""
 
-    Args:
-        level: help of `--level`.
-    """
-    options = (
-        click.option(
-            "--nulls",
-            type=click.IntRange(min=1),
-            help="Number of recordings without any effect to simulate for comparison, 160 or more; on films the number "
-            "of meshes and time-stepping methods, 20 by default.",
-        ),
-        click.option(
-            "--bank",
-            type=LocalPath(exists=True),
-            help="Folder of such simulations that were made before, by the study `challenge bank` of a checkout.",
-        ),
-        click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), help=level),
-        click.option(
-            "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the simulated nulls."
-        ),
-        click.option(
-            "--workers", type=click.IntRange(min=1), help="Number of processes; by default one for each core."
-        ),
+    level: float | None = option(
+        "Significance level of the test; 0.05 by default.", default=None, section=TEST, type=SHARE
+    )
+    nulls: int | None = option(
+        "Number of recordings without any effect to simulate for comparison, 160 or more; on films the number of "
+        "meshes and time-stepping methods, 20 by default.",
+        default=None,
+        section=TEST,
+        type=POSITIVE,
+    )
+    bank: Path | None = option(
+        "Folder of such simulations that were made before, by the study `challenge bank` of a checkout.",
+        default=None,
+        section=TEST,
+        type=LocalPath(exists=True),
+    )
+    seed: int = option("Seed of the simulated nulls.", default=0, section=TEST, type=click.IntRange(min=0))
+    workers: int | None = option(
+        "Number of processes; by default one for each core.", default=None, section=TEST, type=POSITIVE
     )
 
-    def decorated(command: _Command) -> _Command:
-        for option in reversed(options):
-            command = option(command)
-        return command
-
-    return decorated
+    @property
+    def processes(self) -> int:
+        """How many processes simulate."""
+        return self.workers or len(os.sched_getaffinity(0))
 
 
-def nulls_given(
-    recipe: ExperimentRecipe | None, *, level: float | None, nulls: int | None, bank: Path | None
-) -> dict[str, Any]:
-    """`level` and `nulls` of options, as the command line or else the recipe says them; without what neither does.
+def nulls_given(recipe: ExperimentRecipe | None, chosen: ByNulls, *, level: float | None) -> dict[str, Any]:
+    """Returns `level` and `nulls` as the command line or else the recipe says them; without what neither does.
 
     Raises:
         UsageError: a bank, and a number of nulls to simulate.
     """
-    if bank is not None and nulls is not None:
+    if chosen.bank is not None and chosen.nulls is not None:
         raise UsageError("both --nulls and --bank are given", where="--nulls", fix="keep one of them")
-    said = {"level": level, "nulls": nulls}
+    said = {"level": level, "nulls": chosen.nulls}
     if recipe is not None:
         said = {name: getattr(recipe, name) if value is None else value for name, value in said.items()}
     return {name: value for name, value in said.items() if value is not None}

@@ -8,17 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from click.core import ParameterSource
 
-from flagdata.commands.durations import DURATION
-from flagdata.commands.sections import LongCommand
-from flagdata.commands.statements import STATED
-from flagdata.console import LakePlace, LocalPath, document, echo, following, json_option, progress, say, say_finding
+from flagdata.api.measuring import LENGTHS, Calibrating
+from flagdata.console import LocalPath, document, echo, following, progress, say, say_finding
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.findings import Severity
+from flagdata.option_types import POSITIVE
+from flagdata.options import argument, command, option, options, typed
 from flagdata.printable import SHORT
-from flagdata.stated import Stated
-from flagdata.storage import Place
+from flagdata.shared_options import FLAG, HOW, WRITTEN, AsJson, Keeping
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -29,137 +27,42 @@ if TYPE_CHECKING:
     from measure.film.source import Reading
 
 
-@click.command(cls=LongCommand)
-@click.argument("sources", nargs=-1, required=True, metavar="RECORDING...")
-@click.option(
-    "--only",
-    type=click.Choice(["weight", "anemometer"]),
-    help="Do only one: weigh the cloth, in minutes "
-    "of simulation, or calibrate the flag as an anemometer, as fast as its film is read.",
-)
-@click.option(
-    "--name",
-    metavar="NAME",
-    help="Of the reading model, by which flagdata measure --model finds it; by "
-    "default the first recording's with -anemometer.",
-)
-@click.option(
-    "--model", metavar="NAME|FOLDER|ID", help="Network whose summary the reading model uses; by default flow-outdoor."
-)
-@click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0.")
-@click.option(
-    "--attachment",
-    type=click.Choice(["corners", "hoist"]),
-    default="corners",
-    show_default=True,
-    help="How the flag is held: at both ends of its hoist, or along all of it.",
-)
-@click.option(
-    "--azimuth",
-    type=STATED,
-    metavar="DEGREES",
-    help="Of the camera's axis to the wind, 90 from the side, as in 70±7; by default 30:150.",
-)
-@click.option("--elevation", type=STATED, metavar="DEGREES", help="Of the camera's axis, upwards; by default 0±5.")
-@click.option(
-    "--distance",
-    type=click.FloatRange(min=1.0),
-    default=15.0,
-    show_default=True,
-    metavar="M",
-    help="From the camera to the flag [m].",
-)
-@click.option(
-    "--material",
-    metavar="NAME",
-    help="What the flag is made of, as in woven-polyester, knit or camel-ponte-roma; by default any fabric.",
-)
-@click.option(
-    "--crop", metavar="X,Y,W,H", help="Region of films in which the flag is [px]; by default the whole picture."
-)
-@click.option(
-    "--flag", type=click.IntRange(min=1), metavar="N", help="Which moving cloth; by default the one that moves most."
-)
-@click.option(
-    "--log",
-    metavar="ARTIFACT",
-    help="Log of the wind beside tables that have no wind column: a wind of --lake, by its id.",
-)
-@click.option(
-    "--offset",
-    type=STATED,
-    metavar="S±SIGMA",
-    help="Seconds added to the tables' clock to reach the log's, as in 0.3±0.1; by default estimated.",
-)
-@click.option("--start", "first", type=DURATION, default="0s", metavar="TIME", help="Where to begin, as in 12s.")
-@click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end; weighing uses two minutes at most.")
-@click.option(
-    "--simulations",
-    type=click.IntRange(min=64),
-    default=128,
-    show_default=True,
-    help="Simulated flags for each recording.",
-)
-@click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    default=lambda: os.cpu_count() or 1,
-    show_default="all cores",
-    help="Number of processes that simulate.",
-)
-@click.option(
-    "--cache",
-    type=LocalPath(),
-    metavar="FOLDER",
-    help="Where simulations are kept, so that an interrupted calibration goes on; by default the user's cache folder.",
-)
-@click.option(
-    "--level",
-    type=click.FloatRange(0, 1, min_open=True, max_open=True),
-    default=0.9,
-    show_default=True,
-    help="Level of the intervals.",
-)
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all draws.")
-@click.option("--report", type=LocalPath(), metavar="FILE.html", help="Write a page that needs no other.")
-@click.option(
-    "--lake",
-    "lake_path",
-    type=LakePlace(),
-    envvar="FLAGDATA_LAKE",
-    help="Where recordings are, and where calibrations go; also FLAGDATA_LAKE.",
-)
-@click.option("--branch", default="main", show_default=True, help="Branch of the lake to read and commit on.")
-@click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
-@json_option
-def calibrate(
-    sources: tuple[str, ...],
-    only: str | None,
-    name: str | None,
-    model: str | None,
-    flag_size: str | None,
-    attachment: str,
-    azimuth: Stated | None,
-    elevation: Stated | None,
-    distance: float,
-    material: str | None,
-    crop: str | None,
-    flag: int | None,
-    log: str | None,
-    offset: Stated | None,
-    first: float,
-    last: float | None,
-    simulations: int,
-    workers: int,
-    cache: Path | None,
-    level: float,
-    seed: int,
-    report: Path | None,
-    lake_path: Place | None,
-    branch: str,
-    read_only: bool,
-    as_json: bool,
-) -> None:
+@options
+class CalibrateCommand(AsJson, Calibrating, Keeping):
+    """The same on the command line, the reading model that is made beside, and what is written."""
+
+    recordings: tuple[str, ...] = argument("Recordings of one flag; see `flagdata.calibrate`.", "RECORDING...")
+    flag_size: str | None = option(f"{LENGTHS}.", default=None, section=FLAG, metavar="LxH")
+    only: str | None = option(
+        "Do only one: weigh the cloth, in minutes of simulation, or calibrate the flag as an anemometer, as fast as "
+        "its film is read.",
+        default=None,
+        section=HOW,
+        type=click.Choice(["weight", "anemometer"]),
+    )
+    name: str | None = option(
+        "Of the reading model, by which flagdata measure --model finds it; by default the first recording's with "
+        "-anemometer.",
+        default=None,
+        section=HOW,
+        metavar="NAME",
+    )
+    model: str | None = option(
+        "Network whose summary the reading model uses; by default flow-outdoor.",
+        default=None,
+        section=HOW,
+        metavar="NAME|FOLDER|ID",
+    )
+    workers: int | None = option(
+        "Number of processes that simulate; by default one for each core.", default=None, section=HOW, type=POSITIVE
+    )
+    report: Path | None = option(
+        "Write a page that needs no other.", default=None, section=WRITTEN, type=LocalPath(), metavar="FILE.html"
+    )
+
+
+@command(CalibrateCommand)
+def calibrate(chosen: CalibrateCommand) -> None:
     """Weigh the cloth of a flag from its motion and the log of the wind beside it: area weight, bending and damping,
     with intervals. And make the flag an anemometer: a reading model of this flag from this place, which flagdata
     measure --model takes for other films of it.
@@ -178,102 +81,69 @@ def calibrate(
       flagdata calibrate tracked.csv --log 3f2a9c --offset 0.3±0.1 --lake lake --flag-size 0.9x0.6
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --only anemometer --name garden
     """
-    _check_only(only)
-    if flag_size is None:
+    _check_only(chosen)
+    if chosen.flag_size is None:
         raise UsageError(
             "the flag's size is missing: windows are as long as its size requires",
             where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
         )
-    from flagdata.caches import user_cache
-    from flagdata.lake import Lake
     from flagdata.lake.results import placed
     from flagdata.outputs import check_file, write_file
+    from measure.calibrate.arrays import folder_of, options_of, sources_of
     from measure.calibrate.artifact import artifact, keep
-    from measure.calibrate.calibrate import Options
     from measure.calibrate.calibrate import calibrate as calibrated
-    from measure.calibrate.fabric import fabric
-    from measure.calibrate.filmed import Sources
-    from measure.calibrate.known import known
     from measure.calibrate.numerics import FLAGS, effort
     from measure.calibrate.page import page
-    from measure.calibrate.prior import AZIMUTH, ELEVATION
-    from measure.calibrate.simulation import Flag
     from measure.calibrate.workload import announced
-    from measure.film.similarity import parse_size
-    from measure.film.source import Reading, box_of
+    from measure.film.similarity import FlagSize
+    from measure.film.source import Reading
 
-    if report is not None:
-        check_file(report, command="calibrate")
-    lake = None if lake_path is None else Lake.open(lake_path)
-    if lake is not None and not read_only:
-        lake.check_writable()
-    size = parse_size(flag_size)
-    reading = Reading(crop=box_of(crop), flag=flag, aspect=size.aspect)
-    made_of = None if material is None else fabric(material, where="--material")
-    weighable = None
-    if only != "anemometer":
-        weighable = Sources.open(
-            sources, size, reading, lake=lake, at=branch, first=first, last=last, log=log, offset=offset
-        )
-    anemometer = None
-    if only != "weight":
-        anemometer = _anemometer(
-            sources,
-            size,
-            reading,
-            only=only,
-            name=name,
-            model=model,
-            lake=lake,
-            branch=branch,
-            commit=not read_only,
-            first=first,
-            last=last,
-            level=level,
-        )
+    if chosen.report is not None:
+        check_file(chosen.report, command="calibrate")
+    lake = chosen.opened()
+    size = FlagSize.of(chosen.flag_size)
+    reading = Reading.of(chosen, size)
+    drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
+    options = options_of(chosen, size, **drawn)
+    weighable = anemometer = None
+    if chosen.only != "anemometer":
+        weighable = sources_of(chosen.recordings, chosen, size, lake, at=chosen.version)
+    if chosen.only != "weight":
+        anemometer = _anemometer(chosen, size, reading, lake)
     if weighable is None:
         if anemometer is not None:
-            _report(anemometer, report, as_json=as_json)
+            _report(anemometer, chosen.report, as_json=chosen.as_json)
         return
-    options = Options(
-        flag=Flag(length=size.length, height=size.height, attachment=attachment),
-        azimuth=AZIMUTH if azimuth is None else known(AZIMUTH, azimuth, where="--azimuth"),
-        elevation=ELEVATION if elevation is None else known(ELEVATION, elevation, where="--elevation"),
-        distance=distance,
-        simulations=simulations,
-        level=level,
-        seed=seed,
-        material=made_of,
-    )
+    workers = chosen.workers or os.cpu_count() or 1
     with progress(None, label="observe", unit="window") as advance:
         gathered = weighable.read(size, advance=advance)
     observed, parents = gathered.recordings, gathered.parents
-    work = sum(simulations * one.duration + effort(one.duration) for one in observed)
+    work = sum(options.simulations * one.duration + effort(one.duration) for one in observed)
     say(announced(work, workers=workers))
-    with progress((simulations + FLAGS) * len(observed), label="calibrate", unit="flag") as advance:
+    with progress((options.simulations + FLAGS) * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
             observed,
             options,
-            folder=(cache or user_cache() / "calibrate"),
+            folder=folder_of(chosen),
             workers=workers,
             left_out=gathered.left_out,
             advance=advance,
         )
     wanted = None
-    if lake is not None and not read_only:
-        wanted = placed(lake, artifact(found, reading, parents), branch=branch).artifact.id
-    text = None if report is None else page(found, _provenance(found, wanted), sections=_sections(anemometer))
+    if lake is not None and not chosen.read_only:
+        wanted = placed(lake, artifact(found, reading, parents), branch=chosen.branch).artifact.id
+    text = None if chosen.report is None else page(found, _provenance(found, wanted), sections=_sections(anemometer))
     place = None
     if lake is not None and wanted is not None:
-        place = keep(lake, found, reading, parents, branch=branch)
+        place = keep(lake, found, reading, parents, branch=chosen.branch)
         say(f"{wanted[:SHORT]}  measurement, {place.sentence}")
-    if report is not None and text is not None:
+    if chosen.report is not None and text is not None:
         new = place is not None and place.new
         with following(f"the calibration {wanted}", "writing its report") if new else nullcontext():
-            write_file(report, text, command="calibrate")
-            say(f"report: {report}")
-    if as_json:
+            write_file(chosen.report, text, command="calibrate")
+            say(f"report: {chosen.report}")
+    if chosen.as_json:
         own = None if anemometer is None else anemometer.as_dict()
         document("calibrate", {**found.as_dict(), "artifact": wanted, "anemometer": own})
     else:
@@ -282,53 +152,38 @@ def calibrate(
         raise click.exceptions.Exit(RefusedError.exit_code)
 
 
-_OF_WEIGHT = (
+_OF_WEIGHT = {
     "attachment",
-    "azimuth",
-    "elevation",
+    "azimuth_deg",
+    "elevation_deg",
     "distance",
     "material",
     "log",
-    "offset",
+    "clock_offset",
     "simulations",
     "workers",
     "cache",
     "seed",
-)
-_OF_ANEMOMETER = ("name", "model")
+}
 
 
-def _check_only(only: str | None) -> None:
+def _check_only(chosen: CalibrateCommand) -> None:
     """Raises:
     UsageError: an option of what is not to be done.
     """
-    context = click.get_current_context()
-    for option in {"weight": _OF_ANEMOMETER, "anemometer": _OF_WEIGHT}.get(only or "", ()):
-        if context.get_parameter_source(option) is ParameterSource.COMMANDLINE:
-            raise UsageError(f"--{option} with --only {only}", where=f"--{option}", fix=f"leave --{option} out")
+    others = {"weight": {"name", "model"}, "anemometer": _OF_WEIGHT}.get(chosen.only or "", set())
+    for name in sorted(others & typed(chosen)):
+        option = f"--{name.removesuffix('_deg').replace('_', '-')}"
+        raise UsageError(f"{option} with --only {chosen.only}", where=option, fix=f"leave {option} out")
 
 
-def _anemometer(
-    sources: tuple[str, ...],
-    size: FlagSize,
-    reading: Reading,
-    *,
-    only: str | None,
-    name: str | None,
-    model: str | None,
-    lake: Lake | None,
-    branch: str,
-    commit: bool,
-    first: float,
-    last: float | None,
-    level: float,
-) -> Made | None:
+def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: Reading, lake: Lake | None) -> Made | None:
     """The reading model; None with the reason on stderr where none can be made and the weight was asked for as well."""
     from measure.anemometer.making import made
     from measure.calibrate.filmed import is_table
 
-    if any(is_table(source) for source in sources):
-        if only is None and name is None and model is None:
+    if any(is_table(source) for source in chosen.recordings):
+        if chosen.only is None and chosen.name is None and chosen.model is None:
             return None
         raise UsageError(
             "a table of observables has no pictures, which a reading model takes",
@@ -338,21 +193,21 @@ def _anemometer(
     try:
         with progress(None, label="read", unit="window") as advance:
             done = made(
-                sources,
+                chosen.recordings,
                 size,
                 reading,
-                name=name,
-                model=model,
+                name=chosen.name,
+                model=chosen.model,
                 lake=lake,
-                branch=branch,
-                commit=commit,
-                first=first,
-                last=last,
-                level=level,
+                at=chosen.version,
+                branch=None if chosen.read_only else chosen.branch,
+                first=chosen.start or 0.0,
+                last=chosen.end,
+                level=chosen.level,
                 advance=advance,
             )
     except (InputError, RefusedError) as error:
-        if only is not None:
+        if chosen.only is not None:
             raise
         say(f"no reading model: {error.what}" + (f"; {error.fix}" if error.fix else ""))
         return None

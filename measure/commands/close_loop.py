@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from click.core import ParameterSource
 
 from flagdata.commands.confirm import on_command_line
-from flagdata.commands.sections import LongCommand
-from flagdata.console import LakePlace, LocalPath, json_option, say
+from flagdata.console import LocalPath, say
 from flagdata.errors import UnknownNameError, UsageError
-from flagdata.storage import Place
-from measure.closing.command_line import null_options, nulls_given, refuse, stage_bars
+from flagdata.option_types import POSITIVE
+from flagdata.options import argument, command, option, options, typed
+from flagdata.shared_options import AsJson, NamedLake, OnBranch
+from measure.closing.command_line import TEST, nulls_given, refuse, stage_bars
 from measure.closing.findings import with_warnings
-from measure.films.command_line import Given, film_options, refuse_of_others
+from measure.films.command_line import JudgingFilms, refuse_of_others
 
 if TYPE_CHECKING:
     from measure.closing.artifacts import Answer
@@ -26,141 +25,105 @@ if TYPE_CHECKING:
     from measure.observe.recipe import ExperimentRecipe
     from sim.material import Material
 
+MARKERS, WIND = "Markers and meshes", "The wind beside markers"
 _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "rate", "unit", "noise", "up")
 """Options that say how sources of the command line are read."""
 
 
-@click.command("close-loop", cls=LongCommand)
-@click.argument("sources", metavar="SOURCE...", nargs=-1)
-@click.option(
-    "--recipe",
-    "recipe_path",
-    type=LocalPath(),
-    metavar="FILE.toml",
-    help="Recipe of the cloth, pins, wind and test; it may name the recordings as well.",
-)
-@click.option(
-    "--wind",
-    "winds",
-    multiple=True,
-    metavar="M/S|LOG|ID",
-    help="Wind beside the recordings: one for all of them, or one for each.",
-)
-@click.option(
-    "--axis",
-    default="1,0,0",
-    show_default=True,
-    metavar="X,Y,Z",
-    help="Direction towards which a wind given as a speed blows.",
-)
-@click.option(
-    "--north",
-    type=float,
-    metavar="DEG",
-    help="Where north lies, as an angle from +x towards +y, for a log that has directions.",
-)
-@click.option("--offset", type=float, help="Time from the first sample of the log to the first frame [s].")
-@click.option(
-    "--sensor", metavar="NAME|FILE.toml", help="Recipe that says how to read a log that does not say so itself."
-)
-@click.option("--zone", help="Time zone of the stamps of a log: +02:00, or an IANA name.")
-@click.option(
-    "--accept", metavar="HASH", help="Confirms how a log without a recipe is read, by the hash of its refusal."
-)
-@click.option(
-    "--material",
-    help="Nominal material, a name of the catalog; by default the one that the source states. Of films: what the flag "
-    "is made of, as in woven-polyester, knit or camel-ponte-roma; by default any fabric.",
-)
-@click.option(
-    "--density-uncertainty",
-    type=click.FloatRange(0, 1, min_open=True),
-    help="Relative standard uncertainty of the material's area weight: 0.02 for a cloth that was weighed to 2 %; "
-    "by default 0.3.",
-)
-@click.option("--size", metavar="WxH", help="Size of the flat cloth [m]; by default the outline of the markers.")
-@click.option(
-    "--pins",
-    help="Where it is held: hoist-corners, top-corners, hoist, or u,v;u,v;… [m]; by default as the source states.",
-)
-@click.option(
-    "--rate", type=click.FloatRange(min=0, min_open=True), help="Frames per second, if the source does not state them."
-)
-@click.option("--unit", default="m", show_default=True, help="Unit of the positions.")
-@click.option(
-    "--up", default="z", show_default=True, help="Axis of the recordings that points up: z, y, x, -z, -y or -x."
-)
-@click.option(
-    "--noise",
-    type=click.FloatRange(min=0),
-    help="Standard deviation of a marker's coordinate [m]; by default it is estimated.",
-)
-@film_options
-@null_options(level="Significance level of the global test; 0.05 by default.")
-@click.option(
-    "--suspect",
-    metavar="EFFECT[+|-]",
-    help="An effect that was suspected before the recordings were looked at, as in lift or vertical-wind-; it alone "
-    "is tested for, in that direction, and seen where it is weaker.",
-)
-@click.option(
-    "--most-nulls",
-    type=click.IntRange(min=1),
-    default=320,
-    show_default=True,
-    help="Number up to which more are simulated where p is within a factor of two of the level.",
-)
-@click.option(
-    "--lake",
-    "lake_path",
-    type=LakePlace(),
-    envvar="FLAGDATA_LAKE",
-    help="Lake that artifacts are read from and results are written to; also FLAGDATA_LAKE.",
-)
-@click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
-@click.option("--name", help="Name of the measurement and its models; by default that of the first source.")
-@click.option(
-    "--out",
-    type=LocalPath(),
-    default=Path("out/close-loop"),
-    show_default=True,
-    help="Folder that report.html, verdict.json and the models are written to.",
-)
-@json_option
-@click.pass_context
-def close_loop(
-    context: click.Context,
-    film: Given,
-    sources: tuple[str, ...],
-    recipe_path: Path | None,
-    winds: tuple[str, ...],
-    axis: str,
-    north: float | None,
-    offset: float | None,
-    sensor: str | None,
-    zone: str | None,
-    accept: str | None,
-    material: str | None,
-    density_uncertainty: float | None,
-    size: str | None,
-    pins: str | None,
-    rate: float | None,
-    unit: str,
-    up: str,
-    noise: float | None,
-    nulls: int | None,
-    suspect: str | None,
-    most_nulls: int,
-    bank: Path | None,
-    level: float | None,
-    seed: int,
-    workers: int | None,
-    lake_path: Place | None,
-    branch: str,
-    name: str | None,
-    out: Path,
-    as_json: bool,
-) -> None:
+@options
+class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
+    """How recordings of one cloth are read and judged, and what is written."""
+
+    sources: tuple[str, ...] = argument("Recordings of one cloth.", "SOURCE...", default=())
+    recipe: Path | None = option(
+        "Recipe of the cloth, pins, wind and test; it may name the recordings as well.",
+        default=None,
+        section=MARKERS,
+        type=LocalPath(),
+        metavar="FILE.toml",
+    )
+    density_uncertainty: float | None = option(
+        "Relative standard uncertainty of the material's area weight: 0.02 for a cloth that was weighed to 2 %; by "
+        "default 0.3.",
+        default=None,
+        section=MARKERS,
+        type=click.FloatRange(0, 1, min_open=True),
+    )
+    size: str | None = option(
+        "Size of the flat cloth [m]; by default the outline of the markers.",
+        default=None,
+        section=MARKERS,
+        metavar="WxH",
+    )
+    pins: str | None = option(
+        "Where it is held: hoist-corners, top-corners, hoist, or u,v;u,v;… [m]; by default as the source states.",
+        default=None,
+        section=MARKERS,
+    )
+    rate: float | None = option(
+        "Frames per second, if the source does not state them.",
+        default=None,
+        section=MARKERS,
+        type=click.FloatRange(min=0, min_open=True),
+    )
+    unit: str = option("Unit of the positions.", default="m", section=MARKERS)
+    up: str = option("Axis of the recordings that points up: z, y, x, -z, -y or -x.", default="z", section=MARKERS)
+    noise: float | None = option(
+        "Standard deviation of a marker's coordinate [m]; by default it is estimated.",
+        default=None,
+        section=MARKERS,
+        type=click.FloatRange(min=0),
+    )
+    winds: tuple[str, ...] = option(
+        "Wind beside the recordings: one for all of them, or one for each.",
+        "--wind",
+        default=(),
+        section=WIND,
+        metavar="M/S|LOG|ID",
+    )
+    axis: str = option(
+        "Direction towards which a wind given as a speed blows.", default="1,0,0", section=WIND, metavar="X,Y,Z"
+    )
+    north: float | None = option(
+        "Where north lies, as an angle from +x towards +y, for a log that has directions.",
+        default=None,
+        section=WIND,
+        metavar="DEG",
+    )
+    offset: float | None = option(
+        "Time from the first sample of the log to the first frame [s].", default=None, section=WIND
+    )
+    sensor: str | None = option(
+        "Recipe that says how to read a log that does not say so itself.",
+        default=None,
+        section=WIND,
+        metavar="NAME|FILE.toml",
+    )
+    zone: str | None = option("Time zone of the stamps of a log: +02:00, or an IANA name.", default=None, section=WIND)
+    accept: str | None = option(
+        "Confirms how a log without a recipe is read, by the hash of its refusal.",
+        default=None,
+        section=WIND,
+        metavar="HASH",
+    )
+    most_nulls: int = option(
+        "Number up to which more are simulated where p is within a factor of two of the level.",
+        default=320,
+        section=TEST,
+        type=POSITIVE,
+    )
+    name: str | None = option(
+        "Name of the measurement and its models; by default that of the first source.", default=None
+    )
+    out: Path = option(
+        "Folder that report.html, verdict.json and the models are written to.",
+        default=Path("out/close-loop"),
+        type=LocalPath(),
+    )
+
+
+@command(CloseLoopCommand)
+def close_loop(chosen: CloseLoopCommand) -> None:
     """Find what the model of a cloth lacks, name it, and say what adding it changes on unseen data.
 
     SOURCE is the output folder of an ArcSim run, a table of tracked markers (CSV or Parquet with the columns frame or
@@ -169,8 +132,9 @@ def close_loop(
     artifacts; `flagdata simulate` runs a model by its name.
 
     Or SOURCE is a film with its log, a recording of --lake by its name or id, or a table of observables as `flagdata
-    calibrate` takes it: then what a flag shows in windows of 2.5 s is compared, and --flag-size is needed. Films beside
-    markers of the same cloth are judged together: each kind at half of the level, with one joint answer.
+    calibrate` takes it: then what a flag shows in windows of 2.5 s is compared, and --flag-size is needed; the options
+    of flag, camera, film and tables are about these. Films beside markers of the same cloth are judged together: each
+    kind at half of the level, with one joint answer.
 
     \b
       flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8
@@ -178,7 +142,7 @@ def close_loop(
       flagdata close-loop --recipe flag.toml --lake lake
       flagdata close-loop monday tuesday --lake lake --flag-size 1.5x1.0 --azimuth 70±7
     """
-    from flagdata.lake import Lake
+    from flagdata.api.lakes import lake_of
     from flagdata.outputs import check_files
     from measure.closing.artifacts import answer_of
     from measure.closing.close import close_loop as close
@@ -192,60 +156,61 @@ def close_loop(
     from measure.observe import Setup, observe
     from measure.observe import recipe as recipes
 
-    recipe = None if recipe_path is None else recipes.parse(recipe_path)
+    recipe = None if chosen.recipe is None else recipes.parse(chosen.recipe)
     in_recipe = recipe is not None and bool(recipe.recordings)
-    if not in_recipe and not sources:
+    if not in_recipe and not chosen.sources:
         raise UsageError("no recordings", where="SOURCE", fix="name them, or a recipe that does")
-    check_files(out, *dict.fromkeys((*FILES, *JOINT)), command="close-loop")
-    lake = None if lake_path is None else Lake.open(lake_path)
+    check_files(chosen.out, *dict.fromkeys((*FILES, *JOINT)), command="close-loop")
+    lake, branch, name, out = lake_of(chosen.lake), chosen.branch, chosen.name, chosen.out
     if lake is not None:
         lake.check_writable()
-    films = films_among(sources, lake=lake, at=branch, sized=film.flag_size is not None, tracked=in_recipe)
-    tracked = tuple(source for source in sources if source not in films)
+    films = films_among(chosen.sources, lake=lake, at=branch, sized=chosen.flag_size is not None, tracked=in_recipe)
+    tracked = tuple(source for source in chosen.sources if source not in films)
     if in_recipe:
-        _refuse_beside(context, tracked)
+        _refuse_beside(chosen, tracked)
     both = bool(films) and (in_recipe or bool(tracked))
     names = {kind: name if name is None or not both else f"{name}-{kind}" for kind in KINDS}
     if both:
         for kind in KINDS:
             check_files(out / kind, *FILES, command="close-loop")
-        if nulls is not None:
+        if chosen.nulls is not None:
             raise UsageError(
                 "films count kinds of numerics, and markers recordings",
                 where="--nulls",
                 fix="leave it out: 40 kinds are simulated for markers and 20 for films",
             )
     else:
-        refuse_of_others(context, films=bool(films))
+        refuse_of_others(chosen, films=bool(films))
 
     def of_markers(level: float | None) -> tuple[Answer, Material]:
         """The answer by markers, and the cloth's nominal material."""
-        said = nulls_given(recipe, level=level, nulls=nulls, bank=bank)
+        said = nulls_given(recipe, chosen, level=level)
         options = Options(
-            seed=seed,
-            bank=bank,
-            most_nulls=most_nulls,
-            workers=workers or len(os.sched_getaffinity(0)),
-            suspected=None if suspect is None else Suspicion.parse(suspect, on_markers()),
+            seed=chosen.seed,
+            bank=chosen.bank,
+            most_nulls=chosen.most_nulls,
+            workers=chosen.processes,
+            suspected=None if chosen.suspect is None else Suspicion.parse(chosen.suspect, on_markers()),
             **said,
         )
-        setup = _setup(Setup() if recipe is None else recipe.setup, material, density_uncertainty, size, pins)
+        setup = _setup(Setup() if recipe is None else recipe.setup, chosen)
         if recipe is not None and in_recipe:
             observed = recipes.read(replace(recipe, setup=setup), lake)
         else:
+            north = chosen.north
             reading = Reading(
-                rate=rate,
-                unit=unit,
-                noise=noise,
-                offset=offset,
-                up=_up(context, up, recipe),
-                sensor=sensor,
-                zone=zone,
-                axis=_axis(context, axis, north),
-                confirm=on_command_line(accept, as_json=as_json),
+                rate=chosen.rate,
+                unit=chosen.unit,
+                noise=chosen.noise,
+                offset=chosen.offset,
+                up=_up(chosen, recipe),
+                sensor=chosen.sensor,
+                zone=chosen.zone,
+                axis=_axis(chosen),
+                confirm=on_command_line(chosen.accept, as_json=chosen.as_json),
                 north=None if north is None else math.radians(north),
             )
-            observed = observe(read(tracked, winds, reading, lake), setup)
+            observed = observe(read(tracked, chosen.winds, reading, lake), setup)
         refuse(observed.findings)
         recordings, cloth = observed.experiment.recordings, observed.experiment.specimen
         say(of_recordings(recordings, cloth.mesh.vertex_count, options, workers=options.workers))
@@ -258,36 +223,24 @@ def close_loop(
             options,
             name=called,
             findings=observed.findings,
-            models=models(verdict, observed.experiment, name=called, seed=seed),
+            models=models(verdict, observed.experiment, name=called, seed=chosen.seed),
         )
         return answer, cloth.material
 
     def of_films(level: float | None) -> Answer:
         from measure.films.command import close_films
 
-        return close_films(
-            films,
-            film,
-            lake=lake,
-            branch=branch,
-            name=names["films"],
-            material=material,
-            level=level,
-            nulls=nulls,
-            suspect=suspect,
-            seed=seed,
-            workers=workers,
-        )
+        return close_films(films, chosen, lake=lake, branch=branch, name=names["films"], level=level)
 
     if not both:
-        answer = of_films(level) if films else of_markers(level)[0]
-        deliver(answer, out=out, lake=lake, branch=branch, as_json=as_json)
+        answer = of_films(chosen.level) if films else of_markers(chosen.level)[0]
+        deliver(answer, out=out, lake=lake, branch=branch, as_json=chosen.as_json)
         return
     from measure.calibrate.simulation import mean_bending
     from measure.closing.joint import joined
     from measure.verdict.criteria import CRITERIA
 
-    whole = level or (None if recipe is None else recipe.level) or CRITERIA.level
+    whole = chosen.level or (None if recipe is None else recipe.level) or CRITERIA.level
     by_films = of_films(whole / 2)
     by_markers, nominal = of_markers(whole / 2)
     joint = joined(
@@ -296,16 +249,16 @@ def close_loop(
         level=whole,
         nominal={"area_weight": nominal.density, "bending": mean_bending(nominal)},
     )
-    deliver_joint(joint, (by_markers, by_films), out=out, lake=lake, branch=branch, as_json=as_json)
+    deliver_joint(joint, (by_markers, by_films), out=out, lake=lake, branch=branch, as_json=chosen.as_json)
 
 
-def _refuse_beside(context: click.Context, sources: tuple[str, ...]) -> None:
+def _refuse_beside(chosen: CloseLoopCommand, sources: tuple[str, ...]) -> None:
     """Options that would be ignored beside a recipe that names its recordings."""
     if sources:
         raise UsageError("the recipe names its recordings", where="SOURCE", fix="leave SOURCE or [[recording]] out")
-    for option in _OF_SOURCES:
-        if context.get_parameter_source(option) is ParameterSource.COMMANDLINE:
-            spelled = "wind" if option == "winds" else option
+    for name in _OF_SOURCES:
+        if name in typed(chosen):
+            spelled = "wind" if name == "winds" else name
             raise UsageError(
                 "the recipe says how its recordings are read", where=f"--{spelled}", fix="write it into the recipe"
             )
@@ -318,10 +271,11 @@ def _name(recording: str, sources: tuple[str, ...], recipe: ExperimentRecipe | N
     return recording if recipe is None or sources else recipe.title
 
 
-def _axis(context: click.Context, text: str, north: float | None) -> tuple[float, float, float] | None:
+def _axis(chosen: CloseLoopCommand) -> tuple[float, float, float] | None:
     """Where the air goes; None where north is given."""
-    if north is not None:
-        if context.get_parameter_source("axis") is ParameterSource.COMMANDLINE:
+    text = chosen.axis
+    if chosen.north is not None:
+        if "axis" in typed(chosen):
             raise UsageError("both --axis and --north are given", where="--north", fix="keep one of them")
         return None
     try:
@@ -333,38 +287,36 @@ def _axis(context: click.Context, text: str, north: float | None) -> tuple[float
     return x, y, z
 
 
-def _up(context: click.Context, text: str, recipe: ExperimentRecipe | None) -> Up:
+def _up(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Up:
     from measure.observe import Up
 
-    if recipe is not None and context.get_parameter_source("up") is not ParameterSource.COMMANDLINE:
+    if recipe is not None and "up" not in typed(chosen):
         return recipe.up
-    if text not in list(Up):
-        raise UnknownNameError.of("axis", text, list(Up), where="--up")
-    return Up(text)
+    if chosen.up not in list(Up):
+        raise UnknownNameError.of("axis", chosen.up, list(Up), where="--up")
+    return Up(chosen.up)
 
 
-def _setup(
-    setup: Setup, material: str | None, density_uncertainty: float | None, size: str | None, pins: str | None
-) -> Setup:
+def _setup(setup: Setup, chosen: CloseLoopCommand) -> Setup:
     """A setup with what the command line says instead."""
     from measure.observe import Hold, sheet
     from sim.material import MATERIALS, named
 
-    if material is not None:
-        if material not in MATERIALS.names():
-            raise UnknownNameError.of("material", material, MATERIALS.names(), where="--material")
-        setup = replace(setup, material=named(material))
-    if density_uncertainty is not None:
-        setup = replace(setup, mass_known=True, density_uncertainty=density_uncertainty)
-    if size is not None:
+    if chosen.material is not None:
+        if chosen.material not in MATERIALS.names():
+            raise UnknownNameError.of("material", chosen.material, MATERIALS.names(), where="--material")
+        setup = replace(setup, material=named(chosen.material))
+    if chosen.density_uncertainty is not None:
+        setup = replace(setup, mass_known=True, density_uncertainty=chosen.density_uncertainty)
+    if chosen.size is not None:
         try:
-            width, height = (float(part) for part in size.lower().split("x"))
+            width, height = (float(part) for part in chosen.size.lower().split("x"))
         except ValueError as error:
-            raise UsageError(f"{size!r} is not a size", where="--size", fix="give 1.5x1.0, in metres") from error
+            raise UsageError(f"{chosen.size!r} is not a size", where="--size", fix="give 1.5x1.0, in metres") from error
         setup = replace(setup, outline=sheet(width, height))
-    if pins is not None:
+    if chosen.pins is not None:
         held: Hold | tuple[tuple[float, float], ...]
-        held = Hold(pins) if pins in {h.value for h in Hold} else _places(pins)
+        held = Hold(chosen.pins) if chosen.pins in {h.value for h in Hold} else _places(chosen.pins)
         setup = replace(setup, pins=held)
     return setup
 

@@ -10,150 +10,64 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.commands.durations import DURATION
-from flagdata.commands.sections import LongCommand
-from flagdata.commands.statements import STATED
-from flagdata.console import (
-    LakePlace,
-    LocalPath,
-    csv_rows,
-    document,
-    echo,
-    following,
-    json_option,
-    progress,
-    say,
-    say_finding,
-)
+from flagdata.api.measuring import Measuring
+from flagdata.console import LocalPath, csv_rows, document, echo, following, progress, say, say_finding
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.options import argument, command, option, options
 from flagdata.printable import SHORT
-from flagdata.storage import Place
-from measure.film_options import film_options
+from flagdata.shared_options import FILM, HOW, WRITTEN, AsJson, Keeping
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
-    from flagdata.stated import Stated
     from measure.anemometer.network import Network
+    from measure.commands.measuring import Request
     from measure.estimate.measuring import Measurement, Options
     from measure.estimate.series import Beside
     from measure.film.source import Reading, Subject
     from measure.refine.refinement import Refinement
 
 
-@click.command(cls=LongCommand)
-@click.argument("source", required=False, metavar="[SOURCE]")
-@click.option("--query", metavar="EXPR", help='SQL condition over clips, instead of SOURCE: "wind between 3 and 6".')
-@click.option(
-    "--flag-size",
-    metavar="LxH",
-    help="Length along the wind and height along the pole [m], as in 1.5x1.0; of a hanging cloth its width and height.",
-)
-@click.option(
-    "--area-weight",
-    type=STATED,
-    metavar="VALUE",
-    help="Area weight of the cloth [kg/m²]: 0.284, 0.284±0.01 (deviation) or 0.27:0.30.",
-)
-@click.option(
-    "--material",
-    metavar="NAME",
-    help="Cloth whose area weight is taken, a material of the catalog or a "
-    "fabric that films of the lake declare; nothing else of it is used.",
-)
-@click.option(
-    "--windows",
-    "--window",
-    "step",
-    type=DURATION,
-    metavar="TIME",
-    help="A wind series, one window every so often, as in 1.2s.",
-)
-@film_options
-@click.option(
-    "--level",
-    type=click.FloatRange(0, 1, min_open=True, max_open=True),
-    default=0.9,
-    show_default=True,
-    help="Level of the intervals.",
-)
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all draws.")
-@click.option(
-    "--model",
-    metavar="NAME|FOLDER|ID",
-    help="Network that measures, or reading model of flagdata calibrate; by default flow-outdoor, of flags.",
-)
-@click.option(
-    "--refine",
-    type=click.IntRange(min=20),
-    metavar="N",
-    help="Refine the first window by N simulated clips, 20 or more; 50 take minutes.",
-)
-@click.option(
-    "--cache",
-    type=LocalPath(),
-    metavar="FOLDER",
-    help="Where simulated clips are kept, so that an interrupted refinement goes on.",
-)
-@click.option(
-    "--false-alarm",
-    type=click.FloatRange(0, 1, min_open=True, max_open=True),
-    default=0.05,
-    show_default=True,
-    help="Share of familiar films that the gate may refuse.",
-)
-@click.option(
-    "--anyway",
-    is_flag=True,
-    help="Show, marked, what the model says of a film that the gate refuses, if anything moves in it.",
-)
-@click.option("--report", type=LocalPath(), metavar="FILE.html", help="Write a page that needs no other.")
-@click.option(
-    "--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER", help="Write draws and series as a Zarr data set."
-)
-@click.option("--csv", "as_csv", is_flag=True, help="The windows as comma-separated values on stdout.")
-@click.option(
-    "--lake",
-    "lake_path",
-    type=LakePlace(),
-    envvar="FLAGDATA_LAKE",
-    help="Where artifacts are, and where measurements go; also FLAGDATA_LAKE.",
-)
-@click.option(
-    "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."
-)
-@click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
-@click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
-@json_option
-def measure(
-    source: str | None,
-    query: str | None,
-    flag_size: str | None,
-    area_weight: Stated | None,
-    material: str | None,
-    step: float | None,
-    crop: str | None,
-    flag: int | None,
-    first: float | None,
-    last: float | None,
-    true_fps: float | None,
-    sequence_fps: float | None,
-    level: float,
-    seed: int,
-    model: str | None,
-    refine: int | None,
-    cache: Path | None,
-    false_alarm: float,
-    anyway: bool,
-    report: Path | None,
-    zarr_path: Path | None,
-    as_csv: bool,
-    lake_path: Place | None,
-    at: str | None,
-    branch: str,
-    read_only: bool,
-    as_json: bool,
-) -> None:
+@options
+class MeasureCommand(AsJson, Measuring, Keeping):
+    """The same on the command line: which of a lake's clips, what is refined, and what is written."""
+
+    source: str | None = argument("the film; see `flagdata.measure`.", "[SOURCE]", default=None)
+    query: str | None = option(
+        'SQL condition over clips, instead of SOURCE: "wind between 3 and 6".',
+        default=None,
+        section=FILM,
+        metavar="EXPR",
+    )
+    refine: int | None = option(
+        "Refine the first window by N simulated clips, 20 or more; 50 take minutes.",
+        default=None,
+        section=HOW,
+        type=click.IntRange(min=20),
+        metavar="N",
+    )
+    cache: Path | None = option(
+        "Where simulated clips are kept, so that an interrupted refinement goes on.",
+        default=None,
+        section=HOW,
+        type=LocalPath(),
+        metavar="FOLDER",
+    )
+    report: Path | None = option(
+        "Write a page that needs no other.", default=None, section=WRITTEN, type=LocalPath(), metavar="FILE.html"
+    )
+    zarr: Path | None = option(
+        "Write draws and series as a Zarr data set.",
+        default=None,
+        section=WRITTEN,
+        type=LocalPath(),
+        metavar="FOLDER",
+    )
+    as_csv: bool = option("The windows as comma-separated values on stdout.", "--csv", default=False, section=WRITTEN)
+
+
+@command(MeasureCommand)
+def measure(chosen: MeasureCommand) -> None:
     """Measure wind and area weight from a film of a flag, with intervals.
 
     SOURCE is a video file, a folder of images, a recording, clip or camera of --lake by its name or id, or the film
@@ -167,73 +81,41 @@ def measure(
       flagdata measure recording-7 --lake lake --windows 1.2s --csv
       flagdata measure --lake lake --query "wind between 3 and 6" --json
     """
-    if as_json and as_csv:
+    if chosen.as_json and chosen.as_csv:
         raise UsageError("more than one form of output", fix="choose one of --json and --csv")
-    if cache is not None and refine is None:
+    if chosen.cache is not None and chosen.refine is None:
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
-    from flagdata.lake import Lake
     from flagdata.outputs import check_file, check_folder
     from measure.anemometer.network import network
-    from measure.commands.measuring import weight
-    from measure.estimate.measuring import Options
-    from measure.film.similarity import parse_size
-    from measure.film.source import Reading, box_of, size_of, subjects
+    from measure.commands.measuring import Request
+    from measure.film.source import subjects
 
-    if report is not None:
-        check_file(report, command="measure")
-    if zarr_path is not None:
-        check_folder(zarr_path)
-    box = box_of(crop)
-    lake = None if lake_path is None else Lake.open(lake_path)
-    if lake is not None and not read_only:
-        lake.check_writable()
-    seen = at if at is not None else branch
-    stated, origin = weight(area_weight, material, lake=lake, at=seen)
-    if stated is not None and origin is not None:
-        say(f"area weight {stated.text} kg/m² of {material}: {origin}")
-    size = size_of(source, None if flag_size is None else parse_size(flag_size))
-    aspect = None if size is None else size.aspect
-    reading = Reading(crop=box, flag=flag, aspect=aspect, true_fps=true_fps, sequence_fps=sequence_fps)
-    options = Options(
-        size=size,
-        step=step,
-        first=first,
-        last=last,
-        level=level,
-        false_alarm=false_alarm,
-        seed=seed,
-        refine=refine,
-        area_weight=stated,
-    )
-    found = subjects(source, query=query, lake=lake, at=seen, reading=reading)
-    job = _Job(
-        options=options,
-        reading=reading,
-        network=network(model, lake=lake, at=seen),
-        lake=lake,
-        at=seen,
-        branch=branch,
-        commit=not read_only,
-        anyway=anyway,
-        report=report,
-        zarr=zarr_path,
-        cache=cache,
-    )
-    if query is not None:
-        if report is not None or zarr_path is not None or as_csv or refine is not None:
+    if chosen.report is not None:
+        check_file(chosen.report, command="measure")
+    if chosen.zarr is not None:
+        check_folder(chosen.zarr)
+    lake, at = chosen.opened(), chosen.version
+    request = Request.of(chosen, lake=lake, at=at, refine=chosen.refine)
+    weight = request.options.area_weight
+    if weight is not None and request.origin is not None:
+        say(f"area weight {weight.text} kg/m² of {chosen.material}: {request.origin}")
+    found = subjects(chosen.source, query=chosen.query, lake=lake, at=at, reading=request.reading)
+    job = _Job(chosen=chosen, request=request, network=network(chosen.model, lake=lake, at=at), lake=lake, at=at)
+    if chosen.query is not None:
+        if chosen.report is not None or chosen.zarr is not None or chosen.as_csv or chosen.refine is not None:
             raise UsageError(
                 "a page, a Zarr, a CSV or a refinement is of one film", fix="measure one clip by its id, or use --json"
             )
-        _several(job, found, as_json=as_json)
+        _several(job, found)
         return
     done = job.do(found[0])
     job.refuse(done)
-    if as_json:
-        document("measure", done.as_dict(anyway=anyway))
-    elif as_csv:
+    if chosen.as_json:
+        document("measure", done.as_dict(anyway=chosen.anyway))
+    elif chosen.as_csv:
         csv_rows(done.series.rows())
     else:
-        _report(done, series=step is not None)
+        _report(done, series=chosen.step is not None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -262,17 +144,11 @@ class _Done:
 class _Job:
     """How all films of one command are measured, and where what is found goes."""
 
-    options: Options
-    reading: Reading
+    chosen: MeasureCommand
+    request: Request
     network: Network
     lake: Lake | None
-    at: str | None
-    branch: str
-    commit: bool
-    anyway: bool
-    report: Path | None
-    zarr: Path | None
-    cache: Path | None
+    at: str
 
     def do(self, subject: Subject) -> _Done:
         """Measure one film; commit and write what is to be shown."""
@@ -285,30 +161,39 @@ class _Job:
 
         estimator = self.network.estimator
         with _advancing("measure", "window") as advance:
-            measured = run(subject, self.network, self.options, advance=advance)
+            measured = run(subject, self.network, self.request.options, advance=advance)
         wind = None if subject.record is None else subject.record.wind()
         series = beside(measured, start=subject.film.start, wind=wind)
-        _warn(measured.noticed(anyway=self.anyway))
-        shown = measured.shown(anyway=self.anyway)
+        _warn(measured.noticed(anyway=self.chosen.anyway))
+        shown = measured.shown(anyway=self.chosen.anyway)
         refinement = None
-        if self.options.refine is not None and shown:
+        if self.request.options.refine is not None and shown:
             from measure.estimate.refined import refined
 
-            refinement = refined(measured, subject, estimator, budget=self.options.refine, cache=self.cache)
+            refinement = refined(
+                measured, subject, estimator, budget=self.request.options.refine, cache=self.chosen.cache
+            )
             _warn(refinement.findings)
         found = None if refinement is None else refinement.as_dict()
-        lake = self.lake if self.commit and shown else None
+        lake = None if self.chosen.read_only or not shown else self.lake
         artifact = None
         if lake is not None:
-            row = artifact_of(measured, subject, self.network, self.reading)
-            artifact = placed(lake, row, branch=self.branch).artifact.id
+            row = artifact_of(measured, subject, self.network, self.request.reading)
+            artifact = placed(lake, row, branch=self.chosen.branch).artifact.id
         text = None
-        if self.report is not None:
+        if self.chosen.report is not None:
             text = self._page(measured, series, subject, artifact, refinement)
         published = False
         if lake is not None and artifact is not None:
             place = keep(
-                lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=found
+                lake,
+                measured,
+                subject,
+                self.network,
+                self.request.reading,
+                series,
+                branch=self.chosen.branch,
+                refinement=found,
             )
             published = place.new
             say(f"{artifact[:SHORT]}  measurement, {place.sentence}")
@@ -316,13 +201,13 @@ class _Job:
         def writing(what: str) -> AbstractContextManager[None]:
             return following(f"the measurement {artifact}", f"writing {what}") if published else nullcontext()
 
-        if self.zarr is not None and shown:
-            with writing("its Zarr folder"), fresh_folder(self.zarr) as scratch:
+        if self.chosen.zarr is not None and shown:
+            with writing("its Zarr folder"), fresh_folder(self.chosen.zarr) as scratch:
                 write(scratch, measured, series, found)
-        if self.report is not None and text is not None:
+        if self.chosen.report is not None and text is not None:
             with writing("its report"):
-                write_file(self.report, text, command="measure")
-                say(f"report: {self.report}")
+                write_file(self.chosen.report, text, command="measure")
+                say(f"report: {self.chosen.report}")
         return _Done(measured=measured, series=series, artifact=artifact, subject=subject, refinement=refinement)
 
     def refuse(self, done: _Done) -> None:
@@ -330,8 +215,8 @@ class _Job:
         RefusedError: the gate refused the film, and it is not to be shown anyway or there is nothing to measure.
         """
         verdict = done.measured.verdict
-        if not done.measured.shown(anyway=self.anyway):
-            where = done.measured.film + (f", see {self.report}" if self.report is not None else "")
+        if not done.measured.shown(anyway=self.chosen.anyway):
+            where = done.measured.film + (f", see {self.chosen.report}" if self.chosen.report is not None else "")
             for reason in verdict.reasons[1:]:
                 say(f"also: {reason.what}")
             raise RefusedError(
@@ -368,7 +253,7 @@ class _Job:
                     measured.summary,
                     without=subject.recording,
                     at=self.at,
-                    seed=self.options.seed,
+                    seed=self.request.options.seed,
                     advance=advance,
                 )
         context = Context(
@@ -383,7 +268,7 @@ class _Job:
         sections = ()
         if refinement is not None:
             sections = (Section(anchor="refinement", title="Refined by simulation", body=section(refinement)),)
-        return page(measured, series, context, anyway=self.anyway, sections=sections)
+        return page(measured, series, context, anyway=self.chosen.anyway, sections=sections)
 
     def _provenance(self, subject: Subject, artifact: str | None) -> Mapping[str, str]:
         film = subject.film
@@ -392,8 +277,8 @@ class _Job:
             "film": f"{film.name}, {film.duration:.2f} s at {film.rate:.4g} frames a second",
             "source": f"SHA-256 {source}" if subject.artifact is None else f"{subject.artifact.kind} {source}",
             "network": self.network.described,
-            "options": ", ".join(f"{k} {v}" for k, v in _given(self.options, self.reading).items()),
-            "seed": str(self.options.seed),
+            "options": ", ".join(f"{k} {v}" for k, v in _given(self.request.options, self.request.reading).items()),
+            "seed": str(self.request.options.seed),
         }
         return rows if artifact is None else {**rows, "artifact": artifact}
 
@@ -402,11 +287,11 @@ def _given(options: Options, reading: Reading) -> Mapping[str, Any]:
     return {k: v for k, v in {**options.recipe(), **reading.recipe()}.items() if v is not None}
 
 
-def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
+def _several(job: _Job, found: Sequence[Subject]) -> None:
     done = [job.do(subject) for subject in found]
-    shown = [one for one in done if one.measured.shown(anyway=job.anyway)]
-    if as_json:
-        document("measurements", {"measurements": [one.as_dict(anyway=job.anyway) for one in done]})
+    shown = [one for one in done if one.measured.shown(anyway=job.chosen.anyway)]
+    if job.chosen.as_json:
+        document("measurements", {"measurements": [one.as_dict(anyway=job.chosen.anyway) for one in done]})
     else:
         for one in done:
             source = one.subject.artifact.id[:SHORT] if one.subject.artifact is not None else one.measured.film

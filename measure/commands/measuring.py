@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from flagdata.api.lakes import lake_of
+from flagdata.api.measuring import Measuring
 from flagdata.errors import UsageError
 from flagdata.film_array import Frames
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.camera import CropBox
 from flagdata.lake import Lake
 from flagdata.measured import Answer, Estimate, Measured, Windows
 from flagdata.stated import Stated
@@ -20,7 +22,6 @@ from measure.estimate.answer import Quantity
 from measure.estimate.combine import of_model
 from measure.estimate.material import weight_of
 from measure.estimate.measuring import Measurement, Options, measure
-from measure.film.similarity import FlagSize
 from measure.film.source import Reading, Subject, size_of, subjects
 
 
@@ -65,53 +66,57 @@ def weight(
     return (given, None) if material is None else weight_of(material, lake=lake, at=at)
 
 
-def measured(
-    source: Path | str | Frames,
-    *,
-    flag_size: tuple[float, float] | None,
-    area_weight: float | tuple[float, float] | str | Stated | None,
-    material: str | None,
-    step: float | None,
-    crop: tuple[int, int, int, int] | None,
-    flag: int | None,
-    start: float | None,
-    end: float | None,
-    true_fps: float | None,
-    sequence_fps: float | None,
-    level: float,
-    seed: int,
-    model: str | None,
-    false_alarm: float,
-    lake: Lake | None,
-    at: str | None,
-    anyway: bool,
-) -> Measured:
-    """What `flagdata.measure` does; see there for what it takes.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Request:
+    """What the options of a measurement ask for.
+
+    Attributes:
+        options: how films are measured.
+        reading: how they are read.
+        origin: where the area weight of a material is from; None where none was named.
+    """
+
+    options: Options
+    reading: Reading
+    origin: str | None
+
+    @classmethod
+    def of(cls, chosen: Measuring, *, lake: Lake | None, at: str | None, refine: int | None = None) -> Request:
+        """Reads the options.
+
+        Args:
+            refine: simulated clips of a refinement; None for none.
+
+        Raises:
+            FlagdataError: options that contradict each other, or values that no flag has.
+        """
+        given = None if chosen.area_weight is None else Stated.of(chosen.area_weight)
+        stated, origin = weight(given, chosen.material, lake=lake, at=at)
+        size = size_of(chosen.source, chosen.flag_size)
+        options = Options(
+            size=size,
+            step=chosen.step,
+            first=chosen.start,
+            last=chosen.end,
+            level=chosen.level,
+            false_alarm=chosen.false_alarm,
+            seed=chosen.seed,
+            refine=refine,
+            area_weight=stated,
+        )
+        return cls(options=options, reading=Reading.of(chosen, size), origin=origin)
+
+
+def measured(chosen: Measuring) -> Measured:
+    """Measures one film from Python; see `flagdata.measure`.
 
     Raises:
         FlagdataError: see `flagdata.measure`.
     """
-    given = None if area_weight is None else Stated.of(area_weight)
-    stated, _ = weight(given, material, lake=lake, at=at)
-    size = None if flag_size is None else FlagSize(length=flag_size[0], height=flag_size[1])
-    if not isinstance(source, Frames):
-        size = size_of(source, size)
-    options = Options(
-        size=size,
-        step=step,
-        first=start,
-        last=end,
-        level=level,
-        false_alarm=false_alarm,
-        seed=seed,
-        area_weight=stated,
-    )
-    box = None if crop is None else CropBox(x=crop[0], y=crop[1], width=crop[2], height=crop[3])
-    reading = Reading(
-        crop=box, flag=flag, aspect=None if size is None else size.aspect, true_fps=true_fps, sequence_fps=sequence_fps
-    )
-    (subject,) = _subjects(source, lake=lake, at=at, reading=reading)
-    found = run(subject, network(model, lake=lake, at=at), options)
+    lake = lake_of(chosen.lake)
+    request = Request.of(chosen, lake=lake, at=chosen.at)
+    (subject,) = _subjects(chosen.source, lake=lake, at=chosen.at, reading=request.reading)
+    found = run(subject, network(chosen.model, lake=lake, at=chosen.at), request.options)
     verdict = found.verdict
     return Measured(
         film=found.film,
@@ -130,9 +135,9 @@ def measured(
             )
             for one in verdict.reasons
         ),
-        findings=found.noticed(anyway=anyway),
+        findings=found.noticed(anyway=chosen.anyway),
         figures=subject.film.as_dict(),
-        given=_answer(found) if found.shown(anyway=anyway) else None,
+        given=_answer(found) if found.shown(anyway=chosen.anyway) else None,
     )
 
 

@@ -3,69 +3,43 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import click
-
-from flagdata.commands.durations import DURATION
-from flagdata.commands.sections import LongCommand
-from flagdata.console import LakePlace, LocalPath, document, echo, json_option, progress, say
+from flagdata.api.measuring import Observing
+from flagdata.console import LocalPath, document, echo, progress, say
 from flagdata.errors import RefusedError, UsageError
+from flagdata.options import command, option, options
 from flagdata.printable import SHORT
-from flagdata.storage import Place
-from measure.film_options import film_options
+from flagdata.shared_options import WRITTEN, AsJson, Keeping
+
+if TYPE_CHECKING:
+    from flagdata.lake import Lake
+    from flagdata.rows import Rows
+    from measure.film.source import Reading, Subject
+    from measure.observables.table import Table
 
 
-@click.command(cls=LongCommand)
-@click.argument("source", metavar="SOURCE")
-@click.option(
-    "--flag-size",
-    metavar="LxH",
-    required=True,
-    help="Length along the wind and height along the pole [m], as in 1.5x1.0; the height gives the scale.",
-)
-@click.option("--window", "seconds", type=DURATION, default="2.5s", show_default=True, help="Length of a window.")
-@film_options
-@click.option("--parquet", "parquet_path", type=LocalPath(), metavar="FILE.parquet", help="Write the table as Parquet.")
-@click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER", help="Write the table as a Zarr data set.")
-@click.option(
-    "--picture",
-    "picture_path",
-    type=LocalPath(),
-    metavar="FILE.png",
-    help="Draw each observable against time, and against the log's wind where the recording has one.",
-)
-@click.option(
-    "--lake",
-    "lake_path",
-    type=LakePlace(),
-    envvar="FLAGDATA_LAKE",
-    help="Where recordings are, and where tables go; also FLAGDATA_LAKE.",
-)
-@click.option(
-    "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."
-)
-@click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
-@click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
-@json_option
-def observe(
-    source: str,
-    flag_size: str,
-    seconds: float,
-    crop: str | None,
-    flag: int | None,
-    first: float | None,
-    last: float | None,
-    true_fps: float | None,
-    sequence_fps: float | None,
-    parquet_path: Path | None,
-    zarr_path: Path | None,
-    picture_path: Path | None,
-    lake_path: Place | None,
-    at: str | None,
-    branch: str,
-    read_only: bool,
-    as_json: bool,
-) -> None:
+@options
+class ObserveCommand(AsJson, Observing, Keeping):
+    """The same on the command line, and what is written."""
+
+    parquet: Path | None = option(
+        "Write the table as Parquet.", default=None, section=WRITTEN, type=LocalPath(), metavar="FILE.parquet"
+    )
+    zarr: Path | None = option(
+        "Write the table as a Zarr data set.", default=None, section=WRITTEN, type=LocalPath(), metavar="FOLDER"
+    )
+    picture: Path | None = option(
+        "Draw each observable against time, and against the log's wind where the recording has one.",
+        default=None,
+        section=WRITTEN,
+        type=LocalPath(),
+        metavar="FILE.png",
+    )
+
+
+@command(ObserveCommand)
+def observe(chosen: ObserveCommand) -> None:
     """Read observables off a film: droop, extension, speeds, frequency, amplitudes, wave, area.
 
     SOURCE is a video file, a folder of images, or a recording, clip or camera of --lake by its name or id. Each window
@@ -76,34 +50,71 @@ def observe(
       flagdata observe clip.mp4 --flag-size 1.5x1.0 --parquet clip.parquet --picture clip.png
       flagdata observe recording-7 --lake lake --flag-size 1.5x1.0 --json
     """
-    from flagdata.lake import Lake
     from flagdata.outputs import check_file, check_folder, fresh_folder, write_file
     from flagdata.pages.pictures import png
-    from measure.film.similarity import parse_size
-    from measure.film.source import Reading, box_of, subjects
     from measure.observables.artifact import keep
     from measure.observables.picture import picture
+
+    if chosen.parquet is not None:
+        check_file(chosen.parquet)
+    if chosen.picture is not None:
+        check_file(chosen.picture, command="observe")
+    if chosen.zarr is not None:
+        check_folder(chosen.zarr)
+    lake = chosen.opened()
+    table, subject, reading = _table(chosen, lake, at=chosen.version)
+    for sentence in subject.film.sentences:
+        say(f"  {sentence}")
+    _check_shown(table, subject)
+    identity = None
+    if lake is not None and not chosen.read_only:
+        part = [chosen.start, chosen.end]
+        place = keep(lake, table, subject, {**reading.recipe(), "part": part}, branch=chosen.branch)
+        identity = place.artifact.id
+        say(f"{identity[:SHORT]}  measurement, {place.sentence}")
+    if chosen.parquet is not None:
+        write_file(chosen.parquet, table.parquet())
+    if chosen.zarr is not None:
+        with fresh_folder(chosen.zarr) as scratch:
+            table.write_zarr(scratch)
+    if chosen.picture is not None:
+        write_file(chosen.picture, png(picture(table)), command="observe")
+    if chosen.as_json:
+        document("observe", {**table.as_dict(), "artifact": identity})
+    else:
+        for line in table.lines():
+            echo(line)
+
+
+def observed(chosen: Observing) -> Rows:
+    """Observes a film from Python; see `flagdata.observe`.
+
+    Raises:
+        FlagdataError: see `flagdata.observe`.
+    """
+    from flagdata.api.lakes import lake_of
+    from flagdata.rows import Rows
+
+    table, subject, _ = _table(chosen, lake_of(chosen.lake), at=chosen.at)
+    _check_shown(table, subject)
+    return Rows(table.arrow())
+
+
+def _table(chosen: Observing, lake: Lake | None, *, at: str | None) -> tuple[Table, Subject, Reading]:
+    """Returns the observables of a film, with where it is from and how it was read."""
+    from measure.film.similarity import FlagSize
+    from measure.film.source import Reading, subjects
     from measure.observables.table import table_of
     from measure.observables.watching import count_of, watched
 
-    if parquet_path is not None:
-        check_file(parquet_path)
-    if picture_path is not None:
-        check_file(picture_path, command="observe")
-    if zarr_path is not None:
-        check_folder(zarr_path)
-    if seconds < 1.0:
-        raise UsageError(f"windows of {seconds:g} s", where="--window", fix="give 1s or more: a flutter's period")
-    box = box_of(crop)
-    size = parse_size(flag_size)
-    lake = None if lake_path is None else Lake.open(lake_path)
-    if lake is not None and not read_only:
-        lake.check_writable()
-    reading = Reading(crop=box, flag=flag, aspect=size.aspect, true_fps=true_fps, sequence_fps=sequence_fps)
-    (subject,) = subjects(source, query=None, lake=lake, at=at if at is not None else branch, reading=reading)
-    count = count_of(subject.film, first=first, last=last, seconds=seconds)
-    with progress(count, label="observe", unit="window") as advance:
-        windows = watched(subject.film, size, first=first, last=last, seconds=seconds, advance=advance)
+    if chosen.window < 1.0:
+        raise UsageError(f"windows of {chosen.window:g} s", where="--window", fix="give 1s or more: a flutter's period")
+    size = FlagSize.of(chosen.flag_size)
+    reading = Reading.of(chosen, size)
+    (subject,) = subjects(str(chosen.source), query=None, lake=lake, at=at, reading=reading)
+    part = {"first": chosen.start, "last": chosen.end, "seconds": chosen.window}
+    with progress(count_of(subject.film, **part), label="observe", unit="window") as advance:
+        windows = watched(subject.film, size, **part, advance=advance)
     table = table_of(
         windows,
         film=subject.film.name,
@@ -112,28 +123,16 @@ def observe(
         start=subject.film.start,
         wind=None if subject.record is None else subject.record.wind(),
     )
-    for sentence in subject.film.sentences:
-        say(f"  {sentence}")
+    return table, subject, reading
+
+
+def _check_shown(table: Table, subject: Subject) -> None:
+    """Raises:
+    RefusedError: no window shows the cloth.
+    """
     if table.empty:
         raise RefusedError(
             f"none of {len(table.time)} windows shows the cloth: its outline or its hoist was not found",
             where=subject.film.name,
             fix="give --crop around one whole flag on its pole, or another film",
         )
-    identity = None
-    if lake is not None and not read_only:
-        place = keep(lake, table, subject, {**reading.recipe(), "part": [first, last]}, branch=branch)
-        identity = place.artifact.id
-        say(f"{identity[:SHORT]}  measurement, {place.sentence}")
-    if parquet_path is not None:
-        write_file(parquet_path, table.parquet())
-    if zarr_path is not None:
-        with fresh_folder(zarr_path) as scratch:
-            table.write_zarr(scratch)
-    if picture_path is not None:
-        write_file(picture_path, png(picture(table)), command="observe")
-    if as_json:
-        document("observe", {**table.as_dict(), "artifact": identity})
-    else:
-        for line in table.lines():
-            echo(line)

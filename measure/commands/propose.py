@@ -2,55 +2,38 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
-from flagdata.console import LakePlace, LocalPath, document, echo_lines, json_option, say
-from flagdata.storage import Place
-from measure.closing.command_line import null_options, nulls_given, refuse, stage_bars
+from flagdata.console import LocalPath, document, echo_lines, say
+from flagdata.options import argument, command, option, options
+from flagdata.shared_options import AsJson, NamedLake
+from measure.closing.command_line import ByNulls, nulls_given, refuse, stage_bars
 
 if TYPE_CHECKING:
     from measure.propose.outcome import Outcome
 
 
-@click.command()
-@click.argument("recipe_path", metavar="RECIPE.toml", type=LocalPath())
-@click.option("--effect", metavar="FILE.py:Class", help="Test this effect on the recordings and seek no other.")
-@click.option(
-    "--known", multiple=True, metavar="EFFECT.STRENGTH", help="Effect that the model has already; may be repeated."
-)
-@null_options(level="Significance level of the test of every term; 0.05 by default.")
-@click.option(
-    "--lake",
-    "lake_path",
-    type=LakePlace(),
-    envvar="FLAGDATA_LAKE",
-    help="Lake that artifacts are read from; also FLAGDATA_LAKE.",
-)
-@click.option(
-    "--out",
-    type=LocalPath(),
-    default=Path("out/close-loop"),
-    show_default=True,
-    help="Folder in which proposal/ is written: the effect file, its tests and proposals.json.",
-)
-@json_option
-def propose(
-    recipe_path: Path,
-    effect: str | None,
-    known: tuple[str, ...],
-    nulls: int | None,
-    bank: Path | None,
-    level: float | None,
-    seed: int,
-    workers: int | None,
-    lake_path: Place | None,
-    out: Path,
-    as_json: bool,
-) -> None:
+@options
+class Proposing(AsJson, ByNulls, NamedLake):
+    """How an effect is sought and tested."""
+
+    recipe: Path = argument("The recipe of the experiment.", "RECIPE.toml", type=LocalPath())
+    effect: str | None = option(
+        "Test this effect on the recordings and seek no other.", default=None, metavar="FILE.py:Class"
+    )
+    known: tuple[str, ...] = option(
+        "Effect that the model has already; may be repeated.", default=(), metavar="EFFECT.STRENGTH"
+    )
+    out: Path = option(
+        "Folder in which proposal/ is written: the effect file, its tests and proposals.json.",
+        default=Path("out/close-loop"),
+        type=LocalPath(),
+    )
+
+
+@command(Proposing)
+def propose(chosen: Proposing) -> None:
     """Propose an effect that the library lacks, test it on recordings it was not made from, keep or reject it.
 
     RECIPE.toml is one of `flagdata close-loop --recipe` that names its recordings. Terms are sought in a part of them;
@@ -64,7 +47,7 @@ def propose(
       flagdata propose flag.toml --known lift.coefficient
       flagdata propose other.toml --effect out/close-loop/proposal/proposed_1f2e3d.py:UpwardLower
     """
-    from flagdata.lake import Lake
+    from flagdata.api.lakes import lake_of
     from measure.nulls.plan import NullOptions
     from measure.nulls.workload import of_recordings
     from measure.observe import recipe as recipes
@@ -73,31 +56,33 @@ def propose(
     from measure.propose.terms import dictionary
     from measure.propose.words import words
 
-    folder = out / "proposal"
+    folder = chosen.out / "proposal"
     proposal_log.check(folder / "proposals.json")
-    if effect is None:
+    if chosen.effect is None:
         effect_file.check(folder)
-    recipe = recipes.load(recipe_path)
-    said = nulls_given(recipe, level=level, nulls=nulls, bank=bank)
-    options = NullOptions(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
-    tried, controls = (dictionary(), ()) if effect is None else (candidates.from_file(effect), dictionary())
-    observed = recipes.read(recipe, None if lake_path is None else Lake.open(lake_path))
+    recipe = recipes.load(chosen.recipe)
+    said = nulls_given(recipe, chosen, level=chosen.level)
+    options = NullOptions(seed=chosen.seed, bank=chosen.bank, workers=chosen.processes, **said)
+    tried, controls = (
+        (dictionary(), ()) if chosen.effect is None else (candidates.from_file(chosen.effect), dictionary())
+    )
+    observed = recipes.read(recipe, lake_of(chosen.lake))
     refuse(observed.findings)
     recordings, cloth = observed.experiment.recordings, observed.experiment.specimen
     say(of_recordings(recordings, cloth.mesh.vertex_count, options, workers=options.workers))
     outcome = seek(
         observed.experiment,
         tried,
-        known=[candidates.weighed(name) for name in known],
+        known=[candidates.weighed(name) for name in chosen.known],
         controls=controls,
         options=options,
         stage=stage_bars(),
     )
-    spec = effect or ""
-    if effect is None and outcome.strengths:
+    spec = chosen.effect or ""
+    if chosen.effect is None and outcome.strengths:
         spec = effect_file.write(outcome, folder).spec
     proposal_log.add(folder / "proposals.json", outcome, effect=spec)
-    _report(outcome, spec, folder, as_json=as_json, text=words(outcome))
+    _report(outcome, spec, folder, as_json=chosen.as_json, text=words(outcome))
 
 
 def _report(outcome: Outcome, spec: str, folder: Path, *, as_json: bool, text: str) -> None:

@@ -89,6 +89,26 @@ class FlagSize:
     length: float
     height: float
 
+    @classmethod
+    def of(cls, sides: FlagSize | tuple[float, float] | str) -> FlagSize:
+        """Returns the size that its two sides are, length and height [m], or a text such as "1.5x1.0".
+
+        Raises:
+            UsageError: another text.
+        """
+        if isinstance(sides, FlagSize):
+            return sides
+        if isinstance(sides, tuple):
+            return cls(length=sides[0], height=sides[1])
+        match = _SIZE.fullmatch(sides)
+        if match is None:
+            raise UsageError(
+                f"{sides!r} is not a flag's size",
+                where="--flag-size",
+                fix="give length x height in metres, as in 1.5x1.0",
+            )
+        return cls(length=float(match[1]), height=float(match[2]))
+
     def __post_init__(self) -> None:
         if not (_SHORTEST <= self.length <= _LONGEST and _SHORTEST <= self.height <= _LONGEST):
             raise UsageError(
@@ -121,20 +141,6 @@ class FlagSize:
                 value=aspect,
             ),
         )
-
-
-def parse_size(text: str) -> FlagSize:
-    """The size that "1.5x1.0" names, length by height [m].
-
-    Raises:
-        UsageError: anything else.
-    """
-    match = _SIZE.fullmatch(text)
-    if match is None:
-        raise UsageError(
-            f"{text!r} is not a flag's size", where="--flag-size", fix="give length x height in metres, as in 1.5x1.0"
-        )
-    return FlagSize(length=float(match[1]), height=float(match[2]))
 
 
 @dataclass(frozen=True, kw_only=True)

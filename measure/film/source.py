@@ -17,6 +17,7 @@ from flagdata.lake.matching import matching
 from flagdata.provenance import file_hash
 from flagdata.record import Record
 from flagdata.schema import Kind
+from flagdata.shared_options import OfCloth, OfFilm
 from flagdata.sources import film_at, frames_have_instants, stored_film
 from measure.film.conditioned import ConditionedFilm, WholeFilm
 from measure.film.similarity import FlagSize
@@ -39,6 +40,16 @@ class Reading:
     aspect: float | None = None
     true_fps: float | None = None
     sequence_fps: float | None = None
+
+    @classmethod
+    def of(cls, chosen: OfCloth, size: FlagSize | None) -> Reading:
+        """Returns what the options of a verb say of a film, whose flag is of such a size.
+
+        Raises:
+            UsageError: a region that is not x,y,width,height.
+        """
+        rates = {"true_fps": chosen.true_fps, "sequence_fps": chosen.sequence_fps} if isinstance(chosen, OfFilm) else {}
+        return cls(crop=box_of(chosen.crop), flag=chosen.flag, aspect=None if size is None else size.aspect, **rates)
 
     def conditioned(self, film: WholeFilm) -> ConditionedFilm:
         """A film, made fit."""
@@ -97,18 +108,21 @@ class Subject:
         return total.hexdigest()
 
 
-def size_of(source: str | Path | None, given: FlagSize | None) -> FlagSize | None:
-    """The flag's size as it was given, else as an example states it."""
-    example = None if given is not None or source is None else example_of(source)
-    return given if example is None else FlagSize(length=example.flag_size[0], height=example.flag_size[1])
+def size_of(source: object, given: tuple[float, float] | str | None) -> FlagSize | None:
+    """Returns the flag's size as it was given, else as an example states it."""
+    example = example_of(source) if given is None and isinstance(source, str | Path) else None
+    sides = given if example is None else example.flag_size
+    return None if sides is None else FlagSize.of(sides)
 
 
-def box_of(crop: str | None) -> CropBox | None:
-    """The region of an option --crop.
+def box_of(crop: tuple[int, int, int, int] | str | None) -> CropBox | None:
+    """Returns the region of an option --crop.
 
     Raises:
         UsageError: it is not x,y,width,height.
     """
+    if isinstance(crop, tuple):
+        return CropBox(x=crop[0], y=crop[1], width=crop[2], height=crop[3])
     box = None if crop is None else parse_crop(crop)
     if not (box is None or isinstance(box, CropBox)):
         raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")

@@ -7,32 +7,26 @@ A verdict on films as it is kept in the lake.
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from flagdata.caches import user_cache
 from flagdata.console import progress, say
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from flagdata.stated import Stated
-from measure.calibrate.calibrate import Options as Calibrating
-from measure.calibrate.fabric import fabric
-from measure.calibrate.filmed import Sources
-from measure.calibrate.known import known
+from measure.calibrate.arrays import folder_of, options_of, sources_of
 from measure.calibrate.numerics import effort
-from measure.calibrate.prior import AZIMUTH, ELEVATION
-from measure.calibrate.simulation import COLUMNS, SETTLE, VERSION, Flag, mean_bending
+from measure.calibrate.simulation import COLUMNS, SETTLE, VERSION, mean_bending
 from measure.calibrate.workload import announced
 from measure.closing.artifacts import Answer
 from measure.closing.command_line import stage_bars
 from measure.closing.models import NamedModel, acted, acting, fitted
 from measure.closing.sources import distinct
-from measure.film.similarity import parse_size
-from measure.film.source import Reading, box_of
-from measure.films.command_line import Given
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading
+from measure.films.command_line import JudgingFilms
 from measure.films.design import PAIRS, TOGETHER, lasting
 from measure.films.library import weighable
 from measure.films.page import page
@@ -137,6 +131,8 @@ def _content(verdict: Verdict, outcome: Outcome, title: str, effects: Sequence[C
     }
 
 
+LEVEL = 0.9
+"""Level of the intervals of the calibration behind a verdict."""
 _FEW, _MANY = 64, 128
 """Simulations of the base model for each recording, of one or two and of more."""
 _TWO = 2
@@ -146,74 +142,55 @@ _RELATIVE = 0.01
 
 def close_films(
     sources: Sequence[str],
-    given: Given,
+    chosen: JudgingFilms,
     *,
     lake: Lake | None,
     branch: str,
     name: str | None,
-    material: str | None,
     level: float | None,
-    nulls: int | None,
-    suspect: str | None,
-    seed: int,
-    workers: int | None,
 ) -> Answer:
-    """Judge recordings of one flag.
+    """Judges recordings of one flag.
 
     Args:
-        material: what the flag is made of; None for any fabric.
-        nulls: kinds of numerics.
-        suspect: an effect that was suspected before the recordings were looked at, with its sign.
+        name: of the measurement; None for that of the first recording.
+        level: of the test; None for the usual one.
 
     Raises:
         FlagdataError: sources that cannot be judged; nothing is written then.
     """
-    if given.flag_size is None:
+    if chosen.flag_size is None:
         raise UsageError(
             "the flag's size is missing: what is simulated is a flag of its size",
             where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
         )
     begun = time.monotonic()
-    size = parse_size(given.flag_size)
-    flag = Flag(length=size.length, height=size.height, attachment=given.attachment)
-    options = Options(
-        calibration=Calibrating(
-            flag=flag,
-            azimuth=AZIMUTH if given.azimuth is None else known(AZIMUTH, given.azimuth, where="--azimuth"),
-            elevation=ELEVATION if given.elevation is None else known(ELEVATION, given.elevation, where="--elevation"),
-            distance=given.distance,
-            simulations=given.simulations or simulations_of(len(sources)),
-            seed=seed,
-            material=None if material is None else fabric(material, where="--material"),
-        ),
-        area_weight=None if given.area_weight is None else weight(given.area_weight),
-        level=CRITERIA.level if level is None else level,
-        kinds=CRITERIA.film_kinds if nulls is None else nulls,
-        suspected=None if suspect is None else Suspicion.parse(suspect, weighable(flag)),
-    )
-    reading = Reading(crop=box_of(given.crop), flag=given.flag, aspect=size.aspect)
-    opened = Sources.open(
-        sources,
+    size = FlagSize.of(chosen.flag_size)
+    calibration = options_of(
+        chosen,
         size,
-        reading,
-        lake=lake,
-        at=branch,
-        first=given.first,
-        last=given.last,
-        log=given.log,
-        offset=given.clock_offset,
+        simulations=chosen.simulations or simulations_of(len(sources)),
+        level=LEVEL,
+        seed=chosen.seed,
     )
+    options = Options(
+        calibration=calibration,
+        area_weight=None if chosen.area_weight is None else weight(chosen.area_weight),
+        level=CRITERIA.level if level is None else level,
+        kinds=CRITERIA.film_kinds if chosen.nulls is None else chosen.nulls,
+        suspected=None if chosen.suspect is None else Suspicion.parse(chosen.suspect, weighable(calibration.flag)),
+    )
+    reading = Reading.of(chosen, size)
+    opened = sources_of(sources, chosen, size, lake, at=branch)
     with progress(None, label="observe", unit="window") as advance:
         gathered = opened.read(size, advance=advance)
     recordings = distinct(gathered.recordings)
-    processes = workers or len(os.sched_getaffinity(0))
-    say(announced(workload([one.duration for one in recordings], options), workers=processes))
+    say(announced(workload([one.duration for one in recordings], options), workers=chosen.processes))
     outcome = solve(
         recordings,
         options,
-        folder=given.cache or user_cache() / "calibrate",
-        workers=processes,
+        folder=folder_of(chosen),
+        workers=chosen.processes,
         stage=stage_bars(),
     )
     verdict = verdict_of(outcome)

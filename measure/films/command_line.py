@@ -2,40 +2,22 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
-from click.core import ParameterSource
 
-from flagdata.commands.durations import DURATION
-from flagdata.commands.statements import STATED
-from flagdata.console import LocalPath
+from flagdata.api.measuring import LENGTHS, OfFlag
 from flagdata.errors import UsageError
-from flagdata.stated import Stated
+from flagdata.option_types import STATED
+from flagdata.options import described, option, options, typed
+from flagdata.shared_options import FLAG, HOW
+from measure.closing.command_line import TEST, ByNulls
 
-_Command = Callable[..., Any]
-OF_FILMS = (
-    "flag_size",
-    "attachment",
-    "azimuth",
-    "elevation",
-    "distance",
-    "area_weight",
-    "crop",
-    "flag",
-    "first",
-    "last",
-    "simulations",
-    "cache",
-    "log",
-    "clock_offset",
-)
+if TYPE_CHECKING:
+    from flagdata.stated import Stated
+
 OF_MARKERS = (
-    "recipe_path",
+    "recipe",
     "winds",
     "axis",
     "north",
@@ -55,113 +37,48 @@ OF_MARKERS = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Given:
-    """What the command line says of films; see `flagdata calibrate` for all but `area_weight`."""
+@options
+class OfFilms(OfFlag):
+    """What is stated of films and of tables of observables; see `flagdata calibrate`."""
 
-    flag_size: str | None
-    attachment: str
-    azimuth: Stated | None
-    elevation: Stated | None
-    distance: float
-    area_weight: Stated | None
-    crop: str | None
-    flag: int | None
-    first: float
-    last: float | None
-    simulations: int | None
-    cache: Path | None
-    log: str | None
-    clock_offset: Stated | None
-
-
-def film_options(command: _Command) -> _Command:
-    """Adds the options, and gives the command what they say as `film`."""
-    options = (
-        click.option(
-            "--flag-size",
-            metavar="LxH",
-            help="Of films: length along the wind and height along the pole [m], as in 1.5x1.0.",
-        ),
-        click.option(
-            "--attachment",
-            type=click.Choice(["corners", "hoist"]),
-            default="corners",
-            show_default=True,
-            help="Of films: how the flag is held, at both ends of its hoist or along all of it.",
-        ),
-        click.option(
-            "--azimuth",
-            type=STATED,
-            metavar="DEGREES",
-            help="Of films: the camera's axis to the wind, 90 from the side, as in 70±7; by default 30:150.",
-        ),
-        click.option(
-            "--elevation", type=STATED, metavar="DEGREES", help="Of films: the camera's axis upwards; by default 0±5."
-        ),
-        click.option(
-            "--distance",
-            type=click.FloatRange(min=1.0),
-            default=15.0,
-            show_default=True,
-            metavar="M",
-            help="Of films: from the camera to the flag [m].",
-        ),
-        click.option(
-            "--area-weight",
-            type=STATED,
-            metavar="KG/M2",
-            help="Of films: a cloth that was weighed, as in 0.155±0.005; by default that of any flag.",
-        ),
-        click.option("--crop", metavar="X,Y,W,H", help="Of films: the region in which the flag is [px]."),
-        click.option(
-            "--flag",
-            type=click.IntRange(min=1),
-            metavar="N",
-            help="Of films: which moving cloth; by default the one that moves most.",
-        ),
-        click.option(
-            "--log",
-            metavar="ARTIFACT",
-            help="Of tables of observables without a wind: a wind of --lake beside them, by its id.",
-        ),
-        click.option(
-            "--clock-offset",
-            type=STATED,
-            metavar="S±SIGMA",
-            help="Of such tables: seconds to add to their clock to reach the log's; by default estimated.",
-        ),
-        click.option(
-            "--start", "first", type=DURATION, default="0s", metavar="TIME", help="Of films: where to begin, as in 12s."
-        ),
-        click.option(
-            "--end", "last", type=DURATION, metavar="TIME", help="Of films: where to end; two minutes are used at most."
-        ),
-        click.option(
-            "--simulations",
-            type=click.IntRange(min=64),
-            show_default="64, from three recordings on 128",
-            help="Of films: simulated flags of the base model for each recording.",
-        ),
-        click.option(
-            "--cache",
-            type=LocalPath(),
-            metavar="FOLDER",
-            help="Of films: where simulations are kept; by default the user's cache folder.",
-        ),
+    flag_size: str | None = option(f"Of films: {LENGTHS.lower()}.", default=None, section=FLAG, metavar="LxH")
+    area_weight: Stated | None = option(
+        "Of films: a cloth that was weighed [kg/m²], as in 0.155±0.005; by default that of any flag.",
+        default=None,
+        section=FLAG,
+        type=STATED,
+        metavar="VALUE",
+    )
+    simulations: int | None = option(
+        "Of films: simulated flags of the base model for each recording; by default 64, from three recordings on 128.",
+        default=None,
+        section=HOW,
+        type=click.IntRange(min=64),
     )
 
-    @functools.wraps(command)
-    def collected(*args: Any, **named: Any) -> Any:
-        return command(*args, film=Given(**{name: named.pop(name) for name in OF_FILMS}), **named)
 
-    for option in reversed(options):
-        collected = option(collected)
-    return collected
+@options
+class JudgingFilms(OfFilms, ByNulls):
+    """All that a verdict on films takes."""
+
+    material: str | None = option(
+        "Nominal material, a name of the catalog; by default the one that the source states. Of films: what the flag "
+        "is made of, as in woven-polyester, knit or camel-ponte-roma; by default any fabric.",
+        default=None,
+        section=FLAG,
+        metavar="NAME",
+    )
+    suspect: str | None = option(
+        "An effect that was suspected before the recordings were looked at, as in lift or vertical-wind-; it alone is "
+        "tested for, in that direction, and seen where it is weaker.",
+        default=None,
+        section=TEST,
+        metavar="EFFECT[+|-]",
+    )
 
 
-def refuse_of_others(context: click.Context, *, films: bool) -> None:
-    """Options that would be ignored.
+def refuse_of_others(chosen: JudgingFilms, *, films: bool) -> None:
+    """Refuses options that would be ignored.
 
     Args:
         films: whether the sources are films or tables of observables.
@@ -169,9 +86,10 @@ def refuse_of_others(context: click.Context, *, films: bool) -> None:
     Raises:
         UsageError: one of them is on the command line.
     """
-    spelled = {parameter.name: parameter.opts[-1] for parameter in context.command.params}
-    for name in OF_MARKERS if films else OF_FILMS:
-        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+    rows = described(type(chosen))
+    for name in OF_MARKERS if films else described(OfFilms):
+        if name in typed(chosen) and name != "material":
             what = "films and tables of observables" if films else "markers and meshes"
             other = "markers and meshes" if films else "films and tables of observables"
-            raise UsageError(f"the sources are {what}", where=spelled[name], fix=f"leave it out: it is about {other}")
+            spelled = rows[name][1].spelled(name)
+            raise UsageError(f"the sources are {what}", where=spelled, fix=f"leave it out: it is about {other}")

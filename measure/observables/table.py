@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from measure.observables import OBSERVABLES
 from measure.observables.observable import Observable, Reading
 from measure.observables.unseen import REASONS
 from measure.observables.watching import Watched
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 SCHEMA = "flagdata.observables/1"
 UNSEEN = "no-silhouette"
@@ -62,11 +65,10 @@ class Table:
         """Whether no window has a value."""
         return not any(np.isfinite(self.values(name)).any() for name in self.readings)
 
-    def parquet(self) -> bytes:
-        """A Parquet file: `time`, `wind` and, for each observable, its value, `NAME-sigma` and `NAME-reason`;
-        units and meanings in the fields' metadata. `flagdata calibrate` reads it where there is a wind."""
+    def arrow(self) -> pa.Table:
+        """Returns `time`, `wind` and, for each observable, its value, `NAME-sigma` and `NAME-reason`; units and
+        meanings are in the fields' metadata."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         columns: list[pa.Array] = [pa.array(self.time)]
         fields = [pa.field("time", pa.float64(), metadata={"unit": "s", "meaning": "middle of the window"})]
@@ -82,8 +84,14 @@ class Table:
             columns.append(pa.array([reading.reason for reading in readings], type=pa.string()))
             fields.append(pa.field(f"{name}-reason", pa.string()))
         schema = pa.schema(fields, metadata={"flagdata": json.dumps(self.head())})
+        return pa.Table.from_arrays(columns, schema=schema)
+
+    def parquet(self) -> bytes:
+        """Returns a Parquet file of the table, which `flagdata calibrate` reads where there is a wind."""
+        import pyarrow.parquet as pq
+
         sink = io.BytesIO()
-        pq.write_table(pa.Table.from_arrays(columns, schema=schema), sink, compression="zstd")
+        pq.write_table(self.arrow(), sink, compression="zstd")
         return sink.getvalue()
 
     def write_zarr(self, folder: Path) -> None:

@@ -12,10 +12,11 @@ import click
 
 from flagdata.addresses import lake_place
 from flagdata.caches import beside
-from flagdata.commands.sections import LongCommand
-from flagdata.commands.statements import STATED
-from flagdata.console import LocalPath, document, echo_lines, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, document, echo_lines, progress, say
 from flagdata.errors import InputError
+from flagdata.option_types import POSITIVE, STATED
+from flagdata.options import argument, command, option, options
+from flagdata.shared_options import AsJson, OnLake
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -36,76 +37,66 @@ _BEFORE: dict[str, tuple[str, ...]] = {"train": (), "validation": ("train",), "t
 """Side → the sides that a network has learned from, or was selected by, before it is judged on it."""
 
 
-@click.command(cls=LongCommand)
-@click.argument("models", metavar="MODEL...", nargs=-1, required=True)
-@click.option("--dataset", default="flagsim-wide", show_default=True, help="Data set whose clips are judged.")
-@click.option(
-    "--side",
-    type=click.Choice(("train", "validation", "test")),
-    default="test",
-    show_default=True,
-    help="Side of the data set.",
-)
-@click.option("--at", metavar="REF", help="Tag, branch or version of the lake; by default its head.")
-@click.option(
-    "--out",
-    type=LocalPath(),
-    metavar="DIR",
-    default=Path("evaluation"),
-    show_default=True,
-    help="Where the page, the table in Markdown and the JSON go.",
-)
-@click.option("--name", default="evaluation", show_default=True, help="Name of the files, without their endings.")
-@click.option(
-    "--cache",
-    type=LocalPath(),
-    metavar="DIR",
-    help="Where prepared inputs are kept; by default beside the lake, LAKE.inputs.",
-)
-@click.option("--reference", metavar="LABEL", help="Model that the others are compared with; by default the best.")
-@click.option("--tsne", metavar="LABEL", help="Model whose embedding is drawn by t-SNE.")
-@click.option(
-    "--area-weight",
-    type=STATED,
-    metavar="VALUE",
-    help="Area weight of all clips, if it is known [kg/m²]: 0.284, 0.284±0.01 or 0.10:0.17.",
-)
-@click.option("--handmade", is_flag=True, help="Add ridge and gradient boosting on hand-made features.")
-@click.option(
-    "--frames",
-    type=click.IntRange(min=4),
-    metavar="N",
-    multiple=True,
-    help="Also report triplet accuracy for clips of N frames (networks on maps only); may be repeated.",
-)
-@click.option(
-    "--linear", is_flag=True, help="Also report how well a linear model predicts cloth parameters from each embedding."
-)
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws and of the bootstrap."
-)
-@click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
-@json_option
-@lake_option
-def evaluate(
-    models: Sequence[str],
-    dataset: str,
-    side: str,
-    at: str | None,
-    out: Path,
-    name: str,
-    cache: Path | None,
-    reference: str | None,
-    tsne: str | None,
-    area_weight: Stated | None,
-    handmade: bool,
-    frames: Sequence[int],
-    linear: bool,
-    seed: int,
-    workers: int | None,
-    as_json: bool,
-    lake_path: str,
-) -> None:
+JUDGED, MORE = "What is judged", "More in the table"
+
+
+@options
+class Evaluating(AsJson, OnLake):
+    """Which networks are judged, on what, and what the table holds."""
+
+    models: tuple[str, ...] = argument("Networks.", "MODEL...")
+    dataset: str = option("Data set whose clips are judged.", default="flagsim-wide", section=JUDGED)
+    side: str = option(
+        "Side of the data set.", default="test", section=JUDGED, type=click.Choice(("train", "validation", "test"))
+    )
+    at: str | None = option(
+        "Tag, branch or version of the lake; by default its head.", default=None, section=JUDGED, metavar="REF"
+    )
+    reference: str | None = option(
+        "Model that the others are compared with; by default the best.", default=None, section=JUDGED, metavar="LABEL"
+    )
+    area_weight: Stated | None = option(
+        "Area weight of all clips, if it is known [kg/m²]: 0.284, 0.284±0.01 or 0.10:0.17.",
+        default=None,
+        section=JUDGED,
+        type=STATED,
+        metavar="VALUE",
+    )
+    handmade: bool = option("Add ridge and gradient boosting on hand-made features.", default=False, section=MORE)
+    frames: tuple[int, ...] = option(
+        "Also report triplet accuracy for clips of N frames (networks on maps only); may be repeated.",
+        default=(),
+        section=MORE,
+        type=click.IntRange(min=4),
+        metavar="N",
+    )
+    linear: bool = option(
+        "Also report how well a linear model predicts cloth parameters from each embedding.",
+        default=False,
+        section=MORE,
+    )
+    tsne: str | None = option("Model whose embedding is drawn by t-SNE.", default=None, section=MORE, metavar="LABEL")
+    out: Path = option(
+        "Where the page, the table in Markdown and the JSON go.",
+        default=Path("evaluation"),
+        type=LocalPath(),
+        metavar="DIR",
+    )
+    name: str = option("Name of the files, without their endings.", default="evaluation")
+    cache: Path | None = option(
+        "Where prepared inputs are kept; by default beside the lake, LAKE.inputs.",
+        default=None,
+        type=LocalPath(),
+        metavar="DIR",
+    )
+    seed: int = option("Seed of the draws and of the bootstrap.", default=0, type=click.IntRange(min=0))
+    workers: int | None = option(
+        "Number of threads; by default one for each core.", default=None, type=POSITIVE, metavar="N"
+    )
+
+
+@command(Evaluating)
+def evaluate(chosen: Evaluating) -> None:
     """Judge trained networks on one side of a data set and write the table.
 
     MODEL is a network of the lake by its name (all seeds of it) or the beginning of its id, or "shipped" for the one
@@ -119,15 +110,22 @@ def evaluate(
     from models.evaluation import report
     from models.evaluation.evaluation import as_document
 
-    report.check(out, name=name)
-    source = flagdata.open(lake_path)
-    folder = cache if cache is not None else beside(lake_place(lake_path), ".inputs")
-    desk = _Desk(source, dataset, at, folder, workers or os.cpu_count() or 1, seed, area_weight)
+    report.check(chosen.out, name=chosen.name)
+    source = flagdata.open(chosen.lake)
+    folder = chosen.cache if chosen.cache is not None else beside(lake_place(chosen.lake), ".inputs")
+    workers = chosen.workers or os.cpu_count() or 1
+    desk = _Desk(source, chosen.dataset, chosen.at, folder, workers, chosen.seed, chosen.area_weight)
     found = desk.evaluation(
-        models, side=side, reference=reference, tsne=tsne, handmade=handmade, frames=frames, linear=linear
+        chosen.models,
+        side=chosen.side,
+        reference=chosen.reference,
+        tsne=chosen.tsne,
+        handmade=chosen.handmade,
+        frames=chosen.frames,
+        linear=chosen.linear,
     )
-    page, text, data = report.write(found, out, name=name)
-    if as_json:
+    page, text, data = report.write(found, chosen.out, name=chosen.name)
+    if chosen.as_json:
         document("evaluation", as_document(found))
     else:
         echo_lines(report.markdown(found))

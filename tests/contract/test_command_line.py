@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 from collections.abc import Iterator
 
@@ -11,8 +10,8 @@ import pytest
 
 from docs.generate_cli import commands
 from flagdata import cli
-from flagdata.commands.sections import REST, SECTIONS, LongCommand
 from flagdata.console import say
+from flagdata.options import REST, LongCommand
 from tests.program import invoke
 
 LONG = 14
@@ -25,7 +24,7 @@ def ends() -> Iterator[tuple[str, click.Command]]:
 
 
 def test_every_command_takes_json() -> None:
-    without = [name for name, command in ends() if "as_json" not in inspect.signature(command.callback).parameters]
+    without = [name for name, command in ends() if "as_json" not in {one.name for one in command.params}]
     assert len(list(ends())) > 40
     assert without == []
 
@@ -66,9 +65,10 @@ def test_without_arguments_and_after_help_the_help_is_the_result(capsys: pytest.
 
 def test_a_long_help_is_in_sections_that_hold_each_option_once() -> None:
     long = {name: c for name, c in ends() if sum(isinstance(p, click.Option) for p in c.params) >= LONG}
-    assert sorted(name.removeprefix("flagdata ") for name in long) == sorted(SECTIONS)
+    assert len(long) > 6
     for name, command in long.items():
         assert isinstance(command, LongCommand), name
+        assert len(command.sections()) > 1, name
         shown = [option.name for options in command.sections().values() for option in options]
         assert sorted(shown) == sorted(str(p.name) for p in command.params if isinstance(p, click.Option)), name
         assert len(command.sections()[REST]) <= LONG, name

@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 import pytest
 
-from flagdata.commands.statements import STATED
 from flagdata.errors import UsageError
+from flagdata.option_types import STATED
 from flagdata.stated import Stated, parse
 from tests.refusals import unrefused
 

@@ -82,6 +82,8 @@ def _aside(node: ast.AST) -> Iterator[ast.AST]:
         yield from node.values
     elif isinstance(node, ast.keyword) and node.arg == "help":
         yield from ast.walk(node.value)
+    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("option", "argument"):
+        yield from ast.walk(node.args[0])
 
 
 def _texts(source: ast.Module) -> Iterator[str]:

@@ -52,7 +52,7 @@ GUSTY, STEADY = windy(gusts()), windy(gusts(swing=0.0))
 WINDLESS = table("time,area", np.linspace(0.9, 0.8, 30))
 """Beside it a log is needed, and nothing in it follows the wind."""
 DROOPING = table("time,droop,extension,middle-speed", shown(gusts(30)))
-JOINED = f"calibrate t.csv {SIZED} --log mast --offset 1777629605±0.1"
+JOINED = f"calibrate t.csv {SIZED} --log mast --clock-offset 1777629605±0.1"
 """The table's clock begins at 0, the log at the scene's time."""
 GAP = "time,wind_speed (m/s),wind_direction (deg)\n" + "".join(
     f"2026-05-01T10:0{k // 60}:{k % 60:02d}Z,{5 + k % 10 / 10},{200 + k % 9}\n" for k in range(180) if not 75 < k < 100
@@ -87,7 +87,7 @@ CASES = [
     Case(
         "calibrate/filmed.py",
         "name the log: --log ARTIFACT --lake LAKE",
-        f"calibrate t.csv {SIZED} --offset 1777629605±0.1",
+        f"calibrate t.csv {SIZED} --clock-offset 1777629605±0.1",
         (f"{JOINED} --lake lake",),
         files={"t.csv": DROOPING},
         shows=WEIGHED,
@@ -127,16 +127,16 @@ CASES = [
     Case(
         "calibrate/wind.py",
         "choose a part of the fil",
-        f"calibrate long.csv {SIZED} --log mast --offset 1777629605±0.1",
-        (f"calibrate long.csv {SIZED} --log mast --offset 1777629605±0.1 --start 0s --end 100s",),
+        f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1",
+        (f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1 --start 0s --end 100s",),
         files={"long.csv": table("time,droop,extension,middle-speed", shown(gusts(60)))},
         shows=WEIGHED,
     ),
     Case(
         "calibrate/wind.py",
         "choose a part without ga",
-        f"calibrate t.csv {SIZED} --log gap --offset 1777629605±0.1",
-        (f"calibrate t.csv {SIZED} --log gap --offset 1777629605±0.1 --start 0s --end 60s",),
+        f"calibrate t.csv {SIZED} --log gap --clock-offset 1777629605±0.1",
+        (f"calibrate t.csv {SIZED} --log gap --clock-offset 1777629605±0.1 --start 0s --end 60s",),
         files={"t.csv": table("time,droop,extension,middle-speed", shown(gusts(40))), "gap.csv": GAP},
         before=("ingest gap.csv",),
         shows=WEIGHED,

@@ -12,11 +12,11 @@ from click.testing import CliRunner
 
 from flagdata.align.apart import by_offset, by_spans
 from flagdata.cli import root
-from flagdata.commands.durations import DURATION
 from flagdata.dataset import Source
 from flagdata.dataset.tolerance import Tolerance
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact, Lake
+from flagdata.option_types import DURATION
 from flagdata.record import RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flagdata.commands.ingest_options import marker_options
+from flagdata.commands.ingest_options import frame_rate
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from tests.program import Run, invoke
@@ -324,11 +324,11 @@ def test_a_rate_is_hertz_or_the_time_between_two() -> None:
         ("1 h", 1 / 3600),
         (".5s", 2.0),
     ]
-    assert [marker_options(rate=written, length="m").rate for written, _ in cases] == [rate for _, rate in cases]
+    assert [frame_rate(written) for written, _ in cases] == [rate for _, rate in cases]
 
 
 @pytest.mark.parametrize("written", ["often", "0s", "10 minutes", "Hz", ""])
 def test_what_is_no_rate_says_how_to_write_one(written: str) -> None:
     with pytest.raises(UsageError) as caught:
-        marker_options(rate=written, length="m")
+        frame_rate(written)
     assert "40ms" in str(caught.value.fix)

@@ -198,7 +198,7 @@ def test_a_table_without_a_flag_is_refused(tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (("--log", "cup"), "name the lake that it was ingested into"),
-        (("--offset", "1±0.1"), "an offset without a log"),
+        (("--clock-offset", "1±0.1"), "an offset without a log"),
         (("--end", "30s"), "rows against wind have no times"),
     ],
 )
@@ -229,7 +229,7 @@ def test_a_table_beside_a_log_of_the_lake_is_weighed_and_the_log_is_its_parent(t
     rows = [line.split(",") for line in path.read_text().splitlines()]
     without = [[rows[0][0], *rows[0][2:]], *([str(1_780_000_000 + float(row[0])), *row[2:]] for row in rows[1:])]
     path.write_text("\n".join(",".join(row) for row in without) + "\n")
-    given = (path, "--flag-size", "1.5x1.0", "--lake", tmp_path / "lake", "--log", log.id, "--offset", "2.5±0.1")
+    given = (path, "--flag-size", "1.5x1.0", "--lake", tmp_path / "lake", "--log", log.id, "--clock-offset", "2.5±0.1")
     done = _run(*given, "--json")
     assert done.exit_code == 3, done.output  # the table's droop follows another wind than this log's
     found = json.loads(done.stdout)

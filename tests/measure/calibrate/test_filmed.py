@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.api.measuring import OfFlag
 from flagdata.errors import InputError, RefusedError
 from flagdata.findings import Finding, Severity
 from flagdata.signals import Sensor, WindSeries
 from measure.calibrate import filmed
+from measure.calibrate.arrays import sources_of
 from measure.calibrate.simulation import OBSERVED
 from measure.film.similarity import FlagSize
-from measure.film.source import Reading as Pictures
 from measure.observables import Reading
 
 _SIZE = FlagSize(length=1.5, height=1.0)
@@ -111,12 +112,12 @@ def test_films_that_are_together_too_short_are_refused_before_a_picture_is_read(
 ) -> None:
     _named(monkeypatch, {"monday": 15.0, "tuesday": 4.0})
     with pytest.raises(InputError, match=r"15 s of film with a log beside them; tuesday is left out: 4 s of film"):
-        filmed.Sources.open(("monday", "tuesday"), _SIZE, Pictures(), lake=None, at="main", first=0.0, last=None)
+        sources_of(("monday", "tuesday"), OfFlag(), _SIZE, None, at="main")
 
 
 def test_a_film_whose_length_is_enough_is_opened_and_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
     _named(monkeypatch, {"monday": 60.0})
-    found = filmed.Sources.open(("monday",), _SIZE, Pictures(), lake=None, at="main", first=0.0, last=None)
+    found = sources_of(("monday",), OfFlag(), _SIZE, None, at="main")
     assert [one.duration for one in found.opened] == [60.0]
     with pytest.raises(AssertionError, match="pictures are read"):
         found.read(_SIZE)

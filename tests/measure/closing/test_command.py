@@ -19,8 +19,8 @@ from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.markers.store import ingest_markers
 from flagdata.lake import Lake
 from measure.closing.sources import Reading, read
+from measure.commands.close_loop import CloseLoopCommand, with_warnings
 from measure.commands.close_loop import _setup as setup_of
-from measure.commands.close_loop import with_warnings
 from measure.observe import Setup, Up
 from measure.verdict.record import Conclusion
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks
@@ -205,9 +205,9 @@ def test_recordings_of_one_name_get_names_that_differ(table: Path) -> None:
 
 def test_the_uncertainty_of_the_weight_on_the_command_line_is_that_of_the_setup() -> None:
     unweighed = Setup(mass_known=False)
-    setup = setup_of(unweighed, None, 0.02, None, None)
+    setup = setup_of(unweighed, CloseLoopCommand(density_uncertainty=0.02))
     assert (setup.mass_known, setup.density_uncertainty) == (True, 0.02)
-    assert setup_of(unweighed, None, None, None, None) == unweighed
+    assert setup_of(unweighed, CloseLoopCommand()) == unweighed
 
 
 def test_recordings_of_a_bucket_are_those_of_their_table(table: Path, bucket_folder: str, tmp_path: Path) -> None:

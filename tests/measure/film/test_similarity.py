@@ -14,7 +14,6 @@ from flagdata.rng import stream
 from measure.film.similarity import (
     FlagSize,
     SizePrior,
-    parse_size,
     scaled_back,
     sizes,
     spacing,
@@ -112,5 +111,5 @@ def test_another_shape_is_a_finding() -> None:
 @pytest.mark.parametrize("text", ["1.5", "axb", "0x1", "1.5x", "-1x1", "30x20"])
 def test_what_is_no_size_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match="metres"):
-        parse_size(text)
-    assert parse_size("1.5x1.0") == FlagSize(length=1.5, height=1.0)
+        FlagSize.of(text)
+    assert FlagSize.of("1.5x1.0") == FlagSize(length=1.5, height=1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from flagdata.api.recording_verbs import FromCamera
 from flagdata.commands.ingest_options import camera_options
 from flagdata.errors import TimeError
 from flagdata.findings import quality_flags
@@ -97,16 +98,7 @@ def test_the_avchd_message_is_read_as_binary_coded_decimals() -> None:
 
 
 def test_an_unknown_start_is_flagged_and_goes_before_the_files_own() -> None:
-    options = camera_options(
-        start="unknown",
-        zone_name=None,
-        true_fps=None,
-        sequence_fps=None,
-        rate="25",
-        crop="whole",
-        exposure=None,
-        archive="jpeg",
-    )
+    options = camera_options(FromCamera(sources=(), start="unknown"))
     found = find_start(
         options.camera.start,
         {"creation_time": "2024-05-01T12:00:00Z"},

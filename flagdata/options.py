@@ -1,0 +1,260 @@
+"""Options of a verb, stated once: its command, its Python call and their documentation are made from one dataclass.
+
+    @options
+    class Observing(OfFilm):
+        source: str = argument("The film.", "SOURCE")
+        window: float = option("Length of a window.", default=2.5, type=DURATION)
+
+    @command(Observing)                    @called(Observing)
+    def observe(chosen: Observing): ...    def observe(chosen: Observing): ...
+
+A verb's arguments are what its Python call takes by position. What several verbs share is a class that theirs inherit;
+what only the command has, as the form of what it prints, is a class that inherits that of the call.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import textwrap
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields
+from typing import Any, ParamSpec, TypeVar, dataclass_transform
+
+import click
+from click.core import ParameterSource
+
+from flagdata.errors import FlagdataError
+
+P = ParamSpec("P")
+R = TypeVar("R")
+C = TypeVar("C", bound=type)
+
+REST = "Lake and output"
+"""Section of the options that name none."""
+SECTIONS = (
+    "What the source is",
+    "Camera",
+    "Anemometer",
+    "The clock",
+    "The recording",
+    "What is judged",
+    "More in the table",
+    "The flag",
+    "The flag and the camera",
+    "The film",
+    "Markers and meshes",
+    "The wind beside markers",
+    "A log beside tables",
+    "The test",
+    "How it is done",
+    "What is written",
+    REST,
+)
+"""Titles of the sections of long helps, in their order."""
+_KINDS = {"int": click.INT, "float": click.FLOAT, "Path": click.Path()}
+_WIDTH = 116
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """What an option says of itself beside its name, kind and default.
+
+    Attributes:
+        about: one sentence, with the unit.
+        names: on the command line; none for the field's name.
+        section: of a long help.
+        argument: whether the command takes it by position.
+        click: more that `click.Option` or `click.Argument` is given.
+    """
+
+    about: str
+    names: tuple[str, ...] = ()
+    section: str = REST
+    argument: bool = False
+    click: Mapping[str, Any] = field(default_factory=dict)
+
+    def spelled(self, key: str) -> str:
+        """Returns the name on the command line that errors use, of the option of such a field."""
+        return next((name for name in self.names if name.startswith("--")), f"--{key.replace('_', '-')}")
+
+
+def option(
+    about: str,
+    *names: str,
+    default: Any = MISSING,
+    section: str = REST,
+    kw_only: bool = True,
+    **more: Any,
+) -> Any:
+    """States an option as the default of a field.
+
+    Args:
+        about: its help.
+        names: on the command line; none for the field's name.
+        default: where it is not given; without one it is required.
+        section: of a long help.
+        kw_only: whether the Python call takes it by keyword alone.
+        more: of `click.Option`, as `type`, `metavar` and `envvar`.
+    """
+    row = Option(about=about, names=names, section=section, click=more)
+    return field(default=default, kw_only=kw_only, metadata={"option": row})
+
+
+def argument(about: str, metavar: str, *, default: Any = MISSING, kw_only: bool = False, **more: Any) -> Any:
+    """States what a command and a call take by position, as the default of a field.
+
+    Args:
+        about: what it names, for the Python call.
+        metavar: on the command line.
+        default: where it is not given; without one it is required.
+        kw_only: whether the Python call takes it by keyword alone.
+        more: of `click.Argument`, as `nargs` and `type`.
+    """
+    row = Option(about=about, argument=True, click={"metavar": metavar, **more})
+    return field(default=default, kw_only=kw_only, metadata={"option": row})
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(option, argument))
+def options(form: C) -> C:
+    """Makes a frozen dataclass of a class whose fields are options."""
+    return dataclass(frozen=True, kw_only=True)(form)
+
+
+def described(form: type) -> dict[str, tuple[Field[Any], Option]]:
+    """Returns field → itself and its option: those of a class before those that it inherits."""
+    table = {one.name: one for one in fields(form)}
+    names = dict.fromkeys(name for base in form.__mro__ for name in vars(base).get("__annotations__", ()))
+    return {name: (table[name], table[name].metadata["option"]) for name in names if name in table}
+
+
+def typed(chosen: object) -> frozenset[str]:
+    """Returns the names of the options that the user gave, at their defaults or not."""
+    return vars(chosen).get("_typed", frozenset())
+
+
+def _with_typed(chosen: Any, names: frozenset[str]) -> Any:
+    vars(chosen)["_typed"] = names
+    return chosen
+
+
+class SectionedOption(click.Option):
+    """An option that says in which section of a long help it is.
+
+    Attributes:
+        section: its title.
+    """
+
+    def __init__(self, *names: Any, section: str = REST, **more: Any) -> None:
+        super().__init__(*names, **more)
+        self.section = section
+
+
+class LongCommand(click.Command):
+    """A command whose help prints its options in their sections."""
+
+    def sections(self) -> dict[str, list[click.Option]]:
+        """Returns title → options, in the order of `SECTIONS`; those without a section last."""
+        shown: dict[str, list[click.Option]] = {title: [] for title in SECTIONS}
+        for one in self.params:
+            if isinstance(one, click.Option):
+                shown[getattr(one, "section", REST)].append(one)
+        return {title: rows for title, rows in shown.items() if rows or title == REST}
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        shown = self.sections()
+        shown[REST] += [one for one in (self.get_help_option(ctx),) if one is not None]
+        for title, rows in shown.items():
+            records = [row for one in rows if (row := one.get_help_record(ctx)) is not None]
+            with formatter.section(title if len(shown) > 1 else "Options"):
+                formatter.write_dl(records)
+
+
+def command(
+    form: type[Any], *, cls: type[LongCommand] = LongCommand
+) -> Callable[[Callable[[Any], object]], LongCommand]:
+    """Makes the command of a verb from the class of its options and the function that runs it.
+
+    The function's docstring is the help, and its name that of the command.
+
+    Args:
+        cls: of the command.
+    """
+
+    def made(run: Callable[[Any], object]) -> LongCommand:
+        def callback(**values: Any) -> object:
+            context = click.get_current_context()
+            names = {one for one in values if context.get_parameter_source(one) is ParameterSource.COMMANDLINE}
+            return run(_with_typed(form(**values), frozenset(names)))
+
+        return cls(
+            name=run.__name__.replace("_", "-"),
+            params=[_parameter(key, *row) for key, row in described(form).items()],
+            callback=callback,
+            help=inspect.getdoc(run),
+        )
+
+    return made
+
+
+def _parameter(key: str, place: Field[Any], row: Option) -> click.Parameter:
+    """Returns the parameter of a field; its kind is read from the annotation where the option states no other."""
+    kind = str(place.type).removesuffix(" | None")
+    more: dict[str, Any] = {"type": _KINDS.get(kind.removeprefix("tuple[").removesuffix(", ...]")), **row.click}
+    several = kind.endswith(", ...]")
+    required = place.default is MISSING
+    if row.argument:
+        several = {"nargs": -1} if several else {}
+        return click.Argument([key], required=required, **{"default": None, **several, **more})
+    if kind == "bool":
+        more.update(is_flag=True, type=None)
+    elif several:
+        more["multiple"] = True
+    elif not required and place.default is not None:
+        more = {"show_default": True, **more}
+    names = row.names or (row.spelled(key),)
+    default = {} if required or several else {"default": more.pop("default", place.default)}
+    return SectionedOption([*names, key], section=row.section, help=row.about, required=required, **default, **more)
+
+
+def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable[P, R]]:
+    """Makes the Python call of a verb from the class of its options and the function that runs it.
+
+    Values become plain Python's, each by its annotation (`flagdata.arguments`). The options are described in the call's
+    docstring, before what it raises. Errors about an option name it as the call does.
+    """
+    from flagdata.arguments import converter  # loads NumPy
+
+    rows = described(form)  # type: ignore[arg-type]
+    converts = {key: made for key, (place, _) in rows.items() if (made := converter(str(place.type))) is not None}
+    signature = inspect.signature(form)
+    spelled = {name: key for key, (_, row) in rows.items() for name in (*row.names, row.spelled(key))}
+    ordered = sorted((signature.parameters[key] for key in rows), key=lambda one: one.kind)
+
+    def made(run: Callable[[Any], R]) -> Callable[P, R]:
+        @functools.wraps(run)
+        def call(*positional: P.args, **named: P.kwargs) -> R:
+            values = shown.bind(*positional, **named).arguments
+            plain = {key: converts[key](value, key) if key in converts else value for key, value in values.items()}
+            try:
+                return run(_with_typed(form(**plain), frozenset(plain)))  # type: ignore[call-arg]
+            except FlagdataError as error:
+                if error.where in spelled:
+                    FlagdataError.__init__(error, error.what, where=spelled[error.where], fix=error.fix)
+                raise
+
+        shown = signature.replace(parameters=ordered, return_annotation=run.__annotations__.get("return"))
+        head, raised, rest = (inspect.getdoc(run) or "").partition("\nRaises:")
+        vars(call).update(converts=frozenset(converts), __signature__=shown)
+        call.__doc__ = f"{head}\nArgs:\n{_arguments(rows)}\n{raised}{rest}"
+        return call
+
+    return made
+
+
+def _arguments(rows: Mapping[str, tuple[Field[Any], Option]]) -> str:
+    """Returns what a docstring says of each option."""
+    return "\n".join(
+        textwrap.fill(f"{key}: {row.about}", _WIDTH, initial_indent="    ", subsequent_indent="        ")
+        for key, (_, row) in rows.items()
+    )

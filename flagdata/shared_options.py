@@ -1,0 +1,180 @@
+"""Options that several verbs share, each stated once: a verb's class of options inherits those that it takes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from flagdata.console import LakePlace
+from flagdata.option_types import DURATION, POSITIVE, SHARE, STATED
+from flagdata.options import option, options
+
+if TYPE_CHECKING:
+    from flagdata.api.lakes import AnyLake
+    from flagdata.lake import Lake
+    from flagdata.stated import Stated
+
+LAKE = "The lake's folder, or s3://bucket/prefix; also FLAGDATA_LAKE."
+FILM = "The film"
+FLAG = "The flag and the camera"
+HOW = "How it is done"
+WRITTEN = "What is written"
+
+
+@options
+class AsJson:
+    """What every command can print."""
+
+    as_json: bool = option("One JSON document on stdout.", "--json", default=False)
+
+
+@options
+class OnLake:
+    """The lake that a verb is about."""
+
+    lake: AnyLake = option(LAKE, default=".", envvar="FLAGDATA_LAKE", metavar="DIR")
+
+
+@options
+class AtVersion:
+    """The version of a lake that a verb looks at."""
+
+    at: str | None = option(
+        "Tag, branch, version number, commit, or main at a time: 2026-11-26 (its end, UTC), 3.days.ago; the head of "
+        "main by default.",
+        default=None,
+        metavar="REF",
+    )
+
+
+@options
+class NamedLake:
+    """The lake that names recordings and takes results, where there is one."""
+
+    lake: AnyLake | None = option(
+        "Where recordings and artifacts are, and where results go: a folder, or s3://bucket/prefix; also "
+        "FLAGDATA_LAKE.",
+        default=None,
+        type=LakePlace(),
+        envvar="FLAGDATA_LAKE",
+        metavar="DIR",
+    )
+
+
+@options
+class BesideLake(NamedLake):
+    """The same, at one of its versions."""
+
+    at: str | None = option(
+        "Tag, branch or version of the lake to look at; by default the branch's head.", default=None, metavar="REF"
+    )
+
+
+@options
+class OnBranch:
+    """The branch of a lake that a verb commits on."""
+
+    branch: str = option("Branch of the lake to commit on.", default="main")
+
+
+@options
+class Committing(OnBranch):
+    """Whether and where a verb commits what it found."""
+
+    read_only: bool = option("Read the lake, commit nothing.", default=False)
+
+
+@options
+class Keeping(BesideLake, Committing):
+    """A lake beside what a command reads, in which it keeps what it finds."""
+
+    @property
+    def version(self) -> str:
+        """The version of the lake that is looked at."""
+        return self.branch if self.at is None else self.at
+
+    def opened(self) -> Lake | None:
+        """Opens the lake, if one was named; unless it is only read it can be written."""
+        from flagdata.api.lakes import lake_of
+
+        lake = lake_of(self.lake)
+        if lake is not None and not self.read_only:
+            lake.check_writable()
+        return lake
+
+
+@options
+class OfCloth:
+    """Which cloth of a film, and which part of its time."""
+
+    crop: tuple[int, int, int, int] | str | None = option(
+        "Region in which the flag is: x, y, width, height [px]; by default the whole picture.",
+        default=None,
+        section=FILM,
+        metavar="X,Y,W,H",
+    )
+    flag: int | None = option(
+        "Which moving cloth, as numbered on the page of measure --report; by default the one that moves most.",
+        default=None,
+        section=FILM,
+        type=POSITIVE,
+        metavar="N",
+    )
+    start: float | None = option(
+        "Where to begin in the film [s], as in 12s.", default=None, section=FILM, type=DURATION, metavar="TIME"
+    )
+    end: float | None = option("Where to end [s].", default=None, section=FILM, type=DURATION, metavar="TIME")
+
+
+@options
+class OfFilm(OfCloth):
+    """The same, and the rates of a film that is a file."""
+
+    true_fps: float | None = option(
+        "Rate at which a high-speed camera really ran [Hz].", default=None, section=FILM, metavar="HZ"
+    )
+    sequence_fps: float | None = option("Rate of a folder of images [Hz].", default=None, section=FILM, metavar="HZ")
+
+
+@options
+class Drawn:
+    """The intervals of an answer and the draws behind them."""
+
+    level: float = option("Level of the intervals.", default=0.9, section=HOW, type=SHARE)
+    seed: int = option("Seed of all draws.", default=0, section=HOW, type=click.IntRange(min=0))
+
+
+@options
+class FlagAndCamera:
+    """How a flag is held and seen, as far as it is known."""
+
+    attachment: str = option(
+        "How the flag is held: at both corners of its hoist, or along all of it.",
+        default="corners",
+        section=FLAG,
+        type=click.Choice(["corners", "hoist"]),
+    )
+    azimuth_deg: float | tuple[float, float] | str | Stated | None = option(
+        "Of the camera's axis to the wind [°], 90 from the side, as in 70±7; by default 30:150.",
+        "--azimuth",
+        default=None,
+        section=FLAG,
+        type=STATED,
+        metavar="DEGREES",
+    )
+    elevation_deg: float | tuple[float, float] | str | Stated | None = option(
+        "Of the camera's axis, upwards [°]; by default 0±5.",
+        "--elevation",
+        default=None,
+        section=FLAG,
+        type=STATED,
+        metavar="DEGREES",
+    )
+    distance: float | None = option(
+        "From the camera to the flag [m].",
+        default=15.0,
+        section=FLAG,
+        type=click.FloatRange(min=1.0),
+        metavar="M",
+    )
