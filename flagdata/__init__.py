@@ -11,10 +11,10 @@ training data, `flagdata.errors` what is raised.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flagdata.installed_names import step_aside
+from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from flagdata.api.lakes import open, pairs, query  # noqa: A004  read as flagdata.open
@@ -40,19 +40,7 @@ __all__ = [
     "wind",
 ]
 
-_PLACES = {
-    **dict.fromkeys(("open", "pairs", "query"), "flagdata.api.lakes"),
-    **dict.fromkeys(("calibrate", "close_loop", "measure", "render", "simulate"), "flagdata.api.physics"),
-    **dict.fromkeys(("frames", "meshes", "motion", "wind"), "flagdata.api.recordings"),
-    "example": "flagdata.examples",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_PLACES[name]), name)
-    return value
+__getattr__ = lazy_exports(__name__, __file__)
 
 
 def __dir__() -> list[str]:

@@ -11,7 +11,8 @@ import pytest
 
 from docs.generate_cli import commands
 from flagdata import cli
-from flagdata.commands.sections import REST, SECTIONS, LongCommand
+from flagdata.commands import LongCommand
+from flagdata.commands.sections import REST, SECTIONS
 from flagdata.console import say
 from tests.program import invoke
 

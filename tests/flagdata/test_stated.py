@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 import pytest
 
-from flagdata.commands.statements import STATED
+from flagdata.commands import STATED
 from flagdata.errors import UsageError
 from flagdata.stated import Stated, parse
 from tests.refusals import unrefused

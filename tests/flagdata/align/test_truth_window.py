@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from flagdata.align.apart import by_offset, by_spans
+from flagdata.align import by_spans
+from flagdata.align.apart import by_offset
 from flagdata.cli import root
-from flagdata.commands.durations import DURATION
-from flagdata.dataset import Source
-from flagdata.dataset.tolerance import Tolerance
+from flagdata.commands import DURATION
+from flagdata.dataset import Source, Tolerance
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter

@@ -11,10 +11,9 @@ import pytest
 from flagdata.errors import InputError, RefusedError
 from flagdata.findings import Finding, Severity
 from flagdata.signals import Sensor, WindSeries
-from measure.calibrate import filmed
-from measure.calibrate.simulation import OBSERVED
-from measure.film.similarity import FlagSize
-from measure.film.source import Reading as Pictures
+from measure.calibrate import OBSERVED, filmed
+from measure.film import FlagSize
+from measure.film import Reading as Pictures
 from measure.observables import Reading
 
 _SIZE = FlagSize(length=1.5, height=1.0)
