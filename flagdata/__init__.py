@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from flagdata.installed_names import step_aside
+from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from flagdata.api.lake_verbs import export, query, tag
@@ -48,23 +49,13 @@ __all__ = [
     "wind",
 ]
 
-_PLACES = {
-    **dict.fromkeys(("query", "tag"), "flagdata.api.lake_verbs"),
-    **dict.fromkeys(("open", "pairs"), "flagdata.api.lakes"),
-    **dict.fromkeys(("render", "simulate"), "flagdata.api.physics"),
-    **dict.fromkeys(("calibrate", "close_loop", "measure", "observe"), "flagdata.api.measuring"),
-    **dict.fromkeys(("frames", "meshes", "motion", "wind"), "flagdata.api.recordings"),
-    "example": "flagdata.examples",
-}
+_exported = lazy_exports(__name__, __file__)
 
 
 def __getattr__(name: str) -> Any:
     if name in ("align", "export", "ingest"):  # packages that are called as verbs
         return import_module(f"flagdata.{name}")
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_PLACES[name]), name)
-    return value
+    return _exported(name)
 
 
 def __dir__() -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flagdata.ingest.anemometer.confirm import Accepting, Drafted
+from flagdata.ingest import Accepting, Drafted
 
 
 class Confirming(Accepting):

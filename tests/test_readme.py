@@ -18,8 +18,8 @@ from PIL import Image, ImageSequence
 from docs.generate_example_picture import MOST_BYTES
 from flagdata.outputs import check_folder
 from measure.commands.measure import measure
-from measure.demo.command import MINUTES, SCHEMA, Story
-from measure.demo.recording import RecordingRecipe
+from measure.demo import MINUTES, RecordingRecipe, Story
+from measure.demo.command import SCHEMA
 from tests.docs.pages import Shell
 from tests.pools import Here
 

@@ -13,18 +13,20 @@ Names are imported when they are first used: cutting clips needs no torch.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from flagdata.dataset.cache import DecodedCache
     from flagdata.dataset.clips import clip_rows
     from flagdata.dataset.loader import PairLoader
     from flagdata.dataset.pairs import Pairs
-    from flagdata.dataset.resolve import SideSize
+    from flagdata.dataset.resolve import SideSize, clips_on_side, explicit_sides
     from flagdata.dataset.sample import Batch, Sample, collate
     from flagdata.dataset.source import Source
     from flagdata.dataset.splits import ExplicitSplit, HashedSplit
+    from flagdata.dataset.table import COLUMNS, PairTable
     from flagdata.dataset.tolerance import Refusal, Tolerance
     from flagdata.dataset.truth import TruthSeries, WindTruth
 
@@ -46,26 +48,4 @@ __all__ = [
     "collate",
 ]
 
-_PLACES = {
-    "Batch": "sample",
-    "DecodedCache": "cache",
-    "ExplicitSplit": "splits",
-    "HashedSplit": "splits",
-    "PairLoader": "loader",
-    "Pairs": "pairs",
-    "Refusal": "tolerance",
-    "Sample": "sample",
-    "SideSize": "resolve",
-    "Source": "source",
-    "Tolerance": "tolerance",
-    "TruthSeries": "truth",
-    "WindTruth": "truth",
-    "clip_rows": "clips",
-    "collate": "sample",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
+__getattr__ = lazy_exports(__name__, __file__)

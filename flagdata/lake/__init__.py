@@ -14,8 +14,45 @@ bucket, `s3://bucket/prefix` (see docs/decisions/040-object-storage.md). Its lay
     staging/             one folder a running transaction, with its lease; nothing in it is visible
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.lake import Lake
 from flagdata.lake.transaction import CommitResult, Transaction
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from flagdata.lake.catalog import Catalog
+    from flagdata.lake.collect import garbage, usage
+    from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, sampled, verify, verify_catalog
+    from flagdata.lake.labels import columns, given
+    from flagdata.lake.leases import Lease, collecting
+    from flagdata.lake.lineage import labels_of
+    from flagdata.lake.log import Log
+    from flagdata.lake.merging import difference
+    from flagdata.lake.meshes import (
+        MarkerSequence,
+        Mesh,
+        MeshSequence,
+        RaggedMeshSequence,
+        open_meshes,
+        read_markers,
+        read_meshes,
+        write_markers,
+        write_meshes,
+    )
+    from flagdata.lake.naming import meant
+    from flagdata.lake.objects import Objects
+    from flagdata.lake.refs import Refs, View
+    from flagdata.lake.removal import expire, last_version, lost
+    from flagdata.lake.results import Placed, keep, placed, versions
+    from flagdata.lake.rowfiles import Scan, with_data_sets
+    from flagdata.lake.selection import Request, Selection, select
+    from flagdata.lake.transfer import clone
+
 
 __all__ = ["Artifact", "CommitResult", "Lake", "Transaction"]
+
+__getattr__ = lazy_exports(__name__, __file__)

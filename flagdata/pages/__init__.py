@@ -1,1 +1,14 @@
 """The kit of all reports: one frame and style, escaped text, tables, figures and pictures inside a single HTML file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from flagdata.pages.graph import COLOURS
+    from flagdata.pages.lineage import picture
+    from flagdata.pages.pictures import figure_url, moving
+
+__getattr__ = lazy_exports(__name__, __file__)

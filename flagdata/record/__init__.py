@@ -19,8 +19,24 @@ salvage lost). Attachments are the vendor's log, the sensor recipe that was name
 Chunks are not compressed (JPEG and H.264 do not shrink further), so that a frame is read from its place in the file.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
 from flagdata.record.reader import Record
 from flagdata.record.salvage import salvage
 from flagdata.record.writer import Chunking, Coding, RecordWriter
 
+if TYPE_CHECKING:
+    from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
+    from flagdata.record.container import read_messages, read_summary
+    from flagdata.record.metadata import CAMERA, PROVENANCE
+    from flagdata.record.source import open_bytes
+    from flagdata.record.unpacking import unpacked
+    from flagdata.record.video import VideoEncoder, decode
+
+
 __all__ = ["Chunking", "Coding", "Record", "RecordWriter", "salvage"]
+
+__getattr__ = lazy_exports(__name__, __file__)

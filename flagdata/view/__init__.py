@@ -3,3 +3,16 @@
 films (what moves, as pictures) → media (thumbnails, frames, winds as answers) → pages (HTML) → routes (addresses to
 answers, without a socket) → server (the socket and who may ask).
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from flagdata.view.media import Media
+    from flagdata.view.pages import Site
+    from flagdata.view.server import Answer, Server, answer
+
+__getattr__ = lazy_exports(__name__, __file__)

@@ -9,3 +9,16 @@ calibration recordings and their logs → a reading model
 artifact    a reading model in the lake
 measuring   a film by a reading model, in the form of any other measurement
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.anemometer.calibration import Calibrated, Recording, calibrated
+    from measure.anemometer.features import Features, Place
+    from measure.anemometer.network import Network, gate_beside
+
+__getattr__ = lazy_exports(__name__, __file__)

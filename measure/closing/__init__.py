@@ -3,3 +3,18 @@
 It composes the stages of a verdict and may import all of them: `measure.loop` finds the numbers, `measure.report` the
 words.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.closing.artifacts import Answer, answer_of
+    from measure.closing.close import close_loop
+    from measure.closing.joint import joined
+    from measure.closing.models import acting
+    from measure.closing.sources import Reading
+
+__getattr__ = lazy_exports(__name__, __file__)

@@ -1,1 +1,12 @@
 """The verbs of measuring: what each option means, the parts that it asks in turn, what is printed and written."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.commands.measured import read
+
+__getattr__ = lazy_exports(__name__, __file__)

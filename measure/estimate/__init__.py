@@ -1,1 +1,19 @@
 """Wind and cloth of one recording, with intervals, or the reason why not: what `flagdata measure` does."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.estimate.answer import Quantity, information
+    from measure.estimate.combine import CARD_KEY, OWN, UNKNOWN, Dependence, combined, of_model
+    from measure.estimate.material import weight_of
+    from measure.estimate.measuring import Measurement, measure
+    from measure.estimate.options import Options
+    from measure.estimate.page import Context, Section
+    from measure.estimate.pictures import steps
+    from measure.estimate.series import Beside, beside
+
+__getattr__ = lazy_exports(__name__, __file__)

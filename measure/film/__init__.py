@@ -1,1 +1,15 @@
 """The film that is measured: which one it is, its frames made fit, its windows, and the size of its flag."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.film.conditioned import ConditionedFilm
+    from measure.film.similarity import FlagSize, parse_size, scaled_back, sizes
+    from measure.film.source import Reading, Subject, subjects
+    from measure.film.windows import Layout, findings_of
+
+__getattr__ = lazy_exports(__name__, __file__)

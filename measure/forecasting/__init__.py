@@ -2,3 +2,32 @@
 
 It may import `measure.observe` and the simulator, and no other stage of a verdict.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.forecasting.alignment import aligned
+    from measure.forecasting.calibration import PRIOR, THETA, Calibration
+    from measure.forecasting.model import Model, errors_of
+    from measure.forecasting.observer import Forecaster
+    from measure.forecasting.regressors import (
+        TURNED,
+        AcrossColumn,
+        Column,
+        EffectColumn,
+        FieldColumn,
+        columns,
+        fields,
+        library,
+        names,
+        winds,
+    )
+    from measure.forecasting.segments import Cut, Segments
+    from measure.forecasting.setting import Design, Setting
+    from measure.forecasting.strengths import Suspicion, every, on_markers
+
+__getattr__ = lazy_exports(__name__, __file__)

@@ -2,3 +2,18 @@
 
 It may import `measure.nulls` and what that may import. `measure.report` writes the sentences.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.loop.corrective_field import Mode
+    from measure.loop.run import Options, Outcome, solve
+    from measure.loop.selection import GUST_COLUMN, Judgement, estimate, finalists, judge
+    from measure.loop.set_up import HOIST
+    from measure.loop.validation import folds, paired, total_error
+
+__getattr__ = lazy_exports(__name__, __file__)

@@ -7,11 +7,21 @@ table that `flagdata observe` writes and in the power map.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
 from flagdata.registry import Registry
 from measure.observables.cloth import ClothWindow, View, seen_from
 from measure.observables.film import FilmWindow
 from measure.observables.observable import Observable, Reading, UnseenError
 from measure.observables.silhouettes import Silhouettes
+
+if TYPE_CHECKING:
+    from measure.observables.cloth import edges_of
+    from measure.observables.observable import WINDOW
+    from measure.observables.table import table_of
+    from measure.observables.watching import watched
+
 
 __all__ = [
     "OBSERVABLES",
@@ -44,3 +54,5 @@ OBSERVABLES = Registry(
     },
 )
 """Name → `Observable`."""
+
+__getattr__ = lazy_exports(__name__, __file__)

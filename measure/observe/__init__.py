@@ -1,11 +1,28 @@
 """Observed trajectories: the motion of a cloth, its specimen and its wind; read and checked before anything
 is concluded from them."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
 from measure.observe.experiment import Observed, observe
 from measure.observe.gaps import fill
 from measure.observe.observation import Known, Observation, Up, from_arrays
 from measure.observe.setup import Hold, Setup, sheet
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
+
+if TYPE_CHECKING:
+    from measure.observe.anchors import as_seen, carried
+    from measure.observe.checks.attachment import hoist_stands_still
+    from measure.observe.cloth import model_mesh
+    from measure.observe.experiment import hold
+    from measure.observe.interpolation import onto
+    from measure.observe.meshes import from_folder, from_sequence, sample
+    from measure.observe.recipe import load, parse, read
+    from measure.observe.trajectory import DENSITY_UNCERTAINTY, AttachmentTrack, Floats
+    from measure.observe.wind import LogPlacement, from_log
+
 
 __all__ = [
     "Experiment",
@@ -23,3 +40,5 @@ __all__ = [
     "observe",
     "sheet",
 ]
+
+__getattr__ = lazy_exports(__name__, __file__)

@@ -2,3 +2,18 @@
 
 It may import `measure.forecasting`, and the criteria from `measure.verdict`.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.probes.course import ALONG, LEFT, Course, Variation
+    from measure.probes.lines import REDUCED, Line, Lines, strongest
+    from measure.probes.rows import Rows
+    from measure.probes.statistics import Projection, Statistics, error_scale, projected, reduced
+    from measure.probes.wind_log import by_recording, lags
+
+__getattr__ = lazy_exports(__name__, __file__)

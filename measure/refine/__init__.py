@@ -5,3 +5,23 @@ this project's own procedure (`measure.refine.procedure`) over the paper's 17 pa
 paper's own optimiser and others belong to the validation, which runs them on the same evaluator
 (`measure.refine.evaluator`).
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.refine.command import Clip, run
+    from measure.refine.evaluator import Evaluator, fingerprint
+    from measure.refine.metamodel import Metamodel
+    from measure.refine.procedure import Settings, refine, squared
+    from measure.refine.refinement import Interval, Refinement, Round
+    from measure.refine.simulator import Request, Simulator
+    from measure.refine.space import DENSITY, QUANTITIES, WIND, Space
+    from measure.refine.target import Target
+    from measure.refine.trace import Trace
+    from measure.refine.view import Camera, DrawnView, FixedView
+
+__getattr__ = lazy_exports(__name__, __file__)

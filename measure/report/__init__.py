@@ -2,3 +2,15 @@
 
 It may import `measure.verdict`, and the outcomes of `measure.loop` and of the stages before it.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.report.document import as_document, from_document
+    from measure.report.statement import by_draw, stated
+
+__getattr__ = lazy_exports(__name__, __file__)

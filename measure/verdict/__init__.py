@@ -2,3 +2,36 @@
 
 It imports no other stage of a verdict, and any may import it.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.verdict.criteria import CRITERIA
+    from measure.verdict.decided import NOT_REJECTED, erring, undecided
+    from measure.verdict.quantity import (
+        display,
+        estimate_text,
+        in_errors,
+        number,
+        probability,
+        share,
+        with_error,
+        with_level,
+    )
+    from measure.verdict.record import (
+        Candidate,
+        Comparison,
+        Conclusion,
+        Estimate,
+        NullTest,
+        Parameter,
+        Power,
+        Residual,
+        Verdict,
+    )
+
+__getattr__ = lazy_exports(__name__, __file__)

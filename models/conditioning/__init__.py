@@ -4,6 +4,23 @@
 read as a stream.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
 from models.conditioning.conditioning import Conditioned, Conditioning, Follower, conditioned, conditioning_of
 
+if TYPE_CHECKING:
+    from models.conditioning.conditioning import VERSION
+    from models.conditioning.grain import grained
+    from models.conditioning.instants import Interpolator
+    from models.conditioning.mask_network import MaskNetwork, inputs_of
+    from models.conditioning.outline import Outliner
+    from models.conditioning.repeats import Distinct
+    from models.conditioning.stills import HALVED, Stills, halved
+
+
 __all__ = ["Conditioned", "Conditioning", "Follower", "conditioned", "conditioning_of"]
+
+__getattr__ = lazy_exports(__name__, __file__)

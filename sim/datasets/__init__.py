@@ -4,3 +4,19 @@ A recipe (`recipe`, read by `reading`) says which scene is simulated how often f
 meshes are filmed, and what the anemometer beside them says. `build` turns it into mesh sequences and recordings of a
 lake, which load like real ones.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from sim.datasets.anemometer import logged, velocities
+    from sim.datasets.cast import Cast, Roll, casts
+    from sim.datasets.films import EPOCH, Film, Sequences
+    from sim.datasets.picture import coded, settings
+    from sim.datasets.reading import load, parse
+    from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, Truth
+
+__getattr__ = lazy_exports(__name__, __file__)

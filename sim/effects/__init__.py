@@ -5,9 +5,37 @@ An entry here enrols it in the contract suites (`tests/contract/test_effects.py`
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
 from flagdata.registry import Registry
 from sim.effects.effect import Effect, apply
 from sim.effects.parameter import Parameter, Role
+
+if TYPE_CHECKING:
+    from sim.effects.added_mass import AddedMass
+    from sim.effects.anemometer_lag import AnemometerLag
+    from sim.effects.effect import ClothEffect, FlowEffect, ForceEffect, WindEffect
+    from sim.effects.field import FieldEffect, Flat, Seen, heavier
+    from sim.effects.files import load
+    from sim.effects.finite_span_loading import FiniteSpanLoading
+    from sim.effects.geometry import horizontal, left_of, norm, origin
+    from sim.effects.gusts import Gusts
+    from sim.effects.hem_mass import HemMass
+    from sim.effects.internal_damping import InternalDamping
+    from sim.effects.lift import Lift
+    from sim.effects.parameter import NOT_NEGATIVE, Parametrised, Value, shape, strength
+    from sim.effects.permeability import Permeability
+    from sim.effects.porosity import Porosity
+    from sim.effects.power_law_drag import PowerLawDrag
+    from sim.effects.quantities import AIR_DENSITY
+    from sim.effects.reactive_loading import ReactiveLoading
+    from sim.effects.sensor import AnemometerEffect, Sampling
+    from sim.effects.shear import Shear
+    from sim.effects.slack import Slack
+    from sim.effects.tangential_linear_drag import TangentialLinearDrag
+    from sim.effects.vertical_wind import VerticalWind
+
 
 __all__ = ["EFFECTS", "SENSOR_EFFECTS", "Effect", "Parameter", "Role", "apply"]
 
@@ -66,3 +94,5 @@ SENSOR_EFFECTS = Registry(
     },
 )
 """On the observation: kinds of `sim.effects.sensor`."""
+
+__getattr__ = lazy_exports(__name__, __file__)

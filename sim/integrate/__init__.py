@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
+from flagdata.lazy import lazy_exports
 from flagdata.registry import Registry
 from sim.state import State
 from sim.system import System
+
+if TYPE_CHECKING:
+    from sim.integrate.backend import Backend
+    from sim.integrate.implicit import AirShape, BackwardEuler
+    from sim.integrate.joint_batch import JointBatch
+    from sim.integrate.split import SplitEuler
+    from sim.integrate.stability import stable_step
+    from sim.integrate.symplectic import Symplectic, advance
 
 
 class Integrator(Protocol):
@@ -24,3 +33,5 @@ INTEGRATORS = Registry(
         "implicit": "sim.integrate.implicit:BackwardEuler",
     },
 )
+
+__getattr__ = lazy_exports(__name__, __file__)

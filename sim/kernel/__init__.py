@@ -5,3 +5,14 @@ Why it is there: one leapfrog step of a flag of 651 vertices, batch 16, float32,
 and 750 µs as a compiled graph, which takes minutes to compile (intermediate buffers; table look-ups that do not
 vectorise). This kernel takes about 10 µs, and a second to compile.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from sim.kernel.fused import Kernel
+
+__getattr__ = lazy_exports(__name__, __file__)

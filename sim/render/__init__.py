@@ -7,10 +7,21 @@ turns linear light into sRGB bytes.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
 from flagdata.registry import Registry
 from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
 from sim.render.renderer import Renderer
+
+if TYPE_CHECKING:
+    from sim.render.camera import Camera
+    from sim.render.cycles import Cycles, Workbench
+    from sim.render.develop import plate, to_bytes, to_linear
+    from sim.render.prior import RenderPrior, named
+    from sim.render.raster import Raster
+
 
 __all__ = ["RENDERERS", "Meshes", "RenderParameters", "Renderer"]
 
@@ -23,3 +34,5 @@ RENDERERS = Registry(
     },
 )
 """Name → class, made with the assets it takes backgrounds and textures from: `RENDERERS["raster"](assets=Assets())`."""
+
+__getattr__ = lazy_exports(__name__, __file__)

@@ -3,8 +3,24 @@
 A recipe is a TOML file (see `sim.run.reading`), one of `catalogs/scenes` by name, or an ArcSim scene file.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
 from sim.run.publish import Progress, RunReport, simulate
 from sim.run.reading import load
 from sim.run.recipe import Recipe
 
+if TYPE_CHECKING:
+    from sim.run.arrays import recipe_of
+    from sim.run.batch import CRUMPLED, Outcome, Stepper, principal_strains, run
+    from sim.run.members import Crew
+    from sim.run.publish import member_artifact, one_thread
+    from sim.run.reading import of_content, parse
+    from sim.run.recipe import IntegratorSpec, MaterialSpec, Shape
+
+
 __all__ = ["Progress", "Recipe", "RunReport", "load", "simulate"]
+
+__getattr__ = lazy_exports(__name__, __file__)

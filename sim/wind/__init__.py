@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from torch import Tensor
 
+from flagdata.lazy import lazy_exports
 from flagdata.registry import Registry
+
+if TYPE_CHECKING:
+    from sim.wind.sampled import Beyond, Even, SampledWind
+    from sim.wind.spectral import VonKarman
+    from sim.wind.uniform import UniformWind
 
 
 class Wind(Protocol):
@@ -23,3 +29,5 @@ WINDS = Registry(
         "uniform": "sim.wind.uniform:UniformWind",
     },
 )
+
+__getattr__ = lazy_exports(__name__, __file__)

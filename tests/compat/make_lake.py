@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.meshes import MeshSequence, write_meshes
+from flagdata.lake import Artifact, Lake, MeshSequence, write_meshes
 from flagdata.record import RecordWriter
 from flagdata.schema import Kind, SampleFlag
 from flagdata.signals import Sensor, WindSeries

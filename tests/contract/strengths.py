@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TypeVar
 
-from sim.effects.parameter import Parametrised, Value
+from sim.effects import Parametrised, Value
 
 Some = TypeVar("Some", bound=Parametrised)
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from sim.effects import EFFECTS, SENSOR_EFFECTS, Role
-from sim.effects.parameter import Parametrised
+from sim.effects import EFFECTS, SENSOR_EFFECTS, Parametrised, Role
 
 
 def test_every_parameter_has_unit_null_prior_and_source() -> None:

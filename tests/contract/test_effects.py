@@ -22,8 +22,7 @@ from flagdata.rng import stream
 from sim import scene
 from sim.effects import EFFECTS, Effect
 from sim.handles import Handles
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Backend, Symplectic, advance
+from sim.integrate import Backend, BackwardEuler, Symplectic, advance
 from sim.material import named
 from sim.mesh import Mesh, grid
 from sim.scene import Scene, assemble

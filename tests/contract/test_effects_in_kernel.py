@@ -17,15 +17,9 @@ from flagdata.errors import UsageError
 from flagdata.rng import stream
 from sim import scene
 from sim.air import AIR_FORCES, Stokes
-from sim.effects import EFFECTS
-from sim.effects.field import FieldEffect, Seen
-from sim.effects.files import load
-from sim.integrate.backend import Backend
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.joint_batch import JointBatch
-from sim.integrate.split import SplitEuler
-from sim.integrate.symplectic import advance
-from sim.kernel.fused import Kernel
+from sim.effects import EFFECTS, FieldEffect, Seen, load
+from sim.integrate import Backend, BackwardEuler, JointBatch, SplitEuler, advance
+from sim.kernel import Kernel
 from sim.material import named
 from sim.scene import assemble
 from sim.state import State

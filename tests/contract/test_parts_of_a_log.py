@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from types import FrameType
 
-from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest import WindOptions, read_log
 from tests.contract.imports import imported_names
 
 HOUSE = Path(__file__).resolve().parents[2] / "flagdata" / "ingest" / "anemometer"

@@ -20,8 +20,8 @@ import torch
 import flagdata
 import flagdata.dataset
 from flagdata.arguments import checked, plain, real, whole
-from flagdata.dataset.loader import Batchable, PairLoader
-from flagdata.dataset.sample import Sample
+from flagdata.dataset import PairLoader, Sample
+from flagdata.dataset.loader import Batchable
 from flagdata.errors import UsageError
 from flagdata.rng import stream
 

@@ -12,9 +12,8 @@ from torch import Tensor
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from sim.effects import SENSOR_EFFECTS
-from sim.effects.parameter import Parametrised
-from sim.effects.sensor import AnemometerEffect, CameraEffect, ClockEffect, Sampling
+from sim.effects import SENSOR_EFFECTS, AnemometerEffect, Parametrised, Sampling
+from sim.effects.sensor import CameraEffect, ClockEffect
 from tests.contract.strengths import nulled
 
 NAMES = list(SENSOR_EFFECTS)

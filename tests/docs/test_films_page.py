@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from measure.calibrate import observed
-from measure.calibrate.simulation import OBSERVED
+from measure.calibrate import OBSERVED, observed
 from measure.observables import OBSERVABLES, Observable
 from tests.studies.validation.power import reference_table, table
 

@@ -14,18 +14,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.ingest.meshes import write_folder
-from flagdata.lake import Lake
-from flagdata.lake.meshes import MeshSequence
+from flagdata.ingest import write_folder
+from flagdata.lake import Lake, MeshSequence
 from flagdata.schema import Kind
-from measure.demo.tracked import TrackedRecipe, make_tracks
+from measure.demo import TrackedRecipe, make_tracks
+from measure.nulls import NullBatch
 from measure.nulls.bank import build
-from measure.nulls.simulation import NullBatch
-from measure.observe.recipe import load
-from measure.observe.trajectory import Experiment
-from measure.propose.outcome import Decision, Outcome
+from measure.observe import Experiment, load
+from measure.propose import Decision, Outcome
 from measure.propose.proposal_log import entries
-from measure.verdict.record import Conclusion, Estimate, Parameter, Verdict
+from measure.verdict import Conclusion, Estimate, Parameter, Verdict
 from sim.mesh import grid
 from tests.docs.pages import Shell, blocks, commands
 from tests.measure.observe.flags import HEIGHT, WIDTH, flutter

@@ -12,11 +12,10 @@ import pytest
 
 from flagdata.cli import main
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer import WindOptions
+from flagdata.ingest import Head, WindOptions
 from flagdata.ingest.anemometer.identify import opened
-from flagdata.ingest.anemometer.sniffing import Head
 from flagdata.lake import Lake
-from measure.demo.logger import SENSOR
+from measure.demo import SENSOR
 from tests.docs.pages import DOCS, Shell, blocks, commands, files
 from tests.drawn.field import DrawnRecipe, write_drawn_film, write_drawn_log
 from tests.drawn.flag import DrawnFlag

@@ -10,7 +10,7 @@ import pytest
 
 from docs.generate_cli import commands
 from docs.generate_refusal_pictures import FAULTS, FOLDER, MOST_BYTES, caption, found, looked_at
-from measure.gate.reasons import REASONS
+from measure.gate import REASONS
 from tests.contract.imports import ROOT, modules, tree
 from tests.docs.pages import DOCS
 

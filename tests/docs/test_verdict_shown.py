@@ -7,11 +7,10 @@ import re
 
 import pytest
 
-from measure.report.document import from_document
+from measure.report import by_draw, from_document
 from measure.report.lead import lead
-from measure.report.statement import by_draw
 from measure.report.words import words
-from measure.verdict.record import Verdict
+from measure.verdict import Verdict
 from tests.docs.pages import DOCS
 
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS, from_datetime
-from measure.demo.logger import CUP, write_log
-from measure.demo.recording import BEFORE, START
-from sim.datasets.anemometer import logged
-from sim.wind.spectral import VonKarman
+from measure.demo import BEFORE, CUP, START
+from measure.demo.logger import write_log
+from sim.datasets import logged
+from sim.wind import VonKarman
 from tests.drawn.flag import DrawnFlag
 
 WIND_RATE = 20

@@ -12,10 +12,9 @@ import flagdata
 from flagdata.addresses import local_path
 from flagdata.cli import VERBS
 from flagdata.console import LocalPath
-from flagdata.dataset.cache import DecodedCache
+from flagdata.dataset import DecodedCache
 from flagdata.errors import UsageError
-from flagdata.ingest.anemometer import read_log, sniff
-from flagdata.ingest.camera import open_camera
+from flagdata.ingest import open_camera, read_log, sniff
 from flagdata.lake import Lake
 from tests.program import invoke
 

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pytest
 
 from flagdata.buffers import owned
-from flagdata.ingest.store import ingest_wind
+from flagdata.ingest import ingest_wind
 from flagdata.lake import Lake
 
 

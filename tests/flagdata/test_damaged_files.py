@@ -17,15 +17,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError
-from flagdata.ingest.markers import MarkerOptions
+from flagdata.ingest import MarkerOptions, is_marker_table, read_obj, read_table
 from flagdata.ingest.markers import table as marker_table
-from flagdata.ingest.markers.table import is_marker_table, read_table
-from flagdata.ingest.meshes import read_obj
-from flagdata.lake import Lake
-from flagdata.lake.health import doctor
-from flagdata.lake.meshes import (
+from flagdata.lake import (
+    Lake,
     MarkerSequence,
     MeshSequence,
+    doctor,
     open_meshes,
     read_markers,
     read_meshes,

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata import documents
-from flagdata.dataset.cache import DecodedCache
+from flagdata.dataset import DecodedCache
 from flagdata.documents import NESTING_LIMIT, LimitsError, from_json, from_toml, read_json
 from flagdata.errors import CorruptError
 from flagdata.lake import Lake

@@ -10,13 +10,8 @@ import pytest
 
 from flagdata.errors import InputError, LimitError, NotFoundError
 from flagdata.files import check_input
+from flagdata.ingest import guesses, open_camera, read_cloths, read_json, read_obj, read_table
 from flagdata.ingest.anemometer.text.source import first_bytes
-from flagdata.ingest.camera import open_camera
-from flagdata.ingest.classify import guesses
-from flagdata.ingest.cloths import read_cloths
-from flagdata.ingest.markers import read_table
-from flagdata.ingest.meshes import read_obj
-from flagdata.ingest.meshes.folder import read_json
 from flagdata.ingest.source import Source
 from flagdata.recipes import read_recipe
 

@@ -8,7 +8,7 @@ import io
 import numpy as np
 from PIL import Image
 
-from flagdata.pages.pictures import moving
+from flagdata.pages import moving
 
 
 def test_the_middle_of_a_clip_in_colour_is_shown_in_colour() -> None:

@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest.cloths import read_cloths
-from flagdata.ingest.markers import is_marker_table, read_table
-from flagdata.ingest.meshes.folder import read_json
-from flagdata.ingest.meshes.obj import read_obj
+from flagdata.ingest import is_marker_table, read_cloths, read_json, read_obj, read_table
 from flagdata.recipes import parsed, read_recipe
 
 Bytes = Callable[[str], bytes]

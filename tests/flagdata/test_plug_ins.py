@@ -12,8 +12,7 @@ import pytest
 
 from flagdata.cli import NAMES
 from flagdata.commands.catalog import titles
-from flagdata.ingest.anemometer.formats.registry import FORMATS
-from flagdata.ingest.anemometer.identify import sniff
+from flagdata.ingest import FORMATS, sniff
 from flagdata.registry import PlugInError, Registry
 from sim.effects import EFFECTS
 from tests.program import invoke

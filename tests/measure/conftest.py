@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 import torch
 
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.observer import Forecaster
-from measure.forecasting.segments import Segments
-from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from measure.forecasting import Calibration, Forecaster, Segments
+from measure.observe import Specimen, Trajectory, WindTrack
 from sim import handles
-from sim.integrate.split import SplitEuler
+from sim.integrate import SplitEuler
 from sim.material import named
 from sim.mesh import grid
 

@@ -20,8 +20,7 @@ from flagdata.errors import CorruptError, InputError, LimitError
 from models import estimator
 from models.estimator import CLOUD
 from models.storage import CARD, read_tensors, write_tensors
-from models.training import checkpoint
-from models.training.recipe import TrainingRecipe, parse
+from models.training import TrainingRecipe, checkpoint, parse
 from tests.damage import QUICK, changed, paths, wild
 from tests.refusals import unrefused
 from tests.small import TRAINING

@@ -86,7 +86,7 @@ def test_targets_of_two_kinds_of_cloth_or_named_twice_are_refused(names: tuple[s
 
 def test_the_ranges_of_hanging_cloth_hold_all_that_its_scene_can_draw() -> None:
     """Ends of the factors times the tables of the ten materials, in log10 for the 15 bending coefficients."""
-    from sim.run.reading import load
+    from sim.run import load
 
     scene = load("hanging-cloth-wide")
     spec = scene.material
@@ -134,7 +134,7 @@ def test_the_aspect_is_the_logarithm_of_length_over_height() -> None:
 
 
 def test_the_ranges_of_flags_outdoors_hold_all_that_their_data_sets_can_draw() -> None:
-    from sim.datasets.reading import load
+    from sim.datasets import load
 
     for name in ("outdoor", "outdoor-damped"):
         recipe = load(name)

@@ -7,7 +7,7 @@ from pathlib import Path
 import av
 import numpy as np
 
-from flagdata.ingest.store import ingest_camera, ingest_wind
+from flagdata.ingest import ingest_camera, ingest_wind
 from flagdata.lake import Lake
 
 

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from flagdata.align import methods
-from flagdata.ingest.camera import CameraOptions
-from flagdata.ingest.store import CameraIngest, Labels, ingest_camera
+from flagdata.ingest import CameraIngest, CameraOptions, Labels, ingest_camera
 from flagdata.lake import Lake, selection
 from tests.remedies.cases import Case, heal
 from tests.remedies.user import User

@@ -8,11 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.lake import Lake
-from flagdata.lake.artifact import Artifact
-from flagdata.lake.objects import Objects
-from flagdata.lake.refs import Refs
-from flagdata.lake.transfer import clone, transfer
+from flagdata.lake import Artifact, Lake, Objects, Refs, clone
+from flagdata.lake.transfer import transfer
 from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import overwrite
 from tests.flagdata.lake.test_healing import cut, flip, lose

@@ -10,8 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from flagdata.lake import Lake
-from flagdata.lake.artifact import Artifact
+from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import overwrite
 from tests.remedies.cases import Case, meet

@@ -14,8 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.timebase import NANOSECONDS
-from measure.calibrate import calibrate
-from measure.calibrate.design import Design
+from measure.calibrate import Design, calibrate
 from tests.measure.calibrate.conftest import cheap as cheap
 from tests.measure.calibrate.conftest import known, readings
 from tests.remedies.cases import Case, heal

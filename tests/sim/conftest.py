@@ -17,7 +17,7 @@ from sim.scene import upright
 from sim.state import State
 from sim.system import System
 from sim.tables import Evaluation
-from sim.wind.uniform import UniformWind
+from sim.wind import UniformWind
 
 MakeSystem = Callable[..., tuple[System, State]]
 

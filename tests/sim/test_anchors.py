@@ -11,13 +11,9 @@ import torch
 from flagdata.errors import InputError, UsageError
 from sim import handles
 from sim.anchors import AnchorTracks
-from sim.effects import apply
-from sim.effects.slack import Slack
+from sim.effects import Slack, apply
 from sim.handles import Handles
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.joint_batch import JointBatch
-from sim.integrate.split import SplitEuler
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import BackwardEuler, JointBatch, SplitEuler, Symplectic
 from sim.material import named
 from sim.mesh import grid
 from sim.scene import Scene, assemble, upright

@@ -16,13 +16,13 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import ConflictError, InputError, NotFoundError, UnknownNameError
-from flagdata.ingest.meshes import read_folder
-from flagdata.lake.meshes import Mesh as MeshFrame
+from flagdata.ingest import read_folder
+from flagdata.lake import Mesh as MeshFrame
 from sim.air import QuadraticNormal, Stokes
 from sim.arcsim import STAGES, SWEEPS, ArcsimScene, read_material, read_scene, write_scene
 from sim.contact import Contact
 from sim.handles import Handles
-from sim.integrate.implicit import AirShape, BackwardEuler
+from sim.integrate import AirShape, BackwardEuler
 from sim.limits import StrainLimits
 from sim.material import named
 from sim.mesh import Mesh

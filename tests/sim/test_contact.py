@@ -13,9 +13,8 @@ from flagdata.errors import InputError
 from sim import contact
 from sim.contact import Contact
 from sim.handles import Handles
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Backend, Symplectic, advance
-from sim.kernel.fused import Kernel
+from sim.integrate import Backend, BackwardEuler, Symplectic, advance
+from sim.kernel import Kernel
 from sim.material import isotropic, named
 from sim.mesh import Mesh, grid
 from sim.scene import assemble, flag

@@ -13,9 +13,8 @@ from flagdata.errors import UsageError
 from sim import membrane
 from sim.air import QuadraticNormal
 from sim.handles import Handles
-from sim.integrate.backend import Backend
-from sim.integrate.implicit import AirShape, BackwardEuler, conjugate_gradients
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import AirShape, Backend, BackwardEuler, Symplectic
+from sim.integrate.implicit import conjugate_gradients
 from sim.material import isotropic, named
 from sim.mesh import grid
 from sim.state import State

@@ -14,9 +14,8 @@ from flagdata.errors import UsageError
 from sim import compiler as build
 from sim.air import QuadraticNormal, Stokes
 from sim.handles import Handles
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Backend, Symplectic, advance
-from sim.kernel.fused import Kernel
+from sim.integrate import Backend, BackwardEuler, Symplectic, advance
+from sim.kernel import Kernel
 from sim.material import named
 from sim.state import State
 from sim.tables import Evaluation
@@ -177,7 +176,7 @@ def test_a_forced_step_beyond_the_limit_is_refused_with_the_limit(make_system, d
 
 def test_just_below_the_limit_is_stable_and_well_above_is_not(make_system, distorted) -> None:
     # The estimate is for 15 % stretch and the largest table entries; at small strain the true limit is some way above.
-    from sim.integrate.stability import stable_step
+    from sim.integrate import stable_step
 
     system, state = make_system(distorted, [named("11oz-black-denim")])
     quiet = State(position=state.position, velocity=1e-3 * stirred(state).velocity)

@@ -15,15 +15,12 @@ from flagdata.errors import UsageError
 from sim.air import QuadraticNormal, Stokes
 from sim.contact import Contact
 from sim.handles import Handles
-from sim.integrate.backend import Backend
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Symplectic, advance
+from sim.integrate import Backend, BackwardEuler, Symplectic, advance
 from sim.kernel_warp import batch
 from sim.limits import StrainLimits
 from sim.material import named
 from sim.mesh import grid
-from sim.run.reading import parse
-from sim.run.recipe import Recipe
+from sim.run import Recipe, parse
 from sim.scene import assemble, flag
 from sim.state import State
 from sim.tables import Evaluation

@@ -11,8 +11,7 @@ import torch
 
 from flagdata.errors import InputError
 from sim.handles import Handles
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Backend, Symplectic, advance
+from sim.integrate import Backend, BackwardEuler, Symplectic, advance
 from sim.limits import StrainLimits, correction, limited, stretches
 from sim.material import named
 from sim.mesh import grid

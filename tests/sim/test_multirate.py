@@ -13,11 +13,9 @@ import torch
 from flagdata.errors import UsageError
 from flagdata.rng import stream
 from sim.air import NO_AIR, Stokes
-from sim.effects import EFFECTS, apply
-from sim.effects.lift import Lift
-from sim.effects.tangential_linear_drag import TangentialLinearDrag
+from sim.effects import EFFECTS, Lift, TangentialLinearDrag, apply
 from sim.handles import Handles
-from sim.integrate.symplectic import Backend, Symplectic, advance
+from sim.integrate import Backend, Symplectic, advance
 from sim.material import named
 from sim.mesh import grid
 from sim.scene import assemble, flag

@@ -9,8 +9,7 @@ from torch import Tensor
 from sim import bending, inertia, on_mesh
 from sim.air import NO_AIR, QuadraticNormal, Stokes, face_wind
 from sim.cloth import Cloth
-from sim.effects.permeability import Permeability
-from sim.effects.power_law_drag import PowerLawDrag
+from sim.effects import Permeability, PowerLawDrag
 from sim.material import named
 
 BATCHES = (1, 3, 8, 20)

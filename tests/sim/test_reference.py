@@ -10,8 +10,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from sim.integrate.implicit import AirShape, BackwardEuler
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import AirShape, BackwardEuler, Symplectic
 from sim.material import named
 from sim.scene import Scene, assemble, flag
 from tests.verification.motion import EdgeMotion, edge_motion

@@ -11,12 +11,12 @@ import torch
 from flagdata.errors import InputError, UsageError
 from sim import handles as held
 from sim.handles import Handles
-from sim.integrate.symplectic import Symplectic, advance
+from sim.integrate import Symplectic, advance
 from sim.material import MATERIALS, named
 from sim.mesh import Mesh, grid
 from sim.scene import Scene, assemble, flag, hanging_cloth, upright
 from sim.tables import Evaluation
-from sim.wind.uniform import UniformWind
+from sim.wind import UniformWind
 from tests.refusals import unrefused
 
 CAMEL = named("camel-ponte-roma")

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from flagdata.console import LocalPath, progress, say
 from flagdata.errors import InputError
 from flagdata.rng import child_seed, stream
-from measure.estimate.combine import CARD_KEY, OWN, Dependence
+from measure.estimate import CARD_KEY, OWN, Dependence
 from models.estimator import SHIPPED, Estimator
 from models.storage import CARD, card_bytes, read_card, renew
 from models.targets import truth

@@ -18,13 +18,11 @@ from flagdata.outputs import fresh_folder
 from flagdata.rng import child_seed
 from flagdata.timebase import NANOSECONDS, from_datetime
 from measure.camera import write_film
-from measure.demo.logger import CUP
+from measure.demo import CUP
 from sim.assets import Assets
-from sim.datasets.anemometer import logged, velocities
+from sim.datasets import logged, velocities
 from sim.render import prior
-from sim.run.arrays import recipe_of
-from sim.run.batch import Stepper, run
-from sim.run.members import Crew
+from sim.run import Crew, Stepper, recipe_of, run
 
 SEED = 54
 SCENE = "flag-outdoor-damped"

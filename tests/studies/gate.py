@@ -17,17 +17,16 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.console import LocalPath, progress, say
-from flagdata.dataset.resolve import explicit_sides
+from flagdata.dataset import explicit_sides
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
-from measure.gate.distortions import DISTORTIONS, Film
+from measure.gate import DISTORTIONS, Gate
+from measure.gate.distortions import Film
 from measure.gate.features import Features, features_of
-from measure.gate.gate import Gate
 from models.estimator import DEFAULT, SHIPPED, Estimator, load
-from models.training.conditioned import FitFilm
-from models.training.recipe import DataSpec
+from models.training import DataSpec, FitFilm
 
 PLAIN, DISTORTED = 360, 30
 """Training-side films that are taken as they are, and others of which every distortion is made."""
@@ -160,7 +159,7 @@ def rate_of(model: Estimator) -> float | None:
 @click.option("--seed", type=int, default=1, show_default=True, help="Random seed of the distortions.")
 def main(model: Path, lake_path: Path, datasets: tuple[str, ...], at: str | None, seed: int) -> None:
     """Calibrate the gate of the model in the folder MODEL and store it there."""
-    from measure.gate.storage import write
+    from measure.gate import write
 
     torch.set_num_threads(1)
     loaded = load(model)

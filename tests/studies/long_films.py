@@ -13,20 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from flagdata.record.video import decode
+from flagdata.record import decode
 from flagdata.rng import child_seed
 from models.estimator import Estimator
-from models.training.conditioned import FitFilm
-from models.training.recipe import DataSpec
+from models.training import DataSpec, FitFilm
 from sim.assets import Assets
-from sim.datasets import jobs, picture
-from sim.datasets.cast import Cast, of_group
-from sim.datasets.films import EPOCH, Film
-from sim.datasets.reading import load
-from sim.datasets.recipe import DatasetRecipe
+from sim.datasets import EPOCH, Cast, DatasetRecipe, Film, jobs, load, picture
+from sim.datasets.cast import of_group
 from sim.datasets.record import parameters_of
-from sim.run.members import Crew
-from sim.run.recipe import Recipe
+from sim.run import Crew, Recipe
 
 _SIDE = "train"
 _BATCH = 8

@@ -29,7 +29,7 @@ from models.estimator import CLOUD, SHIPPED, Estimator, load
 from models.evaluation.predict import embedded
 from models.outliers import Familiarity
 from models.storage import WEIGHTS, write_card, write_tensors
-from models.training.inputs import Prepared
+from models.training import Prepared
 
 LEVELS = (0.5, 0.8, 0.9)
 """Central intervals whose coverage decides how far the distributions are spread."""
@@ -138,9 +138,8 @@ def _seedless(recipe: object) -> dict[str, Any]:
 def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Path) -> None:
     """Make a model that comes with the package of all seeds that the training recipe NAME has in a lake."""
     import flagdata
-    from models.training.command import sides_of
-    from models.training.inputs import prepare_clips, prepare_films
-    from models.training.recipe import load as recipe_of
+    from models.training import load as recipe_of
+    from models.training import prepare_clips, prepare_films, sides_of
 
     recipe = recipe_of(name)
     check_folder(out / recipe.name)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flagdata.rng import stream
-from measure.estimate.combine import CARD_KEY, of_model
+from measure.estimate import CARD_KEY, of_model
 from models import estimator
 from tests.studies.dependence import Errors, card_entry, errors_of
 

@@ -11,7 +11,7 @@ from flagdata.errors import InputError, RefusedError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
 from models import estimator
-from models.training.recipe import DataSpec
+from models.training import DataSpec
 from tests.models.conftest import fill
 from tests.studies.gate import FilmsOf, rate_of
 

@@ -11,7 +11,7 @@ from flagdata.errors import InputError
 from models import estimator
 from models.estimator import Estimator
 from models.targets import truth
-from sim.datasets.reading import load
+from sim.datasets import load
 from tests.studies.dependence import columns_of, errors
 from tests.studies.long_films import LongFilm, _casts, _shares, simulated
 

@@ -20,8 +20,7 @@ from scipy.special import j0, jn_zeros
 
 from sim.air import QuadraticNormal
 from sim.handles import Handles
-from sim.integrate.stability import stable_step
-from sim.integrate.symplectic import Symplectic, advance
+from sim.integrate import Symplectic, advance, stable_step
 from sim.material import isotropic, named
 from sim.mesh import grid
 from sim.scene import assemble, flag

@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from sim.air import AirForce, QuadraticNormal
 from sim.cloth import Cloth
 from sim.handles import Handles
-from sim.integrate.stability import stable_step
-from sim.integrate.symplectic import advance
+from sim.integrate import advance, stable_step
 from sim.material import Material
 from sim.mesh import Mesh
 from sim.scene import upright
 from sim.state import State
 from sim.system import System
-from sim.wind.uniform import UniformWind
+from sim.wind import UniformWind
 
 
 def build(

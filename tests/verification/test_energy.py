@@ -7,8 +7,7 @@ import math
 import numpy as np
 import torch
 
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import advance
+from sim.integrate import BackwardEuler, advance
 from sim.material import named
 from sim.state import State
 from tests.verification.cases import KICKED_MESH, energy_drift, kicked

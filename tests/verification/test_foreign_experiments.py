@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import torch
 
-from measure.observe.recipe import parse
-from measure.verdict.record import Conclusion
+from measure.observe import parse
+from measure.verdict import Conclusion
 from sim.cloth import Cloth
-from sim.effects.hem_mass import HemMass
+from sim.effects import HemMass
 from sim.material import named
 from sim.membrane import energy as stretching
 from sim.mesh import grid

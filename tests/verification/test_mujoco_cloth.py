@@ -17,7 +17,7 @@ from scipy.special import j0
 
 from flagdata.errors import NotFoundError
 from sim.cloth import Cloth
-from sim.effects.finite_span_loading import FiniteSpanLoading
+from sim.effects import FiniteSpanLoading
 from sim.material import named
 from sim.mesh import grid
 from tests.studies.validation.environments import MUJOCO, UnusableError

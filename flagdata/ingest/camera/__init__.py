@@ -20,8 +20,9 @@ Names are imported when they are first used: ingesting an anemometer's log needs
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from flagdata.ingest.camera.motion import CropProposal
@@ -43,22 +44,4 @@ __all__ = [
     "propose_crop",
 ]
 
-_PLACES = {
-    "CameraOptions": "options",
-    "CameraProbe": "probing",
-    "CameraStream": "stream",
-    "Crop": "options",
-    "CropBox": "options",
-    "CropProposal": "motion",
-    "Limits": "options",
-    "open_camera": "stream",
-    "parse_crop": "options",
-    "probe": "probing",
-    "propose_crop": "stream",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
+__getattr__ = lazy_exports(__name__, __file__)

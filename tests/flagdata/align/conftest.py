@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from flagdata.align.motion import MotionSeries
+from flagdata.align import MotionSeries
 from flagdata.rng import stream
 from flagdata.signals import Sensor, WindAverage, WindSeries
 from flagdata.timebase import from_datetime

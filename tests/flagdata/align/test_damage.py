@@ -10,14 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.align.methods import ClockOptions, Method, declared
-from flagdata.align.recording import Pair, make_recording
+from flagdata.align import ClockOptions, Method, Pair, make_recording
+from flagdata.align.methods import declared
 from flagdata.checksums import content_hash
 from flagdata.errors import CorruptError, FlagdataError
 from flagdata.lake import Artifact, Lake
-from flagdata.record import Record, RecordWriter
-from flagdata.record.container import read_messages, read_summary
-from flagdata.record.source import open_bytes
+from flagdata.record import Record, RecordWriter, open_bytes, read_messages, read_summary
 from flagdata.rng import stream
 from flagdata.schema import TOPIC_IMAGE, TOPIC_WIND, Kind
 from flagdata.signals import Sensor, WindSeries

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from flagdata.align.declared import by_stamps, given, stamp_sigma, stamp_step
+from flagdata.align import given
+from flagdata.align.declared import by_stamps, stamp_sigma, stamp_step
 from flagdata.clock import ClockModel, Segment
 from flagdata.errors import InputError, UsageError
 from tests.refusals import unrefused

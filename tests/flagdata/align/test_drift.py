@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flagdata.align.drift import ClockLine, clock_line
-from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
-from flagdata.align.motion import MotionSeries
+from flagdata.align import LagEstimate, LagSearch, MotionSeries, clock_line, estimate_offset
+from flagdata.align.drift import ClockLine
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.signals import WindAverage

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
-from flagdata.align.motion import MotionSeries
+from flagdata.align import LagEstimate, LagSearch, MotionSeries, estimate_offset
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer import WindOptions, average, read_log
+from flagdata.ingest import WindOptions, read_log
+from flagdata.ingest.anemometer import average
 from flagdata.rng import stream
 from flagdata.signals import WindAverage
 

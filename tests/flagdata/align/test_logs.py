@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from flagdata.align.lag import LagSearch
-from flagdata.align.logs import LogClock, gain_of, log_clock
+from flagdata.align import LagSearch, LogClock, log_clock
+from flagdata.align.logs import gain_of
 from flagdata.cli import root
 from flagdata.clock import ClockModel
 from flagdata.errors import RefusedError, UsageError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.align.motion import MotionSeries, motion_energy
+from flagdata.align import MotionSeries, motion_energy
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from tests.refusals import unrefused

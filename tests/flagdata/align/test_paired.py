@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.align.paired import host_clock, nominal_times, pair_clocks
+from flagdata.align import host_clock, pair_clocks
+from flagdata.align.paired import nominal_times
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries

@@ -9,11 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flagdata.align.drift import clock_line
-from flagdata.align.lag import LagSearch, estimate_offset
+from flagdata.align import LagSearch, MotionSeries, check, clock_line, draw, estimate_offset
 from flagdata.align.methods import Evidence
-from flagdata.align.motion import MotionSeries
-from flagdata.align.plot import check, draw
 from flagdata.errors import ConflictError, InputError
 from flagdata.rng import stream
 from flagdata.signals import WindAverage

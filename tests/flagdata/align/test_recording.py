@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from flagdata.align.recording import Pair
+from flagdata.align import Pair
 from flagdata.cli import root
 from flagdata.errors import ConflictError, RefusedError, UsageError
 from flagdata.lake import Artifact, Lake

@@ -8,9 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from flagdata.align import methods
-from flagdata.align.lag import LagSearch
-from flagdata.align.methods import ClockOptions, Method, evidence, responding
+from flagdata.align import ClockOptions, LagSearch, Method, evidence, methods
+from flagdata.align.methods import responding
 from flagdata.errors import UsageError
 from flagdata.timebase import NANOSECONDS
 

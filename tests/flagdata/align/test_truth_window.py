@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from flagdata.align.apart import by_offset, by_spans
+from flagdata.align import by_spans
+from flagdata.align.apart import by_offset
 from flagdata.cli import root
 from flagdata.dataset import Source
 from flagdata.dataset.tolerance import Tolerance

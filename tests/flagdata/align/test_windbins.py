@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.align.windbins import wind_bins
+from flagdata.align import wind_bins
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries

@@ -83,8 +83,7 @@ def test_a_recipe_by_keywords_is_the_recipe_as_a_dict(flags) -> None:
 
 
 def test_members_are_those_that_a_lake_keeps(flags, tmp_path: Path) -> None:
-    from sim.run import simulate
-    from sim.run.arrays import recipe_of
+    from sim.run import recipe_of, simulate
 
     lake = Lake.create(tmp_path / "lake")
     recipe = recipe_of(

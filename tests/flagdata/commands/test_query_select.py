@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from flagdata.commands.query import VIEWS
 from flagdata.errors import UnknownNameError, UsageError
-from flagdata.lake import selection
-from flagdata.lake.refs import Slice, View
-from flagdata.lake.selection import COLUMNS, Request, Selection, select
+from flagdata.lake import Request, Selection, View, select, selection
+from flagdata.lake.refs import Slice
+from flagdata.lake.selection import COLUMNS
 from flagdata.schema import CATALOG, Kind, catalog_schema
 from tests.refusals import unrefused
 

@@ -8,7 +8,7 @@ import os
 import numpy as np
 import pytest
 
-from flagdata.dataset.cache import DecodedCache
+from flagdata.dataset import DecodedCache
 from flagdata.errors import FlagdataError, UsageError
 
 FRAMES = 30 * 16 * 16  # B, a clip of these tests

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flagdata.clock import ClockModel
-from flagdata.dataset.clips import clip_rows, runs
+from flagdata.dataset import clip_rows
+from flagdata.dataset.clips import runs
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact
 from flagdata.record import Record, RecordWriter

@@ -9,8 +9,7 @@ import pytest
 
 import flagdata
 from flagdata.lake import Lake
-from sim.run import simulate
-from sim.run.arrays import recipe_of
+from sim.run import recipe_of, simulate
 from tests.docs.calls import example
 
 ELSEWHERE = {"measure", "example", "calibrate", "close_loop"}

@@ -16,8 +16,7 @@ import flagdata
 from flagdata.dataset import DecodedCache, collate
 from flagdata.errors import CorruptError, RefusedError, UsageError
 from flagdata.lake import Lake
-from flagdata.record.container import read_messages, read_summary
-from flagdata.record.source import open_bytes
+from flagdata.record import open_bytes, read_messages, read_summary
 from flagdata.rng import stream
 from flagdata.schema import TOPIC_IMAGE
 

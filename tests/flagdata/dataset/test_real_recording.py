@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 import flagdata
-from flagdata.align.methods import ClockOptions, Method, declared
-from flagdata.align.recording import Pair, make_recording
+from flagdata.align import ClockOptions, Method, Pair, make_recording
+from flagdata.align.methods import declared
 from flagdata.dataset import Tolerance
 from flagdata.errors import RefusedError
-from flagdata.ingest.anemometer import WindOptions
-from flagdata.ingest.camera import CameraOptions
-from flagdata.ingest.store import CameraIngest, Labels, WindIngest, ingest_camera, ingest_wind
+from flagdata.ingest import CameraIngest, CameraOptions, Labels, WindIngest, WindOptions, ingest_camera, ingest_wind
 from flagdata.lake import Lake
 from flagdata.timebase import parse
 

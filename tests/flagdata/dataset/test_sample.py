@@ -8,7 +8,7 @@ from dataclasses import FrozenInstanceError, replace
 import pytest
 import torch
 
-from flagdata.dataset.sample import Sample, collate
+from flagdata.dataset import Sample, collate
 from flagdata.errors import InputError
 
 

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flagdata.dataset.splits import ExplicitSplit, HashedSplit, Origin, check_side, groups, refuse_leaks
+from flagdata.dataset import ExplicitSplit, HashedSplit
+from flagdata.dataset.splits import Origin, check_side, groups, refuse_leaks
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
 
 real = st.builds(

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from flagdata.dataset.table import COLUMNS, PairTable
+from flagdata.dataset import COLUMNS, PairTable
 from flagdata.errors import CorruptError
 from flagdata.schema import CATALOG
 

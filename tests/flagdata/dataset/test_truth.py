@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flagdata.dataset.truth import TruthSeries
+from flagdata.dataset import TruthSeries
 from flagdata.errors import InputError, UsageError
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindSeries

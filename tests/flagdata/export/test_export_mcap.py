@@ -12,7 +12,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from flagdata.dataset.truth import TruthSeries
+from flagdata.dataset import TruthSeries
 from flagdata.export import Export, export
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Coding, Record, RecordWriter

@@ -12,9 +12,8 @@ import pytest
 
 from flagdata.errors import UsageError
 from flagdata.export import Export, export
-from flagdata.ingest.meshes import read_folder
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, write_meshes
+from flagdata.ingest import read_folder
+from flagdata.lake import Artifact, Lake, MeshSequence, RaggedMeshSequence, write_meshes
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 

@@ -7,8 +7,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from flagdata.dataset.resolve import clips_on_side
-from flagdata.dataset.splits import HashedSplit
+from flagdata.dataset import HashedSplit, clips_on_side
 from flagdata.errors import NotFoundError, UnknownNameError, UsageError
 from flagdata.export import Export, export
 from flagdata.lake import Artifact, Lake

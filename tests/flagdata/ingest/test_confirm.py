@@ -14,15 +14,21 @@ import pytest
 
 from flagdata.commands import confirm as commands
 from flagdata.errors import ConflictError
-from flagdata.ingest import store
-from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.confirm import Accepting, Drafted, UnconfirmedError
-from flagdata.ingest.anemometer.draft.questions import OpenFactsError
-from flagdata.ingest.store import WindIngest, ingest_wind
+from flagdata.ingest import (
+    Accepting,
+    Drafted,
+    OpenFactsError,
+    UnconfirmedError,
+    WindIngest,
+    WindOptions,
+    ingest_wind,
+    read_log,
+    store,
+)
 from flagdata.lake import Lake
 from flagdata.record import Record
 from flagdata.signals import WindLog
-from measure.observe.wind import LogPlacement, from_log
+from measure.observe import LogPlacement, from_log
 from tests.confirming import CONFIRMED
 from tests.program import Run, invoke
 

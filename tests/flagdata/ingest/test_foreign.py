@@ -14,8 +14,7 @@ from flagdata.cli import root
 from flagdata.errors import CorruptError, InputError
 from flagdata.export import Export, export
 from flagdata.findings import Severity
-from flagdata.ingest.camera import CameraOptions, open_camera
-from flagdata.ingest.foreign import examine
+from flagdata.ingest import CameraOptions, examine, open_camera
 from flagdata.ingest.mcap import topics
 from tests.flagdata.export.conftest import known as known
 from tests.flagdata.ingest.mcap.conftest import NOON

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.align.declared import given
-from flagdata.align.recording import Alignment, Pair, make_recording
+from flagdata.align import Pair, given, make_recording
+from flagdata.align.recording import Alignment
 from flagdata.errors import ConflictError, CorruptError
 from flagdata.export import Export, export
 from flagdata.export.mcap import ROWS
+from flagdata.ingest import Labels, ingest_camera, ingest_record, ingest_wind
 from flagdata.ingest.classify import classify
-from flagdata.ingest.records import ingest_record
-from flagdata.ingest.store import Labels, ingest_camera, ingest_wind
 from flagdata.lake import Lake
 from flagdata.record import Record
 from flagdata.schema import CATALOG, Kind

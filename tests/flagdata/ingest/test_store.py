@@ -11,10 +11,18 @@ import numpy as np
 import pytest
 
 from flagdata.errors import ConflictError, InputError, NotFoundError, TimeError
-from flagdata.ingest import store
-from flagdata.ingest.anemometer import WindOptions
-from flagdata.ingest.camera import CameraOptions, CropBox, open_camera
-from flagdata.ingest.store import CameraIngest, Labels, WindIngest, ingest_camera, ingest_wind
+from flagdata.ingest import (
+    CameraIngest,
+    CameraOptions,
+    CropBox,
+    Labels,
+    WindIngest,
+    WindOptions,
+    ingest_camera,
+    ingest_wind,
+    open_camera,
+    store,
+)
 from flagdata.lake import Lake
 from flagdata.provenance import file_hash
 from flagdata.record import Coding, Record

@@ -16,8 +16,7 @@ import traceback
 from hashlib import sha256
 from pathlib import Path
 
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.transaction import Transaction
+from flagdata.lake import Artifact, Lake, Transaction
 from flagdata.provenance import code_version
 from flagdata.schema import Kind
 

@@ -14,9 +14,9 @@ from PIL import Image
 from flagdata.commands.looking import _lines
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.ancestry import ancestry
-from flagdata.pages.graph import COLOURS, PAPER, RULE, Box, svg
+from flagdata.pages import COLOURS, picture
+from flagdata.pages.graph import PAPER, RULE, Box, svg
 from flagdata.pages.graph_png import _ascii, png
-from flagdata.pages.lineage import picture
 from flagdata.printable import printable
 from flagdata.schema import catalog_schema
 from tests.program import Run, invoke

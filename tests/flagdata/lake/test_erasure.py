@@ -14,10 +14,8 @@ from flagdata.cli import root
 from flagdata.errors import ConflictError, NotFoundError
 from flagdata.export import Export, export
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, doctor, lost, verify, verify_catalog
 from flagdata.lake.collect import collect
-from flagdata.lake.health import doctor, verify, verify_catalog
-from flagdata.lake.removal import lost
 
 Put = Callable[..., Artifact]
 

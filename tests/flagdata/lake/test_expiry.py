@@ -10,10 +10,8 @@ import pytest
 
 from flagdata.errors import ConflictError, NotFoundError
 from flagdata.export import Export, export
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, doctor, expire, is_healthy, last_version, lost, verify_catalog
 from flagdata.lake.collect import collect
-from flagdata.lake.health import doctor, is_healthy, verify_catalog
-from flagdata.lake.removal import expire, last_version, lost
 from tests.program import invoke
 
 Put = Callable[..., Artifact]

@@ -11,14 +11,18 @@ import pytest
 
 from flagdata import provenance
 from flagdata.errors import FlagdataError
-from flagdata.ingest import records
-from flagdata.ingest.markers.store import ingest_markers
-from flagdata.ingest.meshes.store import MeshIngest, ingest_meshes
-from flagdata.ingest.store import IngestResult, Labels, ingest_camera, ingest_wind
-from flagdata.lake import Artifact, Lake, results
-from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, verify
-from flagdata.lake.lineage import labels_of
-from flagdata.lake.transfer import clone, transfer
+from flagdata.ingest import (
+    IngestResult,
+    Labels,
+    MeshIngest,
+    ingest_camera,
+    ingest_markers,
+    ingest_meshes,
+    ingest_wind,
+    records,
+)
+from flagdata.lake import Artifact, Lake, clone, doctor, is_healthy, labels_of, object_names, read_refs, results, verify
+from flagdata.lake.transfer import transfer
 from flagdata.object_cache import forget
 from flagdata.schema import Kind
 from flagdata.storage import Place

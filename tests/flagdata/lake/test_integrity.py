@@ -18,11 +18,21 @@ import pytest
 
 from flagdata.checksums import content_hash
 from flagdata.errors import CorruptError, FlagdataError, LimitError, NotFoundError
-from flagdata.lake import Artifact, Lake, catalog, locks
+from flagdata.lake import (
+    Artifact,
+    Lake,
+    Log,
+    catalog,
+    clone,
+    doctor,
+    is_healthy,
+    locks,
+    object_names,
+    verify,
+    verify_catalog,
+)
 from flagdata.lake.collect import collect
-from flagdata.lake.health import doctor, is_healthy, object_names, verify, verify_catalog
-from flagdata.lake.log import Log
-from flagdata.lake.transfer import clone, transfer
+from flagdata.lake.transfer import transfer
 from flagdata.provenance import digest
 from flagdata.schema import Kind, catalog_schema
 from flagdata.storage import Place, RemotePath

@@ -16,9 +16,7 @@ from flagdata.cli import root
 from flagdata.dataset import Source
 from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, UsageError
 from flagdata.export import Export, export
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.labels import given
-from flagdata.lake.selection import select
+from flagdata.lake import Artifact, Lake, given, select
 from flagdata.schema import CATALOG
 from tests.flagdata.export.conftest import known as known
 

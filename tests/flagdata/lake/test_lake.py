@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import ConflictError, NotFoundError, UsageError
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.health import doctor, object_names, verify
+from flagdata.lake import Artifact, Lake, doctor, object_names, verify
 from flagdata.schema import Kind, catalog_schema
 
 Put = Callable[..., Artifact]

@@ -6,9 +6,8 @@ import pyarrow as pa
 import pytest
 
 from flagdata.errors import UnknownNameError, UsageError
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, Request, Selection
 from flagdata.lake.matching import matching
-from flagdata.lake.selection import Request, Selection
 from flagdata.schema import Kind, catalog_schema
 
 NAMES = ("plain", "o'brien", "100%", "a_b", "x' or '1' = '1")

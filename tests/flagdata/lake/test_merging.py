@@ -12,9 +12,8 @@ import pytest
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.export import Export, prepare
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, doctor
 from flagdata.lake.collect import collect
-from flagdata.lake.health import doctor
 from flagdata.lake.lineage import Removal
 from flagdata.lake.marking import mark
 from flagdata.schema import Kind

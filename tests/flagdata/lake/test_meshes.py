@@ -13,8 +13,7 @@ import pytest
 
 from flagdata.checksums import content_hash
 from flagdata.errors import ConflictError, CorruptError, InputError
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, open_meshes, read_meshes, write_meshes
+from flagdata.lake import Artifact, Lake, MeshSequence, RaggedMeshSequence, open_meshes, read_meshes, write_meshes
 from flagdata.rng import stream
 from flagdata.schema import Kind
 

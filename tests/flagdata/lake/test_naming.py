@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.naming import meant
+from flagdata.lake import Artifact, Lake, meant
 from flagdata.schema import Kind
 from tests.program import Run, invoke
 

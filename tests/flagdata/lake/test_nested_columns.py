@@ -9,12 +9,10 @@ import pyarrow as pa
 import pytest
 
 from flagdata.cli import main
-from flagdata.dataset.table import COLUMNS, PairTable
+from flagdata.dataset import COLUMNS, PairTable
 from flagdata.errors import CorruptError, InputError
 from flagdata.export.source import Entry
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.health import doctor
-from flagdata.lake.rowfiles import with_data_sets
+from flagdata.lake import Artifact, Lake, doctor, with_data_sets
 from flagdata.record import Record
 from flagdata.schema import Kind, catalog_schema
 

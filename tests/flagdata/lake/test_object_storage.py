@@ -23,15 +23,23 @@ from flagdata import object_cache
 from flagdata.caches import beside
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError, RefusedError, UsageError
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake, locks
+from flagdata.lake import (
+    Artifact,
+    Lake,
+    Lease,
+    Transaction,
+    collecting,
+    doctor,
+    locks,
+    object_names,
+    select,
+    verify,
+    verify_catalog,
+)
 from flagdata.lake.collect import collect
-from flagdata.lake.health import doctor, object_names, verify, verify_catalog
-from flagdata.lake.leases import Lease, collecting, last_written, leases
-from flagdata.lake.selection import select
-from flagdata.lake.transaction import Transaction
+from flagdata.lake.leases import last_written, leases
 from flagdata.schema import Kind
-from flagdata.storage import RemotePath, StoreError
-from flagdata.storage.connection import plain
+from flagdata.storage import RemotePath, StoreError, plain
 from tests.program import invoke
 from tests.s3 import SECRETS, Careless, Denying, Forbidding, read_only, serving
 from tests.studies.failing.store import failing, planned

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pyarrow as pa
 
-from flagdata.lake import Artifact
-from flagdata.lake.rowfiles import with_data_sets
+from flagdata.lake import Artifact, with_data_sets
 from flagdata.schema import Kind, catalog_schema
 
 

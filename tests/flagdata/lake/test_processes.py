@@ -13,9 +13,8 @@ import pytest
 
 from flagdata.errors import ConflictError
 from flagdata.findings import Severity
-from flagdata.lake import Lake, catalog
+from flagdata.lake import Lake, catalog, doctor, object_names, verify
 from flagdata.lake.collect import collect
-from flagdata.lake.health import doctor, object_names, verify
 
 NOW = timedelta(0)
 

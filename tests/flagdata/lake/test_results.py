@@ -9,10 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, Placed, Request, Selection, keep, placed, versions
 from flagdata.lake.ancestry import ancestry
-from flagdata.lake.results import Placed, keep, placed, versions
-from flagdata.lake.selection import Request, Selection
 from flagdata.schema import Kind
 from tests.program import Run, invoke
 

@@ -11,9 +11,8 @@ import pytest
 from deltalake import DeltaTable
 
 from flagdata.errors import CorruptError
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.rowfiles import ROW_ORDER, RowFiles, Scan, in_order
-from flagdata.lake.selection import select
+from flagdata.lake import Artifact, Lake, Scan, select
+from flagdata.lake.rowfiles import ROW_ORDER, RowFiles, in_order
 from flagdata.schema import Kind, catalog_schema
 from tests.flagdata.lake.conftest import overwrite
 from tests.program import invoke

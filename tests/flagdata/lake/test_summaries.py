@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from flagdata.errors import CorruptError
-from flagdata.lake import Lake, catalog, log
-from flagdata.lake.log import Log
+from flagdata.lake import Lake, Log, catalog, log
 from flagdata.schema import catalog_schema
 from tests.flagdata.lake.conftest import overwrite
 

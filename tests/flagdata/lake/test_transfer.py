@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import ConflictError, CorruptError
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, clone, doctor, object_names, verify, verify_catalog
 from flagdata.lake.collect import collect
-from flagdata.lake.health import doctor, object_names, verify, verify_catalog
-from flagdata.lake.transfer import clone, transfer
+from flagdata.lake.transfer import transfer
 from flagdata.object_cache import forget
 from tests.flagdata.lake.conftest import overwrite
 from tests.program import invoke

@@ -11,14 +11,23 @@ import pytest
 
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.catalog import Catalog
-from flagdata.lake.collect import collect, garbage
-from flagdata.lake.health import doctor, is_healthy, object_names, verify, verify_catalog
-from flagdata.lake.objects import Objects
-from flagdata.lake.refs import Refs
+from flagdata.lake import (
+    Artifact,
+    Catalog,
+    Lake,
+    Objects,
+    Refs,
+    clone,
+    doctor,
+    garbage,
+    is_healthy,
+    object_names,
+    verify,
+    verify_catalog,
+)
+from flagdata.lake.collect import collect
 from flagdata.lake.removal import Erasure
-from flagdata.lake.transfer import clone, transfer
+from flagdata.lake.transfer import transfer
 from tests.flagdata.lake.conftest import overwrite
 from tests.flagdata.lake.test_transfer import no_bar
 from tests.program import invoke

@@ -15,11 +15,22 @@ import pytest
 
 from flagdata.errors import ConflictError, CorruptError, NotFoundError
 from flagdata.findings import Finding, Severity
-from flagdata.lake import Artifact, Lake, catalog
-from flagdata.lake.collect import collect, garbage
-from flagdata.lake.health import doctor, is_healthy, object_names, sampled, verify, verify_catalog
-from flagdata.lake.leases import collecting, keeping_collectors_out, leases
-from flagdata.lake.merging import difference
+from flagdata.lake import (
+    Artifact,
+    Lake,
+    catalog,
+    collecting,
+    difference,
+    doctor,
+    garbage,
+    is_healthy,
+    object_names,
+    sampled,
+    verify,
+    verify_catalog,
+)
+from flagdata.lake.collect import collect
+from flagdata.lake.leases import keeping_collectors_out, leases
 from flagdata.schema import Kind
 from flagdata.storage import Place
 from tests.flagdata.lake.conftest import AGES, LINKS, LOCKS, overwrite

@@ -12,10 +12,7 @@ import pytest
 from mcap.reader import make_reader
 
 from flagdata.errors import CorruptError
-from flagdata.record import Coding, Record, salvage
-from flagdata.record.checksums import CHECKSUMS
-from flagdata.record.container import read_messages, read_summary
-from flagdata.record.source import open_bytes
+from flagdata.record import CHECKSUMS, Coding, Record, open_bytes, read_messages, read_summary, salvage
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 
 OLD = Path(__file__).parents[2] / "compat" / "record-v1.mcap"

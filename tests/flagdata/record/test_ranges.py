@@ -14,8 +14,7 @@ from flagdata import object_cache as cache
 from flagdata import object_ranges as ranges
 from flagdata.errors import CorruptError, NotFoundError
 from flagdata.lake import Artifact, Lake, objects
-from flagdata.record import Chunking, Coding, Record
-from flagdata.record.checksums import ChecksummedFile
+from flagdata.record import ChecksummedFile, Chunking, Coding, Record
 from flagdata.schema import Kind
 from flagdata.storage import RemotePath
 from tests.flagdata.record.conftest import PERIOD, START

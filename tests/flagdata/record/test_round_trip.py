@@ -11,8 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from flagdata.record import Record, RecordWriter, salvage
-from flagdata.record.checksums import CHECKSUMS
+from flagdata.record import CHECKSUMS, Record, RecordWriter, salvage
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor, WindSeries
 

@@ -15,11 +15,9 @@ from mcap.records import Chunk
 from mcap.writer import CompressionType, Writer
 
 from flagdata.errors import CorruptError, LimitError
-from flagdata.ingest.mcap.topics import messages, topics
-from flagdata.record import unpacking
+from flagdata.ingest import messages, topics
+from flagdata.record import salvage, unpacked, unpacking
 from flagdata.record.container import MESSAGE_HEAD
-from flagdata.record.salvage import salvage
-from flagdata.record.unpacking import unpacked
 
 BOMB = 96 << 20
 """Bytes that a lying chunk unpacks to."""

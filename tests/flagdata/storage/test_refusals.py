@@ -16,8 +16,8 @@ from deltalake.exceptions import DeltaError
 
 from flagdata.errors import FlagdataError
 from flagdata.lake import Lake
-from flagdata.storage import RemotePath, StoreError, connection, requests
-from flagdata.storage.refusals import CredentialsError, DeniedError, NoBucketError, refusal
+from flagdata.storage import DeniedError, RemotePath, StoreError, connection, refusal, requests
+from flagdata.storage.refusals import CredentialsError, NoBucketError
 from tests.flagdata.storage.conftest import Answering
 from tests.program import invoke
 from tests.s3 import SECRETS, refusing

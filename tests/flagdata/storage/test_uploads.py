@@ -9,13 +9,11 @@ from pathlib import Path
 import pytest
 
 from flagdata.findings import Severity
-from flagdata.lake import Lake
-from flagdata.lake.collect import collect, garbage
-from flagdata.lake.health import doctor
-from flagdata.lake.leases import Lease
-from flagdata.storage import RemotePath, StoreError, connection
+from flagdata.lake import Lake, Lease, doctor, garbage
+from flagdata.lake.collect import collect
+from flagdata.storage import RemotePath, StoreError, Upload, connection
 from flagdata.storage.path import BLOCK
-from flagdata.storage.uploads import Upload, unfinished
+from flagdata.storage.uploads import unfinished
 from tests.flagdata.storage.conftest import Answering
 from tests.program import invoke
 from tests.s3 import Failing, Scripted, refusing, serving

@@ -18,8 +18,7 @@ from typing import Any
 import pytest
 
 from flagdata.lake import Lake
-from flagdata.view import pages, server
-from flagdata.view.server import Answer
+from flagdata.view import Answer, pages, server
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 _PATIENCE = 60.0  # s

@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.meshes import MeshSequence, write_meshes
+from flagdata.lake import Artifact, Lake, MeshSequence, write_meshes
 from flagdata.record import RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
-from flagdata.view.media import Media
-from flagdata.view.pages import Site
+from flagdata.view import Media, Site
 from tests.flagdata.export.conftest import jpeg, picture
 
 SECOND = 1_000_000_000

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.results import keep
+from flagdata.lake import Artifact, Lake, keep
 from flagdata.schema import Kind
-from flagdata.view.server import Answer, answer
+from flagdata.view import Answer, answer
 from tests.flagdata.view.conftest import CURVE, NAME, Shown
 
 

@@ -14,7 +14,8 @@ from urllib.request import urlopen
 import pytest
 
 from flagdata.lake import Lake
-from flagdata.view.server import HEADERS, Server
+from flagdata.view import Server
+from flagdata.view.server import HEADERS
 
 
 @pytest.fixture

@@ -11,11 +11,9 @@ from scipy.signal import lfilter
 
 from flagdata.rng import stream
 from flagdata.signals import Sensor
-from measure.anemometer.calibration import Calibrated, Recording, calibrated
-from measure.anemometer.features import Features, Place
-from measure.calibrate.wind import Log
-from measure.film.similarity import FlagSize
-from measure.film.windows import Layout
+from measure.anemometer import Calibrated, Features, Place, Recording, calibrated
+from measure.calibrate import Log
+from measure.film import FlagSize, Layout
 
 SIZE = FlagSize(length=1.5, height=1.0)
 STEP = 1.2

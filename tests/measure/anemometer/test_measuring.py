@@ -14,15 +14,11 @@ import pytest
 from flagdata.errors import CorruptError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.stated import Stated
-from measure.anemometer import measuring
-from measure.anemometer.calibration import Calibrated
-from measure.anemometer.features import Features, Place
+from measure.anemometer import Calibrated, Features, Place, measuring
 from measure.anemometer.novelty import Compared
 from measure.anemometer.storage import read, write
-from measure.estimate.measuring import Measurement
-from measure.estimate.options import Options
-from measure.estimate.series import beside
-from measure.film.similarity import FlagSize
+from measure.estimate import Measurement, Options, beside
+from measure.film import FlagSize
 from models.targets import TARGETS
 from tests.measure.anemometer.made import SIZE, STEP, features, gusts, model, place
 

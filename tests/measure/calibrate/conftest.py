@@ -9,12 +9,8 @@ import numpy as np
 import pytest
 
 from flagdata.rng import child_seed, stream
-from measure.calibrate import calibrate, posterior
-from measure.calibrate.design import Design
-from measure.calibrate.numerics import MEASURED
-from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import OBSERVED
-from measure.observables.observable import WINDOW
+from measure.calibrate import MEASURED, OBSERVED, Design, Floats, calibrate, posterior
+from measure.observables import WINDOW
 
 NOISE = 0.02
 """Scatter of a window's readings."""

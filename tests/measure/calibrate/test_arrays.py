@@ -10,10 +10,8 @@ import pytest
 
 import flagdata
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from measure.calibrate import arrays
-from measure.calibrate.simulation import OBSERVED
-from measure.calibrate.tables import of_table
-from measure.film.similarity import FlagSize
+from measure.calibrate import OBSERVED, arrays, of_table
+from measure.film import FlagSize
 from tests.measure.calibrate.conftest import readings
 
 COLUMNS = {

@@ -14,15 +14,24 @@ import pytest
 from flagdata.errors import InputError, RefusedError
 from flagdata.stated import parse
 from flagdata.tables import Range
+from measure.calibrate import (
+    CLOTH,
+    OBSERVED,
+    Calibration,
+    Design,
+    Flag,
+    Floats,
+    Log,
+    Normal,
+    Observed,
+    Options,
+    Uncertain,
+    draws,
+    observed,
+)
 from measure.calibrate import calibrate as module
-from measure.calibrate import observed
-from measure.calibrate.calibrate import Calibration, Options, calibrate
-from measure.calibrate.design import Design
-from measure.calibrate.observed import Observed
+from measure.calibrate.calibrate import calibrate
 from measure.calibrate.page import page as written
-from measure.calibrate.prior import CLOTH, Floats, Normal, Uncertain, draws
-from measure.calibrate.simulation import OBSERVED, Flag
-from measure.calibrate.wind import Log
 from measure.ends import Bound
 from tests.measure.calibrate.conftest import readings
 from tests.studies.validation.looks import share, vtk

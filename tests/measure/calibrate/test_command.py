@@ -19,9 +19,9 @@ from flagdata.record import RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
-from measure.calibrate.tables import of_table
+from measure.calibrate import of_table
 from measure.commands.calibrate import calibrate
-from measure.film.similarity import FlagSize
+from measure.film import FlagSize
 from tests.measure.calibrate.conftest import readings
 
 

@@ -8,13 +8,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import UnknownNameError
-from measure.calibrate.calibrate import Options, designs_of
-from measure.calibrate.design import Design
-from measure.calibrate.fabric import CLASSES, TABLES, fabric
-from measure.calibrate.observed import Observed
-from measure.calibrate.simulation import Flag
-from measure.calibrate.wind import Log
-from measure.films.design import nulls
+from measure.calibrate import TABLES, Design, Flag, Log, Observed, Options, designs_of
+from measure.calibrate.fabric import CLASSES, fabric
+from measure.films import nulls
 from sim.material import named
 
 FLAG = Flag(length=1.5, height=1.0)

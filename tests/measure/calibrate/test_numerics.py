@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from flagdata.rng import stream
-from measure.calibrate.design import Design
-from measure.calibrate.numerics import FINE, FLAGS, LASTING, MEASURED, Finer
-from measure.calibrate.simulation import OBSERVED, Flag
-from measure.calibrate.wind import Log
+from measure.calibrate import FLAGS, MEASURED, OBSERVED, Design, Finer, Flag, Log
+from measure.calibrate.numerics import FINE, LASTING
 
 WINDOWS, SEEN = 12, 5
 

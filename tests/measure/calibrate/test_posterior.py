@@ -7,16 +7,23 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from measure.calibrate import posterior
-from measure.calibrate.calibrate import Options, designs_of
-from measure.calibrate.design import Design
-from measure.calibrate.emulator import Emulator
-from measure.calibrate.observed import Observed
-from measure.calibrate.posterior import Sight, weighed
-from measure.calibrate.prior import AZIMUTH, ELEVATION, Floats
+from measure.calibrate import (
+    AZIMUTH,
+    ELEVATION,
+    OBSERVED,
+    Design,
+    Emulator,
+    Flag,
+    Floats,
+    Log,
+    Observed,
+    Options,
+    Sight,
+    designs_of,
+    posterior,
+    weighed,
+)
 from measure.calibrate.scatter import scatter
-from measure.calibrate.simulation import OBSERVED, Flag
-from measure.calibrate.wind import Log
 
 _FLAG = Flag(length=1.5, height=1.0)
 _LOG = Log(times=np.arange(-10.0, 61.0), speed=np.full(71, 5.0))

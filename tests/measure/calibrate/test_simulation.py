@@ -9,13 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from measure.calibrate.design import Design, simulated
-from measure.calibrate.fabric import TABLES
-from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import OBSERVED, Batch, Flag, cloth, mean_bending
-from measure.calibrate.wind import Log
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Symplectic
+from measure.calibrate import OBSERVED, TABLES, Batch, Design, Flag, Floats, Log, mean_bending, simulated
+from measure.calibrate.simulation import cloth
+from sim.integrate import BackwardEuler, Symplectic
 from sim.material import named
 from tests.pools import Here
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from measure.calibrate.summary import Projection, shown
+from measure.calibrate import Projection
+from measure.calibrate.summary import shown
 
 
 def test_a_line_in_the_logarithm_of_the_wind_is_found_exactly_with_windows_missing() -> None:

@@ -8,18 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.align.declared import given
+from flagdata.align import given
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries
 from flagdata.stated import parse
 from flagdata.timebase import NANOSECONDS
+from measure.calibrate import OBSERVED, Observed, constant_wind, of_table
 from measure.calibrate.columns import read
 from measure.calibrate.filmed import declared, estimated
-from measure.calibrate.observed import Observed, constant_wind
-from measure.calibrate.simulation import OBSERVED
-from measure.calibrate.tables import Beside, of_table, rows_of
-from measure.film.similarity import FlagSize
+from measure.calibrate.tables import Beside, rows_of
+from measure.film import FlagSize
 
 SIZE = FlagSize(length=2.0, height=0.5)
 START = 1_780_000_000

@@ -8,9 +8,10 @@ import torch
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from measure.calibrate.wind import RATE, Log, blown
-from sim.effects.anemometer_lag import AnemometerLag
-from sim.wind.spectral import VonKarman
+from measure.calibrate import Log
+from measure.calibrate.wind import RATE, blown
+from sim.effects import AnemometerLag
+from sim.wind import VonKarman
 
 _MEAN, _DISTANCE = 6.0, 3.0
 

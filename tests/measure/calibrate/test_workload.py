@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from measure.calibrate.workload import announced
+from measure.calibrate import announced
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 import flagdata
 from flagdata.errors import UnknownNameError, UsageError
-from flagdata.lake.meshes import MeshSequence
+from flagdata.lake import MeshSequence
 from measure.closing import arrays
-from measure.loop.run import Options
+from measure.loop import Options
 from measure.observe import Experiment
-from measure.verdict.record import Conclusion, Verdict
+from measure.verdict import Conclusion, Verdict
 from tests.measure.report.verdicts import verdict
 
 RATE = 25.0

@@ -15,14 +15,13 @@ import pytest
 from flagdata.cli import main
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.markers import MarkerOptions
-from flagdata.ingest.markers.store import ingest_markers
+from flagdata.ingest import MarkerOptions, ingest_markers
 from flagdata.lake import Lake
 from measure.closing.sources import Reading, read
 from measure.commands.close_loop import CloseLoopCommand, with_warnings
 from measure.commands.close_loop import _setup as setup_of
 from measure.observe import Setup, Up
-from measure.verdict.record import Conclusion
+from measure.verdict import Conclusion
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks
 from tests.measure.report.verdicts import Size, verdict
 

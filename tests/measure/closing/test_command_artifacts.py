@@ -17,16 +17,15 @@ from flagdata.cli import main
 from flagdata.errors import CorruptError, InputError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
-from measure.closing import output
-from measure.closing.artifacts import Answer, answer_of, fingerprint, keep, read
-from measure.closing.models import acting, models
-from measure.loop.run import Options
-from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
-from measure.verdict.record import Conclusion, Estimate, Parameter, Verdict
+from measure.closing import Answer, acting, answer_of, output
+from measure.closing.artifacts import fingerprint, keep, read
+from measure.closing.models import models
+from measure.loop import Options
+from measure.observe import Experiment, Specimen, Trajectory, WindTrack
+from measure.verdict import Conclusion, Estimate, Parameter, Verdict
 from sim.material import named
 from sim.mesh import Mesh
-from sim.run.members import Crew
-from sim.run.reading import of_content
+from sim.run import Crew, of_content
 from tests.measure.report.verdicts import Size, verdict
 
 FITTED = {"density": (1.0, 1.1), "bending": (1.6, 0.7), "damping": (0.004, 0.003)}

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.closing.joint import Joint, _combined, joined
+from measure.closing import joined
+from measure.closing.joint import Joint, _combined
 from measure.closing.output import joint_page
-from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Conclusion, Estimate, Parameter, Verdict
+from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict
 from tests.measure.report.verdicts import verdict
 
 NOMINAL = {"area_weight": 0.2, "bending": 1e-4}

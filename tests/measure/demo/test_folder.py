@@ -9,9 +9,7 @@ from typing import Any
 import pytest
 
 from flagdata.cli import main
-from measure.demo import story
-from measure.demo.command import MINUTES, Story
-from measure.demo.transcript import Transcript
+from measure.demo import MINUTES, Story, Transcript, story
 
 
 @pytest.fixture

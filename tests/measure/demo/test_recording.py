@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.demo.recording import BEFORE, HIDDEN, START, Recording, RecordingRecipe, make_recording
+from measure.demo import BEFORE, START, RecordingRecipe
+from measure.demo.recording import HIDDEN, Recording, make_recording
 from sim.effects import EFFECTS
 
 RECIPE = RecordingRecipe(seed=5, duration=10, columns=6, width=120, rows=90, samples=1)

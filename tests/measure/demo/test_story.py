@@ -14,11 +14,10 @@ from typing import Any, cast
 import pytest
 
 from flagdata.errors import FlagdataError
-from measure.demo import story
+from measure.demo import Transcript, story
 from measure.demo.cards import Card, Judgement
 from measure.demo.page import Recovered
 from measure.demo.recording import Acting
-from measure.demo.transcript import Transcript
 
 
 @pytest.fixture

@@ -12,7 +12,8 @@ import pytest
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.ends import Bound, Span
-from measure.estimate.answer import Quantity, information, quantities, sentence
+from measure.estimate import Quantity, information
+from measure.estimate.answer import quantities, sentence
 
 
 def whole(low: float, high: float) -> Span:

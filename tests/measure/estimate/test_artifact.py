@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from measure.anemometer.network import Network
-from measure.commands.measured import artifact, read, write
-from measure.estimate.series import beside
-from measure.film.conditioned import ConditionedFilm
-from measure.film.source import Reading, Subject
+from measure.anemometer import Network
+from measure.commands import read
+from measure.commands.measured import artifact, write
+from measure.estimate import beside
+from measure.film import ConditionedFilm, Reading, Subject
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even
 from tests.measure.estimate.test_measuring import far, measured

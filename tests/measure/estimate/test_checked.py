@@ -6,9 +6,9 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-from measure.anemometer.network import gate_beside, network
-from measure.gate.storage import write
-from measure.gate.window import CheckedGate, FamiliarityGate
+from measure.anemometer import gate_beside
+from measure.anemometer.network import network
+from measure.gate import CheckedGate, FamiliarityGate, write
 from tests.measure.gate.made import learned
 
 

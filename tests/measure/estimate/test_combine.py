@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from flagdata.errors import CorruptError, InputError
 from flagdata.rng import stream
-from measure.estimate.combine import CARD_KEY, UNKNOWN, Dependence, combined, effective, of_model
+from measure.estimate import CARD_KEY, UNKNOWN, Dependence, combined, of_model
+from measure.estimate.combine import effective
 from models.estimator import Estimator
 
 CLOTH = ("density",)

@@ -21,17 +21,16 @@ from PIL import Image
 import flagdata
 from flagdata.cli import main
 from flagdata.console import progress
-from flagdata.dataset.clips import clip_rows
+from flagdata.dataset import clip_rows
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
-from flagdata.lake import Artifact, Lake, objects
-from flagdata.lake.transfer import clone
+from flagdata.lake import Artifact, Lake, clone, objects
 from flagdata.record import Record, RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
 from flagdata.stated import Stated
 from flagdata.timebase import NANOSECONDS
-from measure.commands.measured import read
-from measure.estimate.material import weight_of
+from measure.commands import read
+from measure.estimate import weight_of
 from measure.estimate.nearest import nearest
 from models.conditioning import conditioned
 from models.estimator import DEFAULT, Estimator

@@ -23,12 +23,9 @@ from flagdata.rng import child_seed
 from flagdata.stated import parse
 from measure.commands.measure import _Done, _report
 from measure.ends import Bound
-from measure.estimate.combine import Dependence
-from measure.estimate.measuring import Measurement, Options, measure
-from measure.estimate.series import beside
-from measure.film.similarity import FlagSize
-from measure.gate.verdict import Reason
-from measure.gate.window import gate_of
+from measure.estimate import Dependence, Measurement, Options, beside, measure
+from measure.film import FlagSize
+from measure.gate import Reason, gate_of
 from models import estimator
 from models.estimator import Estimator
 from models.learner import Loss

@@ -11,10 +11,9 @@ import pytest
 from markupsafe import Markup
 
 from flagdata.film_array import Frames
-from measure.estimate.measuring import Measurement
+from measure.estimate import Context, Measurement, Section, beside
 from measure.estimate.nearest import Neighbour
-from measure.estimate.page import Context, Section, page
-from measure.estimate.series import beside
+from measure.estimate.page import page
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even, pictures
 from tests.measure.estimate.test_measuring import far, measured

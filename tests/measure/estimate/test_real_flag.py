@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from flagdata.film import CameraFilm
-from measure.estimate.combine import UNKNOWN
-from measure.estimate.measuring import Options, measure
-from measure.film.conditioned import ConditionedFilm
-from measure.film.similarity import FlagSize
-from measure.gate.window import gate_of
+from measure.estimate import UNKNOWN, Options, measure
+from measure.film import ConditionedFilm, FlagSize
+from measure.gate import gate_of
 from models import estimator
 
 pytestmark = pytest.mark.reference

@@ -12,10 +12,9 @@ import pytest
 
 from flagdata.stated import parse
 from measure.ends import Bound, Span
-from measure.estimate.measuring import Options
+from measure.estimate import Options
 from measure.estimate.refined import _searched, refined, scaled
-from measure.refine.command import Clip
-from measure.refine.refinement import Interval, Refinement, Round
+from measure.refine import Clip, Interval, Refinement, Round
 from models.targets import Cloth
 
 NOTHING: Any = None

@@ -13,9 +13,8 @@ from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
 from measure.ends import Bound, Span
-from measure.estimate.answer import Quantity
-from measure.estimate.measuring import Measurement
-from measure.estimate.series import Beside, agreement, beside, spectrum
+from measure.estimate import Beside, Measurement, Quantity, beside
+from measure.estimate.series import agreement, spectrum
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even
 from tests.measure.estimate.test_measuring import measured

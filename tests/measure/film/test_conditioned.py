@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
 from flagdata.film_array import Frames
-from flagdata.ingest.camera import CropBox
-from measure.estimate.pictures import steps
-from measure.film import conditioned
-from measure.film.conditioned import ConditionedFilm
+from flagdata.ingest import CropBox
+from measure.estimate import steps
+from measure.film import ConditionedFilm, conditioned
 from tests.measure.estimate.conftest import RATE
 from tests.models.conditioning.test_conditioning import TIMES, Drawn, swaying
 

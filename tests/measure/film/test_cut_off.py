@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.film_array import Frames
-from measure.film.conditioned import ConditionedFilm, CutOff
+from measure.film import ConditionedFilm
+from measure.film.conditioned import CutOff
 from tests.measure.estimate.conftest import RATE
 from tests.models.conditioning.test_conditioning import WIDTH, Drawn
 

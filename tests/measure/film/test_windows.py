@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
-from measure.film.windows import cut, findings_of, lay_out
-from models.conditioning.instants import Interpolator
-from models.conditioning.repeats import Distinct
+from measure.film import findings_of
+from measure.film.windows import cut, lay_out
+from models.conditioning import Distinct, Interpolator
 
 
 def numbered(times: NDArray[np.float64]) -> list[tuple[float, NDArray[np.uint8]]]:

@@ -10,16 +10,10 @@ import numpy as np
 import pytest
 
 from flagdata.rng import stream
-from measure.calibrate.calibrate import Options as Calibrating
-from measure.calibrate.design import Design
-from measure.calibrate.observed import Observed
-from measure.calibrate.prior import Floats, Normal, Uncertain
-from measure.calibrate.simulation import OBSERVED, Batch, Flag
-from measure.calibrate.wind import Log
-from measure.films import design, simulations
-from measure.films.library import weighable
-from measure.films.run import Options
-from measure.observables.observable import WINDOW
+from measure.calibrate import OBSERVED, Batch, Design, Flag, Floats, Log, Normal, Observed, Uncertain
+from measure.calibrate import Options as Calibrating
+from measure.films import Options, design, simulations, weighable
+from measure.observables import WINDOW
 
 NOISE = 0.02
 """Scatter of a window's readings."""

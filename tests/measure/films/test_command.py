@@ -13,17 +13,15 @@ from click.testing import CliRunner, Result
 from flagdata.errors import UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
-from measure.calibrate.simulation import OBSERVED
+from measure.calibrate import OBSERVED
 from measure.commands.close_loop import close_loop
-from measure.films.command import simulations_of
-from measure.films.sources import films_among
+from measure.films import films_among, simulations_of
 from measure.forecasting import strengths
-from measure.loop.run import Options as LoopOptions
-from measure.observables.observable import WINDOW
-from measure.observe.trajectory import Experiment
-from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Conclusion, Estimate, Parameter, Verdict
-from sim.run.reading import load
+from measure.loop import Options as LoopOptions
+from measure.observables import WINDOW
+from measure.observe import Experiment
+from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict
+from sim.run import load
 from tests.measure.films.conftest import EFFECTS, recording
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks
 from tests.measure.report.verdicts import verdict

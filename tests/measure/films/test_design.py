@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 
 from flagdata.rng import stream
-from measure.calibrate.design import Design
-from measure.calibrate.discretisation import Discretisation
-from measure.calibrate.simulation import Batch, Flag
-from measure.calibrate.wind import Log
-from measure.films.design import TOGETHER, lasting, nulls, pairs
-from measure.films.library import weighable
+from measure.calibrate import Batch, Design, Discretisation, Flag, Log
+from measure.films import TOGETHER, lasting, nulls, pairs, weighable
 
 FLAG = Flag(length=1.5, height=1.0)
 EFFECTS = {one.name: one for one in weighable(FLAG)}

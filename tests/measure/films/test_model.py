@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from flagdata.rng import stream
-from measure.calibrate.emulator import Emulator, regressors
-from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats, draws
-from measure.calibrate.simulation import Flag
-from measure.films.library import weighable
+from measure.calibrate import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Emulator, Flag, Floats, draws
+from measure.calibrate.emulator import regressors
+from measure.films import weighable
 from measure.films.model import Model, Response, responded
 
 DRAG = next(one for one in weighable(Flag(length=1.5, height=1.0)) if one.name == "tangential-linear-drag.coefficient")

@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from measure.calibrate import Batch, Floats
 from measure.calibrate import design as designs
-from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import Batch
-from measure.films import design, simulations
-from measure.films.run import close_loop
-from measure.report.document import as_document
+from measure.films import close_loop, design, simulations
+from measure.report import as_document
 from tests.measure.films.conftest import options, readings, recording
 from tests.pools import Here
 

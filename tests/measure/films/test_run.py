@@ -14,16 +14,11 @@ from scipy.special import ndtri
 
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
-from measure.calibrate.observed import Observed
-from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import Batch
-from measure.films import simulations
+from measure.calibrate import Batch, Floats, Observed
+from measure.films import close_loop, simulations, solve, verdict_of, weighable
 from measure.films.evidence import Fit
-from measure.films.library import weighable
-from measure.films.run import close_loop, solve, strength_of, verdict_of
-from measure.verdict.criteria import CRITERIA
-from measure.verdict.quantity import with_level
-from measure.verdict.record import Conclusion, Estimate, Verdict
+from measure.films.run import strength_of
+from measure.verdict import CRITERIA, Conclusion, Estimate, Verdict, with_level
 from tests.measure.films.conftest import ALIKE, EFFECTS, options, recording, simulate_cheaply
 
 DRAG = {"tangential-linear-drag.coefficient": 0.9}

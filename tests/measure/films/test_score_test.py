@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest, chi2, kstest, norm
 
 from flagdata.rng import stream
-from measure.calibrate.prior import Floats
-from measure.films.evidence import Experiments
-from measure.films.score_test import ALIKE, Directions, Scene, Scored, score
+from measure.calibrate import Floats
+from measure.films import Experiments, score
+from measure.films.score_test import ALIKE, Directions, Scene, Scored
 
 SIZE, BASE, KINDS, EACH = 5, 400, 20, 8
 UNITS = np.array([0.01, 1.0, 30.0, 0.2, 5.0])

@@ -12,15 +12,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from measure.calibrate.observed import Excerpt, Observed
+from measure.calibrate import LEAST_WINDOWS, Observed
+from measure.calibrate.observed import Excerpt
 from measure.calibrate.simulation import RATE
-from measure.calibrate.summary import LEAST_WINDOWS
+from measure.films import solve, verdict_of
 from measure.films.page import page
-from measure.films.run import solve, verdict_of
 from measure.films.side_by_side import drawn, side_by_side
-from measure.observables.cloth import ClothWindow
-from measure.observables.film import FilmWindow
-from measure.observables.observable import WINDOW
+from measure.observables import WINDOW, ClothWindow, FilmWindow
 from sim.mesh import grid
 from tests.measure.films.conftest import options, recording
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from measure.films.statement import separating
-from measure.verdict.record import Conclusion
+from measure.verdict import Conclusion
 from tests.measure.report.verdicts import verdict
 
 

@@ -8,13 +8,12 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import UnknownNameError, UsageError
-from measure.calibrate.simulation import Flag
-from measure.films.library import weighable
+from measure.calibrate import Flag
+from measure.films import close_loop, solve, verdict_of, weighable
 from measure.films.page import page
-from measure.films.run import close_loop, solve, verdict_of
 from measure.films.words import words
-from measure.forecasting.strengths import Suspicion
-from measure.verdict.record import Conclusion
+from measure.forecasting import Suspicion
+from measure.verdict import Conclusion
 from tests.measure.films.conftest import options, recording
 
 FLAG = Flag(length=1.5, height=1.0)

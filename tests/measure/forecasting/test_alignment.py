@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.forecasting.alignment import aligned
-from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
+from measure.forecasting import aligned
+from measure.observe import Experiment, Specimen, Trajectory, WindTrack
 
 
 def turned(points: np.ndarray, angle: float) -> np.ndarray:

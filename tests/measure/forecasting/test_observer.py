@@ -9,18 +9,27 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
+from measure.forecasting import (
+    THETA,
+    AcrossColumn,
+    Calibration,
+    EffectColumn,
+    FieldColumn,
+    Forecaster,
+    Model,
+    Segments,
+    errors_of,
+    library,
+    observer,
+    winds,
+)
 from measure.forecasting import model as model_module
-from measure.forecasting import observer
-from measure.forecasting.calibration import THETA, Calibration
-from measure.forecasting.model import Model, errors_of
-from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import AcrossColumn, EffectColumn, FieldColumn, MotionColumn, library, winds
-from measure.forecasting.segments import Segments
-from measure.observe.trajectory import Specimen, Trajectory, WindTrack
-from measure.probes.statistics import Projection, reduced
-from measure.propose.terms import Term, columns_of
+from measure.forecasting.regressors import MotionColumn
+from measure.observe import Specimen, Trajectory, WindTrack
+from measure.probes import Projection, reduced
+from measure.propose import Term, columns_of
 from sim import handles
-from sim.integrate.joint_batch import JointBatch
+from sim.integrate import JointBatch
 
 NOMINAL = Calibration()
 

@@ -10,11 +10,9 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from measure.forecasting.calibration import THETA, Calibration
-from measure.forecasting.model import Model
-from measure.forecasting.regressors import TURNED, FieldColumn, fields, library, motions
-from sim.effects import EFFECTS
-from sim.effects.effect import WindEffect
+from measure.forecasting import THETA, TURNED, Calibration, FieldColumn, Model, fields, library
+from measure.forecasting.regressors import motions
+from sim.effects import EFFECTS, WindEffect
 from sim.material import named
 from sim.scene import assemble, flag
 

@@ -7,10 +7,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from measure.gate import DISTORTIONS, ClipStatistics, Gate
 from measure.gate.checks import CHECKS
-from measure.gate.clip_statistics import ClipStatistics
-from measure.gate.distortions import DISTORTIONS
-from measure.gate.gate import Gate
 from models.crops import Cropping
 from models.estimator import Estimator
 from models.frontend import FrontEnd

@@ -7,7 +7,8 @@ import pytest
 from scipy import ndimage
 
 from flagdata.errors import InputError
-from measure.gate.clip_statistics import SIDE, ClipStatistics
+from measure.gate import ClipStatistics
+from measure.gate.clip_statistics import SIDE
 from tests.measure.gate.made import FRAMES, SIZE, background, film, value
 
 

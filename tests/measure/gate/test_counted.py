@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from flagdata.findings import Finding
 from flagdata.rng import stream
+from measure.gate import REASONS, FilmWatch
 from measure.gate.counted import reasons
-from measure.gate.reasons import REASONS
-from measure.gate.watch import FilmWatch
 from models.conditioning import Follower, conditioning_of
 
 Frames = NDArray[np.uint8]

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.gate.gate import SCORES, Gate, squashed
-from measure.gate.reasons import REASONS
-from measure.gate.tail_probability import level
+from measure.gate import REASONS, Gate, level
+from measure.gate.gate import SCORES, squashed
 from tests.measure.gate.made import KINDS, distorted, learned, plain
 
 

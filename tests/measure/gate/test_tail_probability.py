@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.gate.tail_probability import BODY, ExponentialTails, level
+from measure.gate import level
+from measure.gate.tail_probability import BODY, ExponentialTails
 from models.outliers import conformal_p
 
 

@@ -8,8 +8,8 @@ from scipy.special import ndtr
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from measure.gate.verdict import Reason, Verdict, verdict
-from measure.gate.window import FamiliarityGate
+from measure.gate import FamiliarityGate, Reason, Verdict
+from measure.gate.verdict import verdict
 from models.outliers import Familiarity
 from tests.measure.estimate.conftest import pictures
 

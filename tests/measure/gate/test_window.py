@@ -10,12 +10,8 @@ from numpy.typing import NDArray
 
 from flagdata.checksums import write_sums
 from flagdata.errors import CorruptError, InputError, NotFoundError
-from measure.gate.distortions import DISTORTIONS
-from measure.gate.gate import Gate
-from measure.gate.reasons import REASONS
-from measure.gate.storage import read, write
+from measure.gate import DISTORTIONS, REASONS, CheckedGate, Gate, judge, read, write
 from measure.gate.verdict import verdict
-from measure.gate.window import CheckedGate, judge
 from models.estimator import Estimator
 from tests.measure.gate.made import film, small_model
 from tests.studies.gate import calibrated

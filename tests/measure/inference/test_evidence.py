@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, kstest, uniform
 
 from flagdata.errors import InputError, UsageError
-from measure.forecasting.calibration import PRIOR, THETA
-from measure.forecasting.setting import Design
-from measure.inference.evidence import Evidence, best_gain, gains
+from measure.forecasting import PRIOR, THETA, Design
+from measure.inference import Evidence, NullModel, Nulls, best_gain, gains
 from measure.inference.fluctuation import fluctuation
-from measure.inference.random_effect import NullModel, Nulls
-from measure.nulls.reference import GUSTS, NullBank
-from measure.probes.statistics import Statistics
+from measure.nulls import GUSTS, NullBank
+from measure.probes import Statistics
 
 Floats = NDArray[np.float64]
 COLUMNS, KINDS, CLOTHS, WINDS, SEGMENTS = 8, 40, 1, 4, 4

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from measure.inference.growth import power
+from measure.inference import power
 
 
 @pytest.mark.parametrize("true", [-0.5, 0.1, 0.8])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from measure.inference.random_effect import NullModel
-from measure.nulls.reference import NullBank, Reference
+from measure.inference import NullModel
+from measure.nulls import NullBank, Reference
 from tests.measure.loop.drawn_statistics import made
 
 

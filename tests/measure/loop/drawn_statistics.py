@@ -9,19 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.rng import stream
-from measure.forecasting.calibration import PRIOR, THETA
-from measure.forecasting.regressors import EffectColumn, columns, names
-from measure.inference.evidence import Evidence
-from measure.inference.random_effect import NullModel, Nulls
-from measure.loop.selection import (
-    GUST_COLUMN,
-    Judgement,
-    judge,
-)
-from measure.nulls.reference import GUSTS, NullBank, Reference
-from measure.probes.course import Course
-from measure.probes.lines import REDUCED
-from measure.probes.statistics import Statistics
+from measure.forecasting import PRIOR, THETA, EffectColumn, columns, names
+from measure.inference import Evidence, NullModel, Nulls
+from measure.loop import GUST_COLUMN, Judgement, judge
+from measure.nulls import GUSTS, NullBank, Reference
+from measure.probes import REDUCED, Course, Statistics
 
 Floats = NDArray[np.float64]
 KINDS, CLOTHS, WINDS, SEGMENTS = 50, 1, 4, 4

@@ -12,18 +12,26 @@ import pytest
 
 from flagdata.cli import main
 from flagdata.errors import InputError
-from measure.closing.close import close_loop
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.setting import Setting
-from measure.loop.run import Options
+from measure.closing import close_loop
+from measure.forecasting import Calibration, Setting
+from measure.loop import Options
+from measure.nulls import SETTLE, NullBatch, plan
 from measure.nulls import bank as banks
-from measure.nulls import plan
-from measure.nulls.simulation import SETTLE, NullBatch
-from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
-from measure.observe.cloth import model_mesh
-from measure.observe.experiment import hold
-from measure.observe.trajectory import AttachmentTrack, Experiment, Specimen
-from measure.verdict.decided import NOT_REJECTED
+from measure.observe import (
+    AttachmentTrack,
+    Experiment,
+    Hold,
+    Observation,
+    Setup,
+    Specimen,
+    WindTrack,
+    from_arrays,
+    hold,
+    model_mesh,
+    observe,
+    sheet,
+)
+from measure.verdict import NOT_REJECTED
 from sim.effects import EFFECTS, Effect
 from sim.material import named
 from tests.pools import Here

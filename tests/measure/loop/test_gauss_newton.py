@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 import torch
 
-from measure.forecasting.calibration import THETA, Calibration
-from measure.forecasting.model import Model
-from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import EffectColumn
-from measure.forecasting.segments import Segments
-from measure.inference.random_effect import NullModel
-from measure.inference.whitened_misfit import WhitenedMisfit
+from measure.forecasting import THETA, Calibration, EffectColumn, Forecaster, Model, Segments
+from measure.inference import NullModel, WhitenedMisfit
 from measure.loop import gauss_newton
-from measure.probes.statistics import Statistics
+from measure.probes import Statistics
 
 LIFT = EffectColumn(effect="lift", parameter="coefficient", step=0.3)
 FAR = Model(calibration=Calibration(density=0.5, bending=4.0, damping=10e-3), effects=((LIFT, 2.0),))

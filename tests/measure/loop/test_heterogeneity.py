@@ -9,7 +9,8 @@ import pytest
 from scipy.stats import kstest, uniform
 
 from flagdata.rng import stream
-from measure.loop.selection import estimate, heterogeneity
+from measure.loop import estimate
+from measure.loop.selection import heterogeneity
 
 
 def test_of_two_it_is_the_test_of_their_difference() -> None:

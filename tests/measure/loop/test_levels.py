@@ -5,15 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from measure.forecasting.calibration import THETA
-from measure.forecasting.regressors import names
-from measure.inference.random_effect import NullModel
-from measure.loop.selection import (
-    judge,
-)
-from measure.nulls.reference import Reference
-from measure.verdict.decided import NOT_REJECTED
-from measure.verdict.record import Conclusion
+from measure.forecasting import THETA, names
+from measure.inference import NullModel
+from measure.loop import judge
+from measure.nulls import Reference
+from measure.verdict import NOT_REJECTED, Conclusion
 from tests.measure.loop.drawn_statistics import judged, made, seen
 
 

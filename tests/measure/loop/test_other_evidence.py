@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 
 from flagdata.errors import UsageError
-from measure.inference.random_effect import NullModel
-from measure.loop.selection import (
-    GUST_COLUMN,
-    Judgement,
-    judge,
-)
-from measure.nulls.reference import NullBank, Reference
-from measure.verdict.decided import NOT_REJECTED
-from measure.verdict.record import Conclusion
+from measure.inference import NullModel
+from measure.loop import GUST_COLUMN, Judgement, judge
+from measure.nulls import NullBank, Reference
+from measure.verdict import NOT_REJECTED, Conclusion
 from tests.measure.loop.drawn_statistics import SEGMENTS, SHED, Acting, judged, made, named, pulses, seen, slow
 
 

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from measure.forecasting.calibration import THETA, Calibration
+from measure.forecasting import THETA, Calibration
 from measure.loop.run import parameters
-from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Parameter
+from measure.verdict import CRITERIA, Parameter
 
 REACH = 1.6448536269514722  # of a normal, 90 % to either side
 

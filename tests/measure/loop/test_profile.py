@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from measure.forecasting.regressors import EffectColumn
+from measure.forecasting import EffectColumn
 from measure.loop.refit import BEYOND, Profile, across
-from measure.verdict.quantity import estimate_text, with_level
+from measure.verdict import estimate_text, with_level
 
 HOIST = EffectColumn(effect="full-hoist", parameter="stiffness", step=20.0)
 TURNED = EffectColumn(effect="direction-change", parameter="angle", step=0.05)

@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from flagdata.rng import stream
-from measure.forecasting.calibration import THETA
-from measure.forecasting.regressors import names
-from measure.inference.evidence import Evidence
-from measure.inference.random_effect import NullModel
+from measure.forecasting import THETA, names
+from measure.inference import Evidence, NullModel
+from measure.loop import judge
 from measure.loop.refit import Refit
-from measure.loop.selection import (
-    judge,
-    withdrawn,
-)
-from measure.nulls.reference import Reference
-from measure.verdict.record import Conclusion
+from measure.loop.selection import withdrawn
+from measure.nulls import Reference
+from measure.verdict import Conclusion
 from tests.measure.loop.drawn_statistics import COUNT, EXPECTED, SEGMENTS, drawn, judged, named, seen
 
 LIFT, HEM = names().index("lift.coefficient"), names().index("hem-mass.line_density")

@@ -15,31 +15,22 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import InputError, UsageError
-from measure.closing.close import close_loop
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.regressors import columns, fields
-from measure.forecasting.setting import Design, Setting
-from measure.forecasting.strengths import Suspicion, on_markers
-from measure.inference.evidence import Fit
-from measure.inference.whitened_misfit import WhitenedMisfit
-from measure.loop import run
+from measure.closing import close_loop
+from measure.forecasting import Calibration, Design, Setting, Suspicion, columns, fields, on_markers
+from measure.inference import Fit, WhitenedMisfit
+from measure.loop import Options, run
 from measure.loop.corrective_field import corrective_field
-from measure.loop.run import Options
+from measure.nulls import NullBatch
 from measure.nulls import bank as banks
-from measure.nulls.simulation import NullBatch
-from measure.observe.trajectory import Experiment, Specimen, Trajectory
-from measure.probes.statistics import projected
-from measure.report.document import as_document, from_document
+from measure.observe import Experiment, Specimen, Trajectory
+from measure.probes import projected
+from measure.report import as_document, from_document
 from measure.report.lead import lead
 from measure.report.page import page
 from measure.report.words import words
-from measure.verdict.decided import NOT_REJECTED
-from measure.verdict.quantity import number
-from measure.verdict.record import Conclusion, Verdict
+from measure.verdict import NOT_REJECTED, Conclusion, Verdict, number
 from sim.cloth import Cloth
-from sim.effects import EFFECTS, Effect
-from sim.effects.effect import ForceEffect
-from sim.effects.parameter import Value, strength
+from sim.effects import EFFECTS, Effect, ForceEffect, Value, strength
 from tests.pools import Here
 
 DURATION, NOISE, SPEEDS, KINDS = 4.6, 5e-4, (3.5, 6.0), 9

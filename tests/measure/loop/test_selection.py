@@ -6,19 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from measure.forecasting.regressors import names
-from measure.inference.random_effect import NullModel
-from measure.loop.selection import (
-    GUST_COLUMN,
-    equivalent,
-    estimate,
-    finalists,
-    judge,
-    strength,
-)
-from measure.loop.set_up import HOIST
-from measure.nulls.reference import GUSTS, Reference
-from measure.verdict.record import Conclusion
+from measure.forecasting import names
+from measure.inference import NullModel
+from measure.loop import GUST_COLUMN, HOIST, estimate, finalists, judge
+from measure.loop.selection import equivalent, strength
+from measure.nulls import GUSTS, Reference
+from measure.verdict import Conclusion
 from tests.measure.loop.drawn_statistics import EXPECTED, judged, named, seen
 
 

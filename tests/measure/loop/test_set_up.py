@@ -6,16 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from measure.forecasting.regressors import TURNED, names
-from measure.inference.evidence import Evidence
-from measure.inference.random_effect import NullModel
-from measure.loop.selection import (
-    finalists,
-    judge,
-)
-from measure.loop.set_up import HOIST, SetUp
-from measure.nulls.reference import Reference
-from measure.verdict.record import Conclusion
+from measure.forecasting import TURNED, names
+from measure.inference import Evidence, NullModel
+from measure.loop import HOIST, finalists, judge
+from measure.loop.set_up import SetUp
+from measure.nulls import Reference
+from measure.verdict import Conclusion
 from tests.measure.loop.drawn_statistics import COUNT, SEGMENTS, drawn, named, seen
 
 

@@ -8,15 +8,12 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, UnknownNameError
-from measure.forecasting.regressors import names
-from measure.forecasting.strengths import Suspicion, every, on_markers
-from measure.inference.evidence import Evidence
-from measure.inference.random_effect import NullModel
+from measure.forecasting import Suspicion, every, names, on_markers
+from measure.inference import Evidence, NullModel
+from measure.loop import judge
 from measure.loop.run import _suspected  # pyright: ignore[reportPrivateUsage]
-from measure.loop.selection import judge
-from measure.nulls.reference import Reference
-from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Conclusion
+from measure.nulls import Reference
+from measure.verdict import CRITERIA, Conclusion
 from tests.measure.loop.drawn_statistics import drawn, made, named, seen, strengths
 
 LEVEL = 0.05

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from measure.forecasting.segments import Segments
-from measure.loop.validation import folds, paired, total_error
-from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from measure.forecasting import Segments
+from measure.loop import folds, paired, total_error
+from measure.observe import Specimen, Trajectory, WindTrack
 
 RNG = np.random.default_rng(1)
 NOISE = RNG.standard_normal(12)

@@ -7,16 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import EffectColumn
-from measure.forecasting.segments import Segments
-from measure.nulls.bank import evaluate
-from measure.nulls.simulation import NullBatch
-from measure.observe.anchors import as_seen
-from measure.observe.trajectory import Specimen
+from measure.forecasting import Calibration, EffectColumn, Forecaster, Segments
+from measure.nulls import NullBatch, evaluate
+from measure.observe import Specimen, as_seen
 from measure.probes.statistics import statistics
-from sim.integrate.split import SplitEuler
+from sim.integrate import SplitEuler
 
 LEAN = EffectColumn(effect="tilted-pole", parameter="lean", step=0.02)
 CLOTHS = (Calibration(density=1.2, damping=2e-3), Calibration(density=0.8, bending=2.0, damping=2e-3))

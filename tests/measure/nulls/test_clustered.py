@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, binomtest, kstest, t
 
-from measure.nulls.clustered import ClusteredNulls
+from measure.nulls import ClusteredNulls
 
 KINDS, EACH = 20, 8
 WORLDS = 2000

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import binom, binomtest
 
-from measure.nulls.conformal import GroupedConformal, kinds_needed
+from measure.nulls import GroupedConformal, kinds_needed
 
 Floats = NDArray[np.float64]
 KINDS = 39

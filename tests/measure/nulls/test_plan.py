@@ -10,12 +10,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from measure.forecasting.setting import Setting
+from measure.forecasting import Setting
+from measure.nulls import GroupedConformal, NullBatch, plan
 from measure.nulls import bank as banks
-from measure.nulls import plan
-from measure.nulls.conformal import GroupedConformal
-from measure.nulls.simulation import NullBatch
-from measure.observe.trajectory import Experiment, Specimen, Trajectory
+from measure.observe import Experiment, Specimen, Trajectory
 
 
 @pytest.fixture

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError
-from measure.forecasting.calibration import Calibration
-from measure.nulls.simulation import NullBatch
-from measure.nulls.stiffness import StiffnessFactors
-from measure.observe.trajectory import AttachmentTrack, Specimen, WindTrack
+from measure.forecasting import Calibration
+from measure.nulls import NullBatch, StiffnessFactors
+from measure.observe import AttachmentTrack, Specimen, WindTrack
 from sim import handles
-from sim.effects.vertical_wind import VerticalWind
+from sim.effects import VerticalWind
 
 
 def batch(specimen: Specimen, *, speed: float) -> NullBatch:

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from measure.nulls.stiffness import StiffnessFactors, drawn
+from measure.nulls import StiffnessFactors
+from measure.nulls.stiffness import drawn
 from sim.material import named
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm, t
 
-from measure.forecasting.regressors import names
+from measure.forecasting import names
 from measure.nulls.tails import as_normal, freedom
 from tests.measure.loop.drawn_statistics import blown, made, seen
 

@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from measure.nulls import tracks
-from measure.nulls.simulation import CARRIED, SETTLE
-from measure.observe.anchors import carried
-from measure.observe.trajectory import Floats, Trajectory, WindTrack
+from measure.nulls import SETTLE, tracks
+from measure.nulls.simulation import CARRIED
+from measure.observe import Floats, Trajectory, WindTrack, carried
 
 RATE, SECONDS, FAR, FREQUENCY = 25.0, 8.0, 0.15, 0.7
 MARKERS = np.array([[0.0, 0.0], [0.4, 0.0], [0.0, 0.4], [0.4, 0.4]])

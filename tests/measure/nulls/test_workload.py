@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from measure.nulls.plan import FEWEST_NULLS, NullOptions
-from measure.nulls.workload import of_recordings
-from measure.observe.trajectory import Trajectory, WindTrack
+from measure.nulls import FEWEST_NULLS, NullOptions, of_recordings
+from measure.observe import Trajectory, WindTrack
 
 
 def recording(seconds: float) -> Trajectory:

@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.observables import ClothWindow, View, seen_from
-from measure.observables.cloth import edges_of
+from measure.observables import ClothWindow, View, edges_of, seen_from
 
 LENGTH, HEIGHT = 1.5, 1.0
 RATE = 25.0

@@ -11,12 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from measure.observables import OBSERVABLES, ClothWindow, FilmWindow
-from measure.observables.table import table_of
+from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, table_of
 from measure.observables.watching import Watched
-from models.conditioning import conditioned
-from models.conditioning.outline import Outliner
-from models.conditioning.stills import HALVED, halved
+from models.conditioning import HALVED, Outliner, conditioned, halved
 from tests.measure.observables.shapes import HEIGHT, LENGTH, window
 
 SIDE = 300

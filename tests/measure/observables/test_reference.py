@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from measure.observables import OBSERVABLES, View, seen_from
-from measure.observables.cloth import edges_of
+from measure.observables import OBSERVABLES, View, edges_of, seen_from
 from tests.evidence import REFERENCE
 
 RUNS = REFERENCE / "arcsim" / "jittered"

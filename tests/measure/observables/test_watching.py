@@ -13,10 +13,8 @@ from flagdata.cli import main
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
 from measure.commands import observe as command
-from measure.film.conditioned import ConditionedFilm
-from measure.film.similarity import FlagSize
-from measure.observables import watching
-from measure.observables.watching import watched
+from measure.film import ConditionedFilm, FlagSize
+from measure.observables import watched, watching
 
 SIZE = FlagSize(length=1.5, height=1.0)
 RATE, COUNT, SIDE = 10.0, 30, 64

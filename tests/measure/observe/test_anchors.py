@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.observe.anchors import anchors_of, as_seen
-from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from measure.observe import Specimen, Trajectory, WindTrack, as_seen
+from measure.observe.anchors import anchors_of
 
 PULL = np.array([2e-3, 0.0, -1e-3])
 

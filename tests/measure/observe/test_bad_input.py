@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.observe import Hold, Observation, Setup, Up, WindTrack, observe, sheet
-from measure.observe.checks.attachment import hoist_stands_still
+from measure.observe import Hold, Observation, Setup, Up, WindTrack, hoist_stands_still, observe, sheet
 from tests.measure.observe.flags import HEIGHT, RATE, SETUP, WIDTH, flag
 
 NOISE = 1e-3

@@ -10,19 +10,12 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
-from measure.forecasting.alignment import aligned
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import columns
-from measure.forecasting.segments import Segments
-from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
-from measure.observe.recipe import parse
-from measure.observe.trajectory import Experiment
+from measure.forecasting import Calibration, Forecaster, Segments, aligned, columns
+from measure.observe import Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe, parse, sheet
 from sim import handles
 from sim.anchors import AnchorTracks
 from sim.handles import Handles
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.split import SplitEuler
+from sim.integrate import BackwardEuler, SplitEuler
 from sim.material import named
 from sim.mesh import Diagonals, grid
 from sim.scene import Scene, assemble, upright

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.observe import Hold
-from measure.observe.cloth import area, model_mesh, outline, rectangle
-from measure.observe.experiment import hold
+from measure.observe import Hold, hold, model_mesh
+from measure.observe.cloth import area, outline, rectangle
 from sim.mesh import grid
 
 OUTLINES = {

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.forecasting.segments import Segments
+from measure.forecasting import Segments
 from measure.observe import Known, Observation, observe
 from tests.measure.observe.flags import RATE, SETUP, WIND, flutter, markers
 

@@ -10,9 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from measure.observe import Hold, Known, Observation, Setup, WindTrack, observe, sheet
+from measure.observe import Hold, Known, Observation, Setup, Specimen, Trajectory, WindTrack, observe, sheet
 from measure.observe.checks.inertia import check_inertia, swing, wind_shown
-from measure.observe.trajectory import Specimen, Trajectory
 from sim.air import QuadraticNormal
 from sim.material import named
 from sim.mesh import grid

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.lake.meshes import RaggedMeshSequence
-from measure.observe.interpolation import onto
-from measure.observe.meshes import from_sequence, locate, sample
+from flagdata.lake import RaggedMeshSequence
+from measure.observe import from_sequence, onto, sample
+from measure.observe.meshes import locate
 from sim.mesh import Mesh, grid
 
 

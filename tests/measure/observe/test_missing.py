@@ -9,10 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from measure.observe import Known, Observation, observe
+from measure.observe import Known, Observation, Trajectory, observe
 from measure.observe.common import at_same_rate
 from measure.observe.gaps import LONGEST, fill_positions, frames_of
-from measure.observe.trajectory import Trajectory
 from tests.measure.observe.flags import SETUP, WIND, flutter, markers
 
 FEW = replace(SETUP, vertices=40)

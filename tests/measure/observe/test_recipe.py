@@ -9,15 +9,10 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError, UsageError
-from flagdata.ingest.markers import MarkerOptions
-from flagdata.ingest.markers.store import ingest_markers
-from flagdata.ingest.meshes import write_folder
-from flagdata.ingest.meshes.store import ingest_meshes
-from flagdata.lake import Lake
-from flagdata.lake.meshes import MeshSequence
-from measure.forecasting.setting import Setting
-from measure.observe.meshes import from_folder
-from measure.observe.recipe import load, read
+from flagdata.ingest import MarkerOptions, ingest_markers, ingest_meshes, write_folder
+from flagdata.lake import Lake, MeshSequence
+from measure.forecasting import Setting
+from measure.observe import from_folder, load, read
 from sim.material import named
 from sim.mesh import grid
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, flag, flutter

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest.meshes import read_folder
-from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe
+from flagdata.ingest import read_folder
+from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, from_folder, observe, sample
 from measure.observe.describing import of_arcsim
-from measure.observe.meshes import from_folder, sample
 from sim.mesh import grid
 
 pytestmark = pytest.mark.reference

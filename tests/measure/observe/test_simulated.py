@@ -10,8 +10,7 @@ import pytest
 from flagdata.lake import Lake
 from measure.observe import observe
 from measure.observe.meshes import from_artifact
-from sim.run.publish import simulate
-from sim.run.reading import parse
+from sim.run import parse, simulate
 
 RECIPE = """
 seed = 3

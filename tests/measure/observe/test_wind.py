@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, UsageError
-from flagdata.ingest.anemometer import WindOptions
+from flagdata.ingest import WindOptions
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindSeries
-from measure.observe.wind import LogPlacement, from_log, track
+from measure.observe import LogPlacement, from_log
+from measure.observe.wind import track
 
 NORTH_IS_Y = math.pi / 2
 BEGIN = 1_777_629_600_000_000_000  # 2026-05-01T10:00:00Z

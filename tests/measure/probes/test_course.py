@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
 from flagdata.rng import stream
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import EffectColumn, winds
-from measure.forecasting.segments import Segments
-from measure.observe.trajectory import Trajectory, WindTrack
-from measure.probes.course import ALONG, LEFT, Course, Gauge
-from measure.probes.statistics import Statistics, error_scale, projected, statistics
-from sim.wind.spectral import VonKarman
+from measure.forecasting import Calibration, EffectColumn, Forecaster, Segments, winds
+from measure.observe import Trajectory, WindTrack
+from measure.probes import ALONG, LEFT, Course, Statistics, error_scale, projected
+from measure.probes.course import Gauge
+from measure.probes.statistics import statistics
+from sim.wind import VonKarman
 
 Floats = NDArray[np.float64]
 COLUMNS = (EffectColumn(effect="lift", parameter="coefficient", step=0.3),)

@@ -9,7 +9,8 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from measure.probes.lines import REDUCED, SHAPES, Lines, Spectrum, strongest
+from measure.probes import REDUCED, Lines, strongest
+from measure.probes.lines import SHAPES, Spectrum
 from sim.mesh import grid
 
 Floats = NDArray[np.float64]

@@ -7,12 +7,10 @@ import pytest
 import torch
 
 from flagdata.rng import stream
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import EffectColumn
-from measure.forecasting.segments import Segments
-from measure.observe.trajectory import Trajectory
-from measure.probes.statistics import PoleMoment, projected, shares, statistics
+from measure.forecasting import Calibration, EffectColumn, Forecaster, Segments
+from measure.observe import Trajectory
+from measure.probes import projected
+from measure.probes.statistics import PoleMoment, shares, statistics
 
 COLUMNS = (EffectColumn(effect="lift", parameter="coefficient", step=0.3),)
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
-from measure.probes.rows import Rows
+from measure.probes import Rows
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

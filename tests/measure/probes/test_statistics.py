@@ -9,12 +9,10 @@ import pytest
 import torch
 
 from flagdata.errors import UsageError
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import AcrossColumn, EffectColumn
-from measure.forecasting.segments import Segments
-from measure.observe.trajectory import Trajectory
-from measure.probes.statistics import Statistics, projected, statistics
+from measure.forecasting import AcrossColumn, Calibration, EffectColumn, Forecaster, Segments
+from measure.observe import Trajectory
+from measure.probes import Statistics, projected
+from measure.probes.statistics import statistics
 
 COLUMNS = (
     EffectColumn(effect="lift", parameter="coefficient", step=0.3),

@@ -8,16 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.forecasting.calibration import THETA, Calibration
-from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import library
-from measure.forecasting.segments import Cut, Segment, Segments
-from measure.inference.evidence import Evidence
-from measure.inference.random_effect import NullModel
-from measure.observe.trajectory import Floats, Trajectory, WindTrack
-from measure.probes.course import Course
-from measure.probes.statistics import Statistics, projected
-from measure.probes.wind_log import by_recording, lags, misread
+from measure.forecasting import THETA, Calibration, Cut, Forecaster, Segments, library
+from measure.forecasting.segments import Segment
+from measure.inference import Evidence, NullModel
+from measure.observe import Floats, Trajectory, WindTrack
+from measure.probes import Course, Statistics, by_recording, lags, projected
+from measure.probes.wind_log import misread
 
 COLUMNS = (next(c for c in library() if c.name == "lift.coefficient"),)
 COUNT = len(THETA) + len(COLUMNS)

@@ -12,17 +12,13 @@ import torch
 from torch import Tensor
 
 from flagdata.rng import stream
-from measure.forecasting.calibration import THETA, Calibration
-from measure.forecasting.regressors import Column, EffectColumn, fields
-from measure.inference.random_effect import Nulls
-from measure.nulls.bank import evaluate
-from measure.nulls.reference import NullBank
-from measure.nulls.simulation import NullBatch
-from measure.observe.trajectory import Experiment, Specimen
-from measure.propose.terms import Term, columns_of
+from measure.forecasting import THETA, Calibration, Column, EffectColumn, fields
+from measure.inference import Nulls
+from measure.nulls import NullBank, NullBatch, evaluate
+from measure.observe import Experiment, Specimen
+from measure.propose import Term, columns_of
 from sim.cloth import Cloth
-from sim.effects.effect import Effect, ForceEffect
-from sim.effects.parameter import Value, strength
+from sim.effects import Effect, ForceEffect, Value, strength
 
 RATE, DURATION, NOISE, SPEEDS = 25.0, 4.64, 5e-4, (3.5, 4.3, 5.1, 6.0)
 KINDS, CLOTHS, RECORDINGS = 6, 2, 6

@@ -11,10 +11,9 @@ import pytest
 from flagdata.cli import main
 from flagdata.errors import InputError
 from measure.commands import propose as command
-from measure.nulls.plan import NullOptions
-from measure.nulls.workload import of_recordings
+from measure.nulls import NullOptions, of_recordings
+from measure.observe import Experiment
 from measure.observe import recipe as recipes
-from measure.observe.trajectory import Experiment
 from measure.propose import propose
 
 

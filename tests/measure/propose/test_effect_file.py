@@ -13,13 +13,12 @@ import pytest
 import torch
 
 from flagdata.errors import NotFoundError, UsageError
+from measure.propose import Decision, Outcome, Term, write
 from measure.propose.candidates import from_file
-from measure.propose.effect_file import write
-from measure.propose.outcome import Course, Decision, Outcome, Strength
-from measure.propose.terms import Term, TermEffect
-from measure.verdict.record import Estimate
-from sim.effects import apply
-from sim.effects.files import load
+from measure.propose.outcome import Course, Strength
+from measure.propose.terms import TermEffect
+from measure.verdict import Estimate
+from sim.effects import apply, load
 from sim.material import named
 from sim.scene import assemble, flag
 

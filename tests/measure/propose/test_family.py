@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.forecasting.calibration import PRIOR
-from measure.inference.random_effect import NullModel, Nulls
-from measure.probes.statistics import Statistics
+from measure.forecasting import PRIOR
+from measure.inference import NullModel, Nulls
+from measure.probes import Statistics
 from measure.propose.family import Family
 from measure.propose.projected import evidence
 

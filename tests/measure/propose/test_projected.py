@@ -7,15 +7,11 @@ import numpy as np
 import pytest
 import torch
 
-from measure.forecasting.calibration import THETA, Calibration
-from measure.forecasting.observer import Forecaster
-from measure.forecasting.regressors import Column
-from measure.forecasting.segments import Segments
-from measure.observe.trajectory import Experiment
+from measure.forecasting import THETA, Calibration, Column, Forecaster, Segments
+from measure.observe import Experiment
 from measure.probes.statistics import statistics
+from measure.propose import Term, columns_of, made_ready
 from measure.propose.projected import ProjectedSegments, of_columns
-from measure.propose.propose import made_ready
-from measure.propose.terms import Term, columns_of
 
 TERMS = columns_of(
     [

@@ -10,17 +10,15 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
-from measure.forecasting.regressors import Column, EffectColumn
-from measure.nulls.plan import NullOptions
-from measure.nulls.reference import NullBank
-from measure.observe.trajectory import Experiment, Specimen, WindTrack
-from measure.propose.effect_file import write
-from measure.propose.outcome import Decision, Outcome, Retest
-from measure.propose.propose import made_ready, weigh
+from measure.forecasting import Column, EffectColumn
+from measure.nulls import NullBank, NullOptions
+from measure.observe import Experiment, Specimen, WindTrack
+from measure.propose import Decision, Outcome, made_ready, write
+from measure.propose.outcome import Retest
+from measure.propose.propose import weigh
 from measure.propose.words import words
-from measure.verdict.record import Estimate
-from sim.effects.field import FieldEffect, Seen
-from sim.effects.files import load
+from measure.verdict import Estimate
+from sim.effects import FieldEffect, Seen, load
 from sim.scene import assemble, flag
 from tests.measure.propose.conftest import PUSH
 

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import CorruptError, InputError
-from measure.forecasting.segments import Segments
-from measure.observe.trajectory import Trajectory, WindTrack
-from measure.propose import proposal_log
-from measure.propose.outcome import Decision, Outcome
+from measure.forecasting import Segments
+from measure.observe import Trajectory, WindTrack
+from measure.propose import Decision, Outcome, proposal_log
 from measure.propose.propose import data_hash, split
 
 MARKERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])

@@ -9,17 +9,14 @@ import pytest
 import torch
 
 from flagdata.rng import torch_draws
-from measure.refine.evaluator import Evaluator, fingerprint
-from measure.refine.simulator import Simulator
-from measure.refine.view import Camera, FixedView
+from measure.refine import Camera, Evaluator, FixedView, Simulator, fingerprint
 from models.crops import Cropping
 from models.estimator import Estimator
 from models.frontend import FrontEnd
 from models.learner import Learner, Loss
 from models.wave import WaveNetwork
 from sim.render import RenderParameters
-from sim.run import reading
-from sim.run.recipe import Recipe
+from sim.run import Recipe, reading
 
 FRAMES, RATE, SIZE = 8, 25.0, 48
 SCENE = """

@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from flagdata.errors import InputError
-from measure.refine.procedure import ReplicateMetric, squared
+from measure.refine import squared
+from measure.refine.procedure import ReplicateMetric
 
 
 def _groups(covariance: np.ndarray, count: int, replicates: int) -> list[np.ndarray]:

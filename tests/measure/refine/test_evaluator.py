@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from flagdata.errors import CorruptError
-from measure.refine.evaluator import Evaluator, fingerprint
-from measure.refine.simulator import Simulator
-from measure.refine.view import Camera, DrawnView, FixedView, of_parameters
-from models.conditioning.conditioning import VERSION
+from measure.refine import Camera, DrawnView, Evaluator, FixedView, Simulator, fingerprint
+from measure.refine.view import of_parameters
+from models.conditioning import VERSION
 from models.estimator import Estimator
 from sim.assets import Assets
-from sim.render.prior import named
+from sim.render import named
 
 
 def test_an_evaluation_does_not_depend_on_what_is_evaluated_beside_it(evaluator: Evaluator, points: np.ndarray) -> None:

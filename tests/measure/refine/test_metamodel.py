@@ -8,7 +8,7 @@ from scipy.integrate import trapezoid
 from scipy.stats import kstest, multivariate_t, norm
 
 from flagdata.errors import InputError
-from measure.refine.metamodel import Metamodel
+from measure.refine import Metamodel
 
 
 def test_the_density_integrates_to_one() -> None:

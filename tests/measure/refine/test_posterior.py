@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import binom, norm
 
-from measure.refine.metamodel import Metamodel
+from measure.refine import Metamodel, Space
 from measure.refine.posterior import CLOTHS, posterior, regressors
-from measure.refine.space import Space
-from sim.run.recipe import Recipe
+from sim.run import Recipe
 
 SLOPES = np.array([[1.0, 0.0, 0.3], [2.0, 0.2, 0.0], [0.5, 4.0, 0.5], [0.0, 0.5, 2.0]])
 NOISE = 0.2

@@ -11,16 +11,10 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.rng import child_seed
-from measure.refine.evaluator import Evaluator
-from measure.refine.procedure import Settings, refine
-from measure.refine.refinement import Refinement
+from measure.refine import QUANTITIES, Evaluator, FixedView, Refinement, Request, Settings, Simulator, Target, refine
 from measure.refine.section import section
-from measure.refine.simulator import Request, Simulator
-from measure.refine.space import QUANTITIES
-from measure.refine.target import Target
-from measure.refine.view import FixedView
 from models.estimator import Estimator
-from sim.run.recipe import Recipe
+from sim.run import Recipe
 
 SETTINGS = Settings(budget=36, batch=8, seed=4)
 WHOLE = replace(SETTINGS, to_floor=False)

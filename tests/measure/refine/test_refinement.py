@@ -9,8 +9,9 @@ import numpy as np
 from flagdata.rng import stream
 from flagdata.tables import Range
 from measure.ends import Bound, limits_of
+from measure.refine import Interval, Round
 from measure.refine.procedure import _settled
-from measure.refine.refinement import Interval, Round, intervals_of
+from measure.refine.refinement import intervals_of
 
 BOX = (Range(low=0.0, high=10.0), Range(low=0.05, high=0.40))
 

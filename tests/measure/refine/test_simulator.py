@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.tables import Range, Scale
-from measure.refine.simulator import Request, Scene, Simulator
-from measure.refine.view import Camera, FixedView
+from measure.refine import Camera, FixedView, Request, Simulator
+from measure.refine.simulator import Scene
 from models.conditioning import conditioned
-from sim.run.recipe import IntegratorSpec, Recipe
+from sim.run import IntegratorSpec, Recipe
 
 FRAMES, RATE = 8, 25.0
 DAMPING = Range(low=1e-3, high=20e-3, scale=Scale.LOG)

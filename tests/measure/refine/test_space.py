@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.refine.space import QUANTITIES, Space
+from measure.refine import QUANTITIES, Space
 from sim.material import named
-from sim.run import load
-from sim.run.recipe import Recipe
+from sim.run import Recipe, load
 
 
 def test_the_centre_is_the_material_at_mid_density_and_mid_wind(recipe: Recipe) -> None:

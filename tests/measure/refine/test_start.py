@@ -10,10 +10,9 @@ import torch
 
 from flagdata.rng import stream
 from flagdata.tables import Range
-from measure.refine import start
-from measure.refine.space import DENSITY, WIND, Space
+from measure.refine import DENSITY, WIND, Space, start
 from models.estimator import Estimator
-from sim.run.recipe import Recipe
+from sim.run import Recipe
 
 
 def test_completed_points_have_the_given_wind_and_area_weight(recipe: Recipe) -> None:

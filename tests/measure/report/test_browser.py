@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from measure.report.page import page
-from measure.verdict.record import Conclusion
+from measure.verdict import Conclusion
 from tests.measure.report.verdicts import FULL, verdict, with_holes
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

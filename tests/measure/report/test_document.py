@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from flagdata.errors import InputError
-from measure.report.document import as_document, from_document
-from measure.verdict.record import Conclusion, Verdict
+from measure.report import as_document, from_document
+from measure.verdict import Conclusion, Verdict
 from tests.measure.report.verdicts import Size, verdict, with_holes
 
 

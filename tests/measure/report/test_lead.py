@@ -8,8 +8,7 @@ import pytest
 
 from measure.report.lead import evidence, explained, lead, p_text
 from measure.report.page import page
-from measure.verdict.quantity import with_level
-from measure.verdict.record import Conclusion
+from measure.verdict import Conclusion, with_level
 from tests.measure.report.pages import parsed
 from tests.measure.report.verdicts import about, verdict
 

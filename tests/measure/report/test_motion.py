@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from measure.report.motion import ELEVATION, FACTORS, MISSING, motion, still
-from measure.verdict.record import Residual
+from measure.verdict import Residual
 from tests.measure.report.verdicts import FULL, Size, residual
 
 STEPS = 32767

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from measure.report.page import page
-from measure.verdict.record import Conclusion, Estimate, Verdict
+from measure.verdict import Conclusion, Estimate, Verdict
 from tests.measure.report.pages import parsed
 from tests.measure.report.verdicts import Size, residual, verdict, with_holes
 

@@ -12,7 +12,7 @@ from measure.report.lead import lead
 from measure.report.page import page
 from measure.report.sentences import titles
 from measure.report.words import words
-from measure.verdict.record import Conclusion, Estimate, NullTest
+from measure.verdict import Conclusion, Estimate, NullTest
 from tests.measure.report.verdicts import about, verdict
 
 

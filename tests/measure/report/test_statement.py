@@ -7,16 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.regressors import FieldColumn
-from measure.loop.corrective_field import Mode
-from measure.loop.run import Outcome
-from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
-from measure.probes.course import Variation
-from measure.probes.lines import Line
+from measure.forecasting import Calibration, FieldColumn
+from measure.loop import Mode, Outcome
+from measure.observe import Experiment, Specimen, Trajectory, WindTrack
+from measure.probes import Line, Variation
+from measure.report import by_draw, stated
 from measure.report.lead import lead
-from measure.report.statement import assumptions, blowing, bounds, by_draw, proposal, shedding, stated
-from measure.verdict.record import Conclusion
+from measure.report.statement import assumptions, blowing, bounds, proposal, shedding
+from measure.verdict import Conclusion
 from tests.measure.report.verdicts import verdict
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Residual, Verdict
+from measure.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Residual, Verdict
 
 EFFECTS = ("lift", "shear", "tangential-linear-drag", "internal-damping", "pole-wake", "hem-mass", "corrective-field")
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import UsageError
-from measure.verdict.criteria import CRITERIA, Criteria
+from measure.verdict import CRITERIA
+from measure.verdict.criteria import Criteria
 
 MEASURE = Path(__file__).resolve().parents[3] / "measure"
 STAGES = ("verdict", "forecasting", "probes", "inference", "nulls", "loop", "closing")

@@ -12,8 +12,7 @@ from measure.report.lead import lead
 from measure.report.page import page
 from measure.report.sentences import error_warnings, heading, power_text
 from measure.report.words import words
-from measure.verdict.decided import NOT_REJECTED, erring, undecided
-from measure.verdict.record import Conclusion, Power, Verdict
+from measure.verdict import NOT_REJECTED, Conclusion, Power, Verdict, erring, undecided
 from tests.measure.report.verdicts import about, verdict
 
 SEEN = (0.9, 0.2, 0.4)

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from measure.verdict.quantity import (
+from measure.verdict import (
+    Estimate,
     display,
     estimate_text,
     in_errors,
@@ -16,7 +17,6 @@ from measure.verdict.quantity import (
     with_error,
     with_level,
 )
-from measure.verdict.record import Estimate
 
 
 def estimate(value: float, low: float, high: float, unit: str = "1", level: float = 0.9) -> Estimate:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from models.conditioning.grain import DEVIATION, STILL, grained
+from models.conditioning import grained
+from models.conditioning.grain import DEVIATION, STILL
 
 SHAPE = (30, 40, 50)
 

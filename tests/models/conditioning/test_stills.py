@@ -7,9 +7,7 @@ import pytest
 import torch
 
 from flagdata.errors import CorruptError
-from models.conditioning import mask_network
-from models.conditioning.mask_network import MaskNetwork, inputs_of
-from models.conditioning.stills import Stills, halved
+from models.conditioning import MaskNetwork, Stills, halved, inputs_of, mask_network
 
 
 def test_the_usual_value_is_what_a_place_returns_to() -> None:

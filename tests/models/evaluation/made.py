@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from models.evaluation.predictions import Predictions
+from models.evaluation import Predictions
 
 
 def generator(seed: int) -> np.random.Generator:

@@ -9,9 +9,8 @@ import pytest
 from scipy import stats
 
 from flagdata.errors import InputError
-from models.evaluation.bootstrap import Resamples
-from models.evaluation.calibration import LEVELS, Cells, cells, coverage, rank_histogram, tarp
-from models.evaluation.predictions import Predictions
+from models.evaluation import LEVELS, Predictions, Resamples, coverage, rank_histogram, tarp
+from models.evaluation.calibration import Cells, cells
 from tests.models.evaluation.made import generator, of_wind, posterior
 
 CLIPS = 4000

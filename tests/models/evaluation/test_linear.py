@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from flagdata.errors import InputError
-from models.evaluation.linear import bouman, leave_one_group_out
+from models.evaluation import bouman
+from models.evaluation.linear import leave_one_group_out
 from tests.models.evaluation.made import generator
 from tests.refusals import unrefused
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, NotFoundError
-from models.evaluation.predictions import Predictions, load, save
+from models.evaluation import Predictions
+from models.evaluation.predictions import load, save
 from tests.models.evaluation.made import posterior
 from tests.refusals import unrefused
 

@@ -13,12 +13,10 @@ import pytest
 from markdown import markdown as render
 
 from flagdata.errors import InputError, UnknownNameError
+from models.evaluation import SCORES, Predictions, bouman
 from models.evaluation.curves import FramesPoint, LearningPoint
 from models.evaluation.evaluation import Evaluation, Read, as_document, evaluate
-from models.evaluation.linear import bouman
-from models.evaluation.predictions import Predictions
 from models.evaluation.report import markdown, page, write
-from models.evaluation.scores import SCORES
 from models.evaluation.table import digits
 from tests.models.evaluation.made import generator, of_wind, posterior
 from tests.refusals import unrefused

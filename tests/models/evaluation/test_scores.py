@@ -9,9 +9,9 @@ import pytest
 from scipy import stats
 
 from flagdata.errors import InputError
-from models.evaluation import paper
-from models.evaluation.bootstrap import LEVEL, Resamples, estimate
-from models.evaluation.scores import SCORES, error_against, rmse_bound
+from models.evaluation import SCORES, Resamples, estimate, paper
+from models.evaluation.bootstrap import LEVEL
+from models.evaluation.scores import error_against, rmse_bound
 from tests.models.evaluation.made import generator, of_wind
 from tests.refusals import unrefused
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from models.evaluation.bootstrap import Resamples
+from models.evaluation import Resamples
 from models.evaluation.triplets import accuracy_values, draw, possible
 from tests.models.evaluation.made import generator
 

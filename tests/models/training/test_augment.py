@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UnknownNameError
-from models.training.augment import DISTURBANCES, Augment, Strength
+from models.training import Augment
+from models.training.augment import DISTURBANCES, Strength
 from models.training.augment.augment import AFTER, Film
 
 SIDE, FRAMES = 96, 24

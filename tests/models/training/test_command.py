@@ -25,16 +25,13 @@ from flagdata.errors import (
     UnknownNameError,
     UsageError,
 )
-from flagdata.lake import Lake
-from flagdata.lake.catalog import Catalog
+from flagdata.lake import Catalog, Lake
 from flagdata.locks import alone_in
 from models import estimator
 from models.storage import WEIGHTS, read_card
 from models.targets import Cloth
-from models.training import command, inputs
-from models.training.command import sides_of
-from models.training.inputs import prepare_clips, prepare_films
-from models.training.recipe import TRAININGS, load, parse
+from models.training import command, inputs, load, parse, prepare_clips, prepare_films, sides_of
+from models.training.recipe import TRAININGS
 from tests.small import TRAINING
 from tests.studies import shipping
 

@@ -12,10 +12,7 @@ from numpy.typing import NDArray
 import flagdata
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake import Lake
-from models.training.command import sides_of
-from models.training.conditioned import FitFilm
-from models.training.inputs import Prepared, prepare_clips, prepare_films
-from models.training.recipe import TrainingRecipe, parse
+from models.training import FitFilm, Prepared, TrainingRecipe, parse, prepare_clips, prepare_films, sides_of
 from tests.models.conftest import fill
 from tests.small import TRAINING
 

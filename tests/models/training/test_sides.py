@@ -9,12 +9,12 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
-from flagdata.dataset.resolve import clips_on_side
+from flagdata.dataset import clips_on_side
 from flagdata.errors import InputError, RefusedError, UnknownNameError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind, catalog_schema
 from models.evaluation.command import refuse_learned
-from models.training.recipe import DataSpec, parse
+from models.training import DataSpec, parse
 from tests.refusals import unrefused
 
 SIDES = ("train", "validation", "test")

@@ -22,18 +22,8 @@ from models.estimator import Estimator
 from models.evaluation.predict import predict
 from models.frontend import FrontEnd
 from models.learner import Learner, Loss
-from models.training import checkpoint
-from models.training.augment import Augment
-from models.training.inputs import Prepared
-from models.training.recipe import (
-    DataSpec,
-    LossSpec,
-    NetworkSpec,
-    OptimiserSpec,
-    Precision,
-    Schedule,
-    TrainingRecipe,
-)
+from models.training import Augment, DataSpec, Prepared, TrainingRecipe, checkpoint
+from models.training.recipe import LossSpec, NetworkSpec, OptimiserSpec, Precision, Schedule
 from models.training.steps import Batches, DivergedError, Trained, Training, learning_rate
 
 SIZE = 24

@@ -11,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-from sim.blender.protocol import Message, decode, encode
+from sim.blender import Message, decode, encode
 
 
 def main() -> None:

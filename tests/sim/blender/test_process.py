@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import CorruptError
-from sim.blender.process import RenderError, WorkerProcess
-from sim.blender.protocol import PROTOCOL_VERSION, Message, decode, encode
+from sim.blender import Message, RenderError, WorkerProcess, decode, encode
+from sim.blender.protocol import PROTOCOL_VERSION
 
 FAKE = Path(__file__).with_name("fake_worker.py")
 

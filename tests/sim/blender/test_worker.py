@@ -11,9 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.blender.environment import Environment
-from sim.blender.process import RenderError, WorkerProcess
-from sim.blender.protocol import Message
+from sim.blender import Environment, Message, RenderError, WorkerProcess
 
 pytestmark = pytest.mark.usefixtures("blender")
 SIZE = 32

@@ -11,7 +11,7 @@ from pathlib import Path
 import sim.datasets.build
 import sim.datasets.cluster
 from flagdata.cli import main
-from flagdata.lake.transaction import Transaction
+from flagdata.lake import Transaction
 from tests.pausing import pause
 
 

@@ -16,8 +16,7 @@ from click.testing import CliRunner, Result
 
 from flagdata.cli import root
 from flagdata.lake import Lake
-from sim.datasets.reading import parse
-from sim.datasets.recipe import DatasetRecipe
+from sim.datasets import DatasetRecipe, parse
 from tests import pausing
 from tests.small import DATA_SET, SIMULATION
 

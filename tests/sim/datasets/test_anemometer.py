@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 
 from flagdata.schema import SampleFlag
-from sim.datasets import anemometer
-from sim.datasets.cast import casts
-from sim.datasets.recipe import AnemometerSpec, DatasetRecipe, Truth
-from sim.run.members import Crew
+from sim.datasets import AnemometerSpec, DatasetRecipe, Truth, anemometer, casts
+from sim.run import Crew
 
 BEGIN = 1_577_836_800_000_000_000
 IDEAL = AnemometerSpec(truth=Truth.STATED, rate=1.0, before=75.0, noise=0.0, resolution=1e-6, accuracy=0.0, effects={})

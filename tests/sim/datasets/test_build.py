@@ -14,10 +14,9 @@ import pytest
 import flagdata
 from flagdata.dataset import ExplicitSplit
 from flagdata.errors import FlagdataError
-from flagdata.lake import Lake
-from flagdata.lake.health import doctor, object_names, verify
+from flagdata.lake import Lake, doctor, object_names, verify
 from flagdata.record import Record
-from sim.datasets.recipe import DatasetRecipe
+from sim.datasets import DatasetRecipe
 from tests.program import invoke
 
 SIDES = {side: {"dataset": "tiny", "side": side} for side in ("train", "test")}

@@ -11,11 +11,9 @@ from typing import NoReturn
 import pytest
 
 from flagdata.lake import Lake
-from sim.datasets import jobs, plan
+from sim.datasets import casts, jobs, load, plan
 from sim.datasets.build import BuildReport
-from sim.datasets.cast import casts
 from sim.datasets.plan import Rates
-from sim.datasets.reading import load
 from tests.program import Ended, invoke
 
 
@@ -46,7 +44,7 @@ def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(
 def test_the_planned_size_of_a_sequence_is_near_the_real_one(
     recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from flagdata.lake.meshes import write_meshes
+    from flagdata.lake import write_meshes
 
     _, out, _ = said(capsys, recipe_file, "--lake", tmp_path / "lake", "--plan", "--json")
     simulation = next(casts(load(str(recipe_file)))).simulation

@@ -10,10 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.timebase import iso
-from sim.datasets.cast import Roll, casts
-from sim.datasets.films import Film, Sequences
-from sim.datasets.reading import load
-from sim.datasets.recipe import DatasetRecipe
+from sim.datasets import DatasetRecipe, Film, Roll, Sequences, casts, load
 
 
 def films(recipe: DatasetRecipe, side: str) -> list[Film]:

@@ -8,14 +8,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flagdata.lake.meshes import MeshSequence
+from flagdata.lake import MeshSequence
 from flagdata.record import Record
 from flagdata.rng import stream
-from sim.datasets import jobs
-from sim.datasets.cast import Roll, casts
-from sim.datasets.films import Sequences
-from sim.datasets.recipe import DatasetRecipe
-from sim.run.publish import one_thread
+from sim.datasets import DatasetRecipe, Roll, Sequences, casts, jobs
+from sim.run import one_thread
 from tests.sim.datasets.leakage import FEATURES, Surroundings, accuracies, dealt_anew, features_of
 
 SEQUENCES, FILMS = 40, 80

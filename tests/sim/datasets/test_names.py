@@ -13,13 +13,10 @@ import pytest
 
 from flagdata.errors import ConflictError, InputError
 from flagdata.lake import Artifact, Lake
+from sim.datasets import DatasetRecipe, Film, Roll, casts, load
 from sim.datasets.build import Build
 from sim.datasets.card import write_card
-from sim.datasets.cast import Roll, casts
-from sim.datasets.films import Film
-from sim.datasets.reading import load
-from sim.datasets.recipe import DatasetRecipe
-from sim.run.publish import member_artifact
+from sim.run import member_artifact
 from tests.refusals import unrefused
 
 Make = Callable[..., DatasetRecipe]

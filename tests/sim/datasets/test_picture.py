@@ -11,10 +11,10 @@ import simplejpeg
 from PIL import Image
 
 from flagdata.errors import InputError
-from flagdata.record.writer import Coding
+from flagdata.record import Coding
 from flagdata.tables import Range
-from sim.datasets.picture import filled, jpegs, settings
-from sim.datasets.recipe import CameraSpec
+from sim.datasets import CameraSpec, settings
+from sim.datasets.picture import filled, jpegs
 
 SLOT = 65536
 EXACT = {"camera.jpeg_quality": 100.0, "camera.read_noise": 0.0, "camera.shot_noise": 0.0}

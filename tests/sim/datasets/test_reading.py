@@ -10,11 +10,10 @@ import torch
 
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.tables import Range, ends
-from sim.datasets.cast import casts
-from sim.datasets.reading import DATASETS, load, parse, with_renderer
-from sim.datasets.recipe import DatasetRecipe, Truth
-from sim.effects.finite_span_loading import FiniteSpanLoading
-from sim.run.members import Crew
+from sim.datasets import DatasetRecipe, Truth, casts, load, parse
+from sim.datasets.reading import DATASETS, with_renderer
+from sim.effects import FiniteSpanLoading
+from sim.run import Crew
 from tests.refusals import unrefused
 
 Make = Callable[..., DatasetRecipe]

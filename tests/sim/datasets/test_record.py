@@ -10,16 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.dataset.clips import clip_rows
+from flagdata.dataset import clip_rows
 from flagdata.lake import Artifact
-from flagdata.record import Record
-from flagdata.record.metadata import CAMERA, PROVENANCE
-from sim.datasets import anemometer, jobs
-from sim.datasets.cast import casts
-from sim.datasets.films import Film, Sequences
-from sim.datasets.recipe import DatasetRecipe
-from sim.run.members import Crew
-from sim.run.publish import one_thread
+from flagdata.record import CAMERA, PROVENANCE, Record
+from sim.datasets import DatasetRecipe, Film, Sequences, anemometer, casts, jobs
+from sim.run import Crew, one_thread
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from sim.effects.effect import Effect, apply
+from sim.effects import Effect, apply
 from sim.mesh import Mesh, grid
 from sim.system import System
 

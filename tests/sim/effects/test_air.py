@@ -11,18 +11,12 @@ import torch
 
 from flagdata.errors import UsageError
 from sim.air import QuadraticNormal, Stokes
-from sim.effects.added_mass import AddedMass
+from sim.effects import AddedMass, Lift, Permeability, Porosity, PowerLawDrag, TangentialLinearDrag, apply
 from sim.effects.air_density import AirDensityChange
-from sim.effects.effect import apply
-from sim.effects.lift import Lift
-from sim.effects.permeability import Permeability
-from sim.effects.porosity import Porosity
-from sim.effects.power_law_drag import PowerLawDrag
-from sim.effects.tangential_linear_drag import TangentialLinearDrag
 from sim.effects.tangential_quadratic_drag import TangentialQuadraticDrag
 from sim.handles import Handles
 from sim.inertia import mean_normal_rates, mean_normals
-from sim.integrate.symplectic import advance
+from sim.integrate import advance
 from sim.material import isotropic, named
 from sim.mesh import grid
 from sim.scene import Scene, assemble

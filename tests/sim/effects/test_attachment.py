@@ -10,15 +10,11 @@ import torch
 
 from flagdata.errors import UsageError
 from sim.air import QuadraticNormal
-from sim.effects.effect import apply
+from sim.effects import Slack, apply
 from sim.effects.full_hoist import FullHoist
-from sim.effects.slack import Slack
 from sim.effects.tilted_pole import TiltedPole
 from sim.handles import Handles, corners
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.joint_batch import JointBatch
-from sim.integrate.split import SplitEuler
-from sim.integrate.symplectic import advance
+from sim.integrate import BackwardEuler, JointBatch, SplitEuler, advance
 from sim.mesh import grid
 
 STILL = QuadraticNormal(density=0.0)

@@ -12,16 +12,13 @@ import torch
 from flagdata.errors import UsageError
 from sim import bending
 from sim.air import QuadraticNormal
-from sim.effects.effect import apply
-from sim.effects.hem_mass import HemMass
+from sim.effects import HemMass, InternalDamping, apply
 from sim.effects.hem_stiffness import HemStiffness
 from sim.effects.hysteresis import Hysteresis
-from sim.effects.internal_damping import InternalDamping
 from sim.effects.rest_curvature import RestCurvature
 from sim.effects.wet_mass import WetMass
 from sim.handles import Handles
-from sim.integrate.stability import stable_step
-from sim.integrate.symplectic import advance
+from sim.integrate import advance, stable_step
 from sim.material import isotropic
 from sim.mesh import Mesh, grid
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from sim.effects.field import Flat, Seen, heavier
+from sim.effects import Flat, Seen, heavier
 from sim.material import named
 from sim.scene import assemble, flag
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.special import k0, k1
 
 from sim.cloth import Cloth
-from sim.effects import apply
-from sim.effects.finite_span_loading import FiniteSpanLoading, cosines, profile_over_height, relative_masses, strip_mass
+from sim.effects import FiniteSpanLoading, apply
+from sim.effects.finite_span_loading import cosines, profile_over_height, relative_masses, strip_mass
 from sim.material import named
 from sim.mesh import grid
 from sim.scene import assemble, flag

@@ -7,9 +7,7 @@ import torch
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.rng import stream
-from sim.effects import EFFECTS, apply
-from sim.effects.porosity import Porosity
-from sim.effects.shear import Shear
+from sim.effects import EFFECTS, Porosity, Shear, apply
 
 
 def test_a_refused_value_is_reported_with_its_admissible_range_and_expected_value() -> None:

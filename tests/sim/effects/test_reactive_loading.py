@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from sim.effects.reactive_loading import ReactiveLoading
+from sim.effects import ReactiveLoading
 from sim.mesh import grid
 
 U, K, OMEGA, AMPLITUDE, MASS = 6.0, 9.0, 100.0, 1e-4, 0.4

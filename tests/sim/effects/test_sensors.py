@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
+from sim.effects import AnemometerLag, Sampling
 from sim.effects.anemometer_dead_zone import AnemometerDeadZone
 from sim.effects.anemometer_gain import AnemometerGain
-from sim.effects.anemometer_lag import AnemometerLag
 from sim.effects.anemometer_offset import AnemometerOffset
 from sim.effects.clock_drift import ClockDrift
 from sim.effects.clock_offset import ClockOffset
@@ -20,7 +20,6 @@ from sim.effects.frame_jitter import FrameJitter
 from sim.effects.frame_rate_error import FrameRateError
 from sim.effects.overspeeding import Overspeeding
 from sim.effects.rolling_shutter import RollingShutter
-from sim.effects.sensor import Sampling
 from sim.effects.sensor_distance import SensorDistance
 from sim.effects.sensor_height import SensorHeight
 

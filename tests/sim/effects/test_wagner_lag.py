@@ -14,7 +14,7 @@ from sim import scene
 from sim.air import Stokes, face_wind
 from sim.effects import apply
 from sim.effects.wagner_lag import HeldBack, WagnerLag
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import Symplectic
 from sim.material import named
 from sim.scene import assemble
 

@@ -12,12 +12,10 @@ from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindSeries
+from sim.effects import Gusts, Shear, VerticalWind
 from sim.effects.direction_change import DirectionChange
-from sim.effects.gusts import Gusts
 from sim.effects.logged_gusts import LoggedGusts
 from sim.effects.pole_wake import PoleWake
-from sim.effects.shear import Shear
-from sim.effects.vertical_wind import VerticalWind
 from tests.refusals import unrefused
 
 WIND = torch.tensor([3.0, 4.0, 0.5], dtype=torch.float64)[:, None]

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.render import RenderParameters
-from sim.render.raster import Raster
+from sim.render import Raster, RenderParameters
 from tests.sim.render.pieces import BLACK, WHITE, Given, plain
 
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from flagdata.errors import InputError
-from sim.render.camera import Camera
+from sim.render import Camera
 from tests.refusals import unrefused
 
 NORTH = {"position": (0.0, -5.0, 1.6), "target": (0.0, 0.0, 1.6), "view_angle": 2 * math.atan(0.5)}

@@ -12,11 +12,9 @@ import torch
 
 from flagdata.errors import NotFoundError
 from sim.assets import Assets
-from sim.blender.environment import SETTING, Environment
-from sim.render import RENDERERS, Meshes, RenderParameters
-from sim.render.cycles import Cycles, Workbench
-from sim.render.develop import plate, to_linear
-from sim.render.prior import named
+from sim.blender import Environment
+from sim.blender.environment import SETTING
+from sim.render import RENDERERS, Cycles, Meshes, RenderParameters, Workbench, named, plate, to_linear
 
 needs_blender = pytest.mark.usefixtures("blender")
 SIZE = 96

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from sim.render.develop import develop, plate, to_bytes, to_linear
+from sim.render import plate, to_bytes, to_linear
+from sim.render.develop import develop
 from sim.render.texture import Pyramid
 
 

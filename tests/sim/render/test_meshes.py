@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from flagdata.errors import InputError
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
+from flagdata.lake import MeshSequence, RaggedMeshSequence
 from sim.render import Meshes
 from tests.refusals import unrefused
 from tests.sim.render.pieces import meshes, sheet

@@ -12,8 +12,8 @@ import pytest
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.tables import Range
 from sim.assets import BACKGROUNDS, TEXTURES, Assets
+from sim.render import RenderParameters
 from sim.render import prior as priors
-from sim.render.parameters import RenderParameters
 from tests.refusals import unrefused
 
 DRAWS = 150

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.ingest.meshes.folder import read_folder
-from flagdata.lake.meshes import RaggedMeshSequence
-from sim.render import Meshes
-from sim.render.camera import Camera
+from flagdata.ingest import read_folder
+from flagdata.lake import RaggedMeshSequence
+from sim.render import Camera, Meshes
 from sim.render.shutter import Motion
 from sim.render.stage import stage
 from tests.sim.render.pieces import linear

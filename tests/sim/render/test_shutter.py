@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from flagdata.errors import InputError
-from sim.render.meshes import Meshes
+from sim.render import Meshes
 from sim.render.shutter import moved
 from tests.sim.render.pieces import linear, meshes, sheet
 

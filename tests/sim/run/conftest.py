@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.run.reading import parse
-from sim.run.recipe import Recipe
+from sim.run import Recipe, parse
 
 SMALL = """
 seed = 3

@@ -12,12 +12,9 @@ import torch
 
 from flagdata.errors import UsageError
 from sim import membrane
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import BackwardEuler, Symplectic
 from sim.material import named
-from sim.run.batch import Outcome, Stepper, principal_strains, run
-from sim.run.members import Crew
-from sim.run.reading import parse
+from sim.run import Crew, Outcome, Stepper, parse, principal_strains, run
 from sim.scene import assemble, flag
 
 SIZE = 4

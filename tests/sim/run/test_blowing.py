@@ -10,12 +10,11 @@ import pytest
 
 import flagdata
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.meshes import MeshSequence, read_meshes
-from flagdata.record.writer import RecordWriter
+from flagdata.lake import Artifact, Lake, MeshSequence, read_meshes
+from flagdata.record import RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
-from sim.run.reading import of_content
+from sim.run import of_content
 from tests.program import Run, invoke
 from tests.refusals import unrefused
 

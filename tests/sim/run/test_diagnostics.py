@@ -10,11 +10,10 @@ import pytest
 import torch
 
 from sim.air import NO_AIR
-from sim.integrate.symplectic import Symplectic, advance
+from sim.integrate import Symplectic, advance
 from sim.material import Material, isotropic, named
-from sim.run.batch import CRUMPLED, Monitor, Stepper, run
-from sim.run.members import Crew
-from sim.run.reading import parse
+from sim.run import CRUMPLED, Crew, Stepper, parse, run
+from sim.run.batch import Monitor
 from sim.scene import assemble, flag
 
 PONTE_ROMA = replace(named("camel-ponte-roma"), damping=0.0)

@@ -11,8 +11,7 @@ import torch
 
 from sim.effects import EFFECTS
 from sim.material import named
-from sim.run.members import Crew
-from sim.run.reading import parse
+from sim.run import Crew, parse
 from sim.scene import upright
 
 CAMEL = named("camel-ponte-roma")

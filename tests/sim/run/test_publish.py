@@ -12,11 +12,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import UsageError
-from flagdata.lake import Lake
-from flagdata.lake.meshes import MeshSequence, read_meshes
-from sim.run import Recipe, load, simulate
-from sim.run.members import Crew
-from sim.run.reading import parse
+from flagdata.lake import Lake, MeshSequence, read_meshes
+from sim.run import Crew, Recipe, load, parse, simulate
 from tests import pausing
 
 WORKER = Path(__file__).with_name("simulate_worker.py")

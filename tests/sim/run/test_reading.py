@@ -17,9 +17,8 @@ from sim.arcsim import STAGES
 from sim.contact import Contact
 from sim.effects import EFFECTS
 from sim.limits import StrainLimits
-from sim.run.members import Crew
-from sim.run.reading import SCENES, load, parse
-from sim.run.recipe import Shape
+from sim.run import Crew, Shape, load, parse
+from sim.run.reading import SCENES
 from tests.refusals import unrefused
 
 MINIMAL = '[material]\nname = "camel-ponte-roma"\n[wind]\nspeed = 4.0\n'

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.ingest.meshes import read_folder
-from flagdata.lake import Lake
-from flagdata.lake.meshes import MeshSequence, read_meshes
+from flagdata.ingest import read_folder
+from flagdata.lake import Lake, MeshSequence, read_meshes
 from tests.program import Run, invoke
 
 

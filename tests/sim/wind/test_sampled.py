@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
-from sim.wind.sampled import Beyond, Even, SampledWind, Times
+from sim.wind import Beyond, Even, SampledWind
+from sim.wind.sampled import Times
 from tests.refusals import unrefused
 
 EVEN = Even(start=-1.0, period=0.5, count=4)

@@ -9,7 +9,7 @@ from scipy.signal import welch
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from sim.wind.spectral import VonKarman
+from sim.wind import VonKarman
 from tests.refusals import unrefused
 
 GUSTS = VonKarman(mean=6.0, intensity=0.2, length=60.0)

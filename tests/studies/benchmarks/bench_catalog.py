@@ -34,9 +34,7 @@ from deltalake import DeltaTable, write_deltalake
 from flagdata.lake import Artifact, Lake
 from flagdata.rng import stream
 from flagdata.schema import Kind, catalog_schema
-from flagdata.view.media import Media
-from flagdata.view.pages import Site
-from flagdata.view.server import answer
+from flagdata.view import Media, Site, answer
 
 ROWS = int(os.environ.get("FLAGDATA_BENCH_ROWS", "1_000_000"))
 BATCHES = 10

@@ -21,9 +21,7 @@ from flagdata.rng import stream
 from sim.air import Stokes
 from sim.contact import Contact
 from sim.effects import EFFECTS, apply
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.split import SplitEuler
-from sim.integrate.symplectic import Symplectic, advance
+from sim.integrate import BackwardEuler, SplitEuler, Symplectic, advance
 from sim.material import named
 from sim.scene import assemble, flag
 from sim.state import State

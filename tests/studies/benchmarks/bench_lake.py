@@ -19,8 +19,7 @@ import zarr
 from deltalake import write_deltalake
 
 from flagdata.checksums import size_of
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.meshes import MeshSequence, read_meshes, write_meshes
+from flagdata.lake import Artifact, Lake, MeshSequence, read_meshes, write_meshes
 from flagdata.rng import stream
 from flagdata.schema import CATALOG, CLIP_FRAMES, Kind, catalog_schema
 

@@ -22,13 +22,12 @@ from numpy.typing import NDArray
 
 from flagdata.film import Film
 from flagdata.rng import child_seed
-from measure.anemometer.network import Network, gate_beside, network
-from measure.estimate.combine import of_model
-from measure.estimate.measuring import Options, measure
-from measure.film.similarity import FlagSize
-from measure.film.source import Reading, subjects
-from measure.refine.command import Clip
-from measure.refine.command import run as refine
+from measure.anemometer import Network, gate_beside
+from measure.anemometer.network import network
+from measure.estimate import Options, measure, of_model
+from measure.film import FlagSize, Reading, subjects
+from measure.refine import Clip
+from measure.refine import run as refine
 from tests.studies.long_films import simulated
 
 _RATE = 25

@@ -19,7 +19,7 @@ from torch.nn import functional
 from models import estimator
 from models.frontend import FrontEnd, Maps, standardised
 from models.spectral import SpectralDecomposition
-from models.training.recipe import load
+from models.training import load
 
 _RUNS = 31
 _BATCH = 8

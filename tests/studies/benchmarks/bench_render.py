@@ -17,14 +17,13 @@ import numpy as np
 import torch
 
 from flagdata.errors import NotFoundError
-from flagdata.lake.meshes import MeshSequence
+from flagdata.lake import MeshSequence
 from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import Symplectic
 from sim.material import named as material
-from sim.render import RENDERERS, Meshes, RenderParameters
-from sim.render.prior import named as prior
-from sim.render.raster import Raster
+from sim.render import RENDERERS, Meshes, Raster, RenderParameters
+from sim.render import named as prior
 from sim.scene import assemble, flag
 
 FRAME = 0.04  # s

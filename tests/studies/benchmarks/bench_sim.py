@@ -20,10 +20,8 @@ import numpy as np
 import torch
 
 from sim.contact import Contact
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.stability import stable_step
-from sim.integrate.symplectic import Backend, Symplectic, advance
-from sim.kernel.fused import Kernel
+from sim.integrate import Backend, BackwardEuler, Symplectic, advance, stable_step
+from sim.kernel import Kernel
 from sim.limits import StrainLimits
 from sim.material import named
 from sim.scene import assemble, flag

@@ -22,8 +22,7 @@ import numpy as np
 import torch
 
 from sim.compiler import compiler
-from sim.integrate.stability import stable_step
-from sim.integrate.symplectic import Backend, advance
+from sim.integrate import Backend, advance, stable_step
 from sim.material import named
 from sim.scene import assemble, flag
 from sim.state import State

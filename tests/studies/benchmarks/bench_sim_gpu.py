@@ -20,7 +20,7 @@ import torch
 
 from models.frontend import FrontEnd
 from models.learner import Loss, build
-from sim.integrate.symplectic import Backend, Symplectic, advance
+from sim.integrate import Backend, Symplectic, advance
 from sim.kernel_warp import leapfrog
 from sim.material import named
 from sim.scene import assemble, flag

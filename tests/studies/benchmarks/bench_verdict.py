@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.rng import child_seed
-from measure.forecasting.setting import Setting
-from measure.loop.run import Options, solve
+from measure.forecasting import Setting
+from measure.loop import Options, solve
 from measure.nulls import bank as banks
-from measure.nulls.plan import batches
-from measure.verdict.criteria import CRITERIA
+from measure.nulls import batches
+from measure.verdict import CRITERIA
 from tests.studies.validation import stressors
 
 _ACROSS = (10, 17, 27)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
+from measure.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
 from tests.studies.challenge.answer_key import Acting, AnswerKey
 from tests.studies.challenge.filing import Filing, verdict_json
 from tests.studies.challenge.recipe import Kind

@@ -136,10 +136,10 @@ def bank(
 def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
     """Judge the sets that have no verdict yet, and file the verdicts with their hashes."""
     from flagdata.caches import user_cache
-    from measure.calibrate.workload import announced
+    from measure.calibrate import announced
     from measure.films.command import workload
-    from measure.loop.run import Options
-    from measure.nulls.workload import of_recordings
+    from measure.loop import Options
+    from measure.nulls import of_recordings
     from tests.studies.challenge.filing import filed
     from tests.studies.challenge.fitter import ClosingTheLoop, ClosingTheLoopOnFilms
     from tests.studies.challenge.folder import ChallengeFolder

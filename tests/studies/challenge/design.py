@@ -12,7 +12,7 @@ import numpy as np
 
 from flagdata.errors import UsageError
 from flagdata.rng import stream
-from sim.effects.effect import ClothEffect
+from sim.effects import ClothEffect
 from tests.studies.challenge.answer_key import Acting, AnswerKey
 from tests.studies.challenge.classes import class_of
 from tests.studies.challenge.recipe import ChallengeRecipe, Kind, Method, Strengths, effect_type

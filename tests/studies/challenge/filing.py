@@ -11,7 +11,7 @@ from flagdata.documents import read_json
 from flagdata.errors import ConflictError, CorruptError, RefusedError
 from flagdata.outputs import rewrite
 from flagdata.provenance import file_hash
-from measure.verdict.record import Verdict
+from measure.verdict import Verdict
 from tests.studies.challenge.folder import ChallengeFolder, write_json
 
 

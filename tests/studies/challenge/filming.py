@@ -12,12 +12,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.lake.meshes import MeshSequence
+from flagdata.lake import MeshSequence
 from flagdata.rng import child_seed, stream
 from flagdata.timebase import NANOSECONDS
 from measure.camera import write_film
 from sim.assets import Assets
-from sim.effects.anemometer_lag import AnemometerLag
+from sim.effects import AnemometerLag
 from sim.render import prior
 from tests.studies.challenge.answer_key import AnswerKey
 from tests.studies.challenge.films import SCHEMA

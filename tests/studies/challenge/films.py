@@ -21,10 +21,7 @@ import numpy as np
 from flagdata.documents import read_json
 from flagdata.errors import InputError, NotFoundError
 from flagdata.findings import Finding
-from measure.calibrate.observed import Observed
-from measure.calibrate.prior import AZIMUTH, ELEVATION, Normal, Uncertain
-from measure.calibrate.simulation import Flag
-from measure.calibrate.wind import Log
+from measure.calibrate import AZIMUTH, ELEVATION, Flag, Log, Normal, Observed, Uncertain
 
 SCHEMA = "flagdata.challenge-films/1"
 
@@ -56,10 +53,8 @@ class Filmed:
             FlagdataError: in none of the films a flag is found.
         """
         from flagdata.film import CameraFilm
-        from measure.calibrate.filmed import Part
-        from measure.calibrate.leaving_out import usable
-        from measure.film.conditioned import ConditionedFilm
-        from measure.film.similarity import FlagSize
+        from measure.calibrate import Part, usable
+        from measure.film import ConditionedFilm, FlagSize
 
         size = FlagSize(length=self.flag.length, height=self.flag.height)
 

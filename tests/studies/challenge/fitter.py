@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from measure.observe.trajectory import Experiment
-from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Verdict
+from measure.observe import Experiment
+from measure.verdict import CRITERIA, Verdict
 from tests.studies.challenge.films import Filmed
 
 if TYPE_CHECKING:
-    from measure.films.run import Options
+    from measure.films import Options
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,8 +30,8 @@ class ClosingTheLoop:
         Raises:
             InputError: the data do not do.
         """
-        from measure.closing.close import close_loop
-        from measure.loop.run import Options
+        from measure.closing import close_loop
+        from measure.loop import Options
 
         return close_loop(experiment, Options(seed=seed, bank=self.bank))
 
@@ -60,7 +59,7 @@ class ClosingTheLoopOnFilms:
             FlagdataError: films that do not do.
         """
         del seed
-        from measure.films.run import close_loop
+        from measure.films import close_loop
 
         shown, left_out = given.observed()
         verdict = close_loop(shown, self.options(given), folder=self.folder, workers=self.workers)
@@ -68,9 +67,8 @@ class ClosingTheLoopOnFilms:
 
     def options(self, given: Filmed) -> Options:
         """How a set is judged, by what is stated of it."""
-        from measure.calibrate.calibrate import Options as Calibrating
-        from measure.films.command import simulations_of
-        from measure.films.run import Options
+        from measure.calibrate import Options as Calibrating
+        from measure.films import Options, simulations_of
 
         calibration = Calibrating(
             flag=given.flag,

@@ -26,8 +26,7 @@ from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownName
 from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest, file_hash
 from flagdata.recipes import is_name
-from measure.observe.anchors import as_seen
-from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
+from measure.observe import Experiment, Specimen, Trajectory, WindTrack, as_seen
 from sim.handles import corners
 from sim.material import named
 from sim.mesh import grid

@@ -15,13 +15,11 @@ from flagdata.lake import Lake
 from flagdata.outputs import check_folder
 from flagdata.provenance import code_version, recipe_hash
 from flagdata.rng import child_seed, stream
-from measure.forecasting.segments import Cut
-from measure.forecasting.setting import Setting
+from measure.forecasting import Cut, Setting
+from measure.nulls import NullBatch, plan
 from measure.nulls import bank as banks
-from measure.nulls import plan
-from measure.nulls.simulation import NullBatch
+from measure.observe import Specimen
 from measure.observe import recipe as recipes
-from measure.observe.trajectory import Specimen
 from sim import handles
 from sim.material import named
 from sim.mesh import grid

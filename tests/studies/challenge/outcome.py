@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from statistics import fmean, median
 from typing import Any
 
-from measure.verdict.decided import NOT_REJECTED
-from measure.verdict.record import Conclusion
+from measure.verdict import NOT_REJECTED, Conclusion
 from tests.studies.challenge.answer_key import Acting, AnswerKey
 from tests.studies.challenge.classes import class_of
 from tests.studies.challenge.filing import Filing

@@ -28,7 +28,7 @@ import numpy as np
 
 from flagdata.errors import RefusedError
 from measure.shares import Share
-from measure.verdict.record import Conclusion
+from measure.verdict import Conclusion
 from tests.studies.challenge import filing
 from tests.studies.challenge.answer_key import opened
 from tests.studies.challenge.classes import class_of

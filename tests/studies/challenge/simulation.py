@@ -15,18 +15,14 @@ from flagdata.errors import FlagdataError, UsageError
 from flagdata.rng import stream
 from sim.batch import Batch, DivergedError, Divergence
 from sim.contact import Contact
-from sim.effects.effect import Effect, apply
-from sim.effects.gusts import Gusts
+from sim.effects import Effect, Gusts, apply
 from sim.handles import Handles, corners
-from sim.integrate import Integrator
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import BackwardEuler, Integrator, Symplectic
 from sim.material import Material, named
 from sim.scene import Scene, assemble
 from sim.state import State
 from sim.system import System
-from sim.wind.sampled import Beyond, Even, SampledWind
-from sim.wind.spectral import VonKarman
+from sim.wind import Beyond, Even, SampledWind, VonKarman
 from tests.studies.challenge.answer_key import Acting, AnswerKey
 from tests.studies.challenge.meshes import mesh_of
 from tests.studies.challenge.recipe import ChallengeRecipe, Method, Numerics, effect_type

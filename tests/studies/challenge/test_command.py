@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from flagdata import outputs
 from flagdata.cli import main
-from measure.verdict.record import Conclusion
+from measure.verdict import Conclusion
 from tests.studies.__main__ import studies
 from tests.studies.challenge import cases, history
 from tests.studies.challenge.command import challenge

@@ -14,11 +14,9 @@ import pytest
 
 from flagdata.errors import CorruptError, InputError, RefusedError, UnknownNameError
 from flagdata.film import CameraFilm
-from measure.calibrate.filmed import Part
-from measure.calibrate.prior import AZIMUTH, ELEVATION
-from measure.calibrate.simulation import Flag
-from measure.film.similarity import FlagSize
-from measure.verdict.record import Conclusion
+from measure.calibrate import AZIMUTH, ELEVATION, Flag, Part
+from measure.film import FlagSize
+from measure.verdict import Conclusion
 from tests.studies.challenge.cases import TINY, acting, filing, key, verdict
 from tests.studies.challenge.design import draw
 from tests.studies.challenge.filming import logged

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import ConflictError, CorruptError
-from measure.verdict.criteria import CRITERIA
+from measure.verdict import CRITERIA
 from tests.studies.challenge import history
 
 RESULTS = Path(__file__).resolve().parents[3] / "docs" / "results"

@@ -14,10 +14,10 @@ from click.testing import CliRunner
 
 from flagdata.errors import ConflictError, InputError, UsageError
 from flagdata.provenance import recipe_hash
-from measure.forecasting.segments import Cut
+from measure.forecasting import Cut
+from measure.nulls import NullBatch
 from measure.nulls import bank as banks
-from measure.nulls.simulation import NullBatch
-from measure.observe.trajectory import Experiment, Specimen, Trajectory
+from measure.observe import Experiment, Specimen, Trajectory
 from tests.studies.challenge import nulls
 from tests.studies.challenge.cases import TINY
 from tests.studies.challenge.command import challenge

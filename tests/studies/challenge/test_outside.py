@@ -14,7 +14,7 @@ from torch import Tensor
 from flagdata.rng import stream
 from sim.effects import EFFECTS, Effect, apply
 from sim.handles import Handles
-from sim.integrate.symplectic import Backend, advance
+from sim.integrate import Backend, advance
 from sim.material import named
 from sim.mesh import grid
 from sim.scene import Scene, assemble, upright

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from flagdata.errors import ConflictError, CorruptError, InputError, RefusedError, UnknownNameError
-from measure.observe.trajectory import Experiment
-from measure.verdict.record import Conclusion, Verdict
+from measure.observe import Experiment
+from measure.verdict import Conclusion, Verdict
 from tests.pausing import finding_tests
 from tests.studies.challenge import cases
 from tests.studies.challenge import filing as filings

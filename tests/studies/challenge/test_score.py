@@ -11,7 +11,7 @@ import pytest
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.shares import Share
-from measure.verdict.record import Conclusion, Verdict
+from measure.verdict import Conclusion, Verdict
 from sim.effects import EFFECTS
 from tests.studies.challenge import sheet as sheets
 from tests.studies.challenge.answer_key import AnswerKey

@@ -8,12 +8,10 @@ from typing import Protocol
 import numpy as np
 import torch
 
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.setting import Setting
-from measure.loop.validation import folds
-from measure.observe.trajectory import Experiment
-from sim.effects import Effect, apply
-from sim.effects.gusts import Gusts
+from measure.forecasting import Calibration, Setting
+from measure.loop import folds
+from measure.observe import Experiment
+from sim.effects import Effect, Gusts, apply
 from tests.studies.challenge.answer_key import AnswerKey
 from tests.studies.challenge.folder import ChallengeFolder
 from tests.studies.challenge.recipe import effect_type

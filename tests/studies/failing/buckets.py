@@ -37,10 +37,8 @@ from typing import Any
 
 from flagdata.cli import main
 from flagdata.findings import Severity
-from flagdata.lake import Lake
+from flagdata.lake import Lake, doctor, labels_of, object_names, verify
 from flagdata.lake.collect import collect
-from flagdata.lake.health import doctor, object_names, verify
-from flagdata.lake.lineage import labels_of
 from flagdata.lake.objects import SUMS
 from flagdata.storage import RemotePath, connection
 from tests.evidence import circumstances
@@ -125,7 +123,7 @@ CORE = {
 
 def core(folder: Path) -> Scene:
     """Make the scene of the commands of the core, with markers, a record and a lake ahead beside it."""
-    from flagdata.ingest.store import ingest_camera
+    from flagdata.ingest import ingest_camera
 
     scene = made_scene(folder)
     (folder / "markers.csv").write_text(

@@ -12,9 +12,8 @@ import av
 import numpy as np
 
 from flagdata.cli import main
-from flagdata.ingest.store import ingest_camera, ingest_wind
-from flagdata.lake import Lake
-from flagdata.lake.labels import columns
+from flagdata.ingest import ingest_camera, ingest_wind
+from flagdata.lake import Lake, columns
 from tests.small import SCENE
 from tests.studies.failing.trial import Command
 

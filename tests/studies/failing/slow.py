@@ -21,17 +21,15 @@ from numpy.typing import NDArray
 from flagdata.examples import example
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
-from measure.closing.close import close_loop
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.setting import Setting
-from measure.loop.run import Options
+from measure.closing import close_loop
+from measure.forecasting import Calibration, Setting
+from measure.loop import Options
+from measure.nulls import NullBatch, plan
 from measure.nulls import bank as banks
-from measure.nulls import plan
-from measure.nulls.simulation import NullBatch
+from measure.observe import Specimen
 from measure.observe import recipe as recipes
-from measure.observe.trajectory import Specimen
+from measure.propose import dictionary
 from measure.propose.propose import propose
-from measure.propose.terms import dictionary
 from sim import handles
 from sim.datasets.cluster import Job
 from sim.effects import EFFECTS

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.findings import Severity
-from flagdata.lake import Lake
-from flagdata.lake.health import doctor, object_names, read_refs, verify, verify_catalog
+from flagdata.lake import Lake, doctor, object_names, read_refs, verify, verify_catalog
 from tests.studies.failing.groups import PUBLISHING, kinds
 from tests.studies.failing.injector import Done, Fault, Injector
 

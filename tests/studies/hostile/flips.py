@@ -24,10 +24,9 @@ from typing import Any
 import numpy as np
 
 from flagdata.console import foreseen
-from flagdata.dataset.cache import DecodedCache
+from flagdata.dataset import DecodedCache
 from flagdata.errors import UnforeseenError
-from flagdata.lake import Artifact, Lake, catalog
-from flagdata.lake.removal import expire
+from flagdata.lake import Artifact, Lake, catalog, expire
 from flagdata.object_cache import block_of, keep_blocks
 from flagdata.schema import Kind
 from measure.calibrate import design

@@ -12,15 +12,14 @@ from hypothesis import strategies as st
 
 from flagdata.ingest.anemometer.recipe import parse as parse_sensor
 from flagdata.recipes import parsed
-from measure.observe.recipe import load as load_experiment
-from models.training.recipe import parse as parse_training
+from measure.observe import load as load_experiment
+from models.training import parse as parse_training
 from sim.arcsim import read_material, read_scene
-from sim.datasets.reading import parse as parse_dataset
+from sim.datasets import parse as parse_dataset
 from sim.material import Material
 from sim.render.prior import read as read_prior
-from sim.run.batch import Stepper
-from sim.run.members import Crew
-from sim.run.reading import parse as parse_scene
+from sim.run import Crew, Stepper
+from sim.run import parse as parse_scene
 from tests.damage import as_toml, damaged, damages, edited, edits
 from tests.small import EXPERIMENT, SCENE, TRAINING
 from tests.studies.challenge.recipe import CHALLENGES

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import torch
 
 from flagdata.errors import InputError
-from measure.calibrate.prior import Floats
-from sim.effects import SENSOR_EFFECTS
-from sim.effects.parameter import Parameter
-from sim.effects.sensor import AnemometerEffect
+from measure.calibrate import Floats
+from sim.effects import SENSOR_EFFECTS, AnemometerEffect, Parameter
 
 CLOCK = "clock-offset"
 ORDER = ("anemometer-lag", "overspeeding", "anemometer-gain", "anemometer-dead-zone", "anemometer-offset")

@@ -30,7 +30,7 @@ from scipy.stats import qmc
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.stated import Stated
-from measure.calibrate.prior import Floats
+from measure.calibrate import Floats
 from tests.studies.instruments.chain import Chain, about
 
 Mask = NDArray[np.bool_]

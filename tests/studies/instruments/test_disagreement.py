@@ -9,8 +9,7 @@ from flagdata.clock import NINETY
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.stated import parse
-from sim.effects import SENSOR_EFFECTS
-from sim.effects.sensor import AnemometerEffect
+from sim.effects import SENSOR_EFFECTS, AnemometerEffect
 from tests.studies.instruments.chain import ORDER, Chain, about
 from tests.studies.instruments.disagreement import Disagreement, Law, Readings, Rows, fit, jackknife, without
 

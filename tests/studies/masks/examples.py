@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import NotFoundError
-from flagdata.lake import Lake
-from flagdata.lake.meshes import MeshSequence, read_meshes
+from flagdata.lake import Lake, MeshSequence, read_meshes
 from flagdata.outputs import rewrite
 from flagdata.rng import child_seed, stream
 from flagdata.schema import Kind
 from measure.workers import single_threaded
-from models.conditioning.stills import Stills
+from models.conditioning import Stills
 from sim.assets import Assets
 from tests.studies.masks.films import Example, example
 

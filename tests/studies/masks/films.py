@@ -17,18 +17,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.lake.meshes import MeshSequence
-from flagdata.record.video import decode
+from flagdata.lake import MeshSequence
+from flagdata.record import decode
 from flagdata.rng import child_seed, stream
-from models.conditioning import framing
+from models.conditioning import HALVED, Conditioning, Stills, conditioned, framing, halved
 from models.conditioning.camera import STILL
-from models.conditioning.conditioning import Conditioning, conditioned
-from models.conditioning.stills import HALVED, Stills, halved
 from sim.assets import Assets
-from sim.datasets.picture import coded, settings
-from sim.datasets.reading import load
-from sim.render import Meshes, RenderParameters, prior
-from sim.render.raster import Raster
+from sim.datasets import coded, load, settings
+from sim.render import Meshes, Raster, RenderParameters, prior
 from sim.render.stage import stage
 
 _CAMERA = "outdoor"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.lake.meshes import MeshSequence
+from flagdata.lake import MeshSequence
 from flagdata.timebase import NANOSECONDS
-from models.conditioning.stills import Stills
+from models.conditioning import Stills
 from sim.assets import Assets
 from tests.studies.masks.examples import read
 from tests.studies.masks.films import Example, example

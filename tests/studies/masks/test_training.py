@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from models.conditioning.mask_network import MaskNetwork
-from models.conditioning.stills import Stills
+from models.conditioning import MaskNetwork, Stills
 from tests.studies.masks.films import Example
 from tests.studies.masks.training import _moved, scores, train
 

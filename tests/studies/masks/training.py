@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from flagdata.rng import stream
-from models.conditioning.mask_network import MaskNetwork, inputs_of
+from models.conditioning import MaskNetwork, inputs_of
 from tests.studies.masks.films import Example
 
 _BATCH = 32

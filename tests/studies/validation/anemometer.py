@@ -24,20 +24,16 @@ from numpy.typing import NDArray
 
 from flagdata.findings import Finding
 from flagdata.lake import Lake
-from measure.anemometer.calibration import Recording, calibrated
-from measure.anemometer.features import Features, features_of
+from measure.anemometer import Features, Network, Recording, calibrated
+from measure.anemometer.features import features_of
 from measure.anemometer.measuring import measured_from
-from measure.anemometer.network import Network, network
-from measure.calibrate.wind import Log
-from measure.estimate.measuring import Measurement
-from measure.estimate.options import Options
-from measure.estimate.series import beside
-from measure.film.similarity import FlagSize
-from measure.film.source import Reading, Subject, subjects
+from measure.anemometer.network import network
+from measure.calibrate import Log
+from measure.estimate import Measurement, Options, beside
+from measure.film import FlagSize, Reading, Subject, subjects
+from sim.datasets import Cast, load
 from sim.datasets.anemometer import air
-from sim.datasets.cast import Cast
-from sim.datasets.reading import load
-from sim.run.members import Crew
+from sim.run import Crew
 from tests.studies.validation.anemometer_films import FIRST, SECONDS, make, shots
 
 SIZE = FlagSize(length=1.5, height=1.0)

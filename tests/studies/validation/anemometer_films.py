@@ -19,24 +19,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from flagdata.lake import Lake
-from flagdata.lake.meshes import MeshSequence, read_meshes
+from flagdata.lake import Lake, MeshSequence, read_meshes
 from flagdata.record import Record
 from flagdata.rng import child_seed
 from flagdata.schema import Kind
 from flagdata.tables import Range
 from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
-from sim.datasets import jobs
-from sim.datasets.cast import Cast, Roll, casts
-from sim.datasets.films import EPOCH, Film, Sequences
-from sim.datasets.reading import load
-from sim.datasets.recipe import DatasetRecipe
-from sim.render.prior import RenderPrior
-from sim.run.members import Crew
+from sim.datasets import EPOCH, Cast, DatasetRecipe, Film, Roll, Sequences, casts, jobs, load
+from sim.render import RenderPrior
+from sim.run import Crew, MaterialSpec
+from sim.run import Recipe as Simulation
 from sim.run.publish import publish
-from sim.run.recipe import MaterialSpec
-from sim.run.recipe import Recipe as Simulation
 
 FIRST = "gusty-test-00000"
 """Name that `flagdata build gusty` gives its film."""

@@ -16,9 +16,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from flagdata.rng import stream
-from sim.integrate import Integrator
-from sim.integrate.implicit import AirShape, BackwardEuler
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import AirShape, BackwardEuler, Integrator, Symplectic
 from sim.scene import assemble, flag
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.flags_runs import CAMEL, one_core

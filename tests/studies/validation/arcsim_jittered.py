@@ -23,15 +23,13 @@ from typing import Any
 
 import numpy as np
 
-from measure.closing.close import close_loop
-from measure.forecasting.setting import Setting
-from measure.loop.run import Options
+from measure.closing import close_loop
+from measure.forecasting import Setting
+from measure.loop import Options
 from measure.nulls import bank as banks
-from measure.nulls.plan import batches
-from measure.observe import Hold, Observation, Setup, from_arrays, observe
-from measure.observe.trajectory import DENSITY_UNCERTAINTY, Experiment, WindTrack
-from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Conclusion, Estimate, Verdict
+from measure.nulls import batches
+from measure.observe import DENSITY_UNCERTAINTY, Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe
+from measure.verdict import CRITERIA, Conclusion, Estimate, Verdict
 from tests.evidence import ABSENT
 from tests.studies.validation.arcsim import RATE, folder
 from tests.studies.validation.flags_runs import CAMEL

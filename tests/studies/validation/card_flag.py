@@ -41,13 +41,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flagdata.align.paired import pair_clocks
+from flagdata.align import pair_clocks
 from flagdata.clock import NINETY
 from flagdata.pages.pictures import png
 from flagdata.rng import stream
 from flagdata.stated import Stated
 from flagdata.timebase import NANOSECONDS, parse
-from models.evaluation.bootstrap import Resamples, estimate, ratio
+from models.evaluation import Resamples, estimate
+from models.evaluation.bootstrap import ratio
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.instruments.disagreement import Disagreement, Readings, Rows, fit, jackknife, without
 

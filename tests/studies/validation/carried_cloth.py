@@ -18,16 +18,13 @@ import torch
 from scipy.interpolate import CubicSpline
 
 from flagdata.rng import child_seed
-from measure.closing.close import close_loop
-from measure.forecasting.calibration import Calibration
-from measure.forecasting.setting import Setting
-from measure.loop.run import Options
+from measure.closing import close_loop
+from measure.forecasting import Calibration, Setting
+from measure.loop import Options
+from measure.nulls import NullBatch, plan, tracks
 from measure.nulls import bank as banks
-from measure.nulls import plan, tracks
-from measure.nulls.simulation import NullBatch
-from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
-from measure.observe.trajectory import Experiment
-from measure.verdict.record import Verdict
+from measure.observe import Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
+from measure.verdict import Verdict
 from sim.effects import EFFECTS, Effect
 from sim.material import named
 from tests.evidence import ABSENT, REFERENCE

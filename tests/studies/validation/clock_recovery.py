@@ -13,15 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
-from flagdata.align.motion import motion_energy
-from flagdata.align.windbins import wind_bins
-from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.align import LagEstimate, LagSearch, estimate_offset, motion_energy, wind_bins
+from flagdata.ingest import WindOptions, read_log
 from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS, from_datetime
-from measure.demo.logger import SENSOR, ZONE
-from measure.demo.recording import START
-from sim.wind.spectral import VonKarman
+from measure.demo import SENSOR, START
+from measure.demo.logger import ZONE
+from sim.wind import VonKarman
 from tests.drawn.field import DrawnRecipe, write_drawn_log
 from tests.drawn.flag import DrawnFlag
 

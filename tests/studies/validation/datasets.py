@@ -24,13 +24,11 @@ import numpy as np
 import flagdata
 from flagdata.dataset import ExplicitSplit, Tolerance
 from flagdata.errors import FlagdataError
-from flagdata.lake import Lake
-from flagdata.lake.health import doctor, object_names, verify
+from flagdata.lake import Lake, doctor, object_names, verify
 from flagdata.record import Record
 from flagdata.rng import stream
 from flagdata.schema import CATALOG, Kind
-from sim.datasets.reading import load
-from sim.datasets.recipe import DatasetRecipe
+from sim.datasets import DatasetRecipe, load
 from tests.sim.datasets.leakage import FEATURES, Surroundings, accuracies, dealt_anew, features_of
 
 RECIPE = "flagsim-small"

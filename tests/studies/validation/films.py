@@ -19,14 +19,11 @@ import torch
 
 from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.stated import Stated
-from measure.anemometer.network import Network, gate_beside, network
-from measure.estimate.combine import of_model
-from measure.estimate.measuring import Measurement, measure
-from measure.estimate.options import Options
-from measure.film.similarity import FlagSize
-from measure.film.source import Reading, subjects
-from measure.gate.reasons import REASONS
-from measure.gate.window import WindowGate
+from measure.anemometer import Network, gate_beside
+from measure.anemometer.network import network
+from measure.estimate import Measurement, Options, measure, of_model
+from measure.film import FlagSize, Reading, subjects
+from measure.gate import REASONS, WindowGate
 from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.environments import VTK

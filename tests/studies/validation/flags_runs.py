@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 
 from flagdata.rng import stream
 from sim.contact import Contact
-from sim.integrate import Integrator
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import BackwardEuler, Integrator, Symplectic
 from sim.material import named
-from sim.run.batch import principal_strains
+from sim.run import principal_strains
 from sim.scene import Scene, assemble, flag
 from sim.state import State
 from sim.system import System

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from sim.run.batch import CRUMPLED
+from sim.run import CRUMPLED
 from sim.scene import GRAVITY
 from tests.studies.validation.arcsim import ReferenceMotion
 from tests.studies.validation.flags_runs import CAMEL, ENERGY_EVERY, RATE, REPLICATES, SETTLED, Ensemble

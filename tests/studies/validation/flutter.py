@@ -16,8 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import BackwardEuler, Symplectic
 from tests.studies.validation.flutter_measured import compared, plot_measured
 from tests.verification.flutter.beam import Onset, Strip, eigenvalues, leading, onset, pipe_onset
 from tests.verification.flutter.strip import crossing, deflections, growth, sweep

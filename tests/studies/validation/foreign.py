@@ -24,15 +24,13 @@ import torch
 
 from flagdata.errors import InputError, NotFoundError
 from flagdata.rng import child_seed
-from measure.closing.close import close_loop
-from measure.forecasting.segments import Segments
-from measure.loop.run import Options
+from measure.closing import close_loop
+from measure.forecasting import Segments
+from measure.loop import Options
 from measure.nulls import bank as banks
-from measure.observe import Observed
-from measure.observe.recipe import load, read
+from measure.observe import Observed, load, read
 from measure.shares import Share
-from measure.verdict.decided import NOT_REJECTED
-from measure.verdict.record import Conclusion, Estimate
+from measure.verdict import NOT_REJECTED, Conclusion, Estimate
 from tests.studies.challenge.classes import class_of
 from tests.studies.validation.environments import MUJOCO
 from tests.studies.validation.mujoco.experiments import NOISE, NOMINAL, NOTHING, SPEEDS, UNDECLARED, Truth, draw, write

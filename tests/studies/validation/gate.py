@@ -20,9 +20,8 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import NotFoundError
-from measure.gate.gate import Gate
-from measure.gate.storage import read
-from measure.gate.window import CONFIDENCE, FALSE_ALARM, Judgement, judge
+from measure.gate import Gate, judge, read
+from measure.gate.window import CONFIDENCE, FALSE_ALARM, Judgement
 from measure.shares import Share
 from models.estimator import SHIPPED, Estimator, shipped
 from tests.evidence import ABSENT, REFERENCE

@@ -18,19 +18,17 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
-from flagdata.lake.meshes import MeshSequence
-from flagdata.record.video import VideoEncoder, decode
+from flagdata.lake import MeshSequence
+from flagdata.record import VideoEncoder, decode
 from flagdata.rng import child_seed, stream
 from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
 from sim.handles import Handles
-from sim.integrate.implicit import BackwardEuler
+from sim.integrate import BackwardEuler
 from sim.material import named as material
 from sim.mesh import grid
-from sim.render import Meshes
-from sim.render.develop import plate, to_bytes
-from sim.render.prior import named as prior
-from sim.render.raster import Raster
+from sim.render import Meshes, Raster, plate, to_bytes
+from sim.render import named as prior
 from sim.scene import Scene, assemble, upright
 
 Film: TypeAlias = NDArray[np.uint8]

@@ -16,10 +16,11 @@ from typing import Any
 import torch
 
 from flagdata.errors import NotFoundError
-from measure.anemometer.network import Network, gate_beside, network
-from measure.estimate.options import Options
-from measure.film.similarity import FlagSize
-from measure.gate.window import WindowGate
+from measure.anemometer import Network, gate_beside
+from measure.anemometer.network import network
+from measure.estimate import Options
+from measure.film import FlagSize
+from measure.gate import WindowGate
 from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.environments import VTK

@@ -25,7 +25,7 @@ from flagdata.dataset import Pairs
 from flagdata.rng import stream
 from flagdata.schema import Kind
 from models import estimator
-from models.training.recipe import DataSpec
+from models.training import DataSpec
 
 PAPER = ((0.17, 0.22), (0.24, 0.29), (0.39, 0.45))
 """True and measured area weight [kg/m²]."""

@@ -30,8 +30,9 @@ import numpy as np
 
 import flagdata.ingest.anemometer as package
 from flagdata.errors import FlagdataError
+from flagdata.ingest import WindOptions
 from flagdata.ingest.anemometer import log as module
-from flagdata.ingest.anemometer.options import Limits, WindOptions
+from flagdata.ingest.anemometer.options import Limits
 
 _FOLDER = "FLAGDATA_LOGS_ORACLE"
 _LARGEST = 6_000_000

@@ -35,14 +35,12 @@ import numpy as np
 from torch import Tensor
 
 from flagdata.rng import child_seed, stream
-from measure.calibrate.prior import CLOTH, FABRIC, NUISANCES, Floats, draws
-from measure.calibrate.simulation import COLUMNS, OBSERVED, Batch, Flag
+from measure.calibrate import CLOTH, COLUMNS, NUISANCES, OBSERVED, Batch, Flag, Floats, draws
+from measure.calibrate.prior import FABRIC
 from measure.observables import OBSERVABLES
 from sim.assets import Assets
 from sim.mesh import Mesh
-from sim.render import Meshes, RenderParameters
-from sim.render.cycles import Cycles
-from sim.render.raster import Raster
+from sim.render import Cycles, Meshes, Raster, RenderParameters
 from tests.studies.validation.looks_films import RATE, Filmed, Place, edges_of, filmed, look
 from tests.studies.validation.looks_refilmed import Look, refilmed
 from tests.studies.validation.loop_on_films import log

@@ -13,18 +13,12 @@ from torch import Tensor
 
 from flagdata.errors import FlagdataError
 from flagdata.film_array import Frames
-from flagdata.record.video import decode
-from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import OBSERVED, Flag
-from measure.film.conditioned import ConditionedFilm
-from measure.film.similarity import FlagSize
-from measure.observables import OBSERVABLES, ClothWindow
-from measure.observables.cloth import edges_of
-from measure.observables.film import FilmWindow
-from measure.observables.watching import watched
+from flagdata.record import decode
+from measure.calibrate import OBSERVED, Flag, Floats
+from measure.film import ConditionedFilm, FlagSize
+from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, edges_of, watched
 from sim.assets import Assets
-from sim.datasets.picture import coded, settings
-from sim.datasets.reading import load
+from sim.datasets import coded, load, settings
 from sim.mesh import Mesh
 from sim.render import Meshes, RenderParameters, prior
 from sim.render.stage import stage

@@ -13,16 +13,12 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.rng import stream
-from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import Flag
-from measure.observables.cloth import edges_of
-from measure.observables.film import FilmWindow
-from models.conditioning.stills import HALVED
+from measure.calibrate import Flag, Floats
+from measure.observables import FilmWindow, edges_of
+from models.conditioning import HALVED
 from sim.assets import Assets
 from sim.mesh import Mesh
-from sim.render import RenderParameters
-from sim.render.develop import to_linear
-from sim.render.raster import Raster
+from sim.render import Raster, RenderParameters, to_linear
 from tests.studies.validation.looks_films import Filmed, Place, meshes_of, places, read
 
 _CELLS = (12, 16)

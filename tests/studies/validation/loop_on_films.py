@@ -28,22 +28,15 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.rng import child_seed, stream
-from measure.calibrate.design import Design, read
-from measure.calibrate.discretisation import Discretisation
-from measure.calibrate.numerics import Finer
-from measure.calibrate.observed import Observed
-from measure.calibrate.prior import Floats, Normal, Uncertain
-from measure.calibrate.simulation import Batch, Flag
-from measure.calibrate.wind import Log
-from measure.films.design import TOGETHER, lasting, nulls, pairs
-from measure.films.evidence import Experiments
+from measure.calibrate import Batch, Design, Discretisation, Finer, Flag, Floats, Log, Normal, Observed, Uncertain
+from measure.calibrate.design import read
+from measure.films import TOGETHER, Experiments, lasting, nulls, pairs, score, weighable
 from measure.films.judge import Judged, judge
-from measure.films.library import Weighable, weighable
-from measure.films.score_test import score
+from measure.films.library import Weighable
 from measure.films.simulations import Simulations, of_base, of_nulls, sights_of
 from measure.films.weigh import Weighing, directions, weigh
-from sim.effects.anemometer_lag import AnemometerLag
-from sim.wind.spectral import VonKarman
+from sim.effects import AnemometerLag
+from sim.wind import VonKarman
 
 SEED = 20261127
 MEANS = (4.0, 6.5)  # m/s

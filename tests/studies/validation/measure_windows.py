@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from flagdata.console import progress
 from flagdata.rng import child_seed, stream
-from measure.estimate.combine import OWN, combined, of_model
+from measure.estimate import OWN, combined, of_model
 from models import estimator
 from models.estimator import Estimator
-from models.evaluation.bootstrap import Resamples
-from models.evaluation.calibration import LEVELS, Coverage, coverage, rank_histogram, tarp
-from models.evaluation.predictions import WIND, Predictions
+from models.evaluation import LEVELS, Predictions, Resamples, coverage, rank_histogram, tarp
+from models.evaluation.calibration import Coverage
+from models.evaluation.predictions import WIND
 from tests.studies.dependence import Posteriors, posteriors
 from tests.studies.long_films import LongFilm, simulated
 

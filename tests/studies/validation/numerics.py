@@ -21,13 +21,20 @@ from typing import Any
 
 import numpy as np
 
-from measure.calibrate import numerics
-from measure.calibrate.design import Design, read
-from measure.calibrate.discretisation import Discretisation
-from measure.calibrate.prior import Floats, Normal, Uncertain
-from measure.calibrate.simulation import OBSERVED, Batch, Flag
-from measure.calibrate.summary import Projection
-from measure.calibrate.wind import Log
+from measure.calibrate import (
+    OBSERVED,
+    Batch,
+    Design,
+    Discretisation,
+    Flag,
+    Floats,
+    Log,
+    Normal,
+    Projection,
+    Uncertain,
+    numerics,
+)
+from measure.calibrate.design import read
 
 DURATION = 30.0  # s
 BATCHES = {"little damping": 0, "middle": 3, "much damping": 7}

@@ -32,13 +32,12 @@ from typing import Any, ClassVar
 
 from flagdata.errors import RefusedError
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, doctor, object_names, verify
 from flagdata.lake.collect import collect
-from flagdata.lake.health import doctor, object_names, verify
 from flagdata.object_ranges import ObjectRanges
 from flagdata.provenance import code_version
 from flagdata.schema import Kind
-from flagdata.storage.path import RemotePath
+from flagdata.storage import RemotePath
 from tests.s3 import BUCKET, SECRETS, moto, serving
 
 KILLS = 208

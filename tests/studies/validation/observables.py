@@ -19,11 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import FlagdataError
-from measure.film.similarity import FlagSize
-from measure.film.source import Reading, subjects
-from measure.observables import OBSERVABLES, ClothWindow, Observable
-from measure.observables.cloth import edges_of
-from measure.observables.watching import watched
+from measure.film import FlagSize, Reading, subjects
+from measure.observables import OBSERVABLES, ClothWindow, Observable, edges_of, watched
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.films import chosen
 from tests.studies.validation.vtk_films.designs import Design, designs, scene_of

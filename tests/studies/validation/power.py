@@ -21,15 +21,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from measure.observables import OBSERVABLES, Observable, View, seen_from
-from measure.observables.cloth import edges_of
-from measure.observables.observable import WINDOW
-from sim.effects import EFFECTS
-from sim.effects.parameter import Parameter, Role
-from sim.run.batch import Stepper
-from sim.run.batch import run as simulate
-from sim.run.members import Crew
-from sim.run.reading import parse
+from measure.observables import OBSERVABLES, WINDOW, Observable, View, edges_of, seen_from
+from sim.effects import EFFECTS, Parameter, Role
+from sim.run import Crew, Stepper, parse
+from sim.run import run as simulate
 from tests.evidence import REFERENCE
 
 WINDS = (3.0, 5.0, 7.0)

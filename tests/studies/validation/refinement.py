@@ -30,22 +30,30 @@ from numpy.typing import NDArray
 from flagdata.console import progress
 from flagdata.dataset import Source
 from flagdata.rng import child_seed, stream
-from measure.refine import start
+from measure.refine import (
+    DENSITY,
+    WIND,
+    DrawnView,
+    Evaluator,
+    Refinement,
+    Settings,
+    Space,
+    Target,
+    Trace,
+    refine,
+    squared,
+    start,
+)
 from measure.refine.command import RENDERS, scenes_of, space_of
-from measure.refine.evaluator import STAGES, Evaluator
-from measure.refine.procedure import Settings, refine, squared
-from measure.refine.refinement import Refinement
-from measure.refine.space import DENSITY, DIMENSION, WIND, Space
-from measure.refine.target import Target, as_stated, of_recording
-from measure.refine.trace import Trace
-from measure.refine.view import DrawnView
+from measure.refine.evaluator import STAGES
+from measure.refine.space import DIMENSION
+from measure.refine.target import as_stated, of_recording
 from models import estimator as models
 from models.estimator import Estimator
 from models.evaluation.handmade import TARGETS, Fitted, fitted
-from models.training.conditioned import FitFilm
-from models.training.recipe import DataSpec
+from models.training import DataSpec, FitFilm
 from sim.assets import Assets
-from sim.render.prior import named
+from sim.render import named
 from tests.evidence import REFERENCE
 from tests.studies.validation.peers.registry import PEERS, minimise
 from tests.studies.validation.transfer import (

@@ -17,19 +17,12 @@ import torch
 from numpy.typing import NDArray
 from PIL import Image
 
-from flagdata.lake.meshes import MeshSequence
+from flagdata.lake import MeshSequence
 from sim.assets import Assets
-from sim.render import Meshes, RenderParameters
-from sim.render.cycles import Cycles, Workbench
-from sim.render.develop import plate, to_bytes
-from sim.render.prior import named
-from sim.render.raster import Raster
-from sim.render.renderer import Renderer
+from sim.render import Cycles, Meshes, Raster, Renderer, RenderParameters, Workbench, named, plate, to_bytes
 from sim.render.stage import stage
-from sim.run import load
-from sim.run.batch import Stepper
-from sim.run.batch import run as simulate
-from sim.run.members import Crew
+from sim.run import Crew, Stepper, load
+from sim.run import run as simulate
 
 SCENES = 50
 SHEET = 12  # scenes of the picture

@@ -32,21 +32,16 @@ from scipy.signal import lfilter
 
 from flagdata.errors import InputError
 from flagdata.rng import child_seed, stream
-from measure.forecasting.setting import Setting
-from measure.loop.run import Options, solve
+from measure.forecasting import Setting
+from measure.loop import Options, solve
+from measure.nulls import NullBatch, StiffnessFactors, batches
 from measure.nulls import bank as banks
-from measure.nulls.plan import batches
-from measure.nulls.simulation import NullBatch
-from measure.nulls.stiffness import StiffnessFactors
-from measure.observe import Hold, Observation, Setup, from_arrays, observe
-from measure.observe.setup import sheet
-from measure.observe.trajectory import Experiment, Specimen, WindTrack
+from measure.observe import Experiment, Hold, Observation, Setup, Specimen, WindTrack, from_arrays, observe, sheet
 from measure.shares import Share
-from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Estimate
+from measure.verdict import CRITERIA, Estimate
 from sim.material import MATERIALS, named
 from sim.mesh import grid
-from sim.wind.spectral import VonKarman
+from sim.wind import VonKarman
 from tests.studies.validation.flags_runs import CAMEL
 
 Floats = NDArray[np.float64]

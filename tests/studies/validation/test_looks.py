@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flagdata.rng import stream
-from measure.calibrate.simulation import OBSERVED, Flag
-from measure.observables.cloth import edges_of
+from measure.calibrate import OBSERVED, Flag
+from measure.observables import edges_of
 from sim.render import RenderParameters
 from tests.studies.validation.looks import common_of_all, factors, judged, share
 from tests.studies.validation.looks_films import Place, meshes_of, places

@@ -10,11 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from measure.calibrate import posterior
-from measure.calibrate.design import Design
-from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import OBSERVED
-from measure.observables.observable import WINDOW
+from measure.calibrate import OBSERVED, Design, Floats, posterior
+from measure.observables import WINDOW
 from tests.measure.calibrate.conftest import readings
 from tests.studies.validation import weighed
 

@@ -19,23 +19,19 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.lake.meshes import MeshSequence
+from flagdata.lake import MeshSequence
 from flagdata.record import Record
 from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
 from flagdata.tables import Range
-from measure.refine.view import DrawnView
+from measure.refine import DrawnView
 from models import estimator
 from models.restriction import Known
 from sim.assets import Assets
-from sim.datasets import jobs
-from sim.datasets.cast import casts
-from sim.datasets.films import Film, Sequences
-from sim.datasets.reading import load
-from sim.datasets.recipe import DatasetRecipe, Side
-from sim.render import Meshes
-from sim.render.raster import Raster
-from sim.run.recipe import IntegratorSpec
+from sim.datasets import DatasetRecipe, Film, Sequences, casts, jobs, load
+from sim.datasets.recipe import Side
+from sim.render import Meshes, Raster
+from sim.run import IntegratorSpec
 from tests.evidence import ABSENT, REFERENCE
 
 FLAGS = int(os.environ.get("FLAGDATA_TRANSFER_FLAGS", "60"))

@@ -42,25 +42,31 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.rng import stream
-from measure.calibrate.calibrate import Options, answered
-from measure.calibrate.design import Design, simulated
-from measure.calibrate.numerics import MEASURED
-from measure.calibrate.observed import Observed
-from measure.calibrate.prior import Floats, Normal, Uncertain
-from measure.calibrate.simulation import BATCH, OBSERVED, RATE, Flag, windows
-from measure.calibrate.wind import Log
+from measure.calibrate import (
+    MEASURED,
+    OBSERVED,
+    Design,
+    Flag,
+    Floats,
+    Log,
+    Normal,
+    Observed,
+    Options,
+    Uncertain,
+    simulated,
+)
+from measure.calibrate.calibrate import answered
+from measure.calibrate.simulation import BATCH, RATE, windows
 from measure.observables import View
 from sim import handles
 from sim.batch import Batch, Divergence, after
-from sim.effects.anemometer_lag import AnemometerLag
+from sim.effects import AnemometerLag
 from sim.handles import Handles
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import BackwardEuler, Symplectic
 from sim.material import MATERIALS, named
 from sim.mesh import Diagonals, Mesh, grid
 from sim.scene import Scene, assemble
-from sim.wind.sampled import Beyond, Even, SampledWind
-from sim.wind.spectral import VonKarman
+from sim.wind import Beyond, Even, SampledWind, VonKarman
 from tests.studies.validation import environments
 from tests.studies.validation.mujoco.cloth import Air, Method, Sheet, Wind, fly
 from tests.studies.validation.mujoco.experiments import NOMINAL

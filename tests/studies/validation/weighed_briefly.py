@@ -25,19 +25,23 @@ import numpy as np
 import torch
 
 from flagdata.rng import stream
-from measure.calibrate.calibrate import Options, with_errors
-from measure.calibrate.design import simulated
-from measure.calibrate.emulator import Emulator, informative
-from measure.calibrate.numerics import MEASURED
-from measure.calibrate.observed import Observed
-from measure.calibrate.posterior import Sight, weighed
-from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import OBSERVED
+from measure.calibrate import (
+    MEASURED,
+    OBSERVED,
+    Emulator,
+    Floats,
+    Observed,
+    Options,
+    Sight,
+    informative,
+    simulated,
+    weighed,
+    with_errors,
+)
 from sim.batch import Batch, Divergence, after
-from sim.integrate.implicit import BackwardEuler
+from sim.integrate import BackwardEuler
 from sim.scene import assemble
-from sim.wind.sampled import Beyond, Even, SampledWind
-from sim.wind.spectral import VonKarman
+from sim.wind import Beyond, Even, SampledWind, VonKarman
 from tests.studies.validation import loop_on_films as loop
 from tests.studies.validation import weighed as large
 from tests.studies.validation import weighed_films as films

@@ -14,18 +14,12 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.rng import stream
-from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import OBSERVED
-from measure.film.similarity import FlagSize
-from measure.film.source import Reading, subjects
-from measure.observables import OBSERVABLES
-from measure.observables.watching import watched
+from measure.calibrate import OBSERVED, Floats
+from measure.film import FlagSize, Reading, subjects
+from measure.observables import OBSERVABLES, watched
 from sim.assets import Assets
 from sim.mesh import Mesh
-from sim.render import prior
-from sim.render.meshes import Meshes
-from sim.render.parameters import RenderParameters
-from sim.render.raster import Raster
+from sim.render import Meshes, Raster, RenderParameters, prior
 
 RATE, SECONDS = 25.0, 120.0  # Hz, s
 SIGMA = np.array([OBSERVABLES[name].sigma for name in OBSERVED])

@@ -15,12 +15,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from sim.effects import Effect, apply
-from sim.effects.reactive_loading import ReactiveLoading
-from sim.effects.tangential_linear_drag import TangentialLinearDrag
+from sim.effects import Effect, ReactiveLoading, TangentialLinearDrag, apply
 from sim.handles import Handles
-from sim.integrate import Integrator
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import Integrator, Symplectic
 from sim.material import isotropic
 from sim.mesh import grid
 from sim.scene import Scene, assemble

@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError
-from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.draft.questions import OpenFactsError
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest import OpenFactsError, Reading, WindOptions, read_log
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor, WindLog
 

@@ -10,11 +10,8 @@ import pytest
 
 from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.instants.clock import ClockChoice
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest import ClockChoice, Reading, WindOptions, gaps, read_log
 from flagdata.ingest.anemometer.samples.order import in_order
-from flagdata.ingest.anemometer.samples.rules import gaps
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog

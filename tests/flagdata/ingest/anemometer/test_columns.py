@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest import FileLayout, WindOptions, open_text, read_log
 from flagdata.ingest.anemometer.instants.stamps import PLAIN_FORMS, parse
 from flagdata.ingest.anemometer.options import Limits
-from flagdata.ingest.anemometer.recipe import FileLayout
 from flagdata.ingest.anemometer.text.columns import Columns
 from flagdata.ingest.anemometer.text.rows import RowReader
-from flagdata.ingest.anemometer.text.source import TextFile, open_text
+from flagdata.ingest.anemometer.text.source import TextFile
 
 HEADER = b"a,b,c\n"
 LAWS: dict[str, bytes] = {

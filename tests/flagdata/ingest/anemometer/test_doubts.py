@@ -11,11 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import UnknownNameError
-from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest import OpenFactsError, Reading, WindOptions, read_log
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.draft.doubts import KEYS, doubts
-from flagdata.ingest.anemometer.draft.questions import OpenFactsError
-from flagdata.ingest.anemometer.reading import Reading
 from flagdata.rng import stream
 from flagdata.signals import Sensor
 from flagdata.units import unit

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.draft.drafting import Draft, draft
-from flagdata.ingest.anemometer.draft.questions import OpenFactsError
+from flagdata.ingest import OpenFactsError, WindOptions, draft, read_log
+from flagdata.ingest.anemometer.draft.drafting import Draft
 from flagdata.ingest.anemometer.draft.shape import shape_of
 from flagdata.ingest.anemometer.draft.words import meaning
 

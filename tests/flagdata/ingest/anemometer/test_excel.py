@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from flagdata.errors import InputError, LimitError
-from flagdata.ingest.anemometer import Limits, WindOptions, read_log, sniff
-from flagdata.ingest.anemometer.text.source import open_text
+from flagdata.ingest import WindOptions, open_text, read_log, sniff
+from flagdata.ingest.anemometer import Limits
 from flagdata.lake import Lake
 from flagdata.timebase import iso
 from tests.studies.hostile.campaign import command

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import FlagdataError
-from flagdata.ingest.anemometer import WindOptions, read_log, sniff
-from flagdata.ingest.anemometer.formats.registry import FORMATS
+from flagdata.ingest import FORMATS, WindOptions, read_log, sniff
 from flagdata.ingest.anemometer.sniffing import SURE
 
 Write = Callable[..., Path]

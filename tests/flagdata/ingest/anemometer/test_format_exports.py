@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, TimeError
-from flagdata.ingest.anemometer import WindOptions, anemometers
+from flagdata.ingest import WindOptions, anemometers
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog

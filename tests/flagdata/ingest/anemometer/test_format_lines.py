@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
+from flagdata.ingest import checksum
 from flagdata.ingest.anemometer.formats import canboat
 from flagdata.ingest.anemometer.formats.makers import SerialLines, crc16
-from flagdata.ingest.anemometer.formats.sentences import checksum
 from flagdata.ingest.anemometer.formats.serial_lines import Defect, split_stamp
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog

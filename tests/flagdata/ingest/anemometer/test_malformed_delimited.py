@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, TimeError, UnknownNameError, UsageError
-from flagdata.ingest.anemometer.draft.questions import OpenFactsError
+from flagdata.ingest import OpenFactsError
 from flagdata.schema import SampleFlag
 from tests.flagdata.ingest.anemometer.cases import GOOD, ROW, case, csv, stamped
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError
+from flagdata.ingest import OpenFactsError
 from flagdata.ingest.anemometer import Limits
-from flagdata.ingest.anemometer.draft.questions import OpenFactsError
 from tests.flagdata.ingest.anemometer.cases import case
 
 Check = Callable[..., None]

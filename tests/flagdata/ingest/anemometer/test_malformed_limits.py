@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from flagdata.errors import LimitError
-from flagdata.ingest.anemometer import Limits, read_log
+from flagdata.ingest import read_log
+from flagdata.ingest.anemometer import Limits
 from tests.flagdata.ingest.anemometer.cases import GOOD, ROW, case, csv, stamped
 
 Check = Callable[..., None]

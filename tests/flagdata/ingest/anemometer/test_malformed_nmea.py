@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
-from flagdata.ingest.anemometer.draft.questions import OpenFactsError
-from flagdata.ingest.anemometer.formats.sentences import checksum
+from flagdata.ingest import OpenFactsError, checksum
 from flagdata.schema import SampleFlag
 from tests.flagdata.ingest.anemometer.cases import case
 

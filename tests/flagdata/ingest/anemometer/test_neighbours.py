@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.ingest.anemometer import WindOptions
+from flagdata.ingest import Labels, WindIngest, WindOptions, ingest_wind
 from flagdata.ingest.anemometer.samples.neighbours import hours_off
-from flagdata.ingest.store import Labels, WindIngest, ingest_wind
 from flagdata.lake import Lake
 from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries

@@ -10,7 +10,8 @@ import pytest
 from scipy.io import netcdf_file
 
 from flagdata.errors import FlagdataError, LimitError
-from flagdata.ingest.anemometer import Limits, WindOptions, read_log
+from flagdata.ingest import WindOptions, read_log
+from flagdata.ingest.anemometer import Limits
 from flagdata.ingest.anemometer.containers.netcdf import instants
 
 Variable = tuple[str, str, str, Sequence[float]]

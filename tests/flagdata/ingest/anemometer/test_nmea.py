@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
+from flagdata.ingest import Head, checksum
 from flagdata.ingest.anemometer.formats.nmea import Nmea
-from flagdata.ingest.anemometer.formats.sentences import ChecksumError, checksum, clock, split, tag_time
+from flagdata.ingest.anemometer.formats.sentences import ChecksumError, clock, split, tag_time
 from flagdata.ingest.anemometer.formats.stamped_nmea import StampedNmea
-from flagdata.ingest.anemometer.sniffing import Head
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso

@@ -10,9 +10,8 @@ import pytest
 
 from flagdata.documents import from_toml, to_toml
 from flagdata.errors import FlagdataError, InputError
-from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest import FORMATS, WindOptions, read_log
 from flagdata.ingest.anemometer.formats import described
-from flagdata.ingest.anemometer.formats.registry import FORMATS
 from flagdata.provenance import digest
 
 Write = Callable[..., Path]

@@ -11,10 +11,9 @@ import pytest
 
 from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Severity
-from flagdata.ingest.anemometer.instants.clock import ClockChoice, longest_rise
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest import ClockChoice, Reading, gaps
+from flagdata.ingest.anemometer.instants.clock import longest_rise
 from flagdata.ingest.anemometer.samples.order import in_order
-from flagdata.ingest.anemometer.samples.rules import gaps
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog

@@ -16,9 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from flagdata.errors import FlagdataError
-from flagdata.ingest.anemometer import WindOptions, average, read_log, sniff
-from flagdata.ingest.anemometer.formats.registry import FORMATS
-from flagdata.ingest.anemometer.sniffing import Head
+from flagdata.ingest import FORMATS, Head, WindOptions, read_log, sniff
+from flagdata.ingest.anemometer import average
 from flagdata.signals import WindLog
 from flagdata.units import UNITS
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError
-from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest import WindOptions, read_log
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import WindLog

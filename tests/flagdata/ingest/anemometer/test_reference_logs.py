@@ -11,7 +11,8 @@ import pytest
 
 from flagdata.errors import InputError, TimeError
 from flagdata.findings import Finding
-from flagdata.ingest.anemometer import WindOptions, average, read_log, sniff
+from flagdata.ingest import WindOptions, read_log, sniff
+from flagdata.ingest.anemometer import average
 from flagdata.schema import UNUSABLE, SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from flagdata.dataset.truth import TruthSeries
+from flagdata.dataset import TruthSeries
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Severity
+from flagdata.ingest import QualityRules, Reading
 from flagdata.ingest.anemometer import average
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.recipe import QualityRules
 from flagdata.ingest.anemometer.samples import rules, zero
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag

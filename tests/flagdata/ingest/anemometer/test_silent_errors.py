@@ -12,9 +12,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import FlagdataError
-from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.confirm import Drafted
-from flagdata.ingest.anemometer.draft.questions import OpenFactsError
+from flagdata.ingest import Drafted, OpenFactsError, WindOptions, read_log
 
 Write = Callable[[str | bytes], Path]
 REFUSED, ASKED, SHOWN = "refused", "asked", "shown"

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flagdata.errors import TimeError, UsageError
-from flagdata.ingest.anemometer import WindOptions
-from flagdata.ingest.anemometer.draft.drafting import draft
+from flagdata.ingest import WindOptions, draft
 from flagdata.ingest.anemometer.instants import dates
 from flagdata.ingest.anemometer.instants.dates import date_form
 from flagdata.ingest.anemometer.instants.stamps import parse

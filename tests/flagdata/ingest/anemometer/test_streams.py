@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer.reading import Reading, streams
+from flagdata.ingest import Reading, ingest_wind
+from flagdata.ingest.anemometer.reading import streams
 from flagdata.ingest.anemometer.samples import rules
-from flagdata.ingest.store import ingest_wind
 from flagdata.lake import Lake
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag

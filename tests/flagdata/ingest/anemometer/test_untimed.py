@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError, UsageError
-from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest import WindOptions, read_log
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]

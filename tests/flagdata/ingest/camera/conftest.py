@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flagdata.ingest.camera import CameraOptions
+from flagdata.ingest import CameraOptions
 
 SIDE = 96
 CELL = 16

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from flagdata.findings import Finding
-from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest import CameraOptions, open_camera
 from flagdata.signals import CameraInfo, Frame
 
 MS = 1_000_000

@@ -14,9 +14,8 @@ import pytest
 from flagdata.errors import InputError, UsageError
 from flagdata.files import MCAP
 from flagdata.findings import Severity
-from flagdata.ingest.camera import CameraOptions, open_camera, probe
+from flagdata.ingest import CameraIngest, CameraOptions, ingest_camera, open_camera, probe
 from flagdata.ingest.camera.joined import in_order
-from flagdata.ingest.store import CameraIngest, ingest_camera
 from flagdata.lake import Lake
 from flagdata.timebase import parse
 

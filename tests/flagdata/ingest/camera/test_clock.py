@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from flagdata.findings import Severity
-from flagdata.ingest.camera import CameraOptions, propose_crop
+from flagdata.ingest import CameraOptions, propose_crop
 from flagdata.ingest.camera.clock import Counter, restart
 from tests.flagdata.ingest.camera.reading import grid_of, read
 

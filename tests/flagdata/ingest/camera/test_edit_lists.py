@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest import CameraOptions, open_camera
 from flagdata.ingest.camera.boxes import boxes
 from tests.flagdata.ingest.camera.reading import MS, read
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from flagdata.errors import UsageError
-from flagdata.ingest.camera import CameraOptions, CropBox, parse_crop
+from flagdata.ingest import CameraOptions, CropBox, parse_crop
 from flagdata.ingest.camera.geometry import Geometry, Orientation, settle_crop, upright_size
 from flagdata.ingest.camera.options import exact
 from tests.refusals import unrefused

@@ -11,7 +11,7 @@ import av
 import numpy as np
 import pytest
 
-from flagdata.ingest.camera import CameraOptions, open_camera, probe
+from flagdata.ingest import CameraOptions, open_camera, probe
 from flagdata.timebase import NANOSECONDS, parse
 
 START = parse("2026-05-01T10:00:00.250Z")

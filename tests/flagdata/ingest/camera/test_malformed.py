@@ -20,7 +20,8 @@ from PIL import Image
 
 from flagdata.errors import FlagdataError, InputError, LimitError, NotFoundError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.camera import CameraOptions, Limits, open_camera, probe
+from flagdata.ingest import CameraOptions, open_camera, probe
+from flagdata.ingest.camera import Limits
 from flagdata.ingest.camera.boxes import top
 from flagdata.ingest.camera.sequence import heads
 from flagdata.signals import Frame

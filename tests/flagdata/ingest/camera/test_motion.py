@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 from flagdata.errors import RefusedError
-from flagdata.ingest.camera import CameraOptions, CropBox, open_camera, parse_crop, propose_crop
+from flagdata.ingest import CameraOptions, CropBox, open_camera, parse_crop, propose_crop
 
 WIDE, HIGH = 384, 216
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.findings import Severity
-from flagdata.ingest.camera import CameraOptions, open_camera, probe
+from flagdata.ingest import CameraOptions, open_camera, probe
 
 pytestmark = pytest.mark.reference
 

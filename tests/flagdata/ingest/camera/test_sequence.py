@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from flagdata.errors import InputError, TimeError
-from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest import CameraOptions, open_camera
 from tests.flagdata.ingest.camera.reading import read
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flagdata.ingest.camera import CameraOptions
+from flagdata.ingest import CameraOptions
 from tests.flagdata.ingest.camera.reading import read
 
 FRAMES = 8

@@ -16,7 +16,7 @@ from av.video.stream import VideoStream
 
 from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Severity
-from flagdata.ingest.camera import CameraOptions, CropBox, open_camera
+from flagdata.ingest import CameraOptions, CropBox, open_camera
 from flagdata.ingest.camera.container import packets
 from tests.flagdata.ingest.camera.reading import MS, grid_of, read
 

@@ -15,7 +15,7 @@ from PIL import Image
 
 from flagdata.errors import InputError, NotFoundError, TimeError, UsageError
 from flagdata.findings import Severity
-from flagdata.ingest.camera import CameraOptions, CropBox, open_camera, probe
+from flagdata.ingest import CameraOptions, CropBox, open_camera, probe
 from tests.flagdata.ingest.camera.reading import grid_of, read
 
 

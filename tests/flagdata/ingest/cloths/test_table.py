@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import InputError, NotFoundError, UnknownNameError
-from flagdata.ingest.cloths import read_cloths
+from flagdata.ingest import read_cloths
 from tests.refusals import unrefused
 
 HEADING = "film,fabric,area_weight,bending_stiffness,wind_level,wind_speed,wind_sigma"

@@ -10,10 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from flagdata.errors import CorruptError, InputError, UnknownNameError, UsageError
-from flagdata.ingest.markers import MarkerOptions, is_marker_table, read_table
-from flagdata.ingest.markers.store import ingest_markers
-from flagdata.lake import Lake
-from flagdata.lake.meshes import read_markers
+from flagdata.ingest import MarkerOptions, ingest_markers, is_marker_table, read_table
+from flagdata.lake import Lake, read_markers
 from flagdata.schema import Kind
 from tests.program import invoke
 from tests.refusals import unrefused

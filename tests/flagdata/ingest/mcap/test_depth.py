@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from flagdata.errors import InputError
-from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest import CameraOptions, open_camera
 from tests.flagdata.ingest.mcap.conftest import NOON, STEP
 from tests.flagdata.ingest.mcap.ros import COMPRESSED, PLAIN, Cdr, bag, channel, gray, plain
 from tests.flagdata.ingest.mcap.test_layout import grays

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import TimeError
-from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest import CameraOptions, WindOptions, open_camera, read_log
 from tests.flagdata.ingest.mcap.conftest import NOON, STEP
 from tests.flagdata.ingest.mcap.ros import COMPRESSED, WIND, bag, channel, compressed, wind
 from tests.flagdata.ingest.mcap.test_layout import COLUMNS

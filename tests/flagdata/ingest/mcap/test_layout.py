@@ -11,10 +11,7 @@ import pytest
 from mcap.writer import IndexType, Writer
 
 from flagdata.errors import CorruptError
-from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.camera import CameraOptions, open_camera
-from flagdata.ingest.foreign import examine
-from flagdata.ingest.mcap.topics import topics
+from flagdata.ingest import CameraOptions, WindOptions, examine, open_camera, read_log, topics
 from tests.flagdata.ingest.mcap.conftest import NOON, STEP
 from tests.flagdata.ingest.mcap.ros import COMPRESSED, WIND, bag, channel, compressed, film, wind
 

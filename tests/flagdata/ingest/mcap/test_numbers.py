@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest import WindIngest, WindOptions, ingest_wind, read_log
 from flagdata.ingest.classify import classify
-from flagdata.ingest.store import WindIngest, ingest_wind
 from flagdata.lake import Lake
 from flagdata.record import RecordWriter
 from flagdata.signals import Sensor, WindSeries

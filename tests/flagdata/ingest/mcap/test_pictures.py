@@ -12,11 +12,10 @@ import zstandard
 from mcap.writer import CompressionType, Writer
 
 from flagdata.errors import CorruptError, InputError, LimitError, UnknownNameError, UsageError
-from flagdata.ingest.camera import CameraOptions, open_camera
-from flagdata.ingest.classify import classify, guesses
+from flagdata.ingest import CameraIngest, CameraOptions, guesses, ingest_camera, messages, open_camera, topics
+from flagdata.ingest.classify import classify
 from flagdata.ingest.mcap.pictures import TopicSource
-from flagdata.ingest.mcap.topics import index, messages, topics
-from flagdata.ingest.store import CameraIngest, ingest_camera
+from flagdata.ingest.mcap.topics import index
 from flagdata.lake import Lake
 from flagdata.record import salvage, unpacking
 from tests.flagdata.ingest.mcap.conftest import FRAMES, NOON, STEP

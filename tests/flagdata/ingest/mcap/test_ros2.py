@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import CorruptError, InputError
-from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest import CameraOptions, WindOptions, messages, open_camera, read_log, topics
 from flagdata.ingest.mcap import cdr
-from flagdata.ingest.mcap.topics import messages, topics
 
 FILE = Path(__file__).with_name("ros2.mcap")
 NOON, STEP = 1_777_636_800_000_000_000, 100_000_000

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.classify import guesses
+from flagdata.ingest import WindOptions, guesses, read_log
 from tests.flagdata.ingest.mcap.conftest import NOON, STEP, encoded
 from tests.flagdata.ingest.mcap.ros import (
     COMPRESSED,

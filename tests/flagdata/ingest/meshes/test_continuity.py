@@ -10,10 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from flagdata.ingest.meshes.checks import continuity, findings
-from flagdata.ingest.meshes.folder import frame_files, read_folder
-from flagdata.ingest.meshes.obj import Obj, obj_text
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
+from flagdata.ingest import Obj, findings, frame_files, obj_text, read_folder
+from flagdata.ingest.meshes.checks import continuity
+from flagdata.lake import MeshSequence, RaggedMeshSequence
 
 N = 6
 FRAMES = 8

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from flagdata.errors import ConflictError, InputError, LimitError, NotFoundError
+from flagdata.ingest import findings, frame_files, read_folder, write_folder
 from flagdata.ingest.meshes import folder as folders
-from flagdata.ingest.meshes import frame_files, read_folder, write_folder
-from flagdata.ingest.meshes.checks import check_units, findings
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
+from flagdata.ingest.meshes.checks import check_units
+from flagdata.lake import MeshSequence, RaggedMeshSequence
 from tests.refusals import unrefused
 
 SQUARE = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 0 {w} 0\nv 0 {w} {w}\nv 0 0 {w}\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"

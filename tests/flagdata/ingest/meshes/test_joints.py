@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flagdata.ingest.meshes.checks import findings, t_joints
-from flagdata.lake.meshes import MeshSequence
+from flagdata.ingest import findings
+from flagdata.ingest.meshes.checks import t_joints
+from flagdata.lake import MeshSequence
 
 # A square metre of which the left half is one quad and the right half two, so that vertex 6 lies on the edge 1–2.
 REST = np.array([[0, 0], [0.5, 0], [0.5, 1], [0, 1], [1, 0], [1, 1], [0.5, 0.5], [1, 0.5]])

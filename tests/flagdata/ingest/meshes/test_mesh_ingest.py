@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, UsageError
-from flagdata.ingest.meshes import read_folder
-from flagdata.ingest.meshes.store import MeshIngest, ingest_meshes, scene_wind
-from flagdata.lake import Lake
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, read_meshes
+from flagdata.ingest import MeshIngest, ingest_meshes, read_folder, scene_wind
+from flagdata.lake import Lake, MeshSequence, RaggedMeshSequence, read_meshes
 from flagdata.schema import Kind
 from tests.program import Run, invoke
 

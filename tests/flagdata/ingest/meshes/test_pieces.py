@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from flagdata.ingest import MeshIngest, ingest_meshes
 from flagdata.ingest.meshes.pieces import in_pieces, slits, welded
-from flagdata.ingest.meshes.store import MeshIngest, ingest_meshes
-from flagdata.lake import Lake
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, read_meshes
+from flagdata.lake import Lake, MeshSequence, RaggedMeshSequence, read_meshes
 
 N = 4
 FRAMES = 3

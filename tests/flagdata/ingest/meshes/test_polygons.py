@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from flagdata.ingest.meshes import read_obj
+from flagdata.ingest import read_obj
 from flagdata.ingest.meshes.obj import ears
 
 ELL = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.1), (0.1, 0.1), (0.1, 0.2), (0.0, 0.2)]

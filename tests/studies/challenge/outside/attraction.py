@@ -9,9 +9,7 @@ import torch
 from torch import Tensor
 
 from sim.cloth import Cloth
-from sim.effects.effect import Effect
-from sim.effects.geometry import horizontal, norm, origin
-from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
+from sim.effects import NOT_NEGATIVE, Effect, Value, horizontal, norm, origin, shape, strength
 from sim.inertia import rest_areas
 from sim.state import State
 from sim.system import System

@@ -10,9 +10,7 @@ import torch
 from torch import Tensor
 
 from sim.cloth import Cloth
-from sim.effects.effect import ForceEffect
-from sim.effects.geometry import norm
-from sim.effects.parameter import NOT_NEGATIVE, Value, strength
+from sim.effects import NOT_NEGATIVE, ForceEffect, Value, norm, strength
 
 NET = 10.4
 """What helium lifts beyond its weight [N/m³]: 9.81 m/s² of 1.225 less 0.169 kg/m³."""

@@ -8,8 +8,7 @@ from typing import Annotated
 import torch
 
 from sim.cloth import Cloth
-from sim.effects.effect import ClothEffect
-from sim.effects.parameter import NOT_NEGATIVE, Value, strength
+from sim.effects import NOT_NEGATIVE, ClothEffect, Value, strength
 from tests.studies.challenge.outside import places
 
 PLACE = (0.72, 0.3)

@@ -8,10 +8,8 @@ from typing import Annotated
 from torch import Tensor
 
 from sim.cloth import Cloth
-from sim.effects.effect import Effect
-from sim.effects.geometry import norm
-from sim.effects.parameter import NOT_NEGATIVE, Value, strength
-from sim.effects.quantities import AIR_DENSITY, AirDensity
+from sim.effects import AIR_DENSITY, NOT_NEGATIVE, Effect, Value, norm, strength
+from sim.effects.quantities import AirDensity
 from sim.state import State
 from sim.system import System
 from tests.studies.challenge.outside import edges

@@ -9,9 +9,7 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim.effects.effect import FlowEffect
-from sim.effects.geometry import horizontal, left_of, norm
-from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
+from sim.effects import NOT_NEGATIVE, FlowEffect, Value, horizontal, left_of, norm, shape, strength
 
 
 @dataclass(frozen=True, kw_only=True)

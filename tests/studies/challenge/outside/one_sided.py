@@ -7,8 +7,8 @@ from typing import Annotated
 
 from torch import Tensor
 
+from sim.effects import Value, strength
 from sim.effects.effect import PressureEffect
-from sim.effects.parameter import Value, strength
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,9 +8,7 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim.effects.effect import FlowEffect
-from sim.effects.geometry import left_of, norm
-from sim.effects.parameter import Value, shape, strength
+from sim.effects import FlowEffect, Value, left_of, norm, shape, strength
 
 PERIOD = 3.7
 """Between passages [s]."""

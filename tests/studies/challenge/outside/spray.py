@@ -10,8 +10,7 @@ from torch import Tensor
 
 from sim.air import face_wind
 from sim.cloth import Cloth
-from sim.effects.effect import ForceEffect
-from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
+from sim.effects import NOT_NEGATIVE, ForceEffect, Value, shape, strength
 
 
 @dataclass(frozen=True, kw_only=True)

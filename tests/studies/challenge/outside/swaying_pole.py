@@ -10,9 +10,7 @@ import torch
 from torch import Tensor
 
 from sim.cloth import Cloth
-from sim.effects.effect import ForceEffect
-from sim.effects.geometry import left_of, norm
-from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
+from sim.effects import NOT_NEGATIVE, ForceEffect, Value, left_of, norm, shape, strength
 
 
 @dataclass(frozen=True, kw_only=True)

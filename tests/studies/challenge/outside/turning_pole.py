@@ -8,9 +8,7 @@ from typing import Annotated
 from torch import Tensor
 
 from sim.cloth import Cloth
-from sim.effects.effect import Effect
-from sim.effects.geometry import horizontal, left_of, origin
-from sim.effects.parameter import Value, strength
+from sim.effects import Effect, Value, horizontal, left_of, origin, strength
 from sim.state import State
 from sim.system import System
 

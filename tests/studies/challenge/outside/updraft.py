@@ -8,8 +8,7 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim.effects.effect import FlowEffect
-from sim.effects.parameter import Value, shape, strength
+from sim.effects import FlowEffect, Value, shape, strength
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,9 +8,7 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim.effects.effect import FlowEffect
-from sim.effects.geometry import horizontal, left_of
-from sim.effects.parameter import Value, strength
+from sim.effects import FlowEffect, Value, horizontal, left_of, strength
 
 
 @dataclass(frozen=True, kw_only=True)

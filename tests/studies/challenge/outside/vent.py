@@ -12,8 +12,7 @@ from torch import Tensor
 
 from sim.air import face_wind
 from sim.cloth import Cloth
-from sim.effects.effect import Effect
-from sim.effects.parameter import Value, strength
+from sim.effects import Effect, Value, strength
 from sim.mesh import Mesh
 from sim.state import State
 from sim.system import System

@@ -9,9 +9,7 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim.effects.effect import FlowEffect
-from sim.effects.geometry import horizontal, left_of, norm
-from sim.effects.parameter import Value, shape, strength
+from sim.effects import FlowEffect, Value, horizontal, left_of, norm, shape, strength
 
 PLACE = (0.7, 0.4)
 """Its axis from the middle of the attachments: downstream, and to the left of the wind [m]."""

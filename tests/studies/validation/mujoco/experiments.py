@@ -19,7 +19,7 @@ from pyarrow import csv
 
 from flagdata.rng import stream
 from sim import handles
-from sim.effects.quantities import AIR_DENSITY
+from sim.effects import AIR_DENSITY
 from sim.mesh import Diagonals, grid
 from tests.studies.validation.mujoco.cloth import Air, Floats, Integrator, Method, Sheet, Wind, fly
 

@@ -15,12 +15,7 @@ from enum import StrEnum
 import numpy as np
 import torch
 
-from sim.effects import Effect
-from sim.effects.added_mass import AddedMass
-from sim.effects.internal_damping import InternalDamping
-from sim.effects.lift import Lift
-from sim.effects.reactive_loading import ReactiveLoading
-from sim.effects.tangential_linear_drag import TangentialLinearDrag
+from sim.effects import AddedMass, Effect, InternalDamping, Lift, ReactiveLoading, TangentialLinearDrag
 from tests.studies.validation.paper_flag.sheet import Sheet
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Severity
-from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest import CameraOptions, open_camera
 from flagdata.timebase import NANOSECONDS
 
 _SPAN = 15

@@ -18,7 +18,7 @@ from flagdata.errors import InputError
 from sim.air import QuadraticNormal
 from sim.effects import Effect, apply
 from sim.handles import Handles
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import Symplectic
 from sim.material import isotropic
 from sim.mesh import grid
 from sim.scene import Scene, assemble

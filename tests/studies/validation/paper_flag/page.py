@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.pages.pictures import figure_url
+from flagdata.pages import figure_url
 from flagdata.pages.render import render
 from flagdata.provenance import code_version
 from tests.studies.validation.paper_flag import plots

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.registry import Registry
-from measure.refine.trace import Trace
+from measure.refine import Trace
 
 PEERS = Registry(
     "optimiser",

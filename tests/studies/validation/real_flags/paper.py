@@ -25,10 +25,9 @@ import torch
 from numpy.typing import NDArray
 
 from sim.air import QuadraticNormal
-from sim.effects import apply
-from sim.effects.finite_span_loading import FiniteSpanLoading
+from sim.effects import FiniteSpanLoading, apply
 from sim.handles import Handles
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import Symplectic
 from sim.material import isotropic
 from sim.mesh import grid
 from sim.scene import Scene, assemble

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from flagdata.rng import stream
 from sim.contact import Contact
 from sim.effects import EFFECTS, apply
-from sim.integrate.symplectic import Symplectic
+from sim.integrate import Symplectic
 from sim.material import Material, named
 from sim.scene import Scene, assemble, flag
 from tests.studies.validation.flags_runs import one_core

@@ -16,8 +16,7 @@ from sim import handles
 from sim.anchors import AnchorTracks
 from sim.effects import EFFECTS, Effect, Parameter, apply
 from sim.handles import Handles
-from sim.integrate.implicit import BackwardEuler
-from sim.integrate.split import SplitEuler
+from sim.integrate import BackwardEuler, SplitEuler
 from sim.material import Material
 from sim.mesh import Mesh, grid
 from sim.scene import Scene, assemble
