@@ -24,10 +24,12 @@ from flagdata.lake.transaction import CommitResult, Transaction
 from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from flagdata.lake.artifact import Artifact
     from flagdata.lake.catalog import Catalog
     from flagdata.lake.collect import garbage, usage
     from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, sampled, verify, verify_catalog
     from flagdata.lake.labels import columns, given
+    from flagdata.lake.lake import Lake
     from flagdata.lake.leases import Lease, collecting
     from flagdata.lake.lineage import labels_of
     from flagdata.lake.log import Log
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
     from flagdata.lake.results import Placed, keep, placed, versions
     from flagdata.lake.rowfiles import Scan, with_data_sets
     from flagdata.lake.selection import Request, Selection, select
+    from flagdata.lake.transaction import Transaction
     from flagdata.lake.transfer import clone
 
 

@@ -32,9 +32,11 @@ if TYPE_CHECKING:
     from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
     from flagdata.record.container import read_messages, read_summary
     from flagdata.record.metadata import CAMERA, PROVENANCE
+    from flagdata.record.reader import Record
     from flagdata.record.source import open_bytes
     from flagdata.record.unpacking import unpacked
     from flagdata.record.video import VideoEncoder, decode
+    from flagdata.record.writer import Chunking, Coding, RecordWriter
 
 
 __all__ = ["Chunking", "Coding", "Record", "RecordWriter", "salvage"]

@@ -11,7 +11,8 @@ from flagdata.storage.refusals import StoreError
 
 if TYPE_CHECKING:
     from flagdata.storage.connection import plain
-    from flagdata.storage.refusals import DeniedError, refusal
+    from flagdata.storage.path import RemotePath
+    from flagdata.storage.refusals import DeniedError, StoreError, refusal
     from flagdata.storage.uploads import Upload
 
 

@@ -8,7 +8,7 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.film.conditioned import ConditionedFilm
-    from measure.film.similarity import FlagSize, parse_size, scaled_back, sizes
+    from measure.film.similarity import FlagSize, scaled_back, sizes
     from measure.film.source import Reading, Subject, subjects
     from measure.film.windows import Layout, findings_of
 

@@ -17,8 +17,9 @@ from measure.observables.observable import Observable, Reading, UnseenError
 from measure.observables.silhouettes import Silhouettes
 
 if TYPE_CHECKING:
-    from measure.observables.cloth import edges_of
-    from measure.observables.observable import WINDOW
+    from measure.observables.cloth import ClothWindow, View, edges_of, seen_from
+    from measure.observables.film import FilmWindow
+    from measure.observables.observable import WINDOW, Observable
     from measure.observables.table import table_of
     from measure.observables.watching import watched
 

@@ -16,11 +16,21 @@ if TYPE_CHECKING:
     from measure.observe.anchors import as_seen, carried
     from measure.observe.checks.attachment import hoist_stands_still
     from measure.observe.cloth import model_mesh
-    from measure.observe.experiment import hold
+    from measure.observe.experiment import hold, observe
     from measure.observe.interpolation import onto
     from measure.observe.meshes import from_folder, from_sequence, sample
+    from measure.observe.observation import Known, Observation, Up, from_arrays
     from measure.observe.recipe import load, parse, read
-    from measure.observe.trajectory import DENSITY_UNCERTAINTY, AttachmentTrack, Floats
+    from measure.observe.setup import Hold, Setup, sheet
+    from measure.observe.trajectory import (
+        DENSITY_UNCERTAINTY,
+        AttachmentTrack,
+        Experiment,
+        Floats,
+        Specimen,
+        Trajectory,
+        WindTrack,
+    )
     from measure.observe.wind import LogPlacement, from_log
 
 

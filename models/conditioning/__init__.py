@@ -12,7 +12,7 @@ from flagdata.lazy import lazy_exports
 from models.conditioning.conditioning import Conditioned, Conditioning, Follower, conditioned, conditioning_of
 
 if TYPE_CHECKING:
-    from models.conditioning.conditioning import VERSION
+    from models.conditioning.conditioning import VERSION, Conditioning, Follower, conditioned, conditioning_of
     from models.conditioning.grain import grained
     from models.conditioning.instants import Interpolator
     from models.conditioning.mask_network import MaskNetwork, inputs_of

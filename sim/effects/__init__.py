@@ -15,7 +15,7 @@ from sim.effects.parameter import Parameter, Role
 if TYPE_CHECKING:
     from sim.effects.added_mass import AddedMass
     from sim.effects.anemometer_lag import AnemometerLag
-    from sim.effects.effect import ClothEffect, FlowEffect, ForceEffect, WindEffect
+    from sim.effects.effect import ClothEffect, Effect, FlowEffect, ForceEffect, WindEffect, apply
     from sim.effects.field import FieldEffect, Flat, Seen, heavier
     from sim.effects.files import load
     from sim.effects.finite_span_loading import FiniteSpanLoading
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sim.effects.hem_mass import HemMass
     from sim.effects.internal_damping import InternalDamping
     from sim.effects.lift import Lift
-    from sim.effects.parameter import NOT_NEGATIVE, Parametrised, Value, shape, strength
+    from sim.effects.parameter import NOT_NEGATIVE, Parameter, Parametrised, Role, Value, shape, strength
     from sim.effects.permeability import Permeability
     from sim.effects.porosity import Porosity
     from sim.effects.power_law_drag import PowerLawDrag

@@ -19,8 +19,11 @@ if TYPE_CHECKING:
     from sim.render.camera import Camera
     from sim.render.cycles import Cycles, Workbench
     from sim.render.develop import plate, to_bytes, to_linear
+    from sim.render.meshes import Meshes
+    from sim.render.parameters import RenderParameters
     from sim.render.prior import RenderPrior, named
     from sim.render.raster import Raster
+    from sim.render.renderer import Renderer
 
 
 __all__ = ["RENDERERS", "Meshes", "RenderParameters", "Renderer"]

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from sim.run.arrays import recipe_of
     from sim.run.batch import CRUMPLED, Outcome, Stepper, principal_strains, run
     from sim.run.members import Crew
-    from sim.run.publish import member_artifact, one_thread
+    from sim.run.publish import member_artifact, one_thread, simulate
     from sim.run.reading import of_content, parse
-    from sim.run.recipe import IntegratorSpec, MaterialSpec, Shape
+    from sim.run.recipe import IntegratorSpec, MaterialSpec, Recipe, Shape
 
 
 __all__ = ["Progress", "Recipe", "RunReport", "load", "simulate"]

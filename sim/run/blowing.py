@@ -58,7 +58,7 @@ class WindSamples:
 
     def content(self) -> str:
         """Returns a hash of times and velocities."""
-        return digest(canonical([self.times.tolist(), self.velocity.tolist()]))
+        return digest(canonical({"times": self.times.tolist(), "velocity": self.velocity.tolist()}))
 
 
 TYPES: Mapping[str, Mapping[str, Any]] = {
@@ -147,7 +147,7 @@ def _array(samples: Any, *, where: str) -> tuple[Floats, Floats]:
     try:
         rows = np.array(samples, dtype=np.float64)
     except (TypeError, ValueError):
-        rows = np.zeros(0)
+        rows = np.zeros((0, 4))
     if rows.ndim != 2 or rows.shape[1] != 4 or len(rows) < 2 or not np.isfinite(rows).all():
         raise InputError(
             "samples of the wind are no table of numbers",

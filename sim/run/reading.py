@@ -202,7 +202,11 @@ _FORCES: Mapping[str, Mapping[str, Any]] = {
     "stokes": {"viscosity": NotNegative},
 }
 """Force of the air → its keys in [wind]."""
-_STEADY = {"speed": Annotated[Quantity, Meta(ge=0.0, le=100.0)], "toward": AngleQuantity, "vertical": float}
+_STEADY: Mapping[str, Any] = {
+    "speed": Annotated[Quantity, Meta(ge=0.0, le=100.0)],
+    "toward": AngleQuantity,
+    "vertical": float,
+}
 """Keys of a steady wind."""
 _LIMITS = {"low": float, "high": float, "sweeps": Count}
 
@@ -382,7 +386,7 @@ def _wind(
         **_FORCES.get(str(name), _FORCES["quadratic-normal"]),
     }
     source = blowing.source(content, where=where)
-    values = entries(types | (blowing.TYPES[source] if source else _STEADY), content, where=where)
+    values = entries({**types, **(blowing.TYPES[source] if source else _STEADY)}, content, where=where)
     air = {key: values[key] for key in types if key in values and key != "force"}
     force: AirForce = Stokes(**air) if name == "stokes" else QuadraticNormal(**air)
     if source:
@@ -396,7 +400,7 @@ def _wind(
             "no wind speed is given", where=where, fix="add speed = 4.0 (m/s), or a range; a log or samples"
         )
     return WindSpec(
-        **{"toward": 0.0, "vertical": 0.0, "force": force} | {key: values[key] for key in _STEADY if key in values}
+        force=force, **({"toward": 0.0, "vertical": 0.0} | {key: values[key] for key in _STEADY if key in values})
     )
 
 

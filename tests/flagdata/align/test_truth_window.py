@@ -13,8 +13,7 @@ from click.testing import CliRunner
 from flagdata.align import by_spans
 from flagdata.align.apart import by_offset
 from flagdata.cli import root
-from flagdata.dataset import Source
-from flagdata.dataset.tolerance import Tolerance
+from flagdata.dataset import Source, Tolerance
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.option_types import DURATION

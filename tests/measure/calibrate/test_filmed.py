@@ -12,10 +12,8 @@ from flagdata.api.measuring import OfFlag
 from flagdata.errors import InputError, RefusedError
 from flagdata.findings import Finding, Severity
 from flagdata.signals import Sensor, WindSeries
-from measure.calibrate import filmed
-from measure.calibrate.arrays import sources_of
-from measure.calibrate.simulation import OBSERVED
-from measure.film.similarity import FlagSize
+from measure.calibrate import OBSERVED, filmed, sources_of
+from measure.film import FlagSize
 from measure.observables import Reading
 
 _SIZE = FlagSize(length=1.5, height=1.0)

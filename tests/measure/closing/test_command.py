@@ -17,7 +17,8 @@ from flagdata.errors import NotFoundError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest import MarkerOptions, ingest_markers
 from flagdata.lake import Lake
-from measure.closing.sources import Reading, read
+from measure.closing import Reading
+from measure.closing.sources import read
 from measure.commands.close_loop import CloseLoopCommand, with_warnings
 from measure.commands.close_loop import _setup as setup_of
 from measure.observe import Setup, Up

@@ -11,14 +11,9 @@ from numpy.typing import NDArray
 
 from flagdata.errors import RefusedError, UsageError
 from flagdata.rng import stream
-from measure.film.similarity import (
-    FlagSize,
-    SizePrior,
-    scaled_back,
-    sizes,
-    spacing,
-)
-from sim.integrate.symplectic import Symplectic
+from measure.film import FlagSize, scaled_back, sizes
+from measure.film.similarity import SizePrior, spacing
+from sim.integrate import Symplectic
 from sim.material import Material, named
 from sim.scene import assemble, flag
 
