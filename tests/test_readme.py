@@ -156,12 +156,12 @@ def test_the_accuracy_of_a_weight_is_that_of_the_sheet() -> None:
     flags, codes = films["flags"], {flag["code"] for flag in films["flags"]}
     assert films["withheld"] == 0
     assert codes == {"kernel", "mujoco"}
-    assert sum(flag["value"] < flag["truth"] for flag in flags) > 0.8 * len(flags)  # "mostly too light"
+    assert sum(flag["value"] < flag["truth"] for flag in flags) > 0.8 * len(flags)  # "most estimates are too low"
     assert rows()["area weight, wind known"] == (
         f"[{len(flags)} films](docs/results/validate-weighed.md) of {result['seconds']:g} s, two simulators",
         (
-            f"median error {100 * films['median_error']:.0f} %, {films['held']} of {len(flags)} in their intervals, "
-            "mostly too light"
+            f"median error {100 * films['median_error']:.0f} %, {films['held']} of {len(flags)} in their intervals; "
+            "most estimates are too low"
         ),
     )
 
@@ -173,7 +173,9 @@ def test_the_refusals_counted_are_those_of_the_sheet() -> None:
     tested, found = rows()["films with a defect"]
     assert tested.startswith(f"[{refused['count']} films]")
     assert tested.endswith(f"{len({film['kind'] for film in result['films']})} kinds")
-    assert found == f"{refused['hits']} of {refused['count']} refused, {right['hits']} with the true reason first"
+    assert found == (
+        f"{refused['hits']} of {refused['count']} refused, {right['hits']} of them with the true reason first"
+    )
     assert not any(film["refused"] for film in result["films"] if film["kind"] == "overlapping flags")
 
 
@@ -186,12 +188,11 @@ def test_the_forces_counted_are_those_of_the_sheet() -> None:
     )
     wrong, claims = share["false discoveries among claims"].split("/")
     assert f"{wrong} of {claims} claims named a force that had not acted" in " ".join(README.split())
-    tested, stated = rows()["forces that a model lacks"]
+    tested, stated = rows()["forces missing from the cloth model"]
     (sets,) = re.findall(r"^(\d+) sets:", score, flags=re.MULTILINE)
     assert tested.startswith(f"[{sets} sealed sets]")
     assert stated == (
-        f"{nulls} of {of_nulls} rejected where nothing was missing; of {single} with one force {found} detected, "
-        f"{named} named right"
+        f"{nulls} false alarm in {of_nulls}; of {single} hidden forces {found} detected, {named} named correctly"
     )
 
 
@@ -206,9 +207,10 @@ def test_the_forces_counted_on_films_are_those_of_the_second_sheet() -> None:
     page = "docs/results/challenge-films-2/challenge-score.md"
     assert tested == f"[{len(said)} sealed sets]({page}) of three films of 25 s"
     assert set(found) == {"one of"}
+    alarms = sum(what != "no effect needed" for what in nulls)
     assert stated == (
-        f"{sum(what != 'no effect needed' for what in nulls)} of {len(nulls)} rejected where nothing was missing; of "
-        f"{len(single)} with one force {len(found)} detected, each among several"
+        f"{alarms} false alarm in {len(nulls)}; of {len(single)} hidden forces {len(found)} detected, each named among "
+        "several"
     )
 
 
