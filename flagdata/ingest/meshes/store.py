@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.meshes.folder import read_folder
@@ -210,7 +211,7 @@ def _jumps(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
     ways = np.median(np.linalg.norm(np.diff(places, axis=0), axis=2), axis=1)
     size = float(np.linalg.norm(np.ptp(sequence.rest[used].astype(np.float64), axis=0)))
     usual = float(np.median(ways))
-    sudden: NDArray[np.int64] = np.flatnonzero((ways > _SUDDEN * usual) & (ways > _FAR * size))
+    sudden: IntArray = np.flatnonzero((ways > _SUDDEN * usual) & (ways > _FAR * size))
     if len(sudden):
         first = int(sudden[0])
         yield Finding.of(
@@ -272,7 +273,7 @@ def t_joints(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
     )
 
 
-def _joints(mesh: Mesh) -> NDArray[np.int64]:
+def _joints(mesh: Mesh) -> IntArray:
     """Numbers of the vertices on the inside of an edge that only one face has, in the material and in space."""
     edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
     edges, counts = np.unique(edges, axis=0, return_counts=True)
@@ -295,9 +296,7 @@ def _joints(mesh: Mesh) -> NDArray[np.int64]:
     return np.unique(vertex[inside])
 
 
-def _beside(
-    place: NDArray[np.float64], vertex: NDArray[np.int64], first: NDArray[np.int64], last: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _beside(place: FloatArray, vertex: IntArray, first: IntArray, last: IntArray) -> tuple[FloatArray, FloatArray]:
     """Where vertices lie along edges, 0 at the first end and 1 at the last, and how far beside, in edge lengths."""
     edge, arm = place[last] - place[first], place[vertex] - place[first]
     square = np.maximum((edge**2).sum(axis=1), np.finfo(np.float64).tiny)
@@ -396,6 +395,6 @@ def _likely(ratio: float) -> str:
     return ""
 
 
-def _doubled_areas(rest: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+def _doubled_areas(rest: FloatArray, faces: NDArray[np.int32]) -> FloatArray:
     a, b, c = (rest[faces[:, i]] for i in range(3))
     return (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import WindOptions
@@ -57,7 +57,7 @@ def position_columns(header: Sequence[str]) -> tuple[str, str] | None:
     return (found[0][0], found[1][0]) if all(len(names) == 1 for names in found) else None
 
 
-def extent(latitude: NDArray[np.float64], longitude: NDArray[np.float64]) -> float:
+def extent(latitude: FloatArray, longitude: FloatArray) -> float:
     """How far positions [deg] reach, without the farthest twentieth on each side [m]; 0 where there are none."""
     known = (np.abs(latitude) <= 90) & (np.abs(longitude) <= 180) & ((latitude != 0) | (longitude != 0))
     if int(known.sum()) < 2:
@@ -68,7 +68,7 @@ def extent(latitude: NDArray[np.float64], longitude: NDArray[np.float64]) -> flo
     return float(np.hypot(*(high - low))) * EARTH
 
 
-def motion(reading: Reading, positions: Mapping[str, NDArray[np.float64]]) -> Motion | None:
+def motion(reading: Reading, positions: Mapping[str, FloatArray]) -> Motion | None:
     """The motion that a log shows; `None` where it shows none.
 
     Args:
@@ -90,7 +90,7 @@ def settle(
     reading: Reading,
     given: Platform | None,
     *,
-    positions: Mapping[str, NDArray[np.float64]] | None = None,
+    positions: Mapping[str, FloatArray] | None = None,
     where: str,
 ) -> Reading:
     """The reading with its wind in the channels that the platform allows.
