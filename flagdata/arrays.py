@@ -1,23 +1,30 @@
-"""NumPy's archives of arrays (.npz), read where they unpack to what can be held in memory."""
+"""Types of arrays by their elements, and NumPy's archives of arrays (.npz), read where they unpack to what can be held
+in memory."""
 
 from __future__ import annotations
 
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import CorruptError, LimitError
 
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
+BoolArray: TypeAlias = NDArray[np.bool_]
+UInt8Array: TypeAlias = NDArray[np.uint8]
+Float32Array: TypeAlias = NDArray[np.float32]
+AnyArray: TypeAlias = NDArray[Any]
 HELD = 256 << 20
 """Most bytes that an archive may unpack to."""
 EXPANSION = 20
 """Most times its own size that a larger archive may unpack to: numbers that were measured or simulated take 1 to 3."""
 
 
-def read_arrays(path: Path, *, what: str, fix: str) -> dict[str, NDArray[Any]]:
+def read_arrays(path: Path, *, what: str, fix: str) -> dict[str, AnyArray]:
     """All arrays of an archive, by name.
 
     Args:

@@ -22,8 +22,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError, UsageError
 from flagdata.schema import UNUSABLE
 from flagdata.signals import Sensor, WindAverage, WindSeries
@@ -88,13 +88,13 @@ def average(series: WindSeries, period: float = 1.0, *, channel: str = "wind_spe
     )
 
 
-def instrument_sigma(sensor: Sensor, speed: NDArray[np.float64]) -> NDArray[np.float64]:
+def instrument_sigma(sensor: Sensor, speed: FloatArray) -> FloatArray:
     """Standard uncertainty of a reading by the instrument alone: accuracy and resolution [m/s]."""
     accuracy = np.maximum(sensor.accuracy or 0.0, (sensor.accuracy_relative or 0.0) * np.abs(speed))
     return np.hypot(accuracy, (sensor.resolution or 0.0) / math.sqrt(12))
 
 
-def correlation(speed: NDArray[np.float64], starts: NDArray[np.int64], count: NDArray[np.int64]) -> float:
+def correlation(speed: FloatArray, starts: IntArray, count: IntArray) -> float:
     """Correlation ρ of neighbouring samples within bins, 0 to 1, see the module's text."""
     if len(speed) == 0 or int(count.max()) < 2:
         return 0.0
@@ -109,9 +109,7 @@ def correlation(speed: NDArray[np.float64], starts: NDArray[np.int64], count: ND
     return min(max(1 - float((steps**2).mean()) / (2 * variance), 0.0), 1.0)
 
 
-def _scatter(
-    speed: NDArray[np.float64], starts: NDArray[np.int64], count: NDArray[np.int64], mean: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _scatter(speed: FloatArray, starts: IntArray, count: IntArray, mean: FloatArray) -> FloatArray:
     """Standard deviation of each bin's mean from the scatter within it [m/s]; 0 for bins of one sample."""
     square = np.add.reduceat((speed - np.repeat(mean, count)) ** 2, starts)
     variance = square / np.maximum(count - 1, 1)
@@ -120,9 +118,7 @@ def _scatter(
     return np.sqrt(variance / independent)
 
 
-def _vector_mean(
-    speed: NDArray[np.float64], direction: NDArray[np.float64], starts: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _vector_mean(speed: FloatArray, direction: FloatArray, starts: IntArray) -> FloatArray:
     """Direction of the mean wind vector of each bin [rad, 0 to 2π]; NaN where nothing blows or nothing is known."""
     known = np.isfinite(direction)
     east = np.add.reduceat(np.where(known, speed * np.sin(direction), 0.0), starts)

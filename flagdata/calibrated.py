@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from flagdata.arrays import FloatArray
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
 from flagdata.html import table
@@ -65,7 +63,7 @@ class Calibrated:
     sentence: str
     level: float
     quantities: Mapping[str, Weighed]
-    draws: Mapping[str, NDArray[np.float64]]
+    draws: Mapping[str, FloatArray]
     withheld: str | None
     stated: str | None
     findings: tuple[Finding, ...]

@@ -6,8 +6,9 @@ import json
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.timebase import NANOSECONDS
 
@@ -72,11 +73,11 @@ class ClockModel:
             if after.start < before.end:
                 raise InputError("clock segments overlap", fix="give them in order, each ending before the next")
 
-    def _segment(self, time: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _segment(self, time: IntArray) -> IntArray:
         starts = np.array([s.start for s in self.segments[1:]], dtype=np.int64)
         return np.searchsorted(starts, time, side="right")
 
-    def to_common(self, time: ArrayLike) -> NDArray[np.int64]:
+    def to_common(self, time: ArrayLike) -> IntArray:
         """Instants of the device's clock on the common clock; int64 ns in and out, any shape.
 
         Times outside all segments use the nearest one.
@@ -88,7 +89,7 @@ class ClockModel:
         drift = np.array([s.drift for s in self.segments])[index]
         return device + offset + np.round((device - origin) * drift).astype(np.int64)
 
-    def sigma(self, time: ArrayLike) -> NDArray[np.float64]:
+    def sigma(self, time: ArrayLike) -> FloatArray:
         """Standard uncertainty [s] of `to_common` at instants of the device's clock."""
         device = np.asarray(time, dtype=np.int64)
         index = self._segment(device)

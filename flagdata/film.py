@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from flagdata.ingest.camera import CameraOptions, open_camera, probe
@@ -48,7 +48,7 @@ class Film(Protocol):
         """Instant of the first frame [UTC ns]; None where nobody said."""
         ...
 
-    def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+    def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
         """(time since the first frame [s], (height, width) gray) from `first` to `last` [s], in order."""
         ...
 
@@ -99,7 +99,7 @@ class CameraFilm:
     def start(self) -> int | None:
         return None
 
-    def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+    def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
         with open_camera(self.path, self._options) as stream:
             try:
                 for frame in stream:
@@ -157,7 +157,7 @@ class RecordFilm:
     def start(self) -> int | None:
         return int(self.times[0])
 
-    def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+    def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
         low = int(np.searchsorted(self._seconds, first, side="left"))
         high = int(np.searchsorted(self._seconds, last, side="right"))
         for begin in range(low, high, _AT_ONCE):

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flagdata import html
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError, LimitError
 from flagdata.film import Film
 from flagdata.findings import Finding
@@ -35,8 +35,8 @@ class Frames:
         InputError: fewer than two frames, shapes that disagree, or times that do not ascend.
     """
 
-    images: NDArray[np.uint8]
-    time: NDArray[np.float64]
+    images: UInt8Array
+    time: FloatArray
     name: str = "frames"
     start: int | None = None
 
@@ -78,7 +78,7 @@ class Frames:
         """Of a frame [px]."""
         return self.images.shape[1]
 
-    def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+    def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
         """(time since the first frame [s], (height, width) gray) from `first` to `last` [s], in order."""
         seconds = self.time - self.time[0]
         for place in np.flatnonzero((seconds >= first) & (seconds <= last)).tolist():
@@ -103,7 +103,7 @@ class Frames:
         return html.table(repr(self), {}) + html.image(shown)
 
 
-def gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def gray(picture: UInt8Array) -> UInt8Array:
     """(height, width) luma by Rec. 601, as everywhere in `flagdata.ingest`, of a gray or sRGB picture."""
     if picture.ndim == 2:
         return picture
@@ -117,7 +117,7 @@ def collected(film: Film, *, first: float, last: float | None) -> Frames:
         LimitError: more than `LARGEST` bytes.
         InputError: fewer than two frames.
     """
-    images: list[NDArray[np.uint8]] = []
+    images: list[UInt8Array] = []
     times: list[float] = []
     size = 0
     for time, image in film.frames(first, film.duration if last is None else last):

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from flagdata.arrays import FloatArray
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
 from flagdata.html import table
@@ -59,12 +57,12 @@ class Windows:
         low, high: quantity → (k,) ends of the intervals; infinite at an end that nothing bounds.
     """
 
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
-    p: NDArray[np.float64]
-    value: Mapping[str, NDArray[np.float64]]
-    low: Mapping[str, NDArray[np.float64]]
-    high: Mapping[str, NDArray[np.float64]]
+    start: FloatArray
+    end: FloatArray
+    p: FloatArray
+    value: Mapping[str, FloatArray]
+    low: Mapping[str, FloatArray]
+    high: Mapping[str, FloatArray]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,7 +78,7 @@ class Answer:
 
     sentence: str
     quantities: Mapping[str, Estimate]
-    draws: Mapping[str, NDArray[np.float64]]
+    draws: Mapping[str, FloatArray]
     windows: Windows
 
 
@@ -144,7 +142,7 @@ class Measured:
         return self.answer.quantities["wind_speed"]
 
     @property
-    def draws(self) -> Mapping[str, NDArray[np.float64]]:
+    def draws(self) -> Mapping[str, FloatArray]:
         """Name → (n,) draws of the joint posterior. Raises as `answer`."""
         return self.answer.draws
 

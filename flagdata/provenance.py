@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray
 from flagdata.files import open_regular
 from flagdata.storage import Place
 
@@ -34,7 +34,7 @@ def recipe_hash(recipe: Mapping[str, Any]) -> str:
     return digest(canonical(recipe))
 
 
-def array_hash(content: Mapping[str, Any], arrays: Iterable[NDArray[Any]]) -> str:
+def array_hash(content: Mapping[str, Any], arrays: Iterable[AnyArray]) -> str:
     """SHA-256 of plain values and of arrays with their types and shapes, hex."""
     total = hashlib.sha256()
     total.update(canonical(content).encode())

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.findings import Finding
 from flagdata.html import table
 from flagdata.signals import Sensor
 from flagdata.timebase import iso
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

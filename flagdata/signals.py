@@ -9,13 +9,14 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray, UInt8Array
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from flagdata.schema import CHANNELS
 from flagdata.tables import NotNegative
 
-Instants: TypeAlias = NDArray[np.int64]
-Series: TypeAlias = NDArray[np.float64]
+Instants: TypeAlias = IntArray
+Series: TypeAlias = FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +114,7 @@ class Frame:
     """
 
     time: int
-    image: NDArray[np.uint8]
+    image: UInt8Array
     stamp_error: float
 
 

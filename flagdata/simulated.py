@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray
 from flagdata.html import table
 from flagdata.lake.meshes import MeshSequence
 from flagdata.timebase import NANOSECONDS
@@ -27,8 +28,8 @@ class Simulated:
 
     name: str
     members: tuple[MeshSequence, ...]
-    parameters: Mapping[str, NDArray[np.float64]]
-    wind: NDArray[np.float64]
+    parameters: Mapping[str, FloatArray]
+    wind: FloatArray
     failed: Mapping[int, str]
 
     def __len__(self) -> int:
@@ -41,18 +42,18 @@ class Simulated:
         return iter(self.members)
 
     @property
-    def positions(self) -> NDArray[np.float32]:
+    def positions(self) -> Float32Array:
         """(member, frame, vertex, 3) [m], z up."""
         return np.stack([one.positions for one in self.members])
 
     @property
-    def time(self) -> NDArray[np.float64]:
+    def time(self) -> FloatArray:
         """(frame,) since the first frame that is kept [s]."""
         time = self.members[0].time
         return (time - time[0]) / NANOSECONDS
 
     @property
-    def rest(self) -> NDArray[np.float32]:
+    def rest(self) -> Float32Array:
         """(vertex, 2) material coordinates [m]."""
         return self.members[0].rest
 

@@ -11,9 +11,10 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flagdata import compass
+from flagdata.arrays import FloatArray
 from flagdata.errors import UnknownNameError
 
 
@@ -25,11 +26,11 @@ class Unit:
     scale: float
     offset: float = 0.0
 
-    def to_si(self, value: ArrayLike) -> NDArray[np.float64]:
+    def to_si(self, value: ArrayLike) -> FloatArray:
         """Convert values of this unit to SI; shape kept."""
         return np.asarray(value, dtype=np.float64) * self.scale + self.offset
 
-    def from_si(self, value: ArrayLike) -> NDArray[np.float64]:
+    def from_si(self, value: ArrayLike) -> FloatArray:
         """Convert SI values to this unit; shape kept."""
         return (np.asarray(value, dtype=np.float64) - self.offset) / self.scale
 

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from flagdata.align.motion import MotionSeries
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.signals import Instants, Series, WindAverage
 from flagdata.timebase import NANOSECONDS
@@ -103,7 +103,7 @@ class LagBins:
         step = self.period * NANOSECONDS / STEPS
         return self.first + round((self.index(trial).start + STEPS * centre - STEPS / 2) * step)
 
-    def windows(self, samples: NDArray[np.float64], trials: slice) -> NDArray[np.float64]:
+    def windows(self, samples: FloatArray, trials: slice) -> FloatArray:
         """(trials, n) view of `samples` (as long as `motion`): the row of each trial offset."""
         rows = np.lib.stride_tricks.sliding_window_view(samples, STEPS * (len(self.wind) - 1) + 1)[:, ::STEPS]
         return rows[::-1][trials]

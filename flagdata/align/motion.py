@@ -21,8 +21,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from flagdata.signals import Instants, Series
@@ -67,7 +67,7 @@ class MotionSeries:
         return len(self.time)
 
 
-def motion_energy(frames: Iterable[tuple[int, NDArray[np.uint8]]]) -> MotionSeries:
+def motion_energy(frames: Iterable[tuple[int, UInt8Array]]) -> MotionSeries:
     """Motion energy of a film, in one pass, holding two reduced frames at a time.
 
     Args:
@@ -80,7 +80,7 @@ def motion_energy(frames: Iterable[tuple[int, NDArray[np.uint8]]]) -> MotionSeri
     energies: list[float] = []
     shifts: list[float] = []
     gains: list[float] = []
-    before: NDArray[np.float32] | None = None
+    before: Float32Array | None = None
     before_time = 0
     before_shape: tuple[int, ...] = ()
     block = 1
@@ -116,14 +116,14 @@ def motion_energy(frames: Iterable[tuple[int, NDArray[np.uint8]]]) -> MotionSeri
     )
 
 
-def _reduce(image: NDArray[np.uint8], block: int) -> NDArray[np.float32]:
+def _reduce(image: UInt8Array, block: int) -> Float32Array:
     """Means over `block` × `block` pixels; rows and columns that do not fill a block are left out."""
     height, width = image.shape[0] // block, image.shape[1] // block
     whole = image[: height * block, : width * block]
     return whole.reshape(height, block, width, block).mean(axis=(1, 3), dtype=np.float32)
 
 
-def _change(before: NDArray[np.float32], after: NDArray[np.float32], block: int) -> tuple[float, float, float]:
+def _change(before: Float32Array, after: Float32Array, block: int) -> tuple[float, float, float]:
     """Mean change above noise [gray levels], the gain, and the shift [blocks] between two reduced frames."""
     grad_y, grad_x = np.gradient(before) if min(before.shape) > 1 else (np.zeros_like(before), np.zeros_like(before))
     centre = float(before.mean())
@@ -142,8 +142,8 @@ def _change(before: NDArray[np.float32], after: NDArray[np.float32], block: int)
 
 
 def _fitted(
-    columns: NDArray[np.float64], target: NDArray[np.float64], keep: NDArray[np.bool_], least: float
-) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+    columns: FloatArray, target: FloatArray, keep: BoolArray, least: float
+) -> tuple[FloatArray, float, FloatArray]:
     """|residual| and its σ after least squares on the blocks to keep, twice; and the four parameters.
 
     Two starts are compared, since either can go astray: all blocks, where the flag fills little of the picture, and
@@ -164,7 +164,7 @@ def _fitted(
     return residual, sigma, parameters
 
 
-def _quiet(residual: NDArray[np.float64], least: float) -> tuple[NDArray[np.bool_], float]:
+def _quiet(residual: FloatArray, least: float) -> tuple[BoolArray, float]:
     """Which blocks are within 3 σ, σ being that of a normal distribution with the residual's lowest fifth."""
     # np.quantile, which takes ten times as long on so few numbers.
     below, share = divmod(_LOW_QUANTILE * (len(residual) - 1), 1)

@@ -15,9 +15,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flagdata.align.declared import PRIOR_DRIFT, stamp_sigma
+from flagdata.arrays import IntArray
 from flagdata.clock import NINETY, ClockModel, Segment
 from flagdata.errors import InputError
 from flagdata.findings import Finding
@@ -145,7 +145,7 @@ class _Line:
         return self.offset + self.drift * (time - self.origin)
 
 
-def _blocks(time: Series) -> NDArray[np.int64]:
+def _blocks(time: Series) -> IntArray:
     """First indices of the blocks."""
     count = len(time)
     span = max(float(time[-1] - time[0]), 1e-9)
@@ -154,7 +154,7 @@ def _blocks(time: Series) -> NDArray[np.int64]:
     return np.flatnonzero(np.concatenate(([True], np.diff(number) > 0)))
 
 
-def _least(time: Series, late: Series) -> tuple[Series, Series, NDArray[np.int64]]:
+def _least(time: Series, late: Series) -> tuple[Series, Series, IntArray]:
     """Time and value of the least of each block, and the blocks' first indices."""
     starts = _blocks(time)
     ends = np.append(starts[1:], len(time))
@@ -212,7 +212,7 @@ def _jumps(time: Series, late: Series) -> list[int]:
     return sorted(set(found))
 
 
-def _first_after(late: Series, starts: NDArray[np.int64], block: int, before: float, after: float) -> int:
+def _first_after(late: Series, starts: IntArray, block: int, before: float, after: float) -> int:
     """The first sample after a step that lies in block `block` or the one before it."""
     low = int(starts[block - 1])
     high = int(starts[block + 1]) if block + 1 < len(starts) else len(late)

@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flagdata.align.apart import by_offset
 from flagdata.align.motion import MotionSeries, motion_energy
 from flagdata.align.present import find_made, provenance
+from flagdata.arrays import IntArray, UInt8Array
 from flagdata.clock import ClockModel
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import InputError, UsageError
@@ -131,7 +131,7 @@ class Pair:
         """
         return motion_energy(self._frames(progress))
 
-    def _frames(self, progress: Progress | None) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    def _frames(self, progress: Progress | None) -> Iterator[tuple[int, UInt8Array]]:
         record = self.camera_record
         times = record.device_frame_times
         for first in range(0, len(times), _FRAMES_AT_ONCE):
@@ -387,7 +387,7 @@ def copy_frames(
 
 
 def _artifact(
-    pair: Pair, alignment: Alignment, frames: NDArray[np.int64], *, stored: str, name: str | None, session: str | None
+    pair: Pair, alignment: Alignment, frames: IntArray, *, stored: str, name: str | None, session: str | None
 ) -> Artifact:
     clock = alignment.clock
     device = pair.camera_record.device_frame_times

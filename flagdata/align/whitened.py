@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import nnls
 
 from flagdata.align.bins import STEPS, LagBins
+from flagdata.arrays import FloatArray
 from flagdata.signals import Series
 
 _ORDER = 4
@@ -47,7 +47,7 @@ class Whitened:
         score = scores[:, 0]
         return score, counts, int(np.nanargmax(score)) if np.any(np.isfinite(score)) else -1
 
-    def scores(self, winds: NDArray[np.float64], *, overlap: float) -> tuple[NDArray[np.float64], Series]:
+    def scores(self, winds: FloatArray, *, overlap: float) -> tuple[FloatArray, Series]:
         """Scores z = atanh(r) √(n − 3), (m, s), of winds (n, s), and how many bins each trial offset compares, (m,).
 
         All winds count as missing where the filtered wind is. Trials that cover less than `overlap` [s] get NaN.
@@ -175,7 +175,7 @@ def longest_compared(bins: LagBins) -> float:
     return bins.period * float(counts.max())
 
 
-def _response(smooth: NDArray[np.float64], motion: Series, filters: Series) -> Series:
+def _response(smooth: FloatArray, motion: Series, filters: Series) -> Series:
     """a_w ≥ 0, (widths,), of Σ a_w smooth_w fitted to the motion (n,) behind the filter."""
     columns = np.stack([_filter(column, filters, 1) for column in smooth.T], axis=1)
     target = _filter(motion, filters, 1)

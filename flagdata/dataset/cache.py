@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
 from flagdata.arguments import checked
+from flagdata.arrays import UInt8Array
 from flagdata.documents import from_json
 from flagdata.errors import FlagdataError, UsageError
 from flagdata.files import is_beside
@@ -86,9 +86,7 @@ class DecodedCache:
         return {**self.__dict__, "_verified": set()}
 
     @checked
-    def frames(
-        self, object_name: str, first: int, count: int, *, decode: Callable[[], NDArray[np.uint8]]
-    ) -> NDArray[np.uint8]:
+    def frames(self, object_name: str, first: int, count: int, *, decode: Callable[[], UInt8Array]) -> UInt8Array:
         """Frames (count, height, width) of an object, from the cache or else by `decode`, which fills it."""
         name = hashlib.sha256(f"{object_name}\n{first}\n{count}".encode()).hexdigest() + _SUFFIX
         identity = {"format": _FORMAT, "object": object_name, "first": first, "count": count}
@@ -102,7 +100,7 @@ class DecodedCache:
         """Bytes of the clips in the folder now."""
         return sum(entry.size for entry in self._entries())
 
-    def _read(self, name: str, identity: dict[str, Any]) -> NDArray[np.uint8] | None:
+    def _read(self, name: str, identity: dict[str, Any]) -> UInt8Array | None:
         path = self.path / name
         try:
             with path.open("rb") as stream:
@@ -127,7 +125,7 @@ class DecodedCache:
         self._verified.add(name)
         return frames
 
-    def _write(self, name: str, identity: dict[str, Any], frames: NDArray[np.uint8]) -> None:
+    def _write(self, name: str, identity: dict[str, Any], frames: UInt8Array) -> None:
         pixels = np.ascontiguousarray(frames).data
         line = json.dumps({**identity, "shape": list(frames.shape), "crc32": zlib.crc32(pixels)}).encode() + b"\n"
         size = len(line) + frames.nbytes

@@ -13,10 +13,10 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch.utils.data import DataLoader, Dataset
 
 from flagdata.arguments import checked, whole
+from flagdata.arrays import IntArray
 from flagdata.dataset.sample import Batch, Sample, collate
 from flagdata.errors import RefusedError, UsageError
 from flagdata.rng import stream
@@ -159,7 +159,7 @@ class PairLoader:
         end = first + (self._total() - first) // count * count
         return [order[k * size : (k + 1) * size].tolist() for k in range(first + index, end, count)]
 
-    def _ordered(self, epoch: int) -> NDArray[np.int64]:
+    def _ordered(self, epoch: int) -> IntArray:
         n = len(self.pairs)
         if self._order == "stored":
             return np.arange(n)

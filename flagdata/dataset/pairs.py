@@ -7,11 +7,10 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from flagdata.arguments import checked
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.dataset.cache import DecodedCache
 from flagdata.dataset.loader import Batchable, Last, Memory, Order, PairLoader, RunIn
 from flagdata.dataset.sample import Sample
@@ -100,7 +99,7 @@ class Pairs(Batchable):
         )
 
     @checked
-    def film(self, index: int) -> NDArray[np.uint8]:
+    def film(self, index: int) -> UInt8Array:
         """All frames of the recording that the pair at `index` is of: (frames, height, width) gray.
 
         Raises:
@@ -113,7 +112,7 @@ class Pairs(Batchable):
         return record.frames(0, record.frame_count)
 
     @checked
-    def film_times(self, index: int) -> NDArray[np.float64]:
+    def film_times(self, index: int) -> FloatArray:
         """(frames,) instants of the frames of `film`, from the first [s].
 
         Raises:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.dataset.clips import TRUTH_SPEED, clip_truth, truth_series
 from flagdata.dataset.lineage import origins_of, superseded
 from flagdata.dataset.splits import ExplicitSplit, HashedSplit, check_side, groups, refuse_leaks
@@ -157,7 +157,7 @@ def explicit_sides(catalog: pa.Table | Scan, split_by: ExplicitSplit) -> dict[st
     return taken
 
 
-def _windows(clips: pa.Table, table: PairTable) -> NDArray[np.float64]:
+def _windows(clips: pa.Table, table: PairTable) -> FloatArray:
     """Window (n,) of the catalog's ground truth of each pair [s], NaN where its recipe has none."""
     recipe = clips["recipe"].combine_chunks().dictionary_encode()
     first = np.unique(recipe.indices.fill_null(-1).to_numpy(zero_copy_only=False), return_index=True)
@@ -171,7 +171,7 @@ def _windows(clips: pa.Table, table: PairTable) -> NDArray[np.float64]:
     return windows[place.to_numpy()]
 
 
-def _common(windows: NDArray[np.float64]) -> float:
+def _common(windows: FloatArray) -> float:
     """The one window of all pairs [s]; the usual one where no recipe states any.
 
     Raises:
@@ -187,7 +187,7 @@ def _common(windows: NDArray[np.float64]) -> float:
     return float(found[0]) if len(found) else TRUTH_WINDOW
 
 
-def _with_window(lake: Lake, table: PairTable, windows: NDArray[np.float64], window: float) -> PairTable:
+def _with_window(lake: Lake, table: PairTable, windows: FloatArray, window: float) -> PairTable:
     """The table with ground truths over `window`; those of another window are computed anew from the record's wind."""
     other = np.nonzero(windows != window)[0]
     if not len(other):

@@ -14,10 +14,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from flagdata.arrays import IntArray
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
 from flagdata.lake.matching import Where
 
@@ -64,7 +64,7 @@ class Origin:
         return (0, min(self.days)) if self.days else (2, self.recording)
 
 
-def groups(origins: Sequence[Origin]) -> NDArray[np.int64]:
+def groups(origins: Sequence[Origin]) -> IntArray:
     """Label (n,) of the connected group of each recording, from 0."""
     if not origins:
         return np.empty(0, dtype=np.int64)

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from flagdata.documents import column_json
 from flagdata.errors import CorruptError
 
@@ -61,20 +62,20 @@ class PairTable:
     recording: NDArray[np.str_]
     session: NDArray[np.str_]
     day: NDArray[np.str_]
-    seed: NDArray[np.int64]
-    seeded: NDArray[np.bool_]
-    object: NDArray[np.int64]
+    seed: IntArray
+    seeded: BoolArray
+    object: IntArray
     objects: NDArray[np.str_]
-    frame_first: NDArray[np.int64]
-    frame_count: NDArray[np.int64]
-    start: NDArray[np.int64]
-    end: NDArray[np.int64]
-    wind: NDArray[np.float64]
-    wind_sigma: NDArray[np.float64]
-    coverage: NDArray[np.float64]
-    staleness: NDArray[np.float64]
-    clock_sigma: NDArray[np.float64]
-    parameters: NDArray[np.float64]
+    frame_first: IntArray
+    frame_count: IntArray
+    start: IntArray
+    end: IntArray
+    wind: FloatArray
+    wind_sigma: FloatArray
+    coverage: FloatArray
+    staleness: FloatArray
+    clock_sigma: FloatArray
+    parameters: FloatArray
     names: NDArray[np.str_]
 
     def __len__(self) -> int:
@@ -124,7 +125,7 @@ class PairTable:
             names=names,
         )
 
-    def take(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Self:
+    def take(self, index: IntArray | BoolArray) -> Self:
         """The pairs at `index`, in its order, with the objects and parameter names that they use."""
         shared = ("objects", "names")
         taken = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in shared}
@@ -133,9 +134,7 @@ class PairTable:
         taken["parameters"] = taken["parameters"][:, known]
         return replace(self, **taken, objects=self.objects[used], names=self.names[known])
 
-    def parameter_columns(
-        self, rows: NDArray[np.int64] | Sequence[int] | slice = slice(None)
-    ) -> dict[str, NDArray[np.float64]]:
+    def parameter_columns(self, rows: IntArray | Sequence[int] | slice = slice(None)) -> dict[str, FloatArray]:
         """Name → (n,) values of some pairs, by default of all; NaN where a clip has no such parameter."""
         chosen = self.parameters[rows]
         return {str(name): chosen[:, k] for k, name in enumerate(self.names)}
@@ -150,7 +149,7 @@ class PairTable:
         query it was found."""
         digest = hashlib.sha256()
         for field in fields(self):
-            values: NDArray[Any] = getattr(self, field.name)
+            values: AnyArray = getattr(self, field.name)
             digest.update(f"{field.name} {values.shape}\n".encode())
             text = values.dtype.kind == "U"
             digest.update("\n".join(values.tolist()).encode() if text else np.ascontiguousarray(values).tobytes())
@@ -161,18 +160,18 @@ def _text(rows: pa.Table, column: str) -> NDArray[np.str_]:
     return np.array(rows[column].fill_null("").to_pylist(), dtype=np.str_)
 
 
-def _coded(rows: pa.Table, column: str) -> tuple[NDArray[np.str_], NDArray[np.int64]]:
+def _coded(rows: pa.Table, column: str) -> tuple[NDArray[np.str_], IntArray]:
     """The different texts of a column, sorted, and of each row which it has; as `np.unique`, without sorting all."""
     coded = rows[column].combine_chunks().dictionary_encode()
     texts, places = np.unique(np.array(coded.dictionary.to_pylist(), dtype=np.str_), return_inverse=True)
     return texts, places[coded.indices.to_numpy()].astype(np.int64)
 
 
-def _number(rows: pa.Table, column: str, *, null: float) -> NDArray[np.float64]:
+def _number(rows: pa.Table, column: str, *, null: float) -> FloatArray:
     return rows[column].fill_null(null).to_numpy().astype(np.float64)
 
 
-def _parameters(texts: Sequence[str | None], artifacts: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
+def _parameters(texts: Sequence[str | None], artifacts: Sequence[str]) -> tuple[FloatArray, NDArray[np.str_]]:
     """Numbers of JSON objects as columns. Texts and lists among the parameters stay in the catalog only."""
     owners = {text: artifact for text, artifact in zip(texts, artifacts, strict=True) if text}
     parsed = {

@@ -17,9 +17,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flagdata.arguments import checked
+from flagdata.arrays import BoolArray
 from flagdata.errors import InputError, UsageError
 from flagdata.schema import TRUTH_WINDOW, UNUSABLE, SampleFlag
 from flagdata.signals import Instants, Sensor, Series, WindSeries
@@ -120,7 +120,7 @@ class TruthSeries:
     time: Instants
     speed: Series
     held: Series
-    dead: NDArray[np.bool_]
+    dead: BoolArray
     period: float
     sensor: Sensor
 

@@ -23,9 +23,9 @@ import av
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 from PIL import Image
 
+from flagdata.arrays import AnyArray, Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.export.source import FILMED, Entry, Source, label_units
 from flagdata.schema import Kind
@@ -124,7 +124,7 @@ class _Made:
         times = entry.frame_times
         number, count = len(self.episodes), entry.count
         self.worst = max(self.worst, self._apart(entry))
-        columns: dict[str, NDArray[Any]] = {
+        columns: dict[str, AnyArray] = {
             "timestamp": (np.arange(count) / float(self.rate)).astype(np.float32),
             "frame_index": np.arange(count),
             "episode_index": np.full(count, number),
@@ -183,7 +183,7 @@ class _Made:
             )
         return apart
 
-    def _sized(self, entry: Entry, tally: _Tally) -> Iterator[NDArray[np.uint8]]:
+    def _sized(self, entry: Entry, tally: _Tally) -> Iterator[UInt8Array]:
         """The pictures of an entry one by one, (height, width) uint8, counted.
 
         Raises:
@@ -268,7 +268,7 @@ class _Tally:
         return cls(count=0, low=np.inf, high=-np.inf, total=0.0, squares=0.0)
 
     @classmethod
-    def of(cls, values: NDArray[Any]) -> _Tally:
+    def of(cls, values: AnyArray) -> _Tally:
         made = cls.empty()
         made.take(values[np.isfinite(values)].astype(np.float64))
         return made
@@ -283,7 +283,7 @@ class _Tally:
             squares=sum(part.squares for part in parts),
         )
 
-    def take(self, values: NDArray[np.float64]) -> None:
+    def take(self, values: FloatArray) -> None:
         if values.size:
             self.count += values.size
             self.low, self.high = min(self.low, float(values.min())), max(self.high, float(values.max()))
@@ -321,7 +321,7 @@ class _Data:
     def __exit__(self, *error: object) -> None:
         self._open.close()
 
-    def episode(self, columns: Mapping[str, NDArray[Any]], pictures: Sequence[bytes] | None) -> dict[str, int]:
+    def episode(self, columns: Mapping[str, AnyArray], pictures: Sequence[bytes] | None) -> dict[str, int]:
         """Append an episode, and say in which file it is."""
         if self._writer is None or self._written >= _DATA_BYTES:
             self._open.close()
@@ -358,7 +358,7 @@ class _Films:
             self._finish()
         self._open.close()
 
-    def episode(self, images: Iterator[NDArray[np.uint8]]) -> dict[str, Any]:
+    def episode(self, images: Iterator[UInt8Array]) -> dict[str, Any]:
         """Append the pictures of an episode, and say where they are."""
         begin = None
         for image in images:
@@ -382,7 +382,7 @@ class _Films:
             self._finish()
         return {f"videos/{CAMERA}/{name}": value for name, value in place.items()}
 
-    def _next(self, image: NDArray[np.uint8]) -> tuple[Any, Any]:
+    def _next(self, image: UInt8Array) -> tuple[Any, Any]:
         """Container and stream of a new file for pictures like this one."""
         height, width = image.shape
         if height % 2 or width % 2:
@@ -413,7 +413,7 @@ def _path(folder: Path, number: int, suffix: str) -> Path:
     return path
 
 
-def _wind(entry: Entry) -> dict[str, NDArray[np.float32]]:
+def _wind(entry: Entry) -> dict[str, Float32Array]:
     """The newest mean over 1 s at each frame: speed, σ and direction, and how old it is."""
     means, times = entry.record.wind_1hz(), entry.frame_times
     names = ("speed", "sigma", "direction")
@@ -426,7 +426,7 @@ def _wind(entry: Entry) -> dict[str, NDArray[np.float32]]:
     return {f"observation.wind_{name}": values.astype(np.float32) for name, values in found.items()}
 
 
-def _png(image: NDArray[np.uint8]) -> bytes:
+def _png(image: UInt8Array) -> bytes:
     buffer = io.BytesIO()
     Image.fromarray(image).convert("RGB").save(buffer, "PNG")
     return buffer.getvalue()

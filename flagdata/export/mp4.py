@@ -17,8 +17,8 @@ import numpy as np
 from av.video.codeccontext import VideoCodecContext
 from av.video.reformatter import ColorRange
 from av.video.stream import VideoStream
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.export.csv_text import cell, write_csv
 from flagdata.export.source import FILMED, IDENTITY, TRUTH, Entry, Source
@@ -74,7 +74,7 @@ class Mp4:
         }
 
 
-def presentation_times(times: NDArray[np.int64]) -> NDArray[np.int64]:
+def presentation_times(times: IntArray) -> IntArray:
     """Microseconds (n,) after the first frame, rounded; `times` (n,) in UTC ns.
 
     Raises:
@@ -121,7 +121,7 @@ def _configure(stream: VideoStream, shape: Sequence[int], crf: int, *, where: st
     context.options = {"crf": str(crf), "preset": "veryfast", "bf": "0", "threads": "1"}
 
 
-def _luma_frame(image: NDArray[np.uint8]) -> av.VideoFrame:
+def _luma_frame(image: UInt8Array) -> av.VideoFrame:
     """A gray image (height, width) as the full-range luma of a picture without colour."""
     height, width = image.shape
     planar = np.full((height * 3 // 2, width), 128, dtype=np.uint8)

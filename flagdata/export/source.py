@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.documents import column_json
 from flagdata.errors import CorruptError
 from flagdata.lake import Lake
@@ -103,7 +103,7 @@ class Entry:
         window = recipe.get("window", recipe.get("truth", {}).get("window", TRUTH_WINDOW))
         return int(times[0]) - round(window * NANOSECONDS), int(times[-1])
 
-    def images(self, size: int = 64) -> Iterator[NDArray[np.uint8]]:
+    def images(self, size: int = 64) -> Iterator[UInt8Array]:
         """The frames decoded, in order, as arrays (at most `size`, height, width) gray."""
         for begin in range(0, self.count, size):
             yield self.record.frames(self.first + begin, min(size, self.count - begin))

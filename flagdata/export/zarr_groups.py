@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
 import xarray
-from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray, IntArray, UInt8Array
 from flagdata.export.source import IDENTITY, TRUTH, Entry, Source, label_units
 from flagdata.schema import CHANNELS, Kind
 
@@ -86,10 +85,10 @@ def _numbers(entry: Entry) -> xarray.Dataset:
     return xarray.Dataset(variables, attrs={**known, "units": json.dumps(label_units()), "flagdata_label": text})
 
 
-def _frames(images: NDArray[np.uint8], attributes: Mapping[Any, Any]) -> xarray.Dataset:
+def _frames(images: UInt8Array, attributes: Mapping[Any, Any]) -> xarray.Dataset:
     about = {"units": "1", "long_name": CHANNELS["image"].about, "comment": CHANNELS["image"].frame}
     return xarray.Dataset({"image": (("frame", "height", "width"), images, about)}, attrs=attributes)
 
 
-def _instants(dimension: str, times: NDArray[np.int64], about: str) -> tuple[str, NDArray[Any], dict[str, str]]:
+def _instants(dimension: str, times: IntArray, about: str) -> tuple[str, AnyArray, dict[str, str]]:
     return dimension, times.astype("datetime64[ns]"), {"long_name": about}

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.errors import CorruptError, FlagdataError, InputError
 from flagdata.files import is_lerobot
 from flagdata.findings import Finding, Severity
@@ -50,7 +50,7 @@ class Stream:
     backward: int
 
     @classmethod
-    def of(cls, name: str, holds: str, stamps: NDArray[np.int64]) -> Stream:
+    def of(cls, name: str, holds: str, stamps: IntArray) -> Stream:
         steps = np.diff(stamps)
         forward = steps[steps > 0]
         median = float(np.median(forward)) if len(forward) else 0.0

@@ -70,22 +70,6 @@ Check = Callable[[], None]
 """Raises ConflictError where a lock may have been lost meanwhile, which that of a disk never is."""
 
 
-class Note(Protocol):
-    """The lease of a running transaction, which other processes see."""
-
-    def append(self, line: str) -> None:
-        """Adds a line; no collection that has not seen it runs afterwards."""
-        ...
-
-    def check(self) -> None:
-        """Checks that others still see it: see `Check`."""
-        ...
-
-    def close(self) -> None:
-        """Takes it away; what cannot be removed is left to a collection."""
-        ...
-
-
 class Locks(Protocol):
     """What the processes that use a lake know of each other."""
 
@@ -97,7 +81,7 @@ class Locks(Protocol):
         """Keeps all others out during the block."""
         ...
 
-    def note(self) -> Note:
+    def note(self) -> FileNote | TimedNote:
         """Begins the lease of a transaction."""
         ...
 
@@ -177,7 +161,7 @@ class FileNote:
                 raise
 
     def append(self, line: str) -> None:
-        """See `Note.append`."""
+        """Adds a line; no collection that has not seen it runs afterwards."""
         with self._locks.sharing():
             self._line(line)
 
@@ -368,7 +352,7 @@ class TimedNote(Held):
     """The lease of a transaction of a lake in a bucket."""
 
     def append(self, line: str) -> None:
-        """See `Note.append`."""
+        """Adds a line; no collection that has not seen it runs afterwards."""
         super().append(line)
         staging = self.place.parent.parent
         next(None for _ in _pauses(staging) if living(staging / _EXCLUSIVE, staging) is None)

@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray, Float32Array, FloatArray, IntArray
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, LimitError
 from flagdata.html import table
 from flagdata.lake.durable import disk_errors
@@ -56,9 +57,9 @@ _CHUNK = 1 << 20  # B
 _CHUNKS_A_SHARD = 64
 _HEAD = "flagdata_meshes"
 
-Floats = NDArray[np.float32]
+Floats = Float32Array
 Indices = NDArray[np.int32]
-Instants = NDArray[np.int64]
+Instants = IntArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -316,7 +317,7 @@ def store_errors(path: Path, what: str, *, fix: str = _RESTORE) -> Iterator[None
         raise CorruptError(f"{what}: {said[:300]}", where=str(path), fix=fix) from error
 
 
-def read_part(group: zarr.Group, name: str, first: int | None, last: int | None, *, where: str) -> NDArray[Any]:
+def read_part(group: zarr.Group, name: str, first: int | None, last: int | None, *, where: str) -> AnyArray:
     """Rows `first` to `last` of an array, once its size and its chunks are known to be within the limits.
 
     Raises:
@@ -348,7 +349,7 @@ _ATTRIBUTES: dict[str, dict[str, Any]] = {
 }
 
 
-def write_array(group: zarr.Group, name: str, values: NDArray[Any], dims: tuple[str, ...]) -> None:
+def write_array(group: zarr.Group, name: str, values: AnyArray, dims: tuple[str, ...]) -> None:
     """Write an array of a moving mesh or of markers into a Zarr group: chunked by its first axis, with its units."""
     from zarr.codecs import BloscCodec, TransposeCodec
 
@@ -412,7 +413,7 @@ def _check_offsets(offset: Instants, frames: int, total: int, name: str) -> None
         )
 
 
-def write_plain(group: zarr.Group, name: str, values: NDArray[Any], dims: tuple[str, ...] | None = None) -> None:
+def write_plain(group: zarr.Group, name: str, values: AnyArray, dims: tuple[str, ...] | None = None) -> None:
     """Write an array of a measurement into a Zarr group, in one chunk."""
     from zarr.codecs import BloscCodec
 
@@ -447,9 +448,9 @@ class MarkerSequence:
             not increase, two markers of one name.
     """
 
-    time: NDArray[np.int64]
-    positions: NDArray[np.float64]
-    rest: NDArray[np.float64]
+    time: IntArray
+    positions: FloatArray
+    rest: FloatArray
     names: tuple[str, ...]
     attributes: Mapping[str, Any] = field(default_factory=dict)
 

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
+
+from flagdata.arrays import UInt8Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,12 +33,12 @@ def figure_url(figure: Figure, *, dpi: float = 110) -> str:
     return data_url(png(figure, dpi=dpi), "image/png")
 
 
-def still(frame: NDArray[np.uint8] | Image.Image, *, side: int | None = None) -> str:
+def still(frame: UInt8Array | Image.Image, *, side: int | None = None) -> str:
     """A frame (height, width) as a JPEG in a data URL, at its own size or `side` pixels wide and high."""
     return _url([_sized(frame, side)], "jpeg", quality=85)
 
 
-def moving(clip: Sequence[NDArray[np.uint8]] | NDArray[np.uint8], *, rate: float, side: int) -> str:
+def moving(clip: Sequence[UInt8Array] | UInt8Array, *, rate: float, side: int) -> str:
     """The largest centred square of a clip (frame, height, width), gray or in colour, endless at `rate` [Hz], as a WebP
     in a data URL."""
     frames = np.asarray(clip)
@@ -47,7 +48,7 @@ def moving(clip: Sequence[NDArray[np.uint8]] | NDArray[np.uint8], *, rate: float
     return _url([_sized(frame, side) for frame in cut], "webp", quality=60, duration=round(1000 / rate), loop=0)
 
 
-def _sized(frame: NDArray[np.uint8] | Image.Image, side: int | None) -> Image.Image:
+def _sized(frame: UInt8Array | Image.Image, side: int | None) -> Image.Image:
     image = frame if isinstance(frame, Image.Image) else Image.fromarray(frame)
     return image if side is None else image.resize((side, side), Image.Resampling.LANCZOS)
 

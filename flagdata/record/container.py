@@ -22,6 +22,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Metadata, MetadataIndex, Schema
 from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.errors import CorruptError, InputError
 from flagdata.record.checksums import CHECKSUMS, FIX, HEAD_BYTES, ChannelChecksums, Checksums, metadata_checksum
 from flagdata.record.source import Bytes
@@ -73,10 +74,10 @@ class Messages:
         first: number of the topic's message in row 0.
     """
 
-    log_time: NDArray[np.int64]
-    publish_time: NDArray[np.int64]
-    offset: NDArray[np.int64]
-    length: NDArray[np.int64]
+    log_time: IntArray
+    publish_time: IntArray
+    offset: IntArray
+    length: IntArray
     checksums: NDArray[np.uint32] | None = None
     checksum: int | None = None
     first: int = 0
@@ -311,7 +312,7 @@ def message_count(chunk: ChunkIndex, channel: int) -> int:
 
 def _places(
     file: Bytes, summary: Summary, channel: int, *, where: str, span: tuple[int, int] | None
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[IntArray, IntArray, IntArray]:
     """Log time of messages, where their heads lie, and where the records of their chunks end, in file order.
 
     Args:
@@ -416,13 +417,11 @@ def check_chunk(file: Bytes, chunk: ChunkIndex, *, where: str) -> None:
         )
 
 
-def _empty() -> NDArray[np.int64]:
+def _empty() -> IntArray:
     return np.empty(0, dtype=np.int64)
 
 
-def _message_index(
-    file: Bytes, at: int, channel: int, end: int, *, where: str
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _message_index(file: Bytes, at: int, channel: int, end: int, *, where: str) -> tuple[IntArray, IntArray]:
     if at + _INDEX.size > end:
         raise CorruptError("a message index lies beyond the data", where=where, fix=_RECOVER)
     opcode, length, owner, size = _INDEX.unpack(read_exact(file, _INDEX.size, at, where=where))

@@ -31,7 +31,8 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
-from numpy.typing import NDArray
+
+from flagdata.arrays import BoolArray, IntArray, UInt8Array
 
 MAGIC = b"\x89MCAP0\r\n"
 _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
@@ -67,10 +68,10 @@ class MessageBlock:
         used: (n, w) bool.
     """
 
-    log_time: NDArray[np.int64]
-    publish_time: NDArray[np.int64]
-    payload: NDArray[np.uint8]
-    used: NDArray[np.bool_]
+    log_time: IntArray
+    publish_time: IntArray
+    payload: UInt8Array
+    used: BoolArray
 
 
 class McapFile:

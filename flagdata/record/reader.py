@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import simplejpeg
 from google.protobuf.message import DecodeError
-from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
+from flagdata.arrays import FloatArray, IntArray, UInt8Array
 from flagdata.errors import CorruptError, InputError, NotFoundError, UsageError
 from flagdata.record import container, messages
 from flagdata.record.key_frames import is_key
@@ -127,16 +127,16 @@ class Record:
         return kept.channels[TOPIC_IMAGE].count if kept is not None and self._in_spans else len(self._frames)
 
     @property
-    def frame_times(self) -> NDArray[np.int64]:
+    def frame_times(self) -> IntArray:
         """(n,) instants of the frames on the common clock [UTC ns]."""
         return self._frames.log_time
 
     @property
-    def device_frame_times(self) -> NDArray[np.int64]:
+    def device_frame_times(self) -> IntArray:
         """(n,) instants of the frames on the camera's own clock [UTC ns]."""
         return self._frames.publish_time
 
-    def times(self, first: int, count: int) -> NDArray[np.int64]:
+    def times(self, first: int, count: int) -> IntArray:
         """(count,) instants of consecutive frames from index `first` on the common clock [UTC ns].
 
         Raises:
@@ -145,7 +145,7 @@ class Record:
         table = self._span(first, count)
         return table.log_time[first - table.first :][:count]
 
-    def frames(self, first: int, count: int) -> NDArray[np.uint8]:
+    def frames(self, first: int, count: int) -> UInt8Array:
         """`count` consecutive frames from index `first`: (count, height, width) gray.
 
         Raises:
@@ -187,7 +187,7 @@ class Record:
             return [encode_jpeg(frame) for frame in self._video_frames(first, count)]
         return [bytes(picture) for picture in self._payloads(first, count)]
 
-    def timestamps(self, first: int, count: int) -> NDArray[np.int64]:
+    def timestamps(self, first: int, count: int) -> IntArray:
         """(count,) mid-exposures of frames on the common clock [UTC ns], from their messages.
 
         Raises:
@@ -209,7 +209,7 @@ class Record:
         if not len(table):
             return None
         samples = self._decode(TOPIC_WIND, messages.WindSample, table)
-        columns: dict[str, NDArray[np.float64]] = {}
+        columns: dict[str, FloatArray] = {}
         for channel, (name, _) in messages.WIND_FIELDS.items():
             if any(sample.HasField(name) for sample in samples):
                 columns[channel] = np.array([getattr(s, name) if s.HasField(name) else np.nan for s in samples])
@@ -223,7 +223,7 @@ class Record:
         )
 
     @property
-    def device_wind_times(self) -> NDArray[np.int64]:
+    def device_wind_times(self) -> IntArray:
         """(n,) instants of the wind samples on the anemometer's own clock [UTC ns]."""
         return self._messages(TOPIC_WIND).publish_time
 
@@ -274,7 +274,7 @@ class Record:
             fix=f"there are: {', '.join(self.attachments) or 'none'}",
         )
 
-    def _video_frames(self, first: int, count: int) -> NDArray[np.uint8]:
+    def _video_frames(self, first: int, count: int) -> UInt8Array:
         key = first
         pictures = self._payloads(first, count)
         while not is_key(pictures[0]):
@@ -330,7 +330,7 @@ class Record:
             self._check_chunks(table.offset[first : first + count])
         return parts
 
-    def _check_chunks(self, offsets: NDArray[np.int64]) -> None:
+    def _check_chunks(self, offsets: IntArray) -> None:
         starts = np.array([chunk.chunk_start_offset for chunk in self._summary.chunks], dtype=np.int64)
         for index in np.unique(np.searchsorted(starts, offsets, side="right") - 1).tolist():
             if index not in self._sound:

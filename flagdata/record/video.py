@@ -14,8 +14,8 @@ import av
 import numpy as np
 from av.error import FFmpegError
 from av.video.reformatter import ColorRange
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import CorruptError, InputError
 
 KEY_INTERVAL = 25
@@ -58,7 +58,7 @@ class VideoEncoder:
         }
         self._codec = codec
 
-    def encode(self, image: NDArray[np.uint8]) -> bytes:
+    def encode(self, image: UInt8Array) -> bytes:
         """The next picture, Annex B.
 
         Raises:
@@ -85,7 +85,7 @@ class VideoEncoder:
         return bytes(packets[0])
 
 
-def decode(pictures: Iterable[bytes | memoryview], *, where: str) -> list[NDArray[np.uint8]]:
+def decode(pictures: Iterable[bytes | memoryview], *, where: str) -> list[UInt8Array]:
     """Decode consecutive pictures, the first a key frame, to (height, width) gray.
 
     Raises:
@@ -94,7 +94,7 @@ def decode(pictures: Iterable[bytes | memoryview], *, where: str) -> list[NDArra
     codec: Any = av.CodecContext.create("h264", "r")
     codec.thread_count = 1
     codec.options = {"err_detect": "explode", "flags": "low_delay"}
-    frames: list[NDArray[np.uint8]] = []
+    frames: list[UInt8Array] = []
     count = 0
     try:
         for picture in pictures:
@@ -110,10 +110,10 @@ def decode(pictures: Iterable[bytes | memoryview], *, where: str) -> list[NDArra
     return frames
 
 
-def _plane(frame: av.VideoFrame, index: int) -> NDArray[np.uint8]:
+def _plane(frame: av.VideoFrame, index: int) -> UInt8Array:
     plane: Any = frame.planes[index]
     return np.frombuffer(plane, dtype=np.uint8).reshape(-1, plane.line_size)[: plane.height]
 
 
-def _gray(frame: av.VideoFrame) -> NDArray[np.uint8]:
+def _gray(frame: av.VideoFrame) -> UInt8Array:
     return _plane(frame, 0)[:, : frame.width].copy()

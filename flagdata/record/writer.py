@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import simplejpeg
 from mcap.well_known import MessageEncoding, SchemaEncoding
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray, UInt8Array
 from flagdata.averaging import average
 from flagdata.clock import ClockModel
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
@@ -57,11 +57,11 @@ class Payloads:
         used: (n, w) bool, which bytes of a row are its message.
     """
 
-    data: NDArray[np.uint8]
-    used: NDArray[np.bool_]
+    data: UInt8Array
+    used: BoolArray
 
 
-def samples(series: WindSeries, log_time: NDArray[np.int64], rows: slice) -> Payloads:
+def samples(series: WindSeries, log_time: IntArray, rows: slice) -> Payloads:
     """`WindSample` of some rows of a series, whose instants on the common clock are `log_time` (n,) [UTC ns]."""
     numbers = {messages.WIND_FIELDS[name]: values for name, values in series.channels.items()}
     parts = [_timestamp("timestamp", messages.WindSample, log_time[rows])]
@@ -104,7 +104,7 @@ def _number(name: str, kind: object) -> int:
     return fields[name].number  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def _tagged(tag: list[int], values: Payloads, present: NDArray[np.bool_]) -> Payloads:
+def _tagged(tag: list[int], values: Payloads, present: BoolArray) -> Payloads:
     """Values (n, w) behind their tag; rows that are not `present` are empty."""
     n = len(present)
     front = np.broadcast_to(np.array(tag, dtype=np.uint8), (n, len(tag)))
@@ -123,12 +123,12 @@ def _double(name: str, kind: object, values: Series, *, presence: bool) -> Paylo
     return _tagged(_tag(_number(name, kind), _DOUBLE), Payloads(data=data, used=np.ones(data.shape, bool)), written)
 
 
-def _integer(name: str, kind: object, values: NDArray[np.int64]) -> Payloads:
+def _integer(name: str, kind: object, values: IntArray) -> Payloads:
     """A whole number; 0 is left out."""
     return _tagged(_tag(_number(name, kind), _VARINT), _varint(values), values != 0)
 
 
-def _timestamp(name: str, kind: object, time: NDArray[np.int64]) -> Payloads:
+def _timestamp(name: str, kind: object, time: IntArray) -> Payloads:
     """A google.protobuf.Timestamp."""
     seconds, nanos = np.divmod(time, NANOSECONDS)
     inner = _joined(
@@ -142,7 +142,7 @@ def _timestamp(name: str, kind: object, time: NDArray[np.int64]) -> Payloads:
     return _tagged(_tag(_number(name, kind), _LENGTH), body, np.ones(len(time), dtype=bool))
 
 
-def _varint(values: NDArray[np.int64]) -> Payloads:
+def _varint(values: IntArray) -> Payloads:
     """Base-128 varints, least significant group first; of a negative number those of its two's complement."""
     unsigned = np.ascontiguousarray(values, dtype=np.int64).view(np.uint64)
     width = max(1, -(-int(unsigned.max(initial=0)).bit_length() // 7))
@@ -285,7 +285,7 @@ class RecordWriter:
                 self._writer.finish()
                 self._stream.sync()
 
-    def frame(self, *, log_time: int, publish_time: int, timestamp: int, image: NDArray[np.uint8] | bytes) -> None:
+    def frame(self, *, log_time: int, publish_time: int, timestamp: int, image: UInt8Array | bytes) -> None:
         """Append one frame.
 
         Args:
@@ -395,14 +395,14 @@ class RecordWriter:
         data = read() if kept is None else kept
         self._writer.add_attachment(log_time=log_time, name=name, media_type=media_type, data=data, size=size)
 
-    def _jpeg(self, image: NDArray[np.uint8] | bytes) -> bytes:
+    def _jpeg(self, image: UInt8Array | bytes) -> bytes:
         if not isinstance(image, bytes):
             return encode_jpeg(image, quality=self._quality)
         if not (image.startswith(b"\xff\xd8") and image.endswith(b"\xff\xd9")):
             raise InputError("a frame's bytes are not a JPEG", fix="give a (height, width) uint8 array or a whole JPEG")
         return image
 
-    def _picture(self, image: NDArray[np.uint8] | bytes) -> bytes:
+    def _picture(self, image: UInt8Array | bytes) -> bytes:
         if isinstance(image, bytes):
             if not image.startswith((b"\x00\x00\x01", b"\x00\x00\x00\x01")):
                 raise InputError("a frame's bytes are no H.264 picture", fix="give Annex B, or an array")
@@ -454,8 +454,8 @@ class RecordWriter:
         topic: str,
         kind: Any,
         payloads: Payloads,
-        log_time: NDArray[np.int64],
-        publish_time: NDArray[np.int64],
+        log_time: IntArray,
+        publish_time: IntArray,
     ) -> None:
         """Add many messages of one topic, in order of log time."""
         first = 0
@@ -504,7 +504,7 @@ class RecordWriter:
             self._flushed = log_time
 
 
-def encode_jpeg(image: NDArray[np.uint8], *, quality: int = JPEG_QUALITY) -> bytes:
+def encode_jpeg(image: UInt8Array, *, quality: int = JPEG_QUALITY) -> bytes:
     """JPEG of a (height, width) uint8 gray image.
 
     Raises:
@@ -514,7 +514,7 @@ def encode_jpeg(image: NDArray[np.uint8], *, quality: int = JPEG_QUALITY) -> byt
     return simplejpeg.encode_jpeg(np.ascontiguousarray(image)[..., None], quality=quality, colorspace="GRAY")
 
 
-def _check_image(image: NDArray[np.uint8]) -> None:
+def _check_image(image: UInt8Array) -> None:
     if image.ndim != 2 or image.dtype != np.uint8 or image.size == 0:
         raise InputError(
             f"a frame cannot have the shape {image.shape} and the type {image.dtype}",

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from flagdata.arrays import AnyArray, FloatArray
 from flagdata.errors import LimitError
 from flagdata.export.source import FILMED, entry_of
 from flagdata.lake import Lake
@@ -110,7 +111,7 @@ def _markers(lake: Lake, name: str) -> Film:
     return Film(times=sequence.time, jpegs=lambda at, count: [drawn(index) for index in range(at, at + count)])
 
 
-def _camera(points: NDArray[Any]) -> Callable[[NDArray[Any]], NDArray[np.float64]]:
+def _camera(points: AnyArray) -> Callable[[AnyArray], FloatArray]:
     """Places points (n, 3) [m], z up, on a square picture that holds all of the given ones: (n, 3) x, y [px], depth."""
     forth = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])  # along the picture's x
     away = np.array([np.cos(_AZIMUTH) * np.cos(_HEIGHT), np.sin(_AZIMUTH) * np.cos(_HEIGHT), np.sin(_HEIGHT)])
@@ -121,7 +122,7 @@ def _camera(points: NDArray[Any]) -> Callable[[NDArray[Any]], NDArray[np.float64
     scale = _SIDE * (1 - 2 * _ROOM) / max(float((high - low)[:2].max()), 1e-9)
     middle = (low + high)[:2] / 2
 
-    def place(points: NDArray[Any]) -> NDArray[np.float64]:
+    def place(points: AnyArray) -> FloatArray:
         seen = points @ axes.T
         seen[:, :2] = (seen[:, :2] - middle) * scale + _SIDE / 2
         return seen
@@ -129,7 +130,7 @@ def _camera(points: NDArray[Any]) -> Callable[[NDArray[Any]], NDArray[np.float64
     return place
 
 
-def _cloth(corners: NDArray[np.float64], positions: NDArray[Any], faces: NDArray[np.int32]) -> Image.Image:
+def _cloth(corners: FloatArray, positions: AnyArray, faces: NDArray[np.int32]) -> Image.Image:
     """Triangles from the farthest to the nearest, lighter where they face the viewer."""
     image = Image.new("L", (_SIDE, _SIDE), _GROUND)
     pen = ImageDraw.Draw(image)

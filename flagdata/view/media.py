@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flagdata.align.recording import CURVE
+from flagdata.arrays import FloatArray
 from flagdata.documents import from_stored_json
 from flagdata.errors import CorruptError, NotFoundError, UsageError
 from flagdata.lake import Lake
@@ -175,9 +175,7 @@ class Media:
         return record
 
 
-def _line(
-    time: NDArray[np.float64], speed: NDArray[np.float64], sigma: NDArray[np.float64], direction: NDArray[np.float64]
-) -> dict[str, Any]:
+def _line(time: FloatArray, speed: FloatArray, sigma: FloatArray, direction: FloatArray) -> dict[str, Any]:
     """A line of at most `POINTS` points, and a band: ± σ, or the lowest and highest of the stretch of each point."""
     stretch = math.ceil(len(time) / POINTS)
     starts = np.arange(0, len(time), stretch)

@@ -35,7 +35,7 @@ CASES = [
     ),
     Case("meshes/folder.py", "give it by --rate", "ingest meshes", ("ingest meshes --rate 25",)),
     Case(
-        "meshes/checks.py",
+        "meshes/store.py",
         "name the unit of the positions by --unit",
         "ingest meshes --rate 25 --unit mm",
         ("ingest meshes --rate 25 --unit m",),
@@ -78,7 +78,7 @@ def test_a_cloth_whose_texture_is_in_millimetres_is_exported_in_metres(user: Use
     assert "a cloth of 500 m by its texture coordinates" in refused.err
     assert "fix:   export it with texture coordinates in metres\n" in refused.err
     export("mm", "m")
-    user.meets("meshes/checks.py", "name the unit of the positions by --unit", *command)
+    user.meets("meshes/store.py", "name the unit of the positions by --unit", *command)
     user.again("--unit", "mm")
     export("m", "m")
     user.succeeds(*command)

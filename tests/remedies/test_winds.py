@@ -323,7 +323,7 @@ CASES = [
         files={"a.csv": ZONED},
     ),
     Case(
-        "formats/stamped_nmea.py",
+        "formats/nmea.py",
         "name another format by --as",
         "ingest a.nmea --as nmea-stamped",
         ("ingest a.nmea --as nmea",),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.recipe import QualityRules
@@ -52,7 +53,7 @@ class Reading:
     time: Instants
     channels: Mapping[str, Series]
     flags: NDArray[np.uint16]
-    line: NDArray[np.int64]
+    line: IntArray
     sensor: Sensor
     step: int
     rules: QualityRules = field(default_factory=QualityRules)
@@ -72,7 +73,7 @@ class Reading:
         if any(len(a) != n for a in arrays):
             raise InputError("columns of different lengths", fix="this is a defect of the format's reader")
 
-    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Reading:
+    def take(self, rows: IntArray | BoolArray) -> Reading:
         """The rows chosen, in the order given."""
         return replace(
             self,
@@ -91,7 +92,7 @@ class Reading:
 
     def marked(
         self,
-        rows: NDArray[np.bool_],
+        rows: BoolArray,
         kind: str,
         what: str,
         *,
@@ -122,7 +123,7 @@ class Reading:
 
     def without(
         self,
-        rows: NDArray[np.bool_],
+        rows: BoolArray,
         kind: str,
         what: str,
         *,
@@ -144,7 +145,7 @@ def described(by: str) -> Finding:
     )
 
 
-def streams(channels: Mapping[str, Series]) -> tuple[tuple[tuple[str, ...], NDArray[np.int64]], ...]:
+def streams(channels: Mapping[str, Series]) -> tuple[tuple[tuple[str, ...], IntArray], ...]:
     """Kinds of wind that come in rows of their own, as sentences do, and the rows of each.
 
     Channels that share a row are of one kind, whatever is missing from other rows. Of a log with one kind all rows are
@@ -162,12 +163,12 @@ def streams(channels: Mapping[str, Series]) -> tuple[tuple[tuple[str, ...], NDAr
         for name, values in channels.items()
         if name in WIND_CHANNELS or name.endswith(("wind_direction", "wind_direction_magnetic"))
     }
-    groups: list[tuple[set[str], NDArray[np.bool_]]] = []
+    groups: list[tuple[set[str], BoolArray]] = []
     for name, here in known.items():
         if not here.any():
             continue
         names, rows = {name}, here.copy()
-        apart: list[tuple[set[str], NDArray[np.bool_]]] = []
+        apart: list[tuple[set[str], BoolArray]] = []
         for other, theirs in groups:
             if bool((theirs & rows).any()):
                 names |= other

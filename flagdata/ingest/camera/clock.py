@@ -14,8 +14,8 @@ from fractions import Fraction
 
 import av
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.findings import Finding
 
 COUNTERS = {"mpegts": 1 << 33, "mpeg": 1 << 33, "flv": 1 << 32, "asf": 1 << 32}
@@ -58,7 +58,7 @@ class Counter:
         return counted
 
 
-def restart(stamps: NDArray[np.int64], *, tick: Fraction) -> int | None:
+def restart(stamps: IntArray, *, tick: Fraction) -> int | None:
     """The first of some stamps whose clock started anew; None where it never did.
 
     A single stamp that is wrong, or a few, are no restart: the stamps around them agree with each other.

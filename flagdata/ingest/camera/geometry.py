@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import UsageError
 from flagdata.ingest.camera.options import Crop, CropBox
 
@@ -39,7 +40,7 @@ class Orientation:
             return 90 if self.flip_x else 270
         return 180 if self.flip_y else 0
 
-    def apply(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def apply(self, image: UInt8Array) -> UInt8Array:
         """The upright picture of a stored one, (height, width) → (height, width) or (width, height)."""
         upright = image.T if self.transpose else image
         if self.flip_x:
@@ -134,7 +135,7 @@ class Geometry:
             left, top, right, bottom = top, left, bottom, right
         return (left * self.width, top * self.height, min(right, 1.0) * self.width, min(bottom, 1.0) * self.height)
 
-    def render(self, luma: Image.Image, *, black: float, white: float) -> NDArray[np.uint8]:
+    def render(self, luma: Image.Image, *, black: float, white: float) -> UInt8Array:
         """The output square of one stored luma picture; (size, size) uint8.
 
         Scaling is a separable convolution with the Hamming-windowed kernel, widened when it shrinks: it averages over
@@ -158,7 +159,7 @@ class Geometry:
         return square
 
 
-def _stretch(image: NDArray[np.generic], *, black: float, white: float) -> NDArray[np.uint8]:
+def _stretch(image: NDArray[np.generic], *, black: float, white: float) -> UInt8Array:
     if image.dtype == np.uint8:
         if (black, white) == (0, 255):
             return image.astype(np.uint8, copy=False)

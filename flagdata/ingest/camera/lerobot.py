@@ -24,9 +24,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 from PIL import Image
 
+from flagdata.arrays import IntArray
 from flagdata.documents import read_json
 from flagdata.errors import CorruptError, InputError, LimitError, NotFoundError, TimeError, UnknownNameError
 from flagdata.files import LEROBOT_INFO, is_beside
@@ -258,7 +258,7 @@ def _stated(row: Mapping[str, Any], name: str, where: str) -> float:
     return value
 
 
-def stamps_of(table: pa.Table, where: str) -> NDArray[np.int64]:
+def stamps_of(table: pa.Table, where: str) -> IntArray:
     """(n,) instants of frames [UTC ns], or nanoseconds from the episode's start where the table has no `TIME`.
 
     Raises:

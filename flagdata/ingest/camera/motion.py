@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from flagdata.arrays import BoolArray, Float32Array, UInt8Array
 from flagdata.errors import RefusedError
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
 from flagdata.ingest.camera.options import CropBox
@@ -69,8 +70,8 @@ def propose(source: Source, *, rate: float, where: str) -> CropProposal:
     facts = source.facts
     wide, high = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)
     whole = settle_crop("whole", width=wide, height=high)
-    maps: list[NDArray[np.float32]] = []
-    shown: NDArray[np.uint8] | None = None
+    maps: list[Float32Array] = []
+    shown: UInt8Array | None = None
     stride = min(8, max(1, round(_STEP * rate)))
     for pictures in source.samples(_RUNS, _PER_RUN, stride):
         if len(pictures) < 3:
@@ -123,7 +124,7 @@ def cut_off(crop: CropBox, proposal: CropProposal, *, wide: int) -> dict[str, in
     return {edge: pixels for edge, pixels in beyond.items() if pixels > least}
 
 
-def _small(picture: Picture, source: Source, whole: CropBox, size: int) -> NDArray[np.uint8]:
+def _small(picture: Picture, source: Source, whole: CropBox, size: int) -> UInt8Array:
     """The whole upright picture with its longer side scaled to `size`, without padding."""
     facts, luma = source.facts, picture.luma()
     geometry = Geometry(
@@ -138,7 +139,7 @@ def _small(picture: Picture, source: Source, whole: CropBox, size: int) -> NDArr
     return geometry.render(luma.image, black=luma.black, white=luma.white)[top : top + high, left : left + wide]
 
 
-def _deviation(frames: NDArray[np.uint8]) -> NDArray[np.float32]:
+def _deviation(frames: UInt8Array) -> Float32Array:
     """Temporal standard deviation of each pixel, global changes of gain and offset taken out; (n, h, w) → (h, w)."""
     stack = frames.astype(np.float32)
     reference = np.median(stack, axis=0)
@@ -157,7 +158,7 @@ def _deviation(frames: NDArray[np.uint8]) -> NDArray[np.float32]:
     return stack.std(axis=0)
 
 
-def _region(maps: NDArray[np.float32], motion: NDArray[np.float32], *, where: str) -> tuple[NDArray[np.bool_], float]:
+def _region(maps: Float32Array, motion: Float32Array, *, where: str) -> tuple[BoolArray, float]:
     """The connected region with most of the motion's energy in the median run, and its share of it.
 
     Args:
@@ -194,7 +195,7 @@ def _region(maps: NDArray[np.float32], motion: NDArray[np.float32], *, where: st
     return _with_tip(region, maps), float(energy[best] / energy.sum())
 
 
-def _with_tip(region: NDArray[np.bool_], maps: NDArray[np.float32]) -> NDArray[np.bool_]:
+def _with_tip(region: BoolArray, maps: Float32Array) -> BoolArray:
     """The region with what moves in any run and touches it; without, where that is much larger than the region."""
     from scipy import ndimage  # only now: ingesting a log needs none of it
 
@@ -211,12 +212,12 @@ def _with_tip(region: NDArray[np.bool_], maps: NDArray[np.float32]) -> NDArray[n
     return grown if _extent(grown) <= _GROWTH * _extent(region) else region
 
 
-def _extent(region: NDArray[np.bool_]) -> int:
+def _extent(region: BoolArray) -> int:
     rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
     return int(max(rows[-1] - rows[0], columns[-1] - columns[0])) + 1
 
 
-def _extent_box(region: NDArray[np.bool_], *, wide: int, high: int) -> CropBox:
+def _extent_box(region: BoolArray, *, wide: int, high: int) -> CropBox:
     """The box just around `region`, in pixels of the upright image."""
     rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
     scale = wide / region.shape[1]
@@ -225,7 +226,7 @@ def _extent_box(region: NDArray[np.bool_], *, wide: int, high: int) -> CropBox:
     return CropBox(x=x, y=y, width=right - x, height=bottom - y)
 
 
-def _box_around(region: NDArray[np.bool_], *, wide: int, high: int) -> CropBox:
+def _box_around(region: BoolArray, *, wide: int, high: int) -> CropBox:
     """The padded square around `region`, in pixels of the upright image, moved inside it and cut where it is larger."""
     rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
     scale = wide / region.shape[1]
@@ -240,7 +241,7 @@ def _box_around(region: NDArray[np.bool_], *, wide: int, high: int) -> CropBox:
     return CropBox(x=x, y=y, width=width, height=height)
 
 
-def _draw(shown: NDArray[np.uint8], motion: NDArray[np.floating], box: CropBox, *, wide: int) -> bytes:
+def _draw(shown: UInt8Array, motion: NDArray[np.floating], box: CropBox, *, wide: int) -> bytes:
     heat = Image.fromarray(motion.astype(np.float32)).resize(
         (shown.shape[1], shown.shape[0]), Image.Resampling.BILINEAR
     )

@@ -8,8 +8,8 @@ from fractions import Fraction
 from typing import Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.clock import REORDER
@@ -57,7 +57,7 @@ class Timing:
 
 
 def survey(
-    stamps: NDArray[np.int64],
+    stamps: IntArray,
     *,
     tick: Fraction,
     missing: int,

@@ -8,10 +8,8 @@ from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flagdata.addresses import local_path
+from flagdata.arrays import UInt8Array
 from flagdata.errors import LimitError, RefusedError, UsageError
 from flagdata.files import is_folder, is_lerobot
 from flagdata.findings import Finding, Severity
@@ -165,7 +163,7 @@ class CameraStream:
     def close(self) -> None:
         self._source.close()
 
-    def unpadded(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def unpadded(self, image: UInt8Array) -> UInt8Array:
         """The crop in a frame's image (size, size), without the padding about it; (height, width) uint8."""
         top, left, high, wide = self._geometry.placement
         return image[top : top + high, left : left + wide]

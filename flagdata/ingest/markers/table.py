@@ -18,8 +18,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
-from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray, FloatArray, IntArray
 from flagdata.errors import InputError, LimitError, UsageError
 from flagdata.files import check_input
 from flagdata.ingest.headings import check_columns, small_table_head
@@ -245,7 +245,7 @@ def _sequence(table: pa.Table, options: MarkerOptions, where: str) -> MarkerSequ
     )
 
 
-def _frames(table: pa.Table, options: MarkerOptions, where: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _frames(table: pa.Table, options: MarkerOptions, where: str) -> tuple[IntArray, IntArray]:
     """(n,) instants of the frames from 0 [ns], and (row,) the frame each row is of."""
     column = "time" if "time" in table.column_names else "frame"
     values = _numbers(table, column)
@@ -259,9 +259,7 @@ def _frames(table: pa.Table, options: MarkerOptions, where: str) -> tuple[NDArra
     return instants, frame.astype(np.int64)
 
 
-def _seats(
-    table: pa.Table, axis: str, marker: NDArray[np.int64], names: NDArray[Any], where: str
-) -> NDArray[np.float64]:
+def _seats(table: pa.Table, axis: str, marker: IntArray, names: AnyArray, where: str) -> FloatArray:
     """(marker,) the one value of u or v that each marker's rows give."""
     values = _numbers(table, axis)
     given = np.isfinite(values)
@@ -285,5 +283,5 @@ def _seats(
     return low
 
 
-def _numbers(table: pa.Table, column: str) -> NDArray[np.float64]:
+def _numbers(table: pa.Table, column: str) -> FloatArray:
     return table[column].to_numpy(zero_copy_only=False).astype(np.float64)

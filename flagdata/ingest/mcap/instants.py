@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.errors import CorruptError, TimeError
 from flagdata.findings import Finding, Severity
 from flagdata.timebase import NANOSECONDS, parse
@@ -110,14 +111,14 @@ class Order:
     findings: tuple[Finding, ...]
 
 
-def few_without_date(stamps: NDArray[np.int64], logged: NDArray[np.int64]) -> NDArray[np.bool_]:
+def few_without_date(stamps: IntArray, logged: IntArray) -> BoolArray:
     """(n,) which messages have a stamp before 1980 or after 2100, as of a clock that was not set yet, where most have a
     date and the log has one for these."""
     odd = (stamps < _FROM) | (stamps >= _TO)
     return odd & (logged >= _FROM) & (logged < _TO) & (2 * int(odd.sum()) < len(stamps))
 
 
-def order_of(stamps: NDArray[np.int64], logged: NDArray[np.int64], *, sort: bool, where: str) -> Order:
+def order_of(stamps: IntArray, logged: IntArray, *, sort: bool, where: str) -> Order:
     """The order of messages by their instants.
 
     Args:
@@ -138,12 +139,12 @@ def order_of(stamps: NDArray[np.int64], logged: NDArray[np.int64], *, sort: bool
     return Order(rows=rows, in_time=in_time, findings=found)
 
 
-def _late(stamps: NDArray[np.int64]) -> bool:
+def _late(stamps: IntArray) -> bool:
     """Whether some come after others by more than a slip."""
     return bool(np.any(np.maximum.accumulate(stamps) - stamps > SLIP)) if len(stamps) else False
 
 
-def _disordered(stamps: NDArray[np.int64], logged: NDArray[np.int64], where: str) -> Finding:
+def _disordered(stamps: IntArray, logged: IntArray, where: str) -> Finding:
     back = float((np.maximum.accumulate(stamps) - stamps).max()) / NANOSECONDS
     steps = int((np.diff(logged) < -SLIP).sum())
     return Finding.of(
@@ -157,9 +158,7 @@ def _disordered(stamps: NDArray[np.int64], logged: NDArray[np.int64], where: str
     )
 
 
-def clock_findings(
-    stamps: NDArray[np.int64], logged: NDArray[np.int64], *, unset: int, unstated: int, where: str
-) -> Iterator[Finding]:
+def clock_findings(stamps: IntArray, logged: IntArray, *, unset: int, unstated: int, where: str) -> Iterator[Finding]:
     """What to report of the clocks of messages.
 
     Args:

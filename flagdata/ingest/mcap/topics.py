@@ -24,6 +24,7 @@ from mcap.records import Channel, Schema
 from mcap_protobuf.decoder import DecoderFactory
 from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.documents import from_stored_json
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError, UnknownNameError
 from flagdata.findings import Finding
@@ -136,9 +137,9 @@ class Index:
     """
 
     rows: NDArray[np.intp]
-    places: NDArray[np.int64]
-    stamps: NDArray[np.int64]
-    logged: NDArray[np.int64]
+    places: IntArray
+    stamps: IntArray
+    logged: IntArray
     in_time: bool
     findings: tuple[Finding, ...]
 
@@ -312,7 +313,7 @@ def index(
     )
 
 
-def _check_successive(path: Path, topic: str, places: NDArray[np.int64], logged: NDArray[np.int64]) -> None:
+def _check_successive(path: Path, topic: str, places: IntArray, logged: IntArray) -> None:
     """Refuse the files of a folder that were recorded at the same time: their messages are no one series.
 
     Raises:

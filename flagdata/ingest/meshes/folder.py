@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.documents import SIZE_LIMIT, from_json
 from flagdata.errors import InputError, LimitError, NotFoundError
 from flagdata.files import check_input, is_beside
@@ -185,7 +185,7 @@ def _sequence(
     )
 
 
-def _listed(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def _listed(faces: IntArray) -> IntArray:
     """Faces (face, 3) in one order, each from its least vertex on, with its orientation."""
     begin = faces.argmin(axis=1)[:, None]
     turned = np.take_along_axis(faces, (begin + np.arange(3)) % 3, axis=1)

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.files import check_input
 
@@ -24,11 +24,11 @@ CORNERS = 256
 _FLAT = 1e-9
 """Twice an area over the squared extent of the polygon below which three corners are in a line."""
 
-Points = NDArray[np.float64]
-Triples = NDArray[np.int64]
+Points = FloatArray
+Triples = IntArray
 
 
-def fans(sizes: NDArray[np.int64]) -> tuple[Triples, NDArray[np.int64]]:
+def fans(sizes: IntArray) -> tuple[Triples, IntArray]:
     """Polygons of so many corners, whose corners lie one polygon after another, as fans around their first corners.
 
     Returns:
@@ -42,7 +42,7 @@ def fans(sizes: NDArray[np.int64]) -> tuple[Triples, NDArray[np.int64]]:
     return np.stack([base, base + step + 1, base + step + 2], axis=1), polygon
 
 
-def convex(points: Points) -> NDArray[np.bool_]:
+def convex(points: Points) -> BoolArray:
     """(polygon,) which of some polygons of equally many corners, (polygon, corner, 2), are strictly convex."""
     ahead = np.roll(points, -1, axis=1) - points
     after = np.roll(ahead, -1, axis=1)
@@ -164,10 +164,10 @@ class Obj:
         textured: whether `rest` was given (`vt`), and not taken from x and y.
     """
 
-    positions: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    rest: NDArray[np.float64]
-    velocities: NDArray[np.float64] | None = None
+    positions: FloatArray
+    faces: IntArray
+    rest: FloatArray
+    velocities: FloatArray | None = None
     textured: bool = True
 
 
@@ -260,11 +260,11 @@ class _Faces:
     """
 
     path: Path
-    corners: NDArray[np.int64]
-    sizes: NDArray[np.int64]
-    lines: NDArray[np.int64]
+    corners: IntArray
+    sizes: IntArray
+    lines: IntArray
 
-    def refuse(self, corners: NDArray[np.bool_], what: str, *, fix: str) -> None:
+    def refuse(self, corners: BoolArray, what: str, *, fix: str) -> None:
         """Refuse the first face that has one of some corners.
 
         Raises:
@@ -274,7 +274,7 @@ class _Faces:
             face = int(np.repeat(np.arange(len(self.sizes)), self.sizes)[int(corners.argmax())])
             raise InputError(what, where=f"{self.path}, line {self.lines[face]}", fix=fix)
 
-    def triangles(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    def triangles(self, points: FloatArray) -> IntArray:
         """(triangle, 3) places of corners: each face split in the plane of its corners, (corner, 2) or (corner, 3).
 
         Raises:
@@ -301,9 +301,7 @@ class _Faces:
         return places
 
 
-def _assembled(
-    faces: _Faces, positions: NDArray[np.float64], texture: NDArray[np.float64], velocities: dict[int, list[float]]
-) -> Obj:
+def _assembled(faces: _Faces, positions: FloatArray, texture: FloatArray, velocities: dict[int, list[float]]) -> Obj:
     counts = np.array([len(positions), len(texture)])
     wrong = (faces.corners[:, 0] < 1) | (faces.corners > counts).any(axis=1) | (faces.corners[:, 1] < 0)
     faces.refuse(wrong, "a corner names what is not there", fix="correct the face")

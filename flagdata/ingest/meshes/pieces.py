@@ -10,11 +10,11 @@ from dataclasses import replace
 from hashlib import blake2b
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from flagdata.arrays import IntArray
 from flagdata.findings import Finding
 from flagdata.lake.meshes import Mesh, MeshSequence, RaggedMeshSequence
 
@@ -102,7 +102,7 @@ def slits(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
     )
 
 
-def _unjoined(mesh: Mesh) -> NDArray[np.int64]:
+def _unjoined(mesh: Mesh) -> IntArray:
     """Vertices at open edges that lie next to another such one of their piece, without an edge between them."""
     edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
     edges, counts = np.unique(edges, axis=0, return_counts=True)
@@ -120,7 +120,7 @@ def _unjoined(mesh: Mesh) -> NDArray[np.int64]:
     return np.array(sorted(found), dtype=np.int64)
 
 
-def _piece(mesh: Mesh) -> NDArray[np.int64]:
+def _piece(mesh: Mesh) -> IntArray:
     """(vertex,) label of the connected piece of each vertex."""
     rows, columns = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     graph = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(len(mesh.rest), len(mesh.rest)))
@@ -137,7 +137,7 @@ def _touching(mesh: Mesh, *, texture: bool = False) -> int:
     return int((np.bincount(both[:, 0])[group] > 1).sum())
 
 
-def _twins(sequence: MeshSequence) -> NDArray[np.int64]:
+def _twins(sequence: MeshSequence) -> IntArray:
     """(vertex,) the first vertex of the faces that is the same throughout; a vertex by itself is its own."""
     own = np.arange(len(sequence.rest))
     used = np.unique(sequence.faces)
@@ -152,7 +152,7 @@ def _twins(sequence: MeshSequence) -> NDArray[np.int64]:
     return own
 
 
-def _is_surface(faces: NDArray[np.int64]) -> bool:
+def _is_surface(faces: IntArray) -> bool:
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     _, counts = np.unique(edges, axis=0, return_counts=True)
     return bool((edges[:, 0] != edges[:, 1]).all() and counts.max() <= 2)

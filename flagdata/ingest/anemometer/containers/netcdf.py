@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray, IntArray
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, snapped
@@ -112,9 +112,7 @@ def since(attributes: Mapping[str, Any], *, where: str) -> Since:
     return Since(unit=unit, zero=from_datetime(zero, nanosecond=int((date["f"] or "").ljust(9, "0"))))
 
 
-def instants(
-    values: NDArray[Any], attributes: Mapping[str, Any], *, where: str
-) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
+def instants(values: AnyArray, attributes: Mapping[str, Any], *, where: str) -> tuple[IntArray, tuple[Finding, ...]]:
     """(n,) UTC nanoseconds of a variable as it is stored, `NOT_A_TIME` for missing ones and years beyond 1970 to 2199.
 
     Raises:

@@ -28,10 +28,10 @@ from dataclasses import replace
 from typing import Any
 
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer.formats import over_ground
 from flagdata.ingest.anemometer.formats.serial_lines import Defect, Instrument, Sample, read_lines
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.samples.platform import settled
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
@@ -114,9 +114,7 @@ class Canboat:
             )
         found = tuple(finding for finding in reading.findings if finding.kind != "non-data-lines")
         knots = [speed / UNITS["kn"].scale for speed in network.speeds]
-        channels, about = over_ground.settled(
-            reading.channels, options, speeds=knots, source=f"PGN {_WIND}", where=where
-        )
+        channels, about = settled(reading.channels, options, speeds=knots, source=f"PGN {_WIND}", where=where)
         sensor = Sensor(name=f"NMEA 2000 device {next(iter(network.devices))}", resolution=0.01)
         return replace(reading, channels=channels, sensor=sensor, findings=(*found, about))
 

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer import recipe as recipes
@@ -132,7 +132,7 @@ class HostRows:
         self._read = 0
         self.first_line = recipe.file.header + 1
 
-    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+    def blocks(self, width: int) -> Iterator[tuple[IntArray, list[list[str]]]]:
         """Line numbers and rows of `width` cells."""
         delimiter = self._layout.delimiter
         for first, lines in self._source.blocks():

@@ -13,8 +13,8 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer.formats.sentences import TimeMark
@@ -52,9 +52,7 @@ class Bursts:
         if kind == self.first:
             self.starts.append(line)
 
-    def placed(
-        self, lines: NDArray[np.int64], winds: Sequence[Hashable], at: NDArray[np.int64], marks: Instants
-    ) -> Instants | None:
+    def placed(self, lines: IntArray, winds: Sequence[Hashable], at: IntArray, marks: Instants) -> Instants | None:
         """Instants of lines by the marks of their bursts; `None` where the stream shows no bursts.
 
         Args:
@@ -76,7 +74,7 @@ class Bursts:
         first = np.searchsorted(burst, burst)
         return time + (np.arange(len(lines)) - first) * _ORDER
 
-    def _edges(self, at: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _edges(self, at: IntArray) -> IntArray:
         """(m,) the first line of each burst: that of its mark, or the first after the last mark that begins a burst.
 
         The stream is taken to begin with a whole burst, unless it ends with as many lines behind its last mark as
@@ -92,12 +90,12 @@ class Bursts:
         return np.where(found <= at, found, at)
 
 
-def _numbered(winds: Sequence[Hashable]) -> NDArray[np.int64]:
+def _numbered(winds: Sequence[Hashable]) -> IntArray:
     kinds = {kind: number for number, kind in enumerate(dict.fromkeys(winds))}
     return np.array([kinds[kind] for kind in winds], dtype=np.int64)
 
 
-def _apart(lines: NDArray[np.int64], winds: Sequence[Hashable], at: NDArray[np.int64], marks: Instants) -> bool:
+def _apart(lines: IntArray, winds: Sequence[Hashable], at: IntArray, marks: Instants) -> bool:
     """Whether marks are far apart for the lines between them, and each kind of wind comes once between them."""
     spacing, between = float(np.median(np.diff(marks))), float(np.median(np.diff(at)))
     if spacing < max(_LEAST, _SILENT * between * SENTENCE):
@@ -166,7 +164,7 @@ class TimeLine:
 
     def place(
         self,
-        lines: NDArray[np.int64],
+        lines: IntArray,
         *,
         date: dt.date | None,
         where: str,
@@ -231,7 +229,7 @@ class TimeLine:
             return None
         return next((kind for kind in _TRUST if kind in self.line), None)
 
-    def _of_one(self, kind: str, lines: NDArray[np.int64], *, date: dt.date | None, where: str) -> Placed:
+    def _of_one(self, kind: str, lines: IntArray, *, date: dt.date | None, where: str) -> Placed:
         """Instants of a few lines about one mark: within the second before or behind it, in their order."""
         at = np.array(self.line[kind], dtype=np.int64)
         clock = np.array(self.clock[kind], dtype=np.int64)
@@ -251,9 +249,7 @@ class TimeLine:
             raise TimeError(NO_TIME if not counts else "the stream carries only one time", where=where, fix=NO_TIME_FIX)
         return next(kind for kind in _TRUST if 2 * counts.get(kind, 0) >= most)
 
-    def _start(
-        self, at: NDArray[np.int64], clock: NDArray[np.int64], day: NDArray[np.int64], date: dt.date | None, where: str
-    ) -> int:
+    def _start(self, at: IntArray, clock: IntArray, day: IntArray, date: dt.date | None, where: str) -> int:
         """Days since 1970 of the first mark."""
         epoch = dt.date(1970, 1, 1).toordinal()
         if self.dated is None:
@@ -278,14 +274,12 @@ class TimeLine:
         return start
 
 
-def _reach(lines: NDArray[np.int64], mark: int) -> int:
+def _reach(lines: IntArray, mark: int) -> int:
     """How many lines the farthest of `lines` is from a mark."""
     return int(np.abs(lines - mark).max()) if len(lines) else 0
 
 
-def _one_clock(
-    marks: Instants, at: NDArray[np.int64], choice: ClockChoice | None
-) -> tuple[Instants, tuple[Finding, ...]]:
+def _one_clock(marks: Instants, at: IntArray, choice: ClockChoice | None) -> tuple[Instants, tuple[Finding, ...]]:
     """Marks on one clock where it was set back for good; those that leave its time for a moment do not rise."""
     most = max(FEW, len(marks) // 100)
     stray = clocks.excursions(marks, most=most) if len(clocks.set_back(marks)) <= most else np.zeros(len(marks), bool)
@@ -306,7 +300,7 @@ def _backwards(count: int, where: str, what: str) -> Finding:
     return Finding.of("time-backwards", what, count=count, where=where)
 
 
-def _interpolate(lines: NDArray[np.int64], at: NDArray[np.int64], marks: NDArray[np.int64]) -> Instants:
+def _interpolate(lines: IntArray, at: IntArray, marks: IntArray) -> Instants:
     """Instants of lines between marks, exact to a nanosecond relative to the marks' first."""
     base = int(marks[0])
     relative = (marks - base).astype(np.float64)

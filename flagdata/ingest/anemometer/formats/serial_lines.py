@@ -19,6 +19,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats.sentences import tag_time
@@ -310,10 +311,8 @@ def _gather(source: TextFile, instrument: Instrument) -> _Gathered:
     return gathered
 
 
-def _channels(
-    gathered: _Gathered, line: NDArray[np.int64], keep: NDArray[np.bool_]
-) -> tuple[dict[str, NDArray[np.float64]], list[Finding]]:
-    channels: dict[str, NDArray[np.float64]] = {}
+def _channels(gathered: _Gathered, line: IntArray, keep: BoolArray) -> tuple[dict[str, FloatArray], list[Finding]]:
+    channels: dict[str, FloatArray] = {}
     found: list[Finding] = []
     for name, column in gathered.channels.items():
         values = np.frombuffer(column, dtype=np.float64)[keep].copy()
@@ -327,7 +326,7 @@ def _channels(
     return channels, found
 
 
-def _missing(channels: dict[str, NDArray[np.float64]]) -> NDArray[np.uint16]:
+def _missing(channels: dict[str, FloatArray]) -> NDArray[np.uint16]:
     """The flag MISSING where there is neither a speed nor a pair of horizontal components."""
     speeds = [values for name, values in channels.items() if name.endswith("wind_speed")]
     pair = [channels[name] for name in ("wind_x", "wind_y") if name in channels]
@@ -339,7 +338,7 @@ def _missing(channels: dict[str, NDArray[np.float64]]) -> NDArray[np.uint16]:
 
 
 def _findings(
-    gathered: _Gathered, instrument: Instrument, flags: NDArray[np.uint16], line: NDArray[np.int64], unreadable: int
+    gathered: _Gathered, instrument: Instrument, flags: NDArray[np.uint16], line: IntArray, unreadable: int
 ) -> list[Finding]:
     found: list[Finding] = []
     places = {defect: [n for n in numbers if n > 1] for defect, numbers in gathered.defects.items()}

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats.described import Described
@@ -108,7 +108,7 @@ def _mean_of_angles(name: str, names: Sequence[str]) -> Finding:
     return Finding.of("direction-mean-of-numbers", what, fix=fix)
 
 
-def _continuity(record: NDArray[np.float64], line: NDArray[np.int64]) -> tuple[Finding, ...]:
+def _continuity(record: FloatArray, line: IntArray) -> tuple[Finding, ...]:
     """Rows lost, repeated or renumbered, by the logger's own count."""
     steps = np.diff(record)
     lost, back = steps > 1, steps < 0
@@ -121,9 +121,7 @@ def _continuity(record: NDArray[np.float64], line: NDArray[np.int64]) -> tuple[F
     )
 
 
-def _report(
-    kind: str, rows: NDArray[np.bool_], line: NDArray[np.int64], what: str, *, count: int | None = None
-) -> tuple[Finding, ...]:
+def _report(kind: str, rows: BoolArray, line: IntArray, what: str, *, count: int | None = None) -> tuple[Finding, ...]:
     """The warning about some rows, with their number and the first of them; none where there are none."""
     if not rows.any():
         return ()
@@ -132,7 +130,7 @@ def _report(
     return (Finding(kind=kind, severity=Severity.WARNING, count=count, where=where, what=f"{count} {what}"),)
 
 
-def _faults(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _faults(values: FloatArray) -> BoolArray:
     """Rows whose diagnostic word reports a fault: a warning bit, or, where it does not count measurements, not 0."""
     known = np.isfinite(values) & (np.abs(values) < 2**31)
     word = np.where(known, values, 0).astype(np.int64)

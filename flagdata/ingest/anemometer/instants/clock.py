@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR
 from flagdata.signals import Instants
@@ -117,7 +117,7 @@ def set_back_a_little(time: Instants, choice: ClockChoice | None) -> tuple[Jump,
     return tuple(found)
 
 
-def _length(steady: NDArray[np.bool_]) -> int:
+def _length(steady: BoolArray) -> int:
     """How many of the first are true."""
     return len(steady) if steady.all() else int(np.argmin(steady))
 
@@ -153,7 +153,7 @@ def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
     return tuple(found)
 
 
-def excursions(time: Instants, *, most: int) -> NDArray[np.bool_]:
+def excursions(time: Instants, *, most: int) -> BoolArray:
     """Rows whose stamps leave the log's time and come back to it: (n,), at most `most` rows at a time.
 
     Such a stretch lies outside the longest rise, between a step back and a step forward of half its size or more and
@@ -180,7 +180,7 @@ def excursions(time: Instants, *, most: int) -> NDArray[np.bool_]:
     return wild
 
 
-def longest_rise(time: Instants) -> NDArray[np.int64]:
+def longest_rise(time: Instants) -> IntArray:
     """Indices of a longest non-decreasing subsequence (Schensted 1961; patience sorting)."""
     tops: list[int] = []
     heads: list[int] = []
@@ -207,9 +207,7 @@ def disordered(time: Instants) -> bool:
     return unusual[0] < unusual[1]
 
 
-def sorted_as_given(
-    time: Instants, line: NDArray[np.int64], choice: ClockChoice | None
-) -> tuple[NDArray[np.int64], Finding] | None:
+def sorted_as_given(time: Instants, line: IntArray, choice: ClockChoice | None) -> tuple[IntArray, Finding] | None:
     """The order of rows that the user says to be out of order, and its finding; `None` where there is none.
 
     Rows of one stamp stay in the file's order.
@@ -225,7 +223,7 @@ def sorted_as_given(
     return np.argsort(time, kind="stable"), found
 
 
-def continued(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None) -> tuple[Instants, NDArray[np.bool_]]:
+def continued(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None) -> tuple[Instants, BoolArray]:
     """One clock through all jumps, and which rows were shifted for it: (n,) both.
 
     Args:
@@ -242,7 +240,7 @@ def continued(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None)
 def report(
     time: Instants,
     jumps: Sequence[Jump],
-    line: NDArray[np.int64],
+    line: IntArray,
     choice: ClockChoice | None,
     *,
     kept: bool = False,

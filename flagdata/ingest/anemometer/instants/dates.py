@@ -14,8 +14,8 @@ from typing import Literal
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.errors import TimeError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants import stamps
@@ -121,7 +121,7 @@ def date_form(texts: Sequence[str], *, given: Order | None, where: str) -> tuple
     return sign.join(parts[letter] for letter in chosen[0]), chosen[0], reason
 
 
-def refuse_twelve(wall: NDArray[np.int64], *, line: NDArray[np.int64], where: str) -> None:
+def refuse_twelve(wall: IntArray, *, line: IntArray, where: str) -> None:
     """Refuse stamps of a clock of twelve hours without AM or PM.
 
     They have hours of 1 to 12 alone and go on, but for the falls from 12:59 to 1:00 within a day.
@@ -148,8 +148,8 @@ def refuse_twelve(wall: NDArray[np.int64], *, line: NDArray[np.int64], where: st
 
 
 def completed(
-    wall: NDArray[np.int64], form: str, *, date: dt.date | None, line: NDArray[np.int64], where: str
-) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
+    wall: IntArray, form: str, *, date: dt.date | None, line: IntArray, where: str
+) -> tuple[IntArray, tuple[Finding, ...]]:
     """Wall-clock nanoseconds of stamps without a date or a year that `parse` has read, in the order of time.
 
     Args:
@@ -202,8 +202,8 @@ def _date_given(what: str, date: dt.date, follow: str) -> tuple[Finding, ...]:
 
 
 def since_start(
-    count: NDArray[np.int64], form: str, *, start: int | None, line: NDArray[np.int64], where: str
-) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
+    count: IntArray, form: str, *, start: int | None, line: IntArray, where: str
+) -> tuple[IntArray, tuple[Finding, ...]]:
     """UTC nanoseconds of counts since a start; `start` is the instant of the first row.
 
     Raises:

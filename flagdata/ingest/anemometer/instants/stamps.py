@@ -34,8 +34,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import UsageError
 from flagdata.timebase import NANOSECONDS
 
@@ -173,10 +173,10 @@ class Stamps:
         step: the resolution of the stamps as written [ns]: the last digit that is ever used.
     """
 
-    ns: NDArray[np.int64]
-    utc: NDArray[np.bool_]
-    valid: NDArray[np.bool_]
-    distant: NDArray[np.bool_]
+    ns: IntArray
+    utc: BoolArray
+    valid: BoolArray
+    distant: BoolArray
     step: int
 
 
@@ -310,7 +310,7 @@ def _plain(text: pa.StringArray) -> Stamps | None:
     return _counts(ns, np.ones(len(ns), dtype=bool), step)
 
 
-def _counts(ns: NDArray[np.int64], valid: NDArray[np.bool_], step: int, *, utc: bool = False) -> Stamps:
+def _counts(ns: IntArray, valid: BoolArray, step: int, *, utc: bool = False) -> Stamps:
     """Stamps of one kind, all with their zone or all without."""
     none = np.zeros(len(ns), dtype=bool)
     return Stamps(ns=np.where(valid, ns, 0), utc=valid.copy() if utc else none, valid=valid, distant=none, step=step)
@@ -341,7 +341,7 @@ def _without_exponents(text: pa.StringArray, scale: int) -> pa.StringArray:
     return pc.replace_with_mask(text, written, pa.array(whole, pa.string()))
 
 
-def _numbers(text: pa.StringArray) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
+def _numbers(text: pa.StringArray) -> tuple[FloatArray, BoolArray, int]:
     """Numbers, which cells are any, and the most digits behind the point."""
     pointed = pc.replace_substring(text, ",", ".")
     number = pc.match_substring_regex(pointed, r"^\d{1,15}(\.\d*)?([eE][-+]?\d{1,2})?$")
@@ -377,7 +377,7 @@ def _elapsed(text: pa.StringArray, form: str) -> Stamps:
     return _counts(ns, valid, step)
 
 
-def snapped(ns: NDArray[np.int64], whole: int, within: int) -> NDArray[np.int64]:
+def snapped(ns: IntArray, whole: int, within: int) -> IntArray:
     """Instants, those within so much of a multiple of `whole` on it."""
     near = np.round(ns / whole).astype(np.int64) * whole
     return np.where(np.abs(ns - near) <= within, near, ns)
@@ -388,7 +388,7 @@ def _field(found: pa.StructArray, name: str) -> Any:
     return None if index < 0 else pc.struct_field(found, [index])
 
 
-def _part(found: pa.StructArray, name: str) -> NDArray[np.int64] | None:
+def _part(found: pa.StructArray, name: str) -> IntArray | None:
     """One named group as integers, 0 where absent; `None` when the format has no such group."""
     column = _field(found, name)
     if column is None:
@@ -397,29 +397,27 @@ def _part(found: pa.StructArray, name: str) -> NDArray[np.int64] | None:
     return pc.cast(filled, pa.int64()).to_numpy(zero_copy_only=False)
 
 
-def _midnight(year: NDArray[np.int64], month: NDArray[np.int64]) -> NDArray[np.int64]:
+def _midnight(year: IntArray, month: IntArray) -> IntArray:
     """Days since 1970 of the first day of a month."""
     months = (12 * (year - 1970) + month - 1).astype("datetime64[M]")
     return months.astype("datetime64[D]").astype(np.int64)
 
 
-def _days(
-    year: NDArray[np.int64], month: NDArray[np.int64], day: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _days(year: IntArray, month: IntArray, day: IntArray) -> tuple[IntArray, BoolArray]:
     """Days since 1970 and whether the date exists."""
     first = _midnight(year, month)
     known = (month >= 1) & (month <= 12) & (day >= 1) & (day <= _midnight(year, month + 1) - first)
     return first + day - 1, known
 
 
-def _month(found: pa.StructArray) -> NDArray[np.int64]:
+def _month(found: pa.StructArray) -> IntArray:
     """The month of each name, 0 for none."""
     names = pc.utf8_lower(pc.coalesce(_field(found, "b"), ""))
     place = pc.fill_null(pc.index_in(names, pa.array(list(_MONTHS))), -1).to_numpy(zero_copy_only=False)
     return np.array([*_MONTHS.values(), 0], dtype=np.int64)[place]
 
 
-def _fraction(found: pa.StructArray) -> tuple[NDArray[np.int64], int]:
+def _fraction(found: pa.StructArray) -> tuple[IntArray, int]:
     """Nanoseconds of the fraction, and the most digits it ever has."""
     column = _field(found, "f")
     if column is None:
@@ -430,7 +428,7 @@ def _fraction(found: pa.StructArray) -> tuple[NDArray[np.int64], int]:
     return pc.cast(padded, pa.int64()).to_numpy(zero_copy_only=False), digits
 
 
-def _offset(found: pa.StructArray, n: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _offset(found: pa.StructArray, n: int) -> tuple[IntArray, BoolArray]:
     """Nanoseconds east of UTC that each stamp states, and whether it states any."""
     offset = np.zeros(n, dtype=np.int64)
     column = _field(found, "z")

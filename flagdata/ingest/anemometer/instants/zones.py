@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, tzinfo
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.errors import FlagdataError, TimeError, ZoneMissingError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants.clock import usual
@@ -48,9 +48,7 @@ _STATED = re.compile(
 )
 
 
-def to_utc(
-    wall: NDArray[np.int64], place: tzinfo, *, lines: NDArray[np.int64], where: str
-) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
+def to_utc(wall: IntArray, place: tzinfo, *, lines: IntArray, where: str) -> tuple[IntArray, tuple[Finding, ...]]:
     """UTC nanoseconds of wall-clock nanoseconds, in the order of the rows.
 
     Args:
@@ -85,9 +83,7 @@ def to_utc(
     return wall - offset, tuple(found)
 
 
-def _second_pass(
-    wall: NDArray[np.int64], rows: NDArray[np.int64], length: int, place: tzinfo, where: str
-) -> NDArray[np.int64]:
+def _second_pass(wall: IntArray, rows: IntArray, length: int, place: tzinfo, where: str) -> IntArray:
     """Which of the rows in a repeated interval [ns] are of its second pass."""
     steps, step = np.diff(wall[rows[0] : rows[-1] + 1]), usual(wall)
     back = np.flatnonzero((steps < -length // 2) | ((steps == 0) & (step >= length)))
@@ -107,7 +103,7 @@ def _second_pass(
 
 
 def instants(
-    wall: NDArray[np.int64], utc: NDArray[np.bool_], *, line: NDArray[np.int64], zone_name: str | None, where: str
+    wall: IntArray, utc: BoolArray, *, line: IntArray, zone_name: str | None, where: str
 ) -> tuple[Instants, tuple[Finding, ...]]:
     """UTC nanoseconds of stamps, some of which may state their own zone.
 

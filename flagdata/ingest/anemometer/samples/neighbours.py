@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.averaging import average
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants.clock import span
@@ -63,7 +63,7 @@ def hours_off(series: WindSeries, other: WindSeries, *, name: str) -> Finding | 
     )
 
 
-def _changes(series: WindSeries, length: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _changes(series: WindSeries, length: int) -> tuple[IntArray, FloatArray]:
     """Numbers of bins since 1970 and the change of the logarithm of their mean speed from the bin before."""
     means = average(series, float(length))
     number = (means.time // (length * NANOSECONDS)).astype(np.int64)
@@ -72,9 +72,7 @@ def _changes(series: WindSeries, length: int) -> tuple[NDArray[np.int64], NDArra
     return number[1:][follows], change[follows]
 
 
-def _score(
-    mine: NDArray[np.int64], one: NDArray[np.float64], theirs: NDArray[np.int64], two: NDArray[np.float64], lag: int
-) -> tuple[float, float, int]:
+def _score(mine: IntArray, one: FloatArray, theirs: IntArray, two: FloatArray, lag: int) -> tuple[float, float, int]:
     """Score and correlation with `mine` moved later by `lag` bins, and the number of bins; 0 where they are few."""
     common, here, there = np.intersect1d(mine + lag, theirs, assume_unique=True, return_indices=True)
     if len(common) < FEWEST:

@@ -24,8 +24,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.errors import TimeError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants import clock
@@ -123,7 +123,7 @@ def _without_copies(reading: Reading) -> Reading:
     return reading.without(twice, "duplicate-rows", what)
 
 
-def _differ(reading: Reading, one: NDArray[np.int64] | slice, other: NDArray[np.int64] | slice) -> NDArray[np.bool_]:
+def _differ(reading: Reading, one: IntArray | slice, other: IntArray | slice) -> BoolArray:
     """(m,) whether rows have other values than others."""
     differ = np.zeros(len(reading.line[one]), dtype=bool)
     for values in reading.channels.values():
@@ -165,7 +165,7 @@ def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> R
     return _continued(settled, jumps, choice)
 
 
-def _believable(time: NDArray[np.int64], jump: Jump) -> bool:
+def _believable(time: IntArray, jump: Jump) -> bool:
     """Whether a step back is a clock that was set; else it may be files joined in another order."""
     passed_again = int(time[jump.row :].max()) > int(time[jump.row - 1])
     return jump.size >= -DAY and (jump.whole or jump.size >= -_SMALL or passed_again)
@@ -211,12 +211,12 @@ def _continued(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | 
 class _Runs:
     """Runs of rows of one stamp: rows, time from each stamp to the next [ns], each row's place in its run."""
 
-    rows: NDArray[np.int64]
-    room: NDArray[np.int64]
-    place: NDArray[np.int64]
+    rows: IntArray
+    room: IntArray
+    place: IntArray
 
     @classmethod
-    def of(cls, time: NDArray[np.int64]) -> _Runs:
+    def of(cls, time: IntArray) -> _Runs:
         start = np.flatnonzero(np.concatenate(([True], np.diff(time) != 0)))
         rows = np.diff(np.append(start, len(time)))
         return cls(rows=rows, room=np.diff(time[start]), place=np.arange(len(time)) - np.repeat(start, rows))
@@ -260,7 +260,7 @@ def _distinct(reading: Reading, where: str) -> Reading:
     return reading.without(stuck, "duplicate-stamps", what, severity=Severity.ERROR, fix=_STATIONS)
 
 
-def _in_room(time: NDArray[np.int64], runs: _Runs) -> NDArray[np.int64]:
+def _in_room(time: IntArray, runs: _Runs) -> IntArray:
     """Runs here and there, spread over the room that the neighbours leave: behind the stamp, else before it; of a fast
     logger that leaves none, within half a period."""
     period, rows = int(np.median(runs.room)) if len(runs.room) else 0, runs.rows
@@ -278,7 +278,7 @@ def _in_room(time: NDArray[np.int64], runs: _Runs) -> NDArray[np.int64]:
     return time + np.repeat(start, rows) + runs.place * np.repeat(step, rows)
 
 
-def _evenly(reading: Reading, runs: _Runs) -> tuple[NDArray[np.int64], float, int]:
+def _evenly(reading: Reading, runs: _Runs) -> tuple[IntArray, float, int]:
     """Runs all over, spread from stamp to stamp; the period of the rows and the usual time between stamps [ns].
 
     The period is the median over the stamps of the time to the next one, divided by the rows between. Where the next is

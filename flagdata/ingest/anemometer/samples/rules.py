@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading, streams
@@ -75,8 +75,8 @@ def impossible(reading: Reading) -> Reading:
 
 
 def direction(
-    name: str, angle: NDArray[np.float64], line: NDArray[np.int64], *, offset: float = 0.0
-) -> tuple[NDArray[np.float64], tuple[Finding, ...]]:
+    name: str, angle: FloatArray, line: IntArray, *, offset: float = 0.0
+) -> tuple[FloatArray, tuple[Finding, ...]]:
     """Angles with those left out (NaN) that no instrument writes: -180° to 360° is possible.
 
     Args:
@@ -259,12 +259,12 @@ def stale(reading: Reading) -> Reading:
 
 
 def _longer(
-    same: NDArray[np.bool_],
-    starts: NDArray[np.int64],
-    lengths: NDArray[np.int64],
-    span: NDArray[np.float64],
+    same: BoolArray,
+    starts: IntArray,
+    lengths: IntArray,
+    span: FloatArray,
     allowed: float | None,
-) -> tuple[NDArray[np.bool_], str, str | None]:
+) -> tuple[BoolArray, str, str | None]:
     """Which runs of repeats are too long, in words, and what to do where the air was that steady."""
     if allowed is not None:
         return span > allowed, f"for longer than the {allowed:g} s its recipe allows", None
@@ -286,27 +286,27 @@ def _longer(
     return long | stuck, f"{fewest} times or more, which chance and resolution do not explain", fix
 
 
-def _limit(n: int, share: NDArray[np.float64]) -> NDArray[np.int64]:
+def _limit(n: int, share: FloatArray) -> IntArray:
     """Repeats in a row that chance does not explain among n rows of which `share` repeat the one before them."""
     kept = np.clip(share, 0.05, 0.999)
     return np.maximum(_STALE_SHORTEST, np.ceil(math.log(n / _STALE_CHANCE) / -np.log(kept))).astype(np.int64)
 
 
-def _least(speed: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _least(speed: FloatArray) -> BoolArray:
     """(n,) rows whose speed is the least that a coarse instrument shows above calm: it stays there as calm air does."""
     above = speed[np.isfinite(speed) & (speed > 0)]
     step, least = resolution(above), float(above.min(initial=np.inf))
     return (speed == least) & (step >= _COARSE_STEP) & (abs(least - step) <= _LEAST_OFF * step)
 
 
-def _runs(same: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _runs(same: BoolArray) -> tuple[IntArray, IntArray]:
     """First row and number of repeats of each run of repeats."""
     edges = np.diff(same.astype(np.int8), prepend=np.int8(0), append=np.int8(0))
     starts = np.flatnonzero(edges == 1)
     return starts, np.flatnonzero(edges == -1) - starts
 
 
-def _within(starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> NDArray[np.int64]:
+def _within(starts: IntArray, lengths: IntArray) -> IntArray:
     """All rows of runs."""
     return np.repeat(starts - np.cumsum(lengths) + lengths, lengths) + np.arange(int(lengths.sum()))
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import ZeroOffset
@@ -43,19 +43,19 @@ class Zero:
 
     offset: float
     sigma: float
-    idle: NDArray[np.bool_]
+    idle: BoolArray
     seconds: float
     jump: float
-    leaves: NDArray[np.bool_]
+    leaves: BoolArray
 
 
-def resolution(values: NDArray[np.float64]) -> float:
+def resolution(values: FloatArray) -> float:
     """Smallest step between different readings that occurs [same unit], 0 when all are equal."""
     levels = np.unique(np.round(values[np.isfinite(values)], 9))
     return float(np.diff(levels).min()) if len(levels) > 1 else 0.0
 
 
-def estimate(time: NDArray[np.int64], speed: NDArray[np.float64]) -> Zero | None:
+def estimate(time: IntArray, speed: FloatArray) -> Zero | None:
     """The zero offset shown by idle stretches, `None` where there is not enough idle time.
 
     Args:

@@ -9,8 +9,8 @@ from typing import TypeAlias
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.errors import UsageError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants import clock, dates, stamps, zones
@@ -25,7 +25,7 @@ NEWEST_FIRST = 0.9
 
 Block: TypeAlias = Columns | Sequence[Sequence[str]]
 """Rows of cells, or their columns."""
-Order: TypeAlias = slice | NDArray[np.int64]
+Order: TypeAlias = slice | IntArray
 """Rows of a table, by a slice or by their indices."""
 
 
@@ -66,7 +66,7 @@ class RowClock:
         self.bare_dates += bare
         return found
 
-    def add(self, found: Stamps, keep: NDArray[np.bool_]) -> None:
+    def add(self, found: Stamps, keep: BoolArray) -> None:
         self.ns.add(found.ns[keep])
         self.utc.add(found.utc[keep])
         self.step = min(self.step, found.step)
@@ -75,7 +75,7 @@ class RowClock:
         """Whether every stamp states its zone, as Unix times do, or needs none, as counts since a start."""
         return dates.is_elapsed(self.form) or bool(self.utc.view().all())
 
-    def order(self, line: NDArray[np.int64], choice: ClockChoice | None) -> tuple[Order, tuple[Finding, ...]]:
+    def order(self, line: IntArray, choice: ClockChoice | None) -> tuple[Order, tuple[Finding, ...]]:
         """The rows from the oldest on, for logs that list the newest first or out of order; and its findings.
 
         Args:
@@ -98,7 +98,7 @@ class RowClock:
         return np.arange(len(wall))[order][sorting[0]], (*found, sorting[1])
 
     def instants(
-        self, order: Order, *, line: NDArray[np.int64], zone_name: str | None, where: str, given: Given
+        self, order: Order, *, line: IntArray, zone_name: str | None, where: str, given: Given
     ) -> tuple[Instants, tuple[Finding, ...]]:
         """The instants and what was found; the blocks are let go."""
         wall, utc = self.ns.view()[order], self.utc.view()[order]

@@ -11,6 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from flagdata import compass
+from flagdata.arrays import BoolArray, FloatArray, IntArray, UInt8Array
 from flagdata.errors import InputError, NothingMeasuredError, UnknownNameError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants import dates, zones
@@ -40,7 +41,7 @@ class Rows(Protocol):
     shift: int
     first_line: int
 
-    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Block]]: ...
+    def blocks(self, width: int) -> Iterator[tuple[IntArray, Block]]: ...
 
     def findings(self) -> tuple[Finding, ...]: ...
 
@@ -55,7 +56,7 @@ class Table:
     """
 
     reading: Reading
-    extra: Mapping[str, NDArray[np.float64]]
+    extra: Mapping[str, FloatArray]
 
 
 @dataclass
@@ -71,12 +72,12 @@ class _Column:
     values: Growing[np.float64] = field(default_factory=lambda: Growing(np.float64))
     states: Growing[np.uint8] = field(default_factory=lambda: Growing(np.uint8))
 
-    def value(self, order: Order) -> NDArray[np.float64]:
+    def value(self, order: Order) -> FloatArray:
         """All values; they are let go, so that a long log is not held twice."""
         found, self.values = self.values.view()[order], Growing(np.float64)
         return found
 
-    def state(self, order: Order) -> NDArray[np.uint8]:
+    def state(self, order: Order) -> UInt8Array:
         """All states; likewise."""
         found, self.states = self.states.view()[order], Growing(np.uint8)
         return found
@@ -88,9 +89,9 @@ class _Check:
 
     layout: CheckLayout
     index: int
-    right: list[NDArray[np.bool_]] = field(default_factory=list)
+    right: list[BoolArray] = field(default_factory=list)
 
-    def faults(self, order: Order, line: NDArray[np.int64]) -> tuple[NDArray[np.bool_], tuple[Finding, ...]]:
+    def faults(self, order: Order, line: IntArray) -> tuple[BoolArray, tuple[Finding, ...]]:
         fault = ~np.concatenate(self.right)[order]
         if not fault.any():
             return fault, ()
@@ -125,7 +126,7 @@ class _Gathered:
         only = [] if self.rows is None else [self.rows]
         return 1 + max([*only, *self.clock.columns, *(column.index for column in [*self.columns(), *self.checks])])
 
-    def add(self, line: NDArray[np.int64], block: Block, recipe: Recipe) -> None:
+    def add(self, line: IntArray, block: Block, recipe: Recipe) -> None:
         if self.rows is not None and recipe.rows is not None:
             wanted = _among(block, self.rows, (recipe.rows.value,))
             if not wanted.any():
@@ -162,11 +163,11 @@ class _Gathered:
             right = _among(block, check.index, check.layout.values)
             check.right.append(right[keep])
 
-    def line(self) -> NDArray[np.int64]:
+    def line(self) -> IntArray:
         return self.lines.view()
 
 
-def _still(states: Mapping[str, NDArray[np.uint8]]) -> dict[str, NDArray[np.bool_]]:
+def _still(states: Mapping[str, UInt8Array]) -> dict[str, BoolArray]:
     """Where a word for calm air stands in a speed: the speed's name and those of its directions → (n,) rows.
 
     WMO-No. 8 (part I, chapter 5) and WMO-No. 306 (FM 15, 00000KT): calm air has speed 0 and no direction.
@@ -179,9 +180,7 @@ def _still(states: Mapping[str, NDArray[np.uint8]]) -> dict[str, NDArray[np.bool
     }
 
 
-def _of_cells(
-    kind: str, severity: Severity, name: str, here: NDArray[np.bool_], line: NDArray[np.int64], what: str
-) -> Finding:
+def _of_cells(kind: str, severity: Severity, name: str, here: BoolArray, line: IntArray, what: str) -> Finding:
     """The finding about the cells of a channel in the rows `here` (n,)."""
     count = int(here.sum())
     return Finding(
@@ -200,14 +199,14 @@ def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str, points: Map
     return ["" if value is None else f"{value:g}".replace(".", decimal) for value in degrees]
 
 
-def _where(block: Block, wanted: NDArray[np.bool_]) -> Block:
+def _where(block: Block, wanted: BoolArray) -> Block:
     """The rows of a block that are wanted (n,)."""
     if isinstance(block, Columns):
         return block.where(wanted)
     return [row for row, kept in zip(block, wanted.tolist(), strict=True) if kept]
 
 
-def _among(block: Block, index: int, values: Sequence[str]) -> NDArray[np.bool_]:
+def _among(block: Block, index: int, values: Sequence[str]) -> BoolArray:
     """(n,) whether the trimmed cells of a column are among `values`."""
     if isinstance(block, Columns):
         return block.among(index, values)
@@ -276,7 +275,7 @@ def read_table(
     host_time = None
     if gathered.host is not None:
         host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
-    channels: dict[str, NDArray[np.float64]] = {}
+    channels: dict[str, FloatArray] = {}
     flags = np.zeros(len(line), dtype=np.uint16)
     states = {name: column.state(order) for name, column in gathered.channels.items()}
     sensor, still = recipe.sensor, _still(states)
@@ -416,7 +415,7 @@ def _index(column: str | int, rows: Rows, where: str) -> int:
     return names.index(column)
 
 
-def in_si(value: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:
+def in_si(value: FloatArray, layout: ChannelLayout) -> FloatArray:
     """Cells of a column in SI, by the recipe's calibration; directions still as the vane gives them."""
     if layout.gain != 1.0 or layout.offset != 0.0:
         value = value * layout.gain + layout.offset
@@ -424,20 +423,20 @@ def in_si(value: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float
     return value if stated.scale == 1.0 and stated.offset == 0.0 else stated.to_si(value)
 
 
-def turned(angle: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:
+def turned(angle: FloatArray, layout: ChannelLayout) -> FloatArray:
     """A vane's angles [rad] as 'from', clockwise, 0 to 2π."""
     mounted = unit(layout.unit).to_si(layout.rotation) + (np.pi if layout.convention == "to" else 0.0)
     return np.mod(angle + mounted, 2 * np.pi)
 
 
 def cell_flags(
-    name: str, layout: ChannelLayout, value: NDArray[np.float64], state: NDArray[np.uint8], line: NDArray[np.int64]
+    name: str, layout: ChannelLayout, value: FloatArray, state: UInt8Array, line: IntArray
 ) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
     """Flags and findings about single cells: missing, unreadable, infinite, outside the instrument's range."""
     flags = np.zeros(len(value), dtype=np.uint16)
     found: list[Finding] = []
 
-    def note(mask: NDArray[np.bool_], flag: SampleFlag, kind: str, severity: Severity, what: str) -> None:
+    def note(mask: BoolArray, flag: SampleFlag, kind: str, severity: Severity, what: str) -> None:
         if mask.any():
             flags[mask] |= flag
             found.append(_of_cells(kind, severity, name, mask, line, f"{what} of {{name}}"))

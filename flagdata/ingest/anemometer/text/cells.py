@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 
 _NUMBER = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?$"
@@ -43,8 +44,8 @@ class Numbers:
         limit: the largest upper limit of a censored value; 0 where none was.
     """
 
-    value: NDArray[np.float64]
-    state: NDArray[np.uint8]
+    value: FloatArray
+    state: UInt8Array
     limit: float = 0.0
 
 
@@ -109,7 +110,7 @@ def _without(text: pa.StringArray, suffix: str) -> pa.StringArray:
     return pc.if_else(pc.and_(pc.invert(known), pc.match_substring_regex(bare, r"\d")), "?", bare)
 
 
-def _mask(array: pa.BooleanArray) -> NDArray[np.bool_]:
+def _mask(array: pa.BooleanArray) -> BoolArray:
     return array.to_numpy(zero_copy_only=False).astype(bool)
 
 

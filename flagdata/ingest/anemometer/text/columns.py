@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray, UInt8Array
 from flagdata.buffers import owned
 
 _LF, _CR, _QUOTE = 10, 13, 34
@@ -44,17 +44,17 @@ class Columns:
         """The cells of several columns of each row, trimmed, with a blank between."""
         return pc.binary_join_element_wise(*(pc.utf8_trim_whitespace(self.cells[i]) for i in indices), " ")
 
-    def among(self, index: int, values: Sequence[str]) -> NDArray[np.bool_]:
+    def among(self, index: int, values: Sequence[str]) -> BoolArray:
         """(n,) whether the trimmed cells of a column are among `values`."""
         found = pc.is_in(pc.utf8_trim_whitespace(self.cells[index]), pa.array(list(values), pa.string()))
         return found.to_numpy(zero_copy_only=False).astype(bool)
 
-    def where(self, wanted: NDArray[np.bool_]) -> Columns:
+    def where(self, wanted: BoolArray) -> Columns:
         """The rows that are wanted (n,)."""
         mask = pa.array(wanted)
         return Columns(cells=[cells.filter(mask) for cells in self.cells])
 
-    def with_rows(self, rows: Sequence[Sequence[str]], order: NDArray[np.int64]) -> Columns:
+    def with_rows(self, rows: Sequence[Sequence[str]], order: IntArray) -> Columns:
         """These rows and then `rows`, all in the `order` of indices given (n,)."""
         more = [pa.array([row[i] for row in rows], pa.string()) for i in range(len(self.cells))]
         return Columns(
@@ -96,9 +96,9 @@ class Lines:
     """
 
     data: bytes
-    start: NDArray[np.int64]
-    end: NDArray[np.int64]
-    regular: NDArray[np.bool_]
+    start: IntArray
+    end: IntArray
+    regular: BoolArray
     shape: Shape
 
     def text(self, index: int, encoding: str) -> str:
@@ -180,9 +180,7 @@ def lines_of(data: bytes, shape: Shape) -> Lines | None:
     return Lines(data=data, start=start, end=end, regular=regular, shape=shape)
 
 
-def _with(
-    data: bytes, byte: NDArray[np.uint8], feeds: NDArray[np.int64], start: NDArray[np.int64], shape: Shape
-) -> NDArray[np.bool_]:
+def _with(data: bytes, byte: UInt8Array, feeds: IntArray, start: IntArray, shape: Shape) -> BoolArray:
     """Lines that hold nothing but blanks, or a byte that has to be looked at: NUL, Ctrl-Z, beyond ASCII."""
     found = np.zeros(len(feeds), dtype=bool)
     odd = (byte == 0) | (byte == 0x1A) if 0 in data or b"\x1a" in data else None
@@ -196,13 +194,13 @@ def _with(
 
 
 def _misquoted(
-    byte: NDArray[np.uint8],
-    feeds: NDArray[np.int64],
-    quotes: NDArray[np.int64],
-    marks: NDArray[np.int64],
-    on: NDArray[np.int64],
+    byte: UInt8Array,
+    feeds: IntArray,
+    quotes: IntArray,
+    marks: IntArray,
+    on: IntArray,
     delimiter: int,
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Lines with a quote that neither begins nor ends a cell, with one too many, or with a delimiter between two."""
     line = np.searchsorted(feeds, quotes)
     count = np.bincount(line, minlength=len(feeds))

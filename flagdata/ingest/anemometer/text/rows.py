@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.recipe import FileLayout
@@ -59,7 +59,7 @@ class RowReader:
             while len(self.header) > max(1, used) and not self.header[-1]:
                 self.header.pop()
 
-    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:
+    def blocks(self, width: int) -> Iterator[tuple[IntArray, Columns | list[list[str]]]]:
         """Line numbers and rows of at least `width` cells; with a header, of as many cells as it names.
 
         Empty cells beyond (delimiters at the line's end) are allowed. Where the encoding lets bytes be cut, regular
@@ -69,16 +69,14 @@ class RowReader:
         plain = self._source.encoding in _PLAIN and len(delimiter) == 1 and delimiter.isascii() and delimiter != " "
         return self._columns(width) if plain and delimiter != '"' else self.rows(width)
 
-    def rows(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+    def rows(self, width: int) -> Iterator[tuple[IntArray, list[list[str]]]]:
         """What `blocks` gives, row by row: its definition."""
         for first, lines in self._source.blocks():
             where, good = self._sorted(list(range(first, first + len(lines))), lines, width)
             if good:
                 yield where, good
 
-    def _sorted(
-        self, numbers: Sequence[int], lines: Sequence[str], width: int
-    ) -> tuple[NDArray[np.int64], list[list[str]]]:
+    def _sorted(self, numbers: Sequence[int], lines: Sequence[str], width: int) -> tuple[IntArray, list[list[str]]]:
         """The rows of these lines that fit, with their numbers; the others are counted."""
         named = len(self.header) if self.header is not None else None
         comment = self._layout.comment
@@ -109,7 +107,7 @@ class RowReader:
             self._last_malformed = bool(self._malformed) and self._malformed[-1] == looked[-1]
         return np.array(where, dtype=np.int64), good
 
-    def _columns(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:
+    def _columns(self, width: int) -> Iterator[tuple[IntArray, Columns | list[list[str]]]]:
         encoding = "utf-8" if self._source.encoding == "utf-8-sig" else self._source.encoding
         first, shape = 1, None
         for data in self._source.raw_blocks():
@@ -145,7 +143,7 @@ class RowReader:
             ascii_only=self._source.encoding == "latin-1",
         )
 
-    def _of_lines(self, lines: Lines, first: int, width: int, encoding: str) -> tuple[NDArray[np.int64], Columns]:
+    def _of_lines(self, lines: Lines, first: int, width: int, encoding: str) -> tuple[IntArray, Columns]:
         """Rows of a block whose first line has the number `first`."""
         number = first + np.arange(len(lines.start), dtype=np.int64)
         lines = replace(lines, regular=lines.regular & (number >= self.first_line))

@@ -12,9 +12,8 @@ import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.ingest import Head, checksum
-from flagdata.ingest.anemometer.formats.nmea import Nmea
+from flagdata.ingest.anemometer.formats.nmea import Nmea, StampedNmea
 from flagdata.ingest.anemometer.formats.sentences import ChecksumError, clock, split, tag_time
-from flagdata.ingest.anemometer.formats.stamped_nmea import StampedNmea
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso

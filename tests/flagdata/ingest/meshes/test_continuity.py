@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.ingest import Obj, findings, frame_files, obj_text, read_folder
-from flagdata.ingest.meshes.checks import continuity
+from flagdata.ingest.meshes.store import continuity
 from flagdata.lake import MeshSequence, RaggedMeshSequence
 
 N = 6

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.ingest import findings
-from flagdata.ingest.meshes.checks import t_joints
+from flagdata.ingest.meshes.store import t_joints
 from flagdata.lake import MeshSequence
 
 # A square metre of which the left half is one quad and the right half two, so that vertex 6 lies on the edge 1–2.
