@@ -427,7 +427,7 @@ def _effect(name: str, content: Mapping[str, Any], *, where: str) -> EffectSpec:
         )
     described = EFFECTS[name].parameters()
     keys = {key: key.replace("_", "-") for key in described}
-    types = {
+    types: dict[str, Any] = {
         keys[key]: Literal["prior"] if content.get(keys[key]) == "prior" else within(Quantity, *entry.admissible)
         for key, entry in described.items()
     }
