@@ -41,6 +41,7 @@ class ErrorKind(StrEnum):
     WORKERS_LOST = "workers-lost"
     TRAINING_DIVERGED = "training-diverged"
     DIVERGED = "diverged"
+    CLOTH_DIVERGED = "cloth-diverged"
 
 
 class FlagdataError(Exception):

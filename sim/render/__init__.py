@@ -35,9 +35,6 @@ RENDERERS = Registry(
     group="flagdata.renderers",
     accepts=lambda entry: isinstance(entry, type) and callable(getattr(entry, "render", None)),
 )
-    group="flagdata.renderers",
-    accepts=lambda entry: isinstance(entry, type) and callable(getattr(entry, "render", None)),
-)
 """Name → class, made with the assets it takes backgrounds and textures from: `RENDERERS["raster"](assets=Assets())`.
 Installed packages add renderers by entry points of the group `flagdata.renderers`."""
 
