@@ -24,8 +24,8 @@ A recipe of a simulation names an effect by its table, for example `[effects.lif
 
 An effect is defined in torch. Where a few lines of C++ stand beside its file, `NAME.hpp` beside `NAME.py`, they run in
 the simulator's compiled kernel, each in a library that is built when the effect is first used; gradients go by torch.
-That holds for an effect of your own too. Where anything that acts has no C++, all that acts beside the base model runs
-by torch, at three to ten times the base model's time.
+That holds for [an effect of your own](extending.md#an-effect) too. Where anything that acts has no C++, all that acts
+beside the base model runs by torch, at three to ten times the base model's time.
 """
 
 

@@ -6,7 +6,8 @@
     found.wind.value, found.wind.interval
 
 The calls below are the public interface; each is imported when it is first used. `flagdata.dataset` has the types of
-training data, `flagdata.errors` what is raised.
+training data, `flagdata.errors` what is raised, `flagdata.extend` what a package that adds to flagdata imports, and
+`flagdata.__version__` the version.
 """
 
 from __future__ import annotations
@@ -55,6 +56,8 @@ _exported = lazy_exports(__name__, __file__)
 def __getattr__(name: str) -> Any:
     if name in ("align", "export", "ingest"):  # packages that are called as verbs
         return import_module(f"flagdata.{name}")
+    if name == "__version__":
+        return import_module("importlib.metadata").version("flagdata")
     return _exported(name)
 
 

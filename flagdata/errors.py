@@ -1,14 +1,47 @@
 """Errors that say what, where and the fix, each with a stable kind.
 
 Every error a user can cause is a `FlagdataError`. The command line prints it as three lines and exits with `exit_code`;
-`--json` prints `as_dict()`. Programs match on `kind`, which never changes once released, not on the wording.
+`--json` prints `as_dict()`. Programs match on `kind`, an `ErrorKind` that never changes once released, not on the
+wording.
 """
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from enum import StrEnum
 from typing import ClassVar
+
+
+class ErrorKind(StrEnum):
+    """Names every kind of error, one for each class below `FlagdataError`; the texts are those of `--json`."""
+
+    FAILED = "failed"
+    BAD_INPUT = "bad-input"
+    LIMIT = "limit"
+    TIME = "time"
+    NOTHING_MEASURED = "nothing-measured"
+    ZONE_MISSING = "zone-missing"
+    NOT_FOUND = "not-found"
+    CONFLICT = "conflict"
+    CORRUPT = "corrupt"
+    REFUSED = "refused"
+    MISSING_EXTRA = "missing-extra"
+    UNFORESEEN = "unforeseen"
+    USAGE = "usage"
+    UNKNOWN_NAME = "unknown-name"
+    LOG_GAP = "log-gap"
+    LINK = "link"
+    UNCONFIRMED = "unconfirmed"
+    OPEN_FACTS = "open-facts"
+    PLUG_IN = "plug-in"
+    RENDER_FAILED = "render-failed"
+    BLENDER_UNUSABLE = "blender-unusable"
+    INAPPLICABLE = "inapplicable"
+    WORKERS_LOST = "workers-lost"
+    TRAINING_DIVERGED = "training-diverged"
+    DIVERGED = "diverged"
+    CLOTH_DIVERGED = "cloth-diverged"
 
 
 class FlagdataError(Exception):
@@ -20,7 +53,7 @@ class FlagdataError(Exception):
         fix: what the user can do about it.
     """
 
-    kind: ClassVar[str] = "failed"
+    kind: ClassVar[ErrorKind] = ErrorKind.FAILED
     exit_code: ClassVar[int] = 1
 
     def __init__(self, what: str, *, where: str | None = None, fix: str) -> None:
@@ -33,7 +66,7 @@ class FlagdataError(Exception):
         return (_rebuild, (type(self), self.what, self.where, self.fix))
 
     def as_dict(self) -> dict[str, str | None]:
-        return {"kind": self.kind, "what": self.what, "where": self.where, "fix": self.fix}
+        return {"kind": str(self.kind), "what": self.what, "where": self.where, "fix": self.fix}
 
 
 def _rebuild(cls: type[FlagdataError], what: str, where: str | None, fix: str) -> FlagdataError:
@@ -43,82 +76,82 @@ def _rebuild(cls: type[FlagdataError], what: str, where: str | None, fix: str) -
 class InputError(FlagdataError):
     """A file or value from outside does not hold what it should."""
 
-    kind = "bad-input"
+    kind = ErrorKind.BAD_INPUT
 
 
 class LimitError(FlagdataError):
     """Input beyond a stated limit (size, frame count, expansion ratio), refused before it is read whole."""
 
-    kind = "limit"
+    kind = ErrorKind.LIMIT
 
 
 class TimeError(FlagdataError):
     """A time, zone or clock that is missing, ambiguous or impossible."""
 
-    kind = "time"
+    kind = ErrorKind.TIME
 
 
 class NothingMeasuredError(InputError):
     """A log, or one anemometer of a log, none of whose values can be used."""
 
-    kind = "nothing-measured"
+    kind = ErrorKind.NOTHING_MEASURED
 
 
 class ZoneMissingError(TimeError):
     """Stamps of a wall clock whose zone nobody named: a question to the user, with the exit code of a refusal."""
 
-    kind = "zone-missing"
+    kind = ErrorKind.ZONE_MISSING
     exit_code = 3
 
 
 class NotFoundError(FlagdataError):
     """An artifact, ref, file or row that is not there."""
 
-    kind = "not-found"
+    kind = ErrorKind.NOT_FOUND
 
 
 class ConflictError(FlagdataError):
     """Something of that name or identity exists already, or changed meanwhile."""
 
-    kind = "conflict"
+    kind = ErrorKind.CONFLICT
 
 
 class CorruptError(FlagdataError):
     """Bytes in the lake are not what their hash or format says."""
 
-    kind = "corrupt"
+    kind = ErrorKind.CORRUPT
 
 
 class RefusedError(FlagdataError):
     """The data fail a quality check: an alignment that is not certain, a pair outside tolerance."""
 
-    kind = "refused"
+    kind = ErrorKind.REFUSED
     exit_code = 3
 
 
 class MissingExtraError(FlagdataError):
     """What was asked for needs a package that a plain installation leaves out."""
 
-    kind = "missing-extra"
+    kind = ErrorKind.MISSING_EXTRA
 
 
 class UnforeseenError(FlagdataError):
     """A defect of flagdata: an exception that nothing turned into one of these."""
 
-    kind = "unforeseen"
+    kind = ErrorKind.UNFORESEEN
 
 
 class UsageError(FlagdataError):
     """Options or arguments that do not fit together."""
 
-    kind = "usage"
+    kind = ErrorKind.USAGE
     exit_code = 2
 
 
 class UnknownNameError(UsageError):
     """A name that is not in a table, with the nearest ones that are."""
 
-    kind = "unknown-name"
+    kind = ErrorKind.UNKNOWN_NAME
 
     @classmethod
     def of(cls, noun: str, name: str, known: Iterable[str], *, where: str | None = None) -> UnknownNameError:

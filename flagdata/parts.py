@@ -8,6 +8,17 @@ from typing import Any
 from flagdata.extras import explained
 
 
+def attribute(place: str) -> Any:
+    """Returns what "module:attribute" names.
+
+    Raises:
+        MissingExtraError: it needs a package that is not installed.
+    """
+    module, _, name = place.partition(":")
+    with explained():
+        return getattr(import_module(module), name)
+
+
 def call(place: str, *arguments: Any, **options: Any) -> Any:
     """What "module:attribute" names, called.
 

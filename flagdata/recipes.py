@@ -1,12 +1,13 @@
 """Recipes by name or by path: where the text of one is found. Its content is parsed by the module that knows its form.
 
 Each kind of recipe has a folder of `catalogs` with files NAME.toml. Wherever one is named, a path that ends in .toml
-names the user's own file in its place.
+names the user's own file in its place. Installed packages add recipes to some kinds by entry points.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -17,6 +18,7 @@ from flagdata.documents import SIZE_LIMIT, LimitsError, from_toml
 from flagdata.errors import InputError, LimitError, UnknownNameError
 from flagdata.files import check_input
 from flagdata.plain_text import plain_text
+from flagdata.registry import Registry
 
 _SUFFIX = ".toml"
 NAME_LIMIT = 100
@@ -56,37 +58,47 @@ class Shelf:
     Args:
         folder: of `catalogs`.
         noun: what one is called in error messages ("data set").
+        group: an entry-point group by which installed packages add recipes; each entry leads to the path of a file.
     """
 
     folder: str
     noun: str
+    group: str | None = None
+
+    @cached_property
+    def registry(self) -> Registry:
+        """The names of the catalog and of installed packages; only those of the latter can be looked up, as paths."""
+        entries = (entry.name for entry in self.place().iterdir())
+        names = sorted(name.removesuffix(_SUFFIX) for name in entries if name.endswith(_SUFFIX))
+        return Registry(self.noun, dict.fromkeys(names, ""), group=self.group, accepts=_is_recipe_path)
 
     def place(self) -> Traversable:
         """The folder in which the files of the catalog are."""
         return files("catalogs") / self.folder
 
     def names(self) -> tuple[str, ...]:
-        """Recipes of the catalog, sorted."""
-        entries = (entry.name for entry in self.place().iterdir())
-        return tuple(sorted(name.removesuffix(_SUFFIX) for name in entries if name.endswith(_SUFFIX)))
+        """Returns the recipes of the catalog and of installed packages, sorted."""
+        return tuple(sorted(self.registry))
 
-    def titles(self) -> dict[str, str]:
-        """Recipe of the catalog → what it is, one line."""
-        tables = {name: parsed(self.named(name).text, where=name) for name in self.names()}
-        return {name: str(table.get("title") or table["about"]) for name, table in tables.items()}
+    def title(self, name: str) -> str:
+        """Returns what a recipe is, one line."""
+        table = parsed(self.named(name).text, where=name)
+        return str(table.get("title") or table["about"])
 
     def named(self, name: str, *, where: str | None = None) -> Found:
-        """The recipe of that name in the catalog.
+        """Returns the recipe of that name in the catalog or in an installed package.
 
         Args:
             where: the name stands, for the error message.
 
         Raises:
             UnknownNameError: no such name; the nearest is suggested.
+            PlugInError: an installed package adds the name, and it cannot be used.
         """
-        known = self.names()
-        if name not in known:
-            raise UnknownNameError.of(self.noun, name, known, where=where)
+        if name not in self.registry:
+            raise UnknownNameError.of(self.noun, name, self.names(), where=where)
+        if self.registry.package(name) is not None:
+            return replace(read_recipe(self.registry[name]), name=name)
         data = (self.place() / f"{name}{_SUFFIX}").read_bytes()
         return Found(name=name, data=data, folder=Path(), where=f"{self.noun} {name!r}")
 
@@ -126,6 +138,11 @@ def read_recipe(path: Path) -> Found:
     except OSError as error:
         raise InputError(f"the recipe cannot be read: {error.strerror}", where=str(path), fix="check it") from None
     return Found(name=path.stem, data=data, folder=path.parent, where=str(path))
+
+
+def _is_recipe_path(entry: object) -> bool:
+    """Returns whether what an entry point leads to is the path of a recipe."""
+    return isinstance(entry, Path) and entry.suffix == _SUFFIX
 
 
 def is_name(value: object) -> bool:

@@ -8,7 +8,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from flagdata.errors import FlagdataError, UnknownNameError
+from flagdata.errors import ErrorKind, FlagdataError, UnknownNameError
 
 _LOG = logging.getLogger("flagdata")
 
@@ -16,7 +16,7 @@ _LOG = logging.getLogger("flagdata")
 class PlugInError(FlagdataError):
     """What an installed package adds by an entry point cannot be used."""
 
-    kind = "plug-in"
+    kind = ErrorKind.PLUG_IN
 
 
 class Registry(Mapping[str, Any]):

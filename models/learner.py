@@ -15,6 +15,7 @@ from torch.nn.functional import pdist
 
 from flagdata.errors import InputError, LimitError
 from models.mixture import Mixture, MixtureHead
+from models.network import Network
 from models.registry import NETWORKS
 from models.targets import Scaling
 
@@ -207,7 +208,14 @@ def build(
         _check_option(key, value)
 
     def made() -> Learner:
-        return Learner(NETWORKS[network](**given), loss=loss, targets=targets, components=components, margin=margin)
+        module = NETWORKS[network](**given)
+        if not isinstance(module, Network):
+            raise InputError(
+                f"the network {network} lacks one of takes, recurrent, dimension and forward",
+                where="[network]",
+                fix="add what flagdata.extend.Network lists to its class",
+            )
+        return Learner(module, loss=loss, targets=targets, components=components, margin=margin)
 
     try:
         with torch.device("meta"):

@@ -1,8 +1,12 @@
-"""The networks by name. A name in a recipe or a checkpoint is looked up here; the module is imported only then."""
+"""The networks by name. A name in a recipe or a checkpoint is looked up here; the module is imported only then.
+
+Installed packages add networks by entry points of the group `flagdata.networks`.
+"""
 
 from __future__ import annotations
 
 from flagdata.registry import Registry
+from models.network import INPUTS
 
 NETWORKS = Registry(
     "network",
@@ -15,4 +19,6 @@ NETWORKS = Registry(
         "cardona": "models.baselines:Cardona",
         "yang": "models.baselines:Yang",
     },
+    group="flagdata.networks",
+    accepts=lambda entry: isinstance(entry, type) and getattr(entry, "takes", None) in INPUTS,
 )

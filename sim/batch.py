@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from flagdata.errors import FlagdataError
+from flagdata.errors import ErrorKind, FlagdataError
 from sim.integrate import Integrator
 from sim.state import SPEED_LIMIT, State
 from sim.system import System
@@ -39,6 +39,8 @@ class DivergedError(FlagdataError):
         member: its place in the batch.
         time: of the state that was no cloth any more, on the clock of the run [s].
     """
+
+    kind = ErrorKind.CLOTH_DIVERGED
 
     def __init__(self, member: int, time: float) -> None:
         self.member, self.time = member, time

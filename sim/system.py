@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from flagdata.errors import UsageError
+from flagdata.errors import ErrorKind, UsageError
 from sim import bending, contact, inertia, membrane
 from sim.air import AirForce
 from sim.cloth import Cloth
@@ -27,7 +27,7 @@ from sim.wind import Wind
 class InapplicableError(UsageError):
     """An effect that a cloth cannot have as it is held."""
 
-    kind = "inapplicable"
+    kind = ErrorKind.INAPPLICABLE
 
 
 class Effect(Protocol):

@@ -64,17 +64,16 @@ def titles(target: str) -> Mapping[str, str]:
     """
     module, _, attribute = target.partition(":")
     held = getattr(import_module(module), attribute)
-    if isinstance(held, Shelf):
-        return held.titles()
     if isinstance(held, Path):
         cards = {path.parent.name: json.loads(path.read_text(encoding="utf-8")) for path in held.glob("*/card.json")}
         return {name: str(cards[name]["title"]) for name in sorted(cards)}
+    registry = held.registry if isinstance(held, Shelf) else held
     found: dict[str, str] = {}
-    for name in held:
+    for name in registry:
         try:
-            found[name] = _line(held[name])
+            found[name] = held.title(name) if isinstance(held, Shelf) else _line(held[name])
         except Exception as error:
-            package = held.package(name) if isinstance(held, Registry) else None
+            package = registry.package(name) if isinstance(registry, Registry) else None
             if package is None:
                 raise
             what = (

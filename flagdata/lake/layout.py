@@ -19,7 +19,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from flagdata.errors import CorruptError, FlagdataError, RefusedError
+from flagdata.errors import CorruptError, ErrorKind, FlagdataError, RefusedError
 from flagdata.lake.durable import SCRATCH, disk_errors
 from flagdata.storage import Place, RemotePath, StoreError
 from flagdata.storage.refusals import DeniedError
@@ -69,7 +69,7 @@ FOLDERS = (*_NOTES, STAGING, *STORES)
 class LinkError(CorruptError):
     """A link or special file where the lake keeps folders and files of its own."""
 
-    kind = "link"
+    kind = ErrorKind.LINK
 
 
 def check_own(root: Place) -> None:

@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.documents import from_json
-from flagdata.errors import CorruptError, FlagdataError
+from flagdata.errors import CorruptError, ErrorKind, FlagdataError
 from flagdata.files import open_regular
 from flagdata.lake.durable import put_if_absent, unreadable
 from flagdata.provenance import digest, file_hash
@@ -66,7 +66,7 @@ _AT_ONCE = 16  # entries of a bucket that are read at the same time
 class LogGapError(CorruptError):
     """An entry of the catalog's log is missing, so what was committed is not known."""
 
-    kind = "log-gap"
+    kind = ErrorKind.LOG_GAP
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import FlagdataError
+from flagdata.errors import ErrorKind, FlagdataError
 from measure.forecasting.calibration import PRIOR, THETA, Calibration
 from measure.forecasting.model import Model, errors_of, linearised
 from measure.forecasting.observer import Forecaster
@@ -36,7 +36,7 @@ _LONGEST = 1.5
 class DivergedError(FlagdataError):
     """A model whose predictions are not finite."""
 
-    kind = "diverged"
+    kind = ErrorKind.DIVERGED
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

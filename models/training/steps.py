@@ -26,7 +26,7 @@ from torch import Tensor, nn
 from torch import distributed as ranks
 from torch.nn.parallel import DistributedDataParallel
 
-from flagdata.errors import CorruptError, FlagdataError, RefusedError, UsageError
+from flagdata.errors import CorruptError, ErrorKind, FlagdataError, RefusedError, UsageError
 from flagdata.provenance import array_hash
 from flagdata.rng import stream, torch_draws
 from models.learner import Learner, Loss
@@ -178,7 +178,7 @@ Bars: TypeAlias = Callable[[int, str, str], AbstractContextManager[Callable[[int
 class DivergedError(FlagdataError):
     """The loss is no longer a number."""
 
-    kind = "training-diverged"
+    kind = ErrorKind.TRAINING_DIVERGED
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

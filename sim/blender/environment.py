@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flagdata.caches import user_cache
-from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.errors import ErrorKind, FlagdataError, NotFoundError
 
 SETTING = "FLAGDATA_BLENDER"
 SERIES = "4.5"
@@ -60,7 +60,7 @@ DEBIAN_PACKAGES = tuple(sorted(set(_DEBIAN.values())))
 class BlenderError(FlagdataError):
     """Blender's environment is there, and the worker cannot use it."""
 
-    kind = "blender-unusable"
+    kind = ErrorKind.BLENDER_UNUSABLE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
-from flagdata.errors import FlagdataError
+from flagdata.errors import ErrorKind, FlagdataError
 from sim.blender.environment import check, find
 from sim.blender.protocol import Message, decode, encode
 
@@ -42,7 +42,7 @@ def blender_worker() -> tuple[str, ...]:
 class RenderError(FlagdataError):
     """A renderer failed, and kept failing."""
 
-    kind = "render-failed"
+    kind = ErrorKind.RENDER_FAILED
 
 
 class _LostError(Exception):

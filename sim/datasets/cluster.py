@@ -16,7 +16,7 @@ from distributed import CancelledError, Client, Future, LocalCluster, as_complet
 from distributed.scheduler import KilledWorker
 from distributed.utils import silence_logging_cmgr
 
-from flagdata.errors import FlagdataError, NotFoundError, UsageError
+from flagdata.errors import ErrorKind, FlagdataError, NotFoundError, UsageError
 
 _CONNECT_TIMEOUT = 30.0  # s
 _AHEAD = 2  # jobs a thread, so that none waits for the next
@@ -47,7 +47,7 @@ Job = tuple[Callable[..., Any], Sequence[Any]]
 class WorkerError(FlagdataError):
     """Workers died over a job, or all of them are gone."""
 
-    kind = "workers-lost"
+    kind = ErrorKind.WORKERS_LOST
 
 
 @contextmanager

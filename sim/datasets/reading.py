@@ -42,7 +42,7 @@ from sim.run import Recipe as Simulation
 from sim.run import load as load_simulation
 from sim.run.recipe import Attachment, Shape
 
-DATASETS = Shelf(folder="datasets", noun="data set")
+DATASETS = Shelf(folder="datasets", noun="data set", group="flagdata.datasets")
 SIDES = ("train", "validation", "test")
 _SIZE_LIMIT = 16_384
 """Most pixels of a side, and samples of a pixel."""

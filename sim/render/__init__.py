@@ -35,7 +35,10 @@ RENDERERS = Registry(
         "cycles": "sim.render.cycles:Cycles",
         "workbench": "sim.render.cycles:Workbench",
     },
+    group="flagdata.renderers",
+    accepts=lambda entry: isinstance(entry, type) and callable(getattr(entry, "render", None)),
 )
-"""Name → class, made with the assets it takes backgrounds and textures from: `RENDERERS["raster"](assets=Assets())`."""
+"""Name → class, made with the assets it takes backgrounds and textures from: `RENDERERS["raster"](assets=Assets())`.
+Installed packages add renderers by entry points of the group `flagdata.renderers`."""
 
 __getattr__ = lazy_exports(__name__, __file__)

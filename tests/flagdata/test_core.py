@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import ast
+import json
 import math
 import pickle
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pytest
 
+import flagdata
 from flagdata import provenance, rng, schema, units
-from flagdata.errors import FlagdataError, RefusedError, UnknownNameError
+from flagdata.errors import ErrorKind, FlagdataError, RefusedError, UnknownNameError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.registry import Registry
+from tests.contract.imports import modules, tree
 from tests.program import invoke
 
 
@@ -29,6 +34,28 @@ def test_error_kinds_are_distinct_and_errors_survive_a_process_boundary() -> Non
     error = pickle.loads(pickle.dumps(RefusedError("a", where="b", fix="c")))
     assert isinstance(error, RefusedError)
     assert error.as_dict() == {"kind": "refused", "what": "a", "where": "b", "fix": "c"}
+
+
+def test_every_kind_of_error_is_that_of_one_class_and_keeps_its_text() -> None:
+    product = [tree(path) for path in modules("flagdata", "sim", "models", "measure")]
+    classes = [node for source in product for node in ast.walk(source) if isinstance(node, ast.ClassDef)]
+    errors = {"FlagdataError"}
+    while more := {node.name for node in classes if errors & set(map(ast.unparse, node.bases))} - errors:
+        errors |= more
+    kinds = {f"ErrorKind.{kind.name}" for kind in ErrorKind}
+    used = [
+        [ast.unparse(line.value) for line in node.body if isinstance(line, ast.Assign | ast.AnnAssign) and line.value]
+        for node in classes
+        if node.name in errors
+    ]
+    assert sorted(value for values in used for value in values if value in kinds) == sorted(kinds)
+    assert len(used) == len(kinds) > 20
+    assert json.loads(json.dumps(RefusedError.kind)) == "refused"
+    assert type(RefusedError("a", fix="b").as_dict()["kind"]) is str
+
+
+def test_the_version_is_that_of_the_installed_package() -> None:
+    assert flagdata.__version__ == version("flagdata")
 
 
 def test_a_sample_flag_leaves_an_array_of_flags_its_sixteen_bits() -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from flagdata.errors import RefusedError
+from flagdata.errors import ErrorKind, RefusedError
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.provenance import canonical, digest
 from flagdata.signals import WindLog
@@ -73,7 +73,7 @@ class Drafted:
 class UnconfirmedError(RefusedError):
     """A reading that the program drafted, and that nobody has confirmed."""
 
-    kind = "unconfirmed"
+    kind = ErrorKind.UNCONFIRMED
 
     def __init__(self, what: str, *, where: str | None = None, fix: str, accept: str = "", preview: str = "") -> None:
         super().__init__(what, where=where, fix=fix)

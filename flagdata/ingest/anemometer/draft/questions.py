@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flagdata.errors import RefusedError
+from flagdata.errors import ErrorKind, RefusedError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ ZONE = Open(
 class OpenFactsError(RefusedError):
     """A draft with questions that nobody has answered."""
 
-    kind = "open-facts"
+    kind = ErrorKind.OPEN_FACTS
 
     def __init__(self, what: str, *, where: str | None = None, fix: str, questions: tuple[Open, ...] = ()) -> None:
         super().__init__(what, where=where, fix=fix)

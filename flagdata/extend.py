@@ -1,0 +1,69 @@
+"""What packages that add to flagdata import: `from flagdata.extend import ForceEffect, strength`.
+
+Effects, log formats, data sets, networks and renderers are added by entry points; docs/extending.md shows one of each.
+The names below are public: they are the same in a checkout and in an installation, where the packages `sim` and
+`models` have other names. Each is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flagdata.parts import attribute
+
+GROUPS = {
+    "flagdata.effects": "a subclass of one of the kinds of effect",
+    "flagdata.formats": "a class like Format",
+    "flagdata.datasets": "a pathlib.Path of a recipe, NAME.toml",
+    "flagdata.networks": "a torch.nn.Module like Network",
+    "flagdata.renderers": "a class like Renderer, made with assets=Assets()",
+}
+"""Entry-point group → what an entry leads to."""
+
+_PLACES = {
+    # effects on the cloth
+    "ForceEffect": "sim.effects.effect:ForceEffect",
+    "PressureEffect": "sim.effects.effect:PressureEffect",
+    "WindEffect": "sim.effects.effect:WindEffect",
+    "FlowEffect": "sim.effects.effect:FlowEffect",
+    "ClothEffect": "sim.effects.effect:ClothEffect",
+    "strength": "sim.effects.parameter:strength",
+    "shape": "sim.effects.parameter:shape",
+    "Value": "sim.effects.parameter:Value",
+    "NOT_NEGATIVE": "sim.effects.parameter:NOT_NEGATIVE",
+    "AirDensity": "sim.effects.quantities:AirDensity",
+    "AIR_DENSITY": "sim.effects.quantities:AIR_DENSITY",
+    "Cloth": "sim.cloth:Cloth",
+    "face_wind": "sim.air:face_wind",
+    # formats of wind logs
+    "Format": "flagdata.ingest.anemometer.formats.registry:Format",
+    "Head": "flagdata.ingest.anemometer.sniffing:Head",
+    "Guess": "flagdata.ingest.anemometer.sniffing:Guess",
+    "TextFile": "flagdata.ingest.anemometer.text.source:TextFile",
+    "WindOptions": "flagdata.ingest.anemometer.options:WindOptions",
+    "Reading": "flagdata.ingest.anemometer.reading:Reading",
+    "Sensor": "flagdata.signals:Sensor",
+    "SampleFlag": "flagdata.schema:SampleFlag",
+    # networks
+    "Network": "models.network:Network",
+    "INPUTS": "models.network:INPUTS",
+    # renderers
+    "Renderer": "sim.render.renderer:Renderer",
+    "Meshes": "sim.render.meshes:Meshes",
+    "RenderParameters": "sim.render.parameters:RenderParameters",
+    "Assets": "sim.assets:Assets",
+    "stage": "sim.render.stage:stage",
+    "plate": "sim.render.develop:plate",
+    "develop": "sim.render.develop:develop",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = attribute(_PLACES[name])
+    return value
+
+
+def __dir__() -> list[str]:
+    return ["GROUPS", *sorted(_PLACES)]
