@@ -102,6 +102,15 @@ def upright(mesh: Mesh) -> NDArray[np.float64]:
     return np.stack([zero, mesh.rest[:, 0], mesh.rest[:, 1]], axis=1)
 
 
+def roughened(
+    flat: NDArray[np.float64], handles: Handles, rng: np.random.Generator, sigma: float
+) -> NDArray[np.float64]:
+    """Returns a start (vertex, 3) [m]: a flat one, with normal noise of deviation `sigma` [m] on what nothing holds."""
+    noise = rng.normal(0.0, sigma, flat.shape)
+    noise[list(handles.vertices)] = 0.0
+    return flat + noise
+
+
 def flag(
     *,
     material: Material,

@@ -34,7 +34,7 @@ from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import Symplectic
 from sim.material import Material, named
 from sim.mesh import Mesh, grid
-from sim.scene import Scene, assemble
+from sim.scene import Scene, assemble, roughened
 from sim.state import State
 from sim.system import System
 from sim.wind.sampled import Beyond, Even, SampledWind
@@ -202,12 +202,11 @@ class Batch:
         handles = self.flag.handles(mesh)
         own = []
         for place, seed in enumerate(self.seeds):
-            rough = stream(seed, "calibrate", "start").normal(0.0, _ROUGH, (mesh.vertex_count, 3))
-            rough[list(handles.vertices)] = 0.0
             along = mesh.rest[:, 0]
-            start = np.stack([along * math.cos(_AHEAD), along * math.sin(_AHEAD), mesh.rest[:, 1]], axis=1)
+            flat = np.stack([along * math.cos(_AHEAD), along * math.sin(_AHEAD), mesh.rest[:, 1]], axis=1)
             material = self._material(place, damped)
-            own.append(Scene(mesh=mesh, position=start + rough, material=material, handles=handles))
+            start = roughened(flat, handles, stream(seed, "calibrate", "start"), _ROUGH)
+            own.append(Scene(mesh=mesh, position=start, material=material, handles=handles))
         return own
 
     def _material(self, place: int, damped: float) -> Material:

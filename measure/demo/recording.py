@@ -35,7 +35,7 @@ from sim.material import named
 from sim.mesh import Diagonals, Mesh, grid
 from sim.render import Meshes, RenderParameters, prior
 from sim.render.stage import stage
-from sim.scene import Scene, assemble
+from sim.scene import Scene, assemble, roughened
 from sim.state import State
 from sim.system import System
 
@@ -274,10 +274,9 @@ def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
     base = named(MATERIAL)
     material = replace(base.scaled(bending=bending), density=area_weight, damping=max(damping - recipe.step, 0.0))
     start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
-    rough = stream(recipe.seed, "demo", "start").normal(0.0, _ROUGH, start.shape)
-    rough[list(held.vertices)] = 0.0
+    start = roughened(start, held, stream(recipe.seed, "demo", "start"), _ROUGH)
     speed = recipe.wind
-    scene = Scene(mesh=flat, position=start + rough, material=material, handles=held, wind=(speed, 0.0, 0.0))
+    scene = Scene(mesh=flat, position=start, material=material, handles=held, wind=(speed, 0.0, 0.0))
     gusts = Gusts(intensity=recipe.intensity).with_series(
         stream(recipe.seed, "demo", "gusts"),
         batch=1,

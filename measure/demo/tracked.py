@@ -24,10 +24,11 @@ from sim.handles import Handles
 from sim.integrate.symplectic import Symplectic
 from sim.material import named
 from sim.mesh import Diagonals, Mesh, grid
-from sim.scene import Scene, assemble
+from sim.scene import Scene, assemble, roughened
 
 MATERIAL = "camel-ponte-roma"
 _OUTER = 2e-3  # s; of the force beside the base model
+_ROUGH = 2e-3  # m, standard deviation of the free vertices' start
 RECIPE = """\
 title = "tracked"
 
@@ -167,9 +168,8 @@ def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object])
     scenes = []
     for index, speed in enumerate(recipe.speeds):
         start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
-        rough = stream(recipe.seed, "tracked", "start", index).normal(0.0, 2e-3, start.shape)
-        rough[list(held.vertices)] = 0.0
-        scenes.append(Scene(mesh=flat, position=start + rough, material=material, handles=held, wind=(speed, 0.0, 0.0)))
+        start = roughened(start, held, stream(recipe.seed, "tracked", "start", index), _ROUGH)
+        scenes.append(Scene(mesh=flat, position=start, material=material, handles=held, wind=(speed, 0.0, 0.0)))
     effect = EFFECTS[recipe.effect](**{recipe.parameter: recipe.strength})
     method = Symplectic(outer=_OUTER)
     system, state = apply([effect], *assemble(scenes))

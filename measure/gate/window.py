@@ -1,7 +1,8 @@
 """Gates of windows: whether one clip is like those of the training, with a p and the reasons in words.
 
 Two gates answer the same question: the distance of the network's summary, and the calibrated checks of
-`measure.gate.gate`, all of them together.
+`measure.gate.gate`, all of them together. Before either, clips in which nothing moves or is visible are refused: a
+network gives numbers for these as well, which say nothing of a flag and are not shown even where a gate is overruled.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from measure.gate.blank import blank
 from measure.gate.checks import CHECKS
+from measure.gate.clip_statistics import LEAST_DEVIATION, ClipStatistics
 from measure.gate.counted import COUNTED
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.features import features_of
@@ -31,6 +32,8 @@ FALSE_ALARM = 0.05
 """Share of clips like the simulated ones that may be refused."""
 CONFIDENCE = 0.9
 """Probability, over which clips the gate was calibrated by, that no larger share of them is."""
+_FLAT = 1.0
+"""Standard deviation of all gray levels of a clip below which nothing is visible: one step of the camera's."""
 _USUAL = (0.01, 0.99)
 _AREA = list(CHECKS).index("area")
 _LIKENESS = 0.5
@@ -257,3 +260,30 @@ def _reason(gate: Gate, place: int, value: float, p: float) -> Reason:
         figure=figure,
         check=score.name,
     )
+
+
+def blank(frames: NDArray[np.uint8]) -> Reason | None:
+    """What a clip lacks; None where there is something to measure.
+
+    Args:
+        frames: (n, height, width) gray.
+
+    Raises:
+        InputError: see `ClipStatistics.of`.
+    """
+    contrast = float(frames.std())
+    if contrast < _FLAT:
+        what = f"{REASONS['too-dark'].sentence}: all gray levels lie within {contrast:.2g} of each other"
+        return _lacking("too-dark", what, check="contrast", value=contrast)
+    most = float(ClipStatistics.of(frames).deviation.max())
+    if most > LEAST_DEVIATION:
+        return None
+    what = (
+        f"no motion is found in the picture: its gray levels change by {most:.1f} at most (standard deviation in "
+        f"time), and up to {LEAST_DEVIATION:g} comes of rounding and coding"
+    )
+    return _lacking("no-motion", what, check="strength", value=most)
+
+
+def _lacking(kind: str, what: str, *, check: str, value: float) -> Reason:
+    return Reason(kind=kind, what=what, p=None, fix=REASONS[kind].fix, blank=True, check=check, value=value)

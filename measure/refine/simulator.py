@@ -35,6 +35,7 @@ from sim.render.renderer import Renderer
 from sim.run.batch import Stepper, run
 from sim.run.members import Crew, Member
 from sim.run.recipe import Recipe
+from sim.scene import roughened
 
 START_NOISE = 1e-3
 """Standard deviation of the free vertices' start about the flat cloth [m]."""
@@ -202,8 +203,7 @@ class Scene:
         """The flag of a request."""
         values = self.space.values(np.array([request.point]))[0]
         scene = self._template.scene
-        noise = stream(request.seed, "start").normal(0.0, START_NOISE, scene.position.shape)
-        noise[list(scene.handles.vertices)] = 0.0
+        start = roughened(scene.position, scene.handles, stream(request.seed, "start"), START_NOISE)
         damping = self.recipe.material.damping
         material = replace(
             scene.material,
@@ -215,7 +215,7 @@ class Scene:
                 else scene.material.damping
             ),
         )
-        flag = replace(scene, position=scene.position + noise, material=material, wind=(float(values[WIND]), 0.0, 0.0))
+        flag = replace(scene, position=start, material=material, wind=(float(values[WIND]), 0.0, 0.0))
         return replace(self._template, scene=flag, seed=request.seed, parameters={})
 
     @cached_property

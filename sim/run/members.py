@@ -21,7 +21,7 @@ from sim.handles import Handles
 from sim.material import BENDING_SHAPE, Material
 from sim.mesh import Mesh, grid
 from sim.run.recipe import Attachment, EffectSpec, MaterialSpec, Recipe, SceneSpec, Shape
-from sim.scene import Scene, assemble, upright
+from sim.scene import Scene, assemble, roughened, upright
 from sim.state import State
 from sim.system import System
 
@@ -194,11 +194,7 @@ class Crew:
     def _start(self, seed: int) -> NDArray[np.float64]:
         spec = self.recipe.scene
         flat = self._flat(spec)
-        if not spec.start_noise:
-            return flat
-        noise = stream(seed, "start").normal(0.0, spec.start_noise, flat.shape)
-        noise[list(self.handles.vertices)] = 0.0
-        return flat + noise
+        return roughened(flat, self.handles, stream(seed, "start"), spec.start_noise) if spec.start_noise else flat
 
     def _flat(self, spec: SceneSpec) -> NDArray[np.float64]:
         """(vertex, 3) where the cloth starts, before its noise [m]."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from models.outliers import Familiarity, shrunk_covariance
+from models.outliers import Familiarity, conformal_p, shrunk_covariance, whitening
 
 
 def draws(seed: int, n: int, d: int = 5) -> np.ndarray:
@@ -36,6 +36,20 @@ def test_the_distance_is_mahalanobiss() -> None:
     offset = x - training.mean(axis=0)
     expected = np.sqrt(np.einsum("nd,nd->n", offset, np.linalg.solve(covariance, offset.T).T))
     np.testing.assert_allclose(Familiarity.of(training, draws(5, 10)).distance(x), expected)
+
+
+def test_whitened_points_have_no_covariance_but_unity_and_narrow_directions_are_widened_no_further() -> None:
+    covariance, _ = shrunk_covariance(draws(15, 60))
+    white = whitening(covariance, least=1e-9)
+    np.testing.assert_allclose(white @ covariance @ white.T, np.eye(5), atol=1e-12)
+    np.testing.assert_allclose(whitening(np.diag([4.0, 0.0]), least=0.25) @ [2.0, 1.0], [2.0, 1.0])
+
+
+def test_a_conformal_p_of_exchangeable_scores_is_uniform_on_its_steps() -> None:
+    """Of 19 reference scores and one more, each rank is as likely: p = k/20 for each k once."""
+    scores = draws(16, 20, 1)[:, 0]
+    left_out = [float(conformal_p(np.sort(np.delete(scores, k)), scores[k])) for k in range(20)]
+    np.testing.assert_allclose(sorted(left_out), np.arange(1, 21) / 20)
 
 
 def test_false_alarms_are_as_rare_as_stated() -> None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding
 from measure.film import findings_of
-from measure.film.windows import cut, lay_out
+from measure.film.windows import WindowReader, cut, lay_out
 from models.conditioning import Distinct, Interpolator
+from models.conditioning.instants import TimedFrame
+from tests.measure.gate.made import small_model
 
 
 def numbered(times: NDArray[np.float64]) -> list[tuple[float, NDArray[np.uint8]]]:
@@ -137,3 +142,35 @@ def test_the_error_of_too_short_a_film_states_the_length_needed() -> None:
 def test_a_part_that_the_film_does_not_have_is_refused(part: tuple[float, float | None]) -> None:
     with pytest.raises(UsageError, match="of a film of 4"):
         lay_out(frames=5, spacings=(0.04,), rate=25.0, duration=4.0, step=None, first=part[0], last=part[1])
+
+
+class Filmed:
+    """A film of numbered frames at a rate."""
+
+    name, start = "numbered", None
+
+    def __init__(self, rate: float, count: int) -> None:
+        self.rate, self.duration = rate, (count - 1) / rate
+        self._all = numbered(np.arange(count) / rate)
+
+    def frames(self, first: float, last: float) -> Iterator[TimedFrame]:
+        return (one for one in self._all if first - 1e-9 <= one[0] <= last + 1e-9)
+
+    def findings(self) -> tuple[Finding, ...]:
+        return ()
+
+
+def test_a_film_is_read_once_by_its_windows_and_by_who_else_looks() -> None:
+    """A network of 12 frames at 25 Hz: two windows from 0.4 s on, of which someone else sees the frames about them."""
+    reader = WindowReader(Filmed(25.0, 60), small_model(), [1.0], first=0.4, last=1.4)
+    looked: list[float] = []
+    advanced: list[tuple[int, int]] = []
+    reader.look = lambda time, _: looked.append(time)
+    starts = []
+    for window in reader.windows(lambda count, one: advanced.append((count, one))):
+        assert len(advanced) == len(starts)  # a window counts when it is done
+        starts.append(window.start)
+    np.testing.assert_allclose(starts, [0.4, 0.88])
+    assert advanced == [(reader.layout.count, 1)] * 2
+    assert len(looked) == len(set(looked)) == reader.distinct.frames
+    assert looked[0] == pytest.approx(0.32)  # two frames before the part

@@ -19,7 +19,7 @@ from sim.effects import Effect, Gusts, apply
 from sim.handles import Handles, corners
 from sim.integrate import BackwardEuler, Integrator, Symplectic
 from sim.material import Material, named
-from sim.scene import Scene, assemble
+from sim.scene import Scene, assemble, roughened
 from sim.state import State
 from sim.system import System
 from sim.wind import Beyond, Even, SampledWind, VonKarman
@@ -214,9 +214,7 @@ def heading(key: AnswerKey) -> Floats:
 
 def _start(rest: Floats, key: AnswerKey, rng: np.random.Generator, handles: Handles) -> Floats:
     flat = rest[:, :1] * heading(key) + rest[:, 1:] * np.array([0.0, 0.0, 1.0])
-    noise = rng.normal(0.0, _START_NOISE, flat.shape)
-    noise[list(handles.vertices)] = 0.0
-    return flat + noise
+    return roughened(flat, handles, rng, _START_NOISE)
 
 
 def _effect(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey], name: str) -> Effect:
