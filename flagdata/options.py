@@ -227,6 +227,7 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
 
     rows = described(form)  # type: ignore[arg-type]
     converts = {key: made for key, (place, _) in rows.items() if (made := converter(str(place.type))) is not None}
+    floats = {key for key, (place, _) in rows.items() if str(place.type).removesuffix(" | None") == "float"}
     signature = inspect.signature(form)
     spelled = {name: key for key, (_, row) in rows.items() for name in (*row.names, row.spelled(key))}
     ordered = sorted((signature.parameters[key] for key in rows), key=lambda one: one.kind)
@@ -236,6 +237,7 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
         def call(*positional: P.args, **named: P.kwargs) -> R:
             values = shown.bind(*positional, **named).arguments
             plain = {key: converts[key](value, key) if key in converts else value for key, value in values.items()}
+            plain |= {key: float(plain[key]) for key in floats & plain.keys() if plain[key] is not None}
             try:
                 return run(_with_typed(form(**plain), frozenset(plain)))  # type: ignore[call-arg]
             except FlagdataError as error:

@@ -142,7 +142,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
       flagdata close-loop --recipe flag.toml --lake lake
       flagdata close-loop monday tuesday --lake lake --flag-size 1.5x1.0 --azimuth 70±7
     """
-    from flagdata.api.lakes import lake_of
+    from flagdata.dataset.source import lake_of
     from flagdata.outputs import check_files
     from measure.closing.artifacts import answer_of
     from measure.closing.close import close_loop as close

@@ -47,7 +47,7 @@ def propose(chosen: Proposing) -> None:
       flagdata propose flag.toml --known lift.coefficient
       flagdata propose other.toml --effect out/close-loop/proposal/proposed_1f2e3d.py:UpwardLower
     """
-    from flagdata.api.lakes import lake_of
+    from flagdata.dataset.source import lake_of
     from measure.nulls.plan import NullOptions
     from measure.nulls.workload import of_recordings
     from measure.observe import recipe as recipes
