@@ -225,8 +225,9 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
     """
     from flagdata.arguments import converter  # loads NumPy
 
-    rows = described(form)  # type: ignore[arg-type]
-    converts = {key: made for key, (place, _) in rows.items() if (made := converter(str(place.type))) is not None}
+    build: Any = form
+    rows = described(build)
+    converts = {key: plain for key, (place, _) in rows.items() if (plain := converter(str(place.type))) is not None}
     floats = {key for key, (place, _) in rows.items() if str(place.type).removesuffix(" | None") == "float"}
     signature = inspect.signature(form)
     spelled = {name: key for key, (_, row) in rows.items() for name in (*row.names, row.spelled(key))}
@@ -239,7 +240,7 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
             plain = {key: converts[key](value, key) if key in converts else value for key, value in values.items()}
             plain |= {key: float(plain[key]) for key in floats & plain.keys() if plain[key] is not None}
             try:
-                return run(_with_typed(form(**plain), frozenset(plain)))  # type: ignore[call-arg]
+                return run(_with_typed(build(**plain), frozenset(plain)))
             except FlagdataError as error:
                 if error.where in spelled:
                     FlagdataError.__init__(error, error.what, where=spelled[error.where], fix=error.fix)
