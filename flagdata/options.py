@@ -236,7 +236,7 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
     def made(run: Callable[[Any], R]) -> Callable[P, R]:
         @functools.wraps(run)
         def call(*positional: P.args, **named: P.kwargs) -> R:
-            values = shown.bind(*positional, **named).arguments
+            values = bind(*positional, **named).arguments
             plain = {key: converts[key](value, key) if key in converts else value for key, value in values.items()}
             plain |= {key: float(plain[key]) for key in floats & plain.keys() if plain[key] is not None}
             try:
@@ -247,6 +247,7 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
                 raise
 
         shown = signature.replace(parameters=ordered, return_annotation=run.__annotations__.get("return"))
+        bind: Any = shown.bind
         head, raised, rest = (inspect.getdoc(run) or "").partition("\nRaises:")
         vars(call).update(converts=frozenset(converts), __signature__=shown)
         call.__doc__ = f"{head}\nArgs:\n{_arguments(rows)}\n{raised}{rest}"

@@ -36,7 +36,7 @@ class Proposing(AsJson, ByNulls, NamedLake):
 def propose(chosen: Proposing) -> None:
     """Propose an effect that the library lacks, test it on recordings it was not made from, keep or reject it.
 
-    RECIPE.toml is one of `flagdata close-loop --recipe` that names its recordings. Terms are sought in a part of them;
+    RECIPE.toml is one of `flagdata close-loop` that names its recordings. Terms are sought in a part of them;
     up to three become an effect, written as a module with its contract tests; the rest of the recordings decide: errors
     must fall, and below those of as many terms of another direction. proposal/proposals.json records what was tried.
     Run it where close-loop says "none of the library"; where it says "partly explained", name what it found with
