@@ -225,8 +225,10 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
     """
     from flagdata.arguments import converter  # loads NumPy
 
-    rows = described(form)  # type: ignore[arg-type]
-    converts = {key: made for key, (place, _) in rows.items() if (made := converter(str(place.type))) is not None}
+    build: Any = form
+    rows = described(build)
+    converts = {key: plain for key, (place, _) in rows.items() if (plain := converter(str(place.type))) is not None}
+    floats = {key for key, (place, _) in rows.items() if str(place.type).removesuffix(" | None") == "float"}
     signature = inspect.signature(form)
     spelled = {name: key for key, (_, row) in rows.items() for name in (*row.names, row.spelled(key))}
     ordered = sorted((signature.parameters[key] for key in rows), key=lambda one: one.kind)
@@ -234,16 +236,18 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
     def made(run: Callable[[Any], R]) -> Callable[P, R]:
         @functools.wraps(run)
         def call(*positional: P.args, **named: P.kwargs) -> R:
-            values = shown.bind(*positional, **named).arguments
+            values = bind(*positional, **named).arguments
             plain = {key: converts[key](value, key) if key in converts else value for key, value in values.items()}
+            plain |= {key: float(plain[key]) for key in floats & plain.keys() if plain[key] is not None}
             try:
-                return run(_with_typed(form(**plain), frozenset(plain)))  # type: ignore[call-arg]
+                return run(_with_typed(build(**plain), frozenset(plain)))
             except FlagdataError as error:
                 if error.where in spelled:
                     FlagdataError.__init__(error, error.what, where=spelled[error.where], fix=error.fix)
                 raise
 
         shown = signature.replace(parameters=ordered, return_annotation=run.__annotations__.get("return"))
+        bind: Any = shown.bind
         head, raised, rest = (inspect.getdoc(run) or "").partition("\nRaises:")
         vars(call).update(converts=frozenset(converts), __signature__=shown)
         call.__doc__ = f"{head}\nArgs:\n{_arguments(rows)}\n{raised}{rest}"

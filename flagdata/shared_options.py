@@ -11,7 +11,7 @@ from flagdata.option_types import DURATION, POSITIVE, SHARE, STATED
 from flagdata.options import option, options
 
 if TYPE_CHECKING:
-    from flagdata.api.lakes import AnyLake
+    from flagdata.dataset.source import AnyLake
     from flagdata.lake import Lake
     from flagdata.stated import Stated
 
@@ -96,7 +96,7 @@ class Keeping(BesideLake, Committing):
 
     def opened(self) -> Lake | None:
         """Opens the lake, if one was named; unless it is only read it can be written."""
-        from flagdata.api.lakes import lake_of
+        from flagdata.dataset.source import lake_of
 
         lake = lake_of(self.lake)
         if lake is not None and not self.read_only:

@@ -15,10 +15,11 @@ from flagdata.console import LocalPath
 from flagdata.errors import UsageError
 from flagdata.option_types import LISTED, POSITIVE
 from flagdata.options import argument, called, option, options
+from flagdata.parts import call
 from flagdata.shared_options import LAKE, AtVersion, OnLake
 
 if TYPE_CHECKING:
-    from flagdata.api.lakes import AnyLake
+    from flagdata.dataset.source import AnyLake
     from flagdata.lake.refs import Ref
     from flagdata.rows import Rows
 
@@ -61,7 +62,7 @@ def query(chosen: Querying) -> Rows:
         NotFoundError: no such lake, or no such version.
         LimitError: it takes longer, or gives more, than it may.
     """
-    from flagdata.api.lakes import opened
+    from flagdata.dataset.source import opened
 
     own = {"sql": chosen.sql, "columns": chosen.columns, "order": chosen.order, "limit": chosen.limit}
     return opened(chosen.lake).query(chosen.where, at=chosen.at, **own)
@@ -105,7 +106,7 @@ def tag(chosen: Naming) -> tuple[Ref, ...]:
         NotFoundError: no such lake, version or tag.
         UsageError: options that contradict each other.
     """
-    from flagdata.api.lakes import opened
+    from flagdata.dataset.source import opened
 
     lake = opened(chosen.lake).lake
     if chosen.name is None:
@@ -163,6 +164,4 @@ def export(chosen: Exporting) -> Mapping[str, Any]:
         NotFoundError: no such lake or version, or nothing matches.
         UsageError: a form that is not known, or options that are not of it.
     """
-    from flagdata.commands.export import exported
-
-    return exported(chosen)
+    return call("flagdata.commands.export:exported", chosen)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from flagdata.arguments import checked
-from flagdata.dataset.source import Source
-from flagdata.lake import Lake
+from flagdata.dataset.source import AnyLake, Source, opened
 from flagdata.storage import Place
 
 if TYPE_CHECKING:
@@ -14,9 +13,6 @@ if TYPE_CHECKING:
     from flagdata.dataset.pairs import Pairs
     from flagdata.dataset.splits import ExplicitSplit, HashedSplit
     from flagdata.dataset.tolerance import Tolerance
-
-AnyLake: TypeAlias = Source | Lake | Place | str
-"""A lake that is open, its folder, or its address `s3://bucket/prefix`."""
 
 
 @checked
@@ -75,15 +71,3 @@ def pairs(
     return opened(lake).pairs(
         where, at=at, split=split, split_by=split_by, window=window, tolerance=tolerance, seed=seed, cache=cache
     )
-
-
-def opened(lake: AnyLake) -> Source:
-    """An open lake, whatever names it."""
-    if isinstance(lake, Source):
-        return lake
-    return Source(lake) if isinstance(lake, Lake) else Source.open(lake)
-
-
-def lake_of(lake: AnyLake | None) -> Lake | None:
-    """Returns the lake that a verb was given, open; None where it was given none."""
-    return None if lake is None else opened(lake).lake

@@ -14,6 +14,7 @@ import click
 from flagdata.console import LocalPath
 from flagdata.option_types import DURATION
 from flagdata.options import argument, called, option, options
+from flagdata.parts import call
 from flagdata.shared_options import OnBranch, OnLake
 
 if TYPE_CHECKING:
@@ -138,9 +139,7 @@ def align(chosen: Aligning) -> Mapping[str, Any]:
         UnknownNameError: no such camera or wind.
         UsageError: options that contradict each other.
     """
-    from flagdata.commands.align import aligned
-
-    return aligned(chosen).content
+    return call("flagdata.commands.align:aligned", chosen).content
 
 
 SOURCE, CAMERA, ANEMOMETER = "What the source is", "Camera", "Anemometer"
@@ -391,6 +390,4 @@ def ingest(chosen: Ingesting) -> tuple[IngestResult, ...]:
         UsageError: an option that means nothing for any of the sources.
         ZoneMissingError: wall-clock stamps whose zone nobody gave.
     """
-    from flagdata.commands.ingest_sources import ingested
-
-    return ingested(chosen)
+    return call("flagdata.commands.ingest_sources:ingested", chosen)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
-from flagdata.api.lakes import AnyLake, opened
 from flagdata.arguments import checked
+from flagdata.dataset.source import AnyLake, opened
 from flagdata.errors import InputError, NotFoundError
 from flagdata.examples import example_of
 from flagdata.film import Film

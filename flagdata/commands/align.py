@@ -131,7 +131,7 @@ def aligned(chosen: Aligning, *, plot: Path | None = None) -> Report:
 
 def _opened(chosen: ByClock, plot: Path | None) -> tuple[Lake, ClockOptions]:
     """Opens the lake, which can be written unless nothing is to be; with how to come by the clock model."""
-    from flagdata.api.lakes import opened
+    from flagdata.dataset.source import opened
 
     clock = chosen.clock()
     _check_plot(plot, clock)

@@ -52,7 +52,7 @@ def exported(chosen: Exporting) -> Mapping[str, Any]:
     Raises:
         FlagdataError: see `flagdata.export`.
     """
-    from flagdata.api.lakes import opened
+    from flagdata.dataset.source import opened
     from flagdata.export import Export, prepare
     from flagdata.outputs import check_folder
 

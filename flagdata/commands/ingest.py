@@ -128,7 +128,7 @@ def ingest(chosen: IngestCommand) -> None:
 
 
 def _ingest(chosen: IngestCommand | FilmCommand | WindCommand | FramesCommand, *, kind: str | None = None) -> None:
-    from flagdata.api.lakes import opened
+    from flagdata.dataset.source import opened
 
     accept = chosen.accept if isinstance(chosen, FromAnemometer) else None
     given = Given.of(chosen, kind=kind, confirm=on_command_line(accept, as_json=chosen.as_json))

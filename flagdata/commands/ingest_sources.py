@@ -201,7 +201,7 @@ def ingested(chosen: Ingesting) -> tuple[IngestResult, ...]:
     Raises:
         FlagdataError: see `flagdata.ingest`.
     """
-    from flagdata.api.lakes import opened
+    from flagdata.dataset.source import opened
     from flagdata.ingest.anemometer.confirm import Accepting
 
     lake = opened(chosen.lake).lake

@@ -80,7 +80,7 @@ def tag(chosen: NamingCommand) -> None:
 
     The name of a tag that was deleted never shows anything else.
     """
-    from flagdata.api.lakes import opened
+    from flagdata.dataset.source import opened
 
     lake = opened(chosen.lake).lake
     if chosen.name is not None and chosen.delete:
@@ -97,7 +97,7 @@ def branch(chosen: NamingCommand) -> None:
 
     A branch that is deleted leaves its commits to the log, to its tags and to branches made from it.
     """
-    from flagdata.api.lakes import opened
+    from flagdata.dataset.source import opened
 
     lake = opened(chosen.lake).lake
     if chosen.name is not None and chosen.delete:

@@ -99,7 +99,7 @@ def query(chosen: QueryCommand) -> None:
         _describe(as_json=chosen.as_json)
         return
     sql_process()  # starts while the lake is read
-    from flagdata.api.lakes import opened
+    from flagdata.dataset.source import opened
     from flagdata.lake.selection import Request, Selection
     from flagdata.outputs import check_file
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from flagdata.arguments import checked
 from flagdata.extras import explained
@@ -147,3 +147,19 @@ class Source:
     def _held(self) -> dict[str, int]:
         """Kind → artifacts on main, by name of the kind."""
         return dict(sorted(Counter(self.lake.rows(columns=["kind"])["kind"].to_pylist()).items()))
+
+
+AnyLake: TypeAlias = Source | Lake | Place | str
+"""A lake that is open, its folder, or its address `s3://bucket/prefix`."""
+
+
+def opened(lake: AnyLake) -> Source:
+    """Opens a lake, whatever names it."""
+    if isinstance(lake, Source):
+        return lake
+    return Source(lake) if isinstance(lake, Lake) else Source.open(lake)
+
+
+def lake_of(lake: AnyLake | None) -> Lake | None:
+    """Opens the lake that a verb was given; None where it was given none."""
+    return None if lake is None else opened(lake).lake

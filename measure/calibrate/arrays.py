@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flagdata.api.lakes import lake_of
 from flagdata.api.measuring import Calibrating, OfFlag
 from flagdata.caches import user_cache
 from flagdata.calibrated import Calibrated, Weighed
+from flagdata.dataset.source import lake_of
 from flagdata.errors import InputError
 from flagdata.lake import Lake
 from flagdata.provenance import array_hash

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from flagdata.addresses import local_path
 from flagdata.errors import UsageError
 from flagdata.ingest.anemometer import WindOptions
 from flagdata.ingest.anemometer.confirm import UNASKED, Confirm
@@ -62,13 +64,19 @@ def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: L
         UsageError: winds that do not fit the recordings.
         FlagdataError: as the readers.
     """
-    found = [
-        seen.turned(reading.up)
-        for source in sources
-        for seen in opened(
-            RecordingSource(source=source, rate=reading.rate, unit=reading.unit, noise=reading.noise), _HERE, lake
-        )
-    ]
+    found = [(seen.turned(reading.up), source, wind) for seen, source, wind in _beside(sources, winds, reading, lake)]
+    return distinct([blown(seen, wind, _HERE, lake) for seen, _, wind in found])
+
+
+def _beside(
+    sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None
+) -> list[tuple[Observation, RecordingSource, WindSource | None]]:
+    """Returns the recordings of some sources as they are, each with its source and its wind; as `read`."""
+    found: list[tuple[Observation, RecordingSource]] = []
+    for text in sources:
+        source = RecordingSource(source=text, rate=reading.rate, unit=reading.unit, noise=reading.noise)
+        several = opened(source, _HERE, lake)
+        found += [(seen, replace(source, take=seen.name if len(several) > 1 else "")) for seen in several]
     if len(winds) not in (0, 1, len(found)):
         raise UsageError(
             f"{len(winds)} winds for {len(found)} recordings", where="--wind", fix="give one, or one for each recording"
@@ -84,9 +92,50 @@ def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: L
             if given[name] is not None:
                 raise UsageError("no wind is a log", where=f"--{name}", fix="leave it out, or name a log by --wind")
     each = [_wind(wind, reading) for wind in (winds if len(winds) == len(found) else [*winds[:1]] * len(found))]
-    return distinct(
-        [blown(seen, wind, _HERE, lake) for seen, wind in zip(found, each or [None] * len(found), strict=True)]
-    )
+    return [(seen, source, wind) for (seen, source), wind in zip(found, each or [None] * len(found), strict=True)]
+
+
+def drafted(
+    sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None, *, folder: Path
+) -> dict[str, Any]:
+    """Returns what a recipe says of the recordings of some sources, see `measure.observe.recipe`.
+
+    Args:
+        folder: of the recipe, which its paths are relative to.
+
+    Raises:
+        FlagdataError: as `read`.
+    """
+
+    def placed(text: str) -> str:
+        path = local_path(text)
+        return os.path.relpath(path, folder) if path.exists() else text
+
+    def blowing(wind: WindSource) -> dict[str, Any]:
+        if wind.velocity is not None:
+            return {"velocity": list(wind.velocity)}
+        log = {"log": placed(wind.log), "axis": reading.axis, "north": reading.north, "offset": reading.offset}
+        sensor = None if reading.sensor is None else placed(reading.sensor)
+        return log | {"sensor": sensor, "zone": reading.zone, "accept": reading.confirm.accept}
+
+    tables = []
+    for _, source, wind in _beside(sources, winds, reading, lake):
+        table = {**vars(source), "source": placed(source.source), "wind": None if wind is None else blowing(wind)}
+        tables.append(table)
+    return filled({"up": reading.up.value, "recording": tables})
+
+
+def filled(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns a table of a recipe without what it says nothing of."""
+    kept: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            value = filled(value)
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            value = [filled(one) for one in value]
+        if value not in (None, "", {}, "m"):
+            kept[key.replace("_", "-")] = value
+    return kept
 
 
 def _is_log(text: str) -> bool:

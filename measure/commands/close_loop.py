@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from flagdata.commands.confirm import on_command_line
-from flagdata.console import LocalPath, say
+from flagdata.console import LocalPath, document, echo, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.option_types import POSITIVE
 from flagdata.options import argument, command, option, options, typed
@@ -20,12 +20,15 @@ from measure.closing.findings import with_warnings
 from measure.films.command_line import JudgingFilms, refuse_of_others
 
 if TYPE_CHECKING:
+    from flagdata.lake import Lake
     from measure.closing.artifacts import Answer
+    from measure.closing.sources import Reading
     from measure.observe import Setup, Up
     from measure.observe.recipe import ExperimentRecipe
     from sim.material import Material
 
 MARKERS, WIND = "Markers and meshes", "The wind beside markers"
+_RECIPE = ".toml"
 _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "rate", "unit", "noise", "up")
 """Options that say how sources of the command line are read."""
 
@@ -35,11 +38,12 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
     """How recordings of one cloth are read and judged, and what is written."""
 
     sources: tuple[str, ...] = argument("Recordings of one cloth.", "SOURCE...", default=())
-    recipe: Path | None = option(
-        "Recipe of the cloth, pins, wind and test; it may name the recordings as well.",
+    draft: Path | None = option(
+        "Write a recipe of the cloth and the recordings as the command line states them, to be completed, and judge "
+        "nothing.",
         default=None,
         section=MARKERS,
-        type=LocalPath(),
+        type=LocalPath(dir_okay=False),
         metavar="FILE.toml",
     )
     density_uncertainty: float | None = option(
@@ -121,6 +125,23 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         type=LocalPath(),
     )
 
+    @property
+    def recipe(self) -> Path | None:
+        """The recipe among the sources.
+
+        Raises:
+            UsageError: there are several.
+        """
+        found = [source for source in self.sources if source.lower().endswith(_RECIPE)]
+        if len(found) > 1:
+            raise UsageError(f"the sources name {len(found)} recipes", where=found[1], fix="name one")
+        return Path(found[0]) if found else None
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """The other sources."""
+        return tuple(source for source in self.sources if not source.lower().endswith(_RECIPE))
+
 
 @command(CloseLoopCommand)
 def close_loop(chosen: CloseLoopCommand) -> None:
@@ -136,19 +157,23 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     of flag, camera, film and tables are about these. Films beside markers of the same cloth are judged together: each
     kind at half of the level, with one joint answer.
 
+    A SOURCE that ends in .toml is a recipe of cloth, pins, wind and test, which may name the recordings of markers and
+    meshes as well; --draft writes one.
+
     \b
       flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8
       flagdata close-loop tracks.csv --wind anemometer.csv --material camel-ponte-roma --pins hoist-corners
-      flagdata close-loop --recipe flag.toml --lake lake
+      flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8 --draft flag.toml
+      flagdata close-loop flag.toml --lake lake
       flagdata close-loop monday tuesday --lake lake --flag-size 1.5x1.0 --azimuth 70±7
     """
-    from flagdata.api.lakes import lake_of
+    from flagdata.dataset.source import lake_of
     from flagdata.outputs import check_files
     from measure.closing.artifacts import answer_of
     from measure.closing.close import close_loop as close
     from measure.closing.models import models
     from measure.closing.output import FILES, JOINT, KINDS, deliver, deliver_joint
-    from measure.closing.sources import Reading, read
+    from measure.closing.sources import read
     from measure.films.sources import films_among
     from measure.forecasting.strengths import Suspicion, on_markers
     from measure.loop.run import Options
@@ -158,14 +183,14 @@ def close_loop(chosen: CloseLoopCommand) -> None:
 
     recipe = None if chosen.recipe is None else recipes.parse(chosen.recipe)
     in_recipe = recipe is not None and bool(recipe.recordings)
-    if not in_recipe and not chosen.sources:
+    if not in_recipe and not chosen.recordings:
         raise UsageError("no recordings", where="SOURCE", fix="name them, or a recipe that does")
     check_files(chosen.out, *dict.fromkeys((*FILES, *JOINT)), command="close-loop")
     lake, branch, name, out = lake_of(chosen.lake), chosen.branch, chosen.name, chosen.out
     if lake is not None:
         lake.check_writable()
-    films = films_among(chosen.sources, lake=lake, at=branch, sized=chosen.flag_size is not None, tracked=in_recipe)
-    tracked = tuple(source for source in chosen.sources if source not in films)
+    films = films_among(chosen.recordings, lake=lake, at=branch, sized=chosen.flag_size is not None, tracked=in_recipe)
+    tracked = tuple(source for source in chosen.recordings if source not in films)
     if in_recipe:
         _refuse_beside(chosen, tracked)
     both = bool(films) and (in_recipe or bool(tracked))
@@ -181,6 +206,15 @@ def close_loop(chosen: CloseLoopCommand) -> None:
             )
     else:
         refuse_of_others(chosen, films=bool(films))
+        if films and recipe is not None:
+            raise UsageError(
+                "the sources are films and tables of observables",
+                where=str(chosen.recipe),
+                fix="leave it out: it is about markers and meshes",
+            )
+    if chosen.draft is not None:
+        _draft(chosen, tracked, lake)
+        return
 
     def of_markers(level: float | None) -> tuple[Answer, Material]:
         """The answer by markers, and the cloth's nominal material."""
@@ -197,19 +231,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         if recipe is not None and in_recipe:
             observed = recipes.read(replace(recipe, setup=setup), lake)
         else:
-            north = chosen.north
-            reading = Reading(
-                rate=chosen.rate,
-                unit=chosen.unit,
-                noise=chosen.noise,
-                offset=chosen.offset,
-                up=_up(chosen, recipe),
-                sensor=chosen.sensor,
-                zone=chosen.zone,
-                axis=_axis(chosen),
-                confirm=on_command_line(chosen.accept, as_json=chosen.as_json),
-                north=None if north is None else math.radians(north),
-            )
+            reading = _reading(chosen, recipe)
             observed = observe(read(tracked, chosen.winds, reading, lake), setup)
         refuse(observed.findings)
         recordings, cloth = observed.experiment.recordings, observed.experiment.specimen
@@ -262,6 +284,57 @@ def _refuse_beside(chosen: CloseLoopCommand, sources: tuple[str, ...]) -> None:
             raise UsageError(
                 "the recipe says how its recordings are read", where=f"--{spelled}", fix="write it into the recipe"
             )
+
+
+def _reading(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Reading:
+    """How sources of the command line are read."""
+    from measure.closing.sources import Reading
+
+    return Reading(
+        rate=chosen.rate,
+        unit=chosen.unit,
+        noise=chosen.noise,
+        offset=chosen.offset,
+        up=_up(chosen, recipe),
+        sensor=chosen.sensor,
+        zone=chosen.zone,
+        axis=_axis(chosen),
+        confirm=on_command_line(chosen.accept, as_json=chosen.as_json),
+        north=None if chosen.north is None else math.radians(chosen.north),
+    )
+
+
+def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None) -> None:
+    """Writes the recipe of what the command line states.
+
+    Raises:
+        UsageError: there is a recipe already, or there are no markers or meshes.
+    """
+    from flagdata.documents import to_toml
+    from flagdata.outputs import write_file
+    from measure.closing.sources import drafted, filled
+    from measure.observe import Setup
+
+    if chosen.recipe is not None or chosen.draft is None or not sources:
+        raise UsageError(
+            "a draft is made of recordings of markers and meshes", where="--draft", fix="name these and no recipe"
+        )
+    setup = _setup(Setup(), chosen)
+    size = () if setup.outline is None else setup.outline.max(axis=0).tolist()
+    pins = {} if setup.pins is None else {"points" if isinstance(setup.pins, tuple) else "at": setup.pins}
+    content = {
+        "title": chosen.name or chosen.draft.stem,
+        "test": {"level": chosen.level, "nulls": chosen.nulls},
+        "cloth": dict(zip(("width", "height"), size, strict=False)),
+        "material": {"name": chosen.material, "density_uncertainty": chosen.density_uncertainty},
+        "pins": pins,
+        **drafted(sources, chosen.winds, _reading(chosen, None), lake, folder=chosen.draft.resolve().parent),
+    }
+    write_file(chosen.draft, to_toml(filled(content)))
+    if chosen.as_json:
+        document("close-loop-draft", {"recipe": str(chosen.draft)})
+    else:
+        echo(chosen.draft)
 
 
 def _name(recording: str, sources: tuple[str, ...], recipe: ExperimentRecipe | None) -> str:

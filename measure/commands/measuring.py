@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.api.lakes import lake_of
 from flagdata.api.measuring import Measuring
+from flagdata.dataset.source import lake_of
 from flagdata.errors import UsageError
 from flagdata.film_array import Frames
 from flagdata.findings import Finding, Severity

@@ -92,7 +92,7 @@ def observed(chosen: Observing) -> Rows:
     Raises:
         FlagdataError: see `flagdata.observe`.
     """
-    from flagdata.api.lakes import lake_of
+    from flagdata.dataset.source import lake_of
     from flagdata.rows import Rows
 
     table, subject, _ = _table(chosen, lake_of(chosen.lake), at=chosen.at)

@@ -36,7 +36,7 @@ class Proposing(AsJson, ByNulls, NamedLake):
 def propose(chosen: Proposing) -> None:
     """Propose an effect that the library lacks, test it on recordings it was not made from, keep or reject it.
 
-    RECIPE.toml is one of `flagdata close-loop --recipe` that names its recordings. Terms are sought in a part of them;
+    RECIPE.toml is one of `flagdata close-loop` that names its recordings. Terms are sought in a part of them;
     up to three become an effect, written as a module with its contract tests; the rest of the recordings decide: errors
     must fall, and below those of as many terms of another direction. proposal/proposals.json records what was tried.
     Run it where close-loop says "none of the library"; where it says "partly explained", name what it found with
@@ -47,7 +47,7 @@ def propose(chosen: Proposing) -> None:
       flagdata propose flag.toml --known lift.coefficient
       flagdata propose other.toml --effect out/close-loop/proposal/proposed_1f2e3d.py:UpwardLower
     """
-    from flagdata.api.lakes import lake_of
+    from flagdata.dataset.source import lake_of
     from measure.nulls.plan import NullOptions
     from measure.nulls.workload import of_recordings
     from measure.observe import recipe as recipes

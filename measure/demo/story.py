@@ -163,7 +163,7 @@ def markers_step(shell: Transcript, seed: int) -> None:
         frames = round((recipe.settle + recipe.duration) * recipe.rate)
         with progress(frames, label="tracking", unit="frame") as advance:
             made = make_tracks(recipe, shell.folder, advance=advance)
-        step.found = shell.show("close-loop", "--recipe", made.recipe.name, "--lake", "lake", "--out", "loop")
+        step.found = shell.show("close-loop", made.recipe.name, "--lake", "lake", "--out", "loop")
         models = [row["name"] for row in shell.read("ls", "--kind", "model", "--lake", "lake")["artifacts"]]
         with_effects = [name for name in models if not name.endswith("-base")]
         shell.show("simulate", (with_effects or models)[0], "--lake", "lake")

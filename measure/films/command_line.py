@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from flagdata.stated import Stated
 
 OF_MARKERS = (
-    "recipe",
+    "draft",
     "winds",
     "axis",
     "north",

@@ -21,10 +21,11 @@ from measure.closing import Reading
 from measure.closing.sources import read
 from measure.commands.close_loop import CloseLoopCommand, with_warnings
 from measure.commands.close_loop import _setup as setup_of
-from measure.observe import Setup, Up
+from measure.observe import Setup, Up, parse
 from measure.verdict import Conclusion
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks
 from tests.measure.report.verdicts import Size, verdict
+from tests.program import invoke
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,7 @@ def said(arguments: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[
     [
         ([], 2, "no recordings"),
         (["nowhere.csv"], 1, "no such file"),
-        (["nowhere.csv", "--recipe", "nowhere.toml"], 1, "no such recipe"),
+        (["nowhere.csv", "nowhere.toml"], 1, "no such recipe"),
         (["nowhere.csv", "--nulls", "100"], 2, "100 nulls"),
         (["nowhere.csv", "--nulls", "200", "--bank", "."], 2, "both --nulls and --bank"),
         (["nowhere.csv", "--level", "1.5"], 2, "1.5"),
@@ -129,10 +130,35 @@ def test_beside_a_recipe_with_recordings_no_option_is_ignored(
 ) -> None:
     recipe = tmp_path / "flag.toml"
     recipe.write_text(f'[[recording]]\nsource = "{table}"\ntake = "calm"\n')
-    code, error = said(["--recipe", str(recipe), option], capsys)
+    code, error = said([str(recipe), option], capsys)
     assert (code, error["where"]) == (2, option.partition("=")[0])
-    code, error = said([str(table), "--recipe", str(recipe)], capsys)
+    code, error = said([str(table), str(recipe)], capsys)
     assert (code, error["where"]) == (2, "SOURCE")
+
+
+def test_a_draft_is_the_recipe_of_what_the_command_line_states(
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "deeper" / "flag.toml"
+    path.parent.mkdir()
+    words = "--wind 4 --wind 8 --axis 0,2,0 --pins 0,0;0,0.4 --size 1.2x0.8 --material paper --density-uncertainty 0.02"
+    given = ("close-loop", table, *words.split(), "--noise", "0.001", "--draft", path, "--json")
+    ended = invoke(capsys, *given)
+    assert (ended.code, ended.document["recipe"]) == (0, str(path))
+    recipe = parse(path)
+    assert [(one.take, one.noise) for one in recipe.recordings] == [("calm", 1e-3), ("brisk", 1e-3)]
+    assert [one.wind.velocity for one in recipe.recordings if one.wind] == [(0.0, 4.0, 0.0), (0.0, 8.0, 0.0)]
+    chosen = CloseLoopCommand(
+        sources=(str(table),), pins="0,0;0,0.4", size="1.2x0.8", material="paper", density_uncertainty=0.02
+    )
+    setup = setup_of(Setup(), chosen)
+    assert recipe.setup.pins == setup.pins
+    assert recipe.setup.material == setup.material
+    assert (recipe.setup.mass_known, recipe.setup.density_uncertainty) == (True, 0.02)
+    np.testing.assert_allclose(recipe.setup.outline, setup.outline)  # type: ignore[arg-type]
+    assert invoke(capsys, *given).code == 1  # the file is there
+    again = invoke(capsys, "close-loop", path, "--draft", tmp_path / "other.toml", "--json")
+    assert (again.code, again.document["where"]) == (2, "--draft")
 
 
 @pytest.mark.parametrize(("line", "what"), [("nuls = 64", "did you mean 'nulls'"), ("nulls = 0.5", "whole number")])
@@ -141,7 +167,7 @@ def test_a_recipe_says_what_the_test_is_and_no_more(
 ) -> None:
     recipe = tmp_path / "flag.toml"
     recipe.write_text(f"[test]\n{line}\n")
-    code, error = said(["tracks.csv", "--recipe", str(recipe)], capsys)
+    code, error = said(["tracks.csv", str(recipe)], capsys)
     assert code in (1, 2)
     assert what in error["fix"]
 

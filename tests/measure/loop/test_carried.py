@@ -178,7 +178,6 @@ def test_close_loop_judges_a_table_of_a_carried_cloth(
         main(
             [
                 "close-loop",
-                "--recipe",
                 str(recipe),
                 "--bank",
                 str(bank),

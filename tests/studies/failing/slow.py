@@ -259,7 +259,6 @@ LOOP = {
     "close-loop": Command(
         arguments=(
             "close-loop",
-            "--recipe",
             "{folder}/tracks.toml",
             "--bank",
             "{folder}/bank",
