@@ -196,21 +196,24 @@ def test_the_forces_counted_are_those_of_the_sheet() -> None:
     )
 
 
-def test_the_forces_counted_on_films_are_those_of_the_second_sheet() -> None:
-    folder = ROOT / "docs" / "results" / "challenge-films-2"
-    score = json.loads((folder / "challenge-score.json").read_text(encoding="utf-8"))
-    said = [(one["key"]["kind"], one["conclusion"]) for one in score["outcomes"]]
+def test_the_forces_counted_on_films_are_those_of_the_third_sheet() -> None:
+    page = "docs/results/challenge-films-3/challenge-score"
+    score = json.loads((ROOT / f"{page}.json").read_text(encoding="utf-8"))
+    verdicts = [(outcome["key"], outcome) for outcome in score["outcomes"]]
     tested, stated = rows()["the same, from films"]
-    nulls = [what for group, what in said if group == "null" and what != "refused"]
-    single = [what for group, what in said if group == "one"]
-    found = [what for what in single if what not in ("refused", "no effect needed")]
-    page = "docs/results/challenge-films-2/challenge-score.md"
-    assert tested == f"[{len(said)} sealed sets]({page}) of three films of 25 s"
-    assert set(found) == {"one of"}
-    alarms = sum(what != "no effect needed" for what in nulls)
+    assert tested == f"[{len(verdicts)} sealed sets]({page}.md) of three films of 25 s"
+    quiet = ("not decided", "no effect needed")
+    nulls = [outcome["conclusion"] for key, outcome in verdicts if key["kind"] == "null"]
+    single = [outcome["conclusion"] for key, outcome in verdicts if key["kind"] == "one"]
+    alarms = sum(conclusion not in quiet for conclusion in nulls)
+    detected = [conclusion for conclusion in single if conclusion not in quiet]
+    named = re.search(
+        r"^\| true effect among those named \| (\d+)/", (ROOT / f"{page}.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert named is not None
+    assert detected.count("one of") == int(named[1])
     assert stated == (
-        f"{alarms} false alarm in {len(nulls)}; of {len(single)} hidden forces {len(found)} detected, each named among "
-        "several"
+        f"{alarms} false alarms in {len(nulls)}; of {len(single)} hidden forces {len(detected)} detected, {named[1]} named among several"
     )
 
 
