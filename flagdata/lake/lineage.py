@@ -86,7 +86,7 @@ class Removal:
 
     @property
     def reason(self) -> str:
-        """Returns the message of whoever made it."""
+        """Returns the message that the user gave to it."""
         return str(self.entry.get("message", ""))
 
     @property
