@@ -202,7 +202,7 @@ class Lineage:
         for entry in sorted(labelled, key=lambda entry: entry["version"]):
             life = self.life(Slice(branch=entry["branch"], version=entry["version"]))
             for artifact, values in noted_labels(entry).items() if entry["version"] <= known.get(life, -1) else ():
-                merged = labels.get(artifact, {}) | values
+                merged = {**labels.get(artifact, {}), **values}
                 labels[artifact] = {name: value for name, value in merged.items() if value is not None}
         return {artifact: values for artifact, values in labels.items() if values}
 

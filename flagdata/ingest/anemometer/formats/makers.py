@@ -193,9 +193,9 @@ class Telegrams:
         elif self._maker.speed:
             sample["wind_speed"] = math.nan
             for names in self._maker.speed:
-                parts = [values.get(name) for name in names.split()]
-                if None in parts:
+                if not all(name in values for name in names.split()):
                     continue
+                parts = [values[name] for name in names.split()]
                 sample["wind_speed"] = parts[0] if len(parts) == 1 else math.hypot(*parts)
                 if len(parts) == 1 or not math.isnan(sample["wind_speed"]):
                     break
