@@ -208,7 +208,7 @@ def build(
         _check_option(key, value)
 
     def made() -> Learner:
-        module = NETWORKS[network](**given)
+        module: nn.Module = NETWORKS[network](**given)
         if not isinstance(module, Network):
             raise InputError(
                 f"the network {network} lacks one of takes, recurrent, dimension and forward",

@@ -36,7 +36,7 @@ def load(spec: str) -> type[Effect]:
         raise UsageError(
             f"{attribute!r} is no effect with a strength",
             where=text,
-            fix="derive a frozen dataclass from a kind of sim.effects.effect, with an annotated strength",
+            fix="derive a frozen dataclass from a kind of effect in flagdata.extend, with an annotated strength",
         )
     return effect
 

@@ -91,6 +91,7 @@ import json
 from importlib import import_module
 import catalogs, measure, models, sim
 import flagdata
+import flagdata.extend
 from flagdata.cli import main
 flags = flagdata.simulate(
     scene={"columns": 4}, wind={"speed": 3.0}, time={"settle": 0.0, "frames": 2},
@@ -109,6 +110,7 @@ except SystemExit as end:
 print(json.dumps({
     "mine": [module.VALUE for module in (catalogs, measure, models, sim)], "frames": flags.positions.shape[1],
     "film": len(film), "kind": kind, "code": code, "own": list(own.strengths()), "from": flagdata.__file__,
+    "public": [name for name in dir(flagdata.extend) if getattr(flagdata.extend, name) is None],
 }))
 """
 OWN_EFFECT = """
@@ -170,7 +172,7 @@ def test_a_users_own_files_of_the_packages_names_neither_break_an_installation_n
     assert found["mine"] == ["mine"] * 4
     assert Path(found["from"]).is_relative_to(site if installation == "wheel" else ROOT)
     assert (found["frames"], found["film"], found["kind"], found["code"]) == (2, 2, "bad-input", 0)
-    assert found["own"] == ["change"]
+    assert (found["own"], found["public"]) == (["change"], [])
 
 
 def test_a_script_and_a_folder_of_weights_may_have_the_name_of_a_package_of_an_editable_installation(
