@@ -10,7 +10,7 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import torch
@@ -37,7 +37,8 @@ class Beyond(StrEnum):
     """A `UsageError`."""
 
 
-class Even(NamedTuple):
+@dataclass(frozen=True, kw_only=True)
+class Even:
     """Times at equal distances.
 
     Attributes:

@@ -14,7 +14,7 @@ from flagdata.errors import FlagdataError
 from sim.batch import Batch, DivergedError, Divergence, after
 from sim.material import named
 from sim.scene import assemble, flag
-from sim.state import State
+from sim.state import SPEED_LIMIT, State
 from sim.system import System
 
 RATE = 4.0
@@ -38,10 +38,10 @@ class Climbing:
         return replace(state, position=position, velocity=velocity, time=state.time + duration)
 
 
-def batch(method: Climbing, divergence: Divergence, **more: float) -> Batch:
+def batch(method: Climbing, divergence: Divergence, *, speed_limit: float = SPEED_LIMIT) -> Batch:
     scenes = [flag(material=named("camel-ponte-roma"), wind_speed=2.0, columns=3) for _ in range(3)]
     system, state = assemble(scenes, dtype=torch.float64)
-    return Batch(system=system, state=state, integrator=method, divergence=divergence, **more)
+    return Batch(system=system, state=state, integrator=method, divergence=divergence, speed_limit=speed_limit)
 
 
 def climbed(run: np.ndarray) -> np.ndarray:
@@ -87,7 +87,7 @@ def test_a_member_that_begins_anew_is_named_and_the_others_go_on() -> None:
 
 def test_a_run_that_keeps_all_shows_where_a_member_is_lost() -> None:
     run = batch(Climbing(lost=2), Divergence.KEEP)
-    finite = np.isfinite(run.positions(range(5), RATE)).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(run.positions(range(5), RATE)).all(axis=(1, 2)))
     np.testing.assert_array_equal(finite[:, 2], [True, True, True, False, False])
     assert finite[:, :2].all()
     assert not run.diverged

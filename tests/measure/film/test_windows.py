@@ -172,5 +172,5 @@ def test_a_film_is_read_once_by_its_windows_and_by_who_else_looks() -> None:
         starts.append(window.start)
     np.testing.assert_allclose(starts, [0.4, 0.88])
     assert advanced == [(reader.layout.count, 1)] * 2
-    assert len(looked) == len(set(looked)) == reader.distinct.frames
+    assert looked == sorted(set(looked))  # each frame once, in order
     assert looked[0] == pytest.approx(0.32)  # two frames before the part

@@ -10,7 +10,7 @@ from scipy.special import ndtr, ndtri
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from measure.gate.several import refused_share, refusing, window_rate
+from measure.gate.verdict import refused_share, refusing, window_rate
 
 RATE = 0.05
 RECORDINGS = 40_000

@@ -93,7 +93,7 @@ def test_a_summary_far_from_the_training_clips_has_a_small_p() -> None:
     gate = FamiliarityGate(cloud=Familiarity.of(rng.normal(size=(300, 3)), rng.normal(size=(199, 3))))
     frames = pictures(4)
     assert gate.judge(frames, np.full(3, 30.0))[0].p == pytest.approx(1 / 200)
-    assert gate.judge(frames, np.zeros(3))[0].p > 0.9
+    assert (gate.judge(frames, np.zeros(3))[0].p or 0.0) > 0.9
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,8 @@ from flagdata.lake import Artifact, Lake, MeshSequence, read_meshes
 from flagdata.record import RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
-from sim.run import of_content
-from tests.program import Run, invoke
+from sim.run import Recipe, of_content
+from tests.program import Ended, Run, invoke
 from tests.refusals import unrefused
 
 TIME = {"settle": 0.2, "frames": 6, "rate": 25.0}
@@ -120,7 +120,7 @@ frames = 6
 def run(lake: Lake, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
     """Simulate a recipe with such a wind."""
 
-    def simulate(wind: str) -> object:
+    def simulate(wind: str) -> Ended:
         recipe = tmp_path / "gusty.toml"
         recipe.write_text(RECIPE.format(wind=wind))
         return invoke(capsys, "simulate", recipe, "--lake", lake.path, "--json")
@@ -154,7 +154,7 @@ def test_a_log_that_the_lake_does_not_have_is_an_error(run: Run) -> None:
     assert (ended.code, "did you mean 'mast'" in ended.out + ended.err) == (2, True)
 
 
-def recipe_of(wind: dict[str, object]) -> object:
+def recipe_of(wind: dict[str, object]) -> Recipe:
     content = {**SMALL, "material": {"name": "camel-ponte-roma"}, "wind": wind}
     return of_content(content, name="r", folder=Path(), where="r")
 
