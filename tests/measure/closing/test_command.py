@@ -142,7 +142,7 @@ def test_a_draft_is_the_recipe_of_what_the_command_line_states(
     path = tmp_path / "deeper" / "flag.toml"
     path.parent.mkdir()
     words = "--wind 4 --wind 8 --axis 0,2,0 --pins 0,0;0,0.4 --size 1.2x0.8 --material paper --density-uncertainty 0.02"
-    given = ("close-loop", table, *words.split(), "--noise", "0.001", "--draft", path, "--json")
+    given = ("close-loop", table, *words.split(), "--noise", "0.001", "--rate", RATE, "--draft", path, "--json")
     ended = invoke(capsys, *given)
     assert (ended.code, ended.document["recipe"]) == (0, str(path))
     recipe = parse(path)
