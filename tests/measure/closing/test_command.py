@@ -153,7 +153,8 @@ def test_a_draft_is_the_recipe_of_what_the_command_line_states(
     )
     setup = setup_of(Setup(), chosen)
     assert recipe.setup.pins == setup.pins
-    assert recipe.setup.material == setup.material
+    assert recipe.setup.material is not None
+    assert recipe.setup.material.name == "paper"
     assert (recipe.setup.mass_known, recipe.setup.density_uncertainty) == (True, 0.02)
     np.testing.assert_allclose(recipe.setup.outline, setup.outline)  # type: ignore[arg-type]
     assert invoke(capsys, *given).code == 1  # the file is there
