@@ -213,8 +213,9 @@ def _parameter(key: str, place: Field[Any], row: Option) -> click.Parameter:
     elif not required and place.default is not None:
         more = {"show_default": True, **more}
     names = row.names or (row.spelled(key),)
-    default = {} if required or several else {"default": more.pop("default", place.default)}
-    return SectionedOption([*names, key], section=row.section, help=row.about, required=required, **default, **more)
+    default = {} if required else {"default": more.pop("default", place.default)}
+    about = f"{row.about.removesuffix('.')}; also {more['envvar']}." if "envvar" in more else row.about
+    return SectionedOption([*names, key], section=row.section, help=about, required=required, **default, **more)
 
 
 def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable[P, R]]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from flagdata.lake import Lake
     from flagdata.stated import Stated
 
-LAKE = "The lake's folder, or s3://bucket/prefix; also FLAGDATA_LAKE."
+LAKE = "The lake's folder, or s3://bucket/prefix."
 FILM = "The film"
 FLAG = "The flag and the camera"
 HOW = "How it is done"
@@ -53,8 +53,7 @@ class NamedLake:
     """The lake that names recordings and takes results, where there is one."""
 
     lake: AnyLake | None = option(
-        "Where recordings and artifacts are, and where results go: a folder, or s3://bucket/prefix; also "
-        "FLAGDATA_LAKE.",
+        "Where recordings and artifacts are, and where results go: a folder, or s3://bucket/prefix.",
         default=None,
         type=LakePlace(),
         envvar="FLAGDATA_LAKE",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -76,8 +77,16 @@ def markers(chosen: FramesCommand) -> None:
     _ingest(chosen, kind="markers")
 
 
+def _sources_follow(below: LongCommand, words: list[str]) -> bool:
+    sources: object = None
+    with suppress(click.UsageError):
+        sources = below.make_parser(click.Context(below)).parse_args([*words])[0].get("sources")
+    return isinstance(sources, tuple) and bool(sources)
+
+
 class Kinds(LongCommand):
-    """A command that does what one of others does where its first word names that and sources follow.
+    """A command that does what one of others does where its first word names that. A word that is also a file, after
+    which no source follows, is that file.
 
     Attributes:
         commands: the others, by their names.
@@ -89,7 +98,7 @@ class Kinds(LongCommand):
         self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
     ) -> click.Context:
         below = self.commands.get(args[0]) if args else None
-        if below is None or (len(args) == 1 and Path(args[0]).exists()):
+        if below is None or (Path(args[0]).exists() and not _sources_follow(below, args[1:])):
             return super().make_context(info_name, args, parent, **extra)
         defaults = None if parent is None else parent.lookup_default(str(info_name))
         return below.make_context(f"{info_name} {args[0]}", args[1:], parent, default_map=defaults, **extra)

@@ -14,7 +14,7 @@ from flagdata.console import LocalPath, document, echo, following, progress, say
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.findings import Severity
 from flagdata.option_types import POSITIVE
-from flagdata.options import argument, command, option, options, typed
+from flagdata.options import argument, command, described, option, options, typed
 from flagdata.printable import SHORT
 from flagdata.shared_options import FLAG, HOW, WRITTEN, AsJson, Keeping
 
@@ -173,8 +173,8 @@ def _check_only(chosen: CalibrateCommand) -> None:
     """
     others = {"weight": {"name", "model"}, "anemometer": _OF_WEIGHT}.get(chosen.only or "", set())
     for name in sorted(others & typed(chosen)):
-        option = f"--{name.removesuffix('_deg').replace('_', '-')}"
-        raise UsageError(f"{option} with --only {chosen.only}", where=option, fix=f"leave {option} out")
+        spelled = described(CalibrateCommand)[name][1].spelled(name)
+        raise UsageError(f"{spelled} with --only {chosen.only}", where=spelled, fix=f"leave {spelled} out")
 
 
 def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: Reading, lake: Lake | None) -> Made | None:

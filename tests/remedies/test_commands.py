@@ -99,21 +99,21 @@ CASES = [
         untried="--start --date",
     ),
     Case(
-        "commands/ingest.py",
+        "commands/ingest_options.py",
         "add --crop auto",
         "ingest second.mp4 --crop-picture crop.png",
         ("ingest second.mp4 --crop-picture crop.png --crop auto",),
     ),
     Case("commands/lake.py", "give FOLDER or --lake, not both", "init x --lake y", ("init x",)),
     Case(
-        "commands/lake.py",
+        "api/lake_verbs.py",
         "leave it out, or see --help",
         "branch side --delete --at v0",
         ("branch --help", "branch side --delete --discard"),
         shows="--discard",
     ),
     Case(
-        "commands/lake.py",
+        "api/lake_verbs.py",
         "leave it out, or see --help",
         "tag v1 --discard",
         ("tag --help", "tag v1"),
@@ -248,9 +248,9 @@ def test_what_no_lake_was_named_for_is_found_in_one(user: User, monkeypatch: pyt
 def test_salt_is_of_a_side(user: User) -> None:
     user.succeeds(*STAMPS.split())
     command = ("export", "mcap", "--to", "out", "--where", "kind = 'recording'")
-    user.meets("commands/export.py", "name the side by --split", *command, "--salt", "x")
+    user.meets("api/lake_verbs.py", "name the side by --split", *command, "--salt", "x")
     user.again(without="--salt")
-    user.meets("commands/export.py", "name the side by --split", *command, "--salt", "x")
+    user.meets("api/lake_verbs.py", "name the side by --split", *command, "--salt", "x")
     user.leaves(["--split"])
     (user.folder / "out").rename(user.folder / "all")
     user.meets("export/plan.py", "choose another side by --split", *command, "--salt", "x", "--split", "train")

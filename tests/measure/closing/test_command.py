@@ -142,7 +142,7 @@ def test_a_draft_is_the_recipe_of_what_the_command_line_states(
     path = tmp_path / "deeper" / "flag.toml"
     path.parent.mkdir()
     words = "--wind 4 --wind 8 --axis 0,2,0 --pins 0,0;0,0.4 --size 1.2x0.8 --material paper --density-uncertainty 0.02"
-    given = ("close-loop", table, *words.split(), "--noise", "0.001", "--draft", path, "--json")
+    given = ("close-loop", table, *words.split(), "--noise", "0.001", "--rate", RATE, "--draft", path, "--json")
     ended = invoke(capsys, *given)
     assert (ended.code, ended.document["recipe"]) == (0, str(path))
     recipe = parse(path)
@@ -153,7 +153,8 @@ def test_a_draft_is_the_recipe_of_what_the_command_line_states(
     )
     setup = setup_of(Setup(), chosen)
     assert recipe.setup.pins == setup.pins
-    assert recipe.setup.material == setup.material
+    assert recipe.setup.material is not None
+    assert recipe.setup.material.name == "paper"
     assert (recipe.setup.mass_known, recipe.setup.density_uncertainty) == (True, 0.02)
     np.testing.assert_allclose(recipe.setup.outline, setup.outline)  # type: ignore[arg-type]
     assert invoke(capsys, *given).code == 1  # the file is there

@@ -1,0 +1,77 @@
+"""Verbs as calls on a lake: what they make is what the commands of their names make."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import flagdata
+from flagdata.errors import ConflictError, RefusedError, UsageError
+from flagdata.lake import Lake
+from tests.program import Run, invoke
+
+
+@pytest.fixture
+def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
+    return lambda *arguments: invoke(capsys, *arguments, "--lake", lake.path)
+
+
+def test_a_recording_is_brought_in_aligned_tagged_and_exported(
+    lake: Lake, video: Path, wind_log: Path, tmp_path: Path, run: Run
+) -> None:
+    film, wind = flagdata.ingest([video, wind_log], lake=lake, session="field")
+    assert (film.created, film.artifact.kind, wind.artifact.kind) == (True, "camera", "wind")
+    for result, source in ((film, video), (wind, wind_log)):
+        there = run("ingest", source, "--session", "field", "--json").document["results"]
+        assert [(one["artifact"], one["created"]) for one in there] == [(result.artifact.id, False)]
+    (again,) = flagdata.ingest(str(video), lake=str(lake.path), session="field")
+    assert not again.created
+    names = (film.artifact.id, wind.artifact.id)
+    found = flagdata.align(*names, lake=lake, by="given", offset=0, offset_sigma=0.1, window=1.0)
+    same = run(
+        "align", *names, *["--by", "given", "--offset", "0", "--offset-sigma", "0.1", "--window", "1s", "--json"]
+    ).document
+    assert (found["recording"], found["created"], same["created"]) == (same["recording"], True, False)
+    (v1,) = flagdata.tag("v1", lake=lake)
+    assert [one.name for one in flagdata.tag(lake=lake)] == [v1.name] == ["v1"]
+    with pytest.raises(ConflictError):
+        flagdata.tag("v1", lake=lake)
+    manifest = flagdata.export("csv", lake=lake, to=tmp_path / "winds", where="kind = 'wind'", at="v1")
+    assert manifest["artifacts"] == 1
+    assert (tmp_path / "winds" / "manifest.json").is_file()
+    assert flagdata.tag("v1", lake=lake, delete=True, message="no more") == ()
+    assert flagdata.tag(lake=lake) == ()
+
+
+def test_options_that_contradict_each_other_are_refused_in_calls_as_in_commands(lake: Lake, wind_log: Path) -> None:
+    with pytest.raises(UsageError, match="without a NAME"):
+        flagdata.tag(lake=lake, at="main")
+    with pytest.raises(UsageError, match="--salt without --split"):
+        flagdata.export("csv", lake=lake, to="out", salt="x")
+    with pytest.raises(UsageError, match="--crop means nothing for an anemometer log"):
+        flagdata.ingest(wind_log, lake=lake, crop="auto")
+    assert lake.rows().num_rows == 0
+
+
+def test_a_table_that_nobody_confirmed_is_refused_in_a_call(lake: Lake, tmp_path: Path) -> None:
+    path = tmp_path / "wind.csv"
+    path.write_text("time,wind\n" + "".join(f"2026-05-13T12:00:{k:02d}Z,{4 + k % 7 / 10:.1f}\n" for k in range(30)))
+    with pytest.raises(RefusedError):
+        flagdata.ingest(path, lake=lake)
+
+
+def test_a_kind_that_is_named_takes_its_own_sources_and_options_alone(
+    run: Run, lake: Lake, video: Path, wind_log: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    assert run("ingest", "wind", video, "--json").document["what"] == "this is a camera file, not an anemometer log"
+    assert run("ingest", "film", video, "--unit", "km/h").code == 2
+    assert run("ingest", "film", wind_log).code == 1
+    assert run("ingest", "meshes").code == 2
+    assert lake.rows().num_rows == 0
+    assert run("ingest", "wind", wind_log).code == 0
+    assert run("--json", "ingest", "film", video).document["results"][0]["kind"] == "camera"
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "film").write_bytes(wind_log.read_bytes())
+    assert "already in the lake" in run("ingest", "film").out  # which is the file here
+    assert run("ingest", "film", video).code == 0
