@@ -9,7 +9,7 @@ from flagdata.lazy import lazy_exports
 from flagdata.verb_package import VerbPackage
 
 if TYPE_CHECKING:
-    from flagdata.ingest.anemometer.confirm import Accepting, Drafted, UnconfirmedError
+    from flagdata.ingest.anemometer.confirm import UNASKED, Accepting, Drafted, UnconfirmedError
     from flagdata.ingest.anemometer.draft.drafting import draft
     from flagdata.ingest.anemometer.draft.questions import OpenFactsError
     from flagdata.ingest.anemometer.formats.registry import FORMATS
