@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from flagdata.ingest.camera.options import CameraOptions, CropBox, parse_crop
     from flagdata.ingest.camera.probing import probe
     from flagdata.ingest.camera.stream import open_camera, propose_crop
-    from flagdata.ingest.classify import guesses
+    from flagdata.ingest.classification import classify, guesses
     from flagdata.ingest.cloths import read_cloths
     from flagdata.ingest.foreign import examine
     from flagdata.ingest.markers.store import ingest_markers
