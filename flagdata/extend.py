@@ -52,7 +52,7 @@ _PLACES = {
     "Meshes": "sim.render.meshes:Meshes",
     "RenderParameters": "sim.render.parameters:RenderParameters",
     "Assets": "sim.assets:Assets",
-    "stage": "sim.render.stage:stage",
+    "stage": "sim.render.staging:stage",
     "plate": "sim.render.develop:plate",
     "develop": "sim.render.develop:develop",
 }

@@ -221,7 +221,7 @@ def _kinds(given: Given) -> tuple[list[Guess | FlagdataError], Given]:
     Raises:
         FlagdataError: an option that means nothing for any source, or a source of another kind than all are to be.
     """
-    from flagdata.ingest.classify import classify
+    from flagdata.ingest.classification import classify
 
     log = given.wind.wind
 
@@ -278,7 +278,7 @@ def sniff_sources(given: Given, *, as_json: bool) -> None:
     Raises:
         FlagdataError: as `ingest_sources`.
     """
-    from flagdata.ingest.classify import guesses
+    from flagdata.ingest.classification import guesses
 
     topic, encoding = given.wind.wind.topic, given.wind.wind.encoding
     ranked = _recognised(

@@ -105,7 +105,7 @@ def du(grace: timedelta, at: str | None, as_json: bool, lake_path: str) -> None:
     shows.
     """
     from flagdata.lake import Lake
-    from flagdata.lake.collect import usage
+    from flagdata.lake.collection import usage
 
     found = usage(Lake.open(lake_path), at=at, grace=grace)
     if as_json:

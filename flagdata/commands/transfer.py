@@ -10,7 +10,7 @@ from flagdata.console import document, echo, json_option, lake_option, progress,
 from flagdata.printable import counted, size_text
 
 if TYPE_CHECKING:
-    from flagdata.lake.transfer import Transfer
+    from flagdata.lake.copying import Transfer
 
 
 @click.command()
@@ -24,7 +24,7 @@ def push(target: str, as_json: bool, lake_path: str) -> None:
     are found by their hash: what is there is not moved again, and a push that was stopped goes on.
     """
     from flagdata.lake import Lake
-    from flagdata.lake.transfer import transfer
+    from flagdata.lake.copying import transfer
 
     lake = Lake.open(target)
     _report("push", str(lake.path), transfer(Lake.open(lake_path), lake, bars=progress), as_json=as_json)
@@ -37,7 +37,7 @@ def push(target: str, as_json: bool, lake_path: str) -> None:
 def pull(source: str, as_json: bool, lake_path: str) -> None:
     """Bring the versions of SOURCE that this lake lacks in, with their tags, branches and data; push's opposite."""
     from flagdata.lake import Lake
-    from flagdata.lake.transfer import transfer
+    from flagdata.lake.copying import transfer
 
     lake = Lake.open(lake_path)
     _report("pull", str(lake.path), transfer(Lake.open(source), lake, bars=progress), as_json=as_json)
@@ -53,7 +53,7 @@ def clone(source: str, target: str, as_json: bool) -> None:
     Where it was stopped, flagdata push TARGET --lake SOURCE goes on with it.
     """
     from flagdata.lake import Lake
-    from flagdata.lake.transfer import clone as cloned
+    from flagdata.lake.copying import clone as cloned
 
     lake, done = cloned(Lake.open(source), target, bars=progress)
     _report("clone", str(lake.path), done, as_json=as_json)

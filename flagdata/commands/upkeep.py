@@ -147,7 +147,7 @@ def _examine(source: Path, *, as_json: bool) -> None:
 def gc(grace: timedelta, dry_run: bool, as_json: bool, lake_path: str) -> None:
     """Delete what no branch, tag or running transaction refers to."""
     from flagdata.lake import Lake
-    from flagdata.lake.collect import collect, garbage
+    from flagdata.lake.collection import collect, garbage
 
     lake = Lake.open(lake_path)
     found = garbage(lake, grace=grace) if dry_run else collect(lake, grace=grace)

@@ -9,7 +9,7 @@ from flagdata.lazy import lazy_exports
 from flagdata.verb_package import VerbPackage
 
 if TYPE_CHECKING:
-    from flagdata.ingest.anemometer.confirm import Accepting, Drafted, UnconfirmedError
+    from flagdata.ingest.anemometer.confirm import UNASKED, Accepting, Drafted, UnconfirmedError
     from flagdata.ingest.anemometer.draft.drafting import draft
     from flagdata.ingest.anemometer.draft.questions import OpenFactsError
     from flagdata.ingest.anemometer.formats.registry import FORMATS
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from flagdata.ingest.camera.options import CameraOptions, CropBox, parse_crop
     from flagdata.ingest.camera.probing import probe
     from flagdata.ingest.camera.stream import open_camera, propose_crop
-    from flagdata.ingest.classify import guesses
+    from flagdata.ingest.classification import classify, guesses
     from flagdata.ingest.cloths import read_cloths
     from flagdata.ingest.foreign import examine
     from flagdata.ingest.markers.store import ingest_markers

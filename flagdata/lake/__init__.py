@@ -26,7 +26,8 @@ from flagdata.lazy import lazy_exports
 if TYPE_CHECKING:
     from flagdata.lake.artifact import Artifact
     from flagdata.lake.catalog import Catalog
-    from flagdata.lake.collect import garbage, usage
+    from flagdata.lake.collection import collect, garbage, usage
+    from flagdata.lake.copying import clone, transfer
     from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, sampled, verify, verify_catalog
     from flagdata.lake.labels import columns, given
     from flagdata.lake.lake import Lake
@@ -53,7 +54,6 @@ if TYPE_CHECKING:
     from flagdata.lake.rowfiles import Scan, with_data_sets
     from flagdata.lake.selection import Request, Selection, select
     from flagdata.lake.transaction import Transaction
-    from flagdata.lake.transfer import clone
 
 
 __all__ = ["Artifact", "CommitResult", "Lake", "Transaction"]

@@ -19,6 +19,6 @@ from flagdata.lazy import lazy_exports
 if TYPE_CHECKING:
     from measure.anemometer.calibration import Calibrated, Recording, calibrated
     from measure.anemometer.features import Features, Place
-    from measure.anemometer.network import Network, gate_beside
+    from measure.anemometer.networks import Network, gate_beside, network
 
 __getattr__ = lazy_exports(__name__, __file__)

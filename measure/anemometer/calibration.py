@@ -15,7 +15,7 @@ from flagdata.findings import Finding
 from flagdata.signals import Sensor
 from measure.anemometer.features import SUMMARY, Features, features_of
 from measure.anemometer.intervals import half_width
-from measure.anemometer.network import Network
+from measure.anemometer.networks import Network
 from measure.anemometer.novelty import Familiar
 from measure.anemometer.reading import ReadingModel
 from measure.anemometer.regression import BLOCK, Ridge, blocks_of, validated, with_neighbours

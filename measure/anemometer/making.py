@@ -21,7 +21,7 @@ from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from measure.anemometer.calibration import ANSWER, ENOUGH, LEAST, Calibrated, Recording, calibrated, recorded
 from measure.anemometer.features import VERSION
-from measure.anemometer.network import CALIBRATED, network
+from measure.anemometer.networks import CALIBRATED, network
 from measure.anemometer.storage import write
 from measure.calibrate.leaving_out import usable
 from measure.film.similarity import FlagSize

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.calibrate.arrays import sources_of
+    from measure.calibrate.arrays import options_of, sources_of
     from measure.calibrate.calibrate import Calibration, Options, designs_of, with_errors
     from measure.calibrate.design import Design, simulated
     from measure.calibrate.discretisation import Discretisation

@@ -23,7 +23,7 @@ from measure.observe.meshes import from_sequence
 from measure.observe.trajectory import DENSITY_UNCERTAINTY
 from measure.report import sentences
 from measure.report.document import as_document
-from measure.report.page import page
+from measure.report.report_page import page
 from measure.report.words import words
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Verdict

@@ -26,7 +26,7 @@ from measure.nulls.bank import files
 from measure.observe import Experiment
 from measure.observe.trajectory import described
 from measure.report.document import as_document, from_document
-from measure.report.page import page
+from measure.report.report_page import page
 from measure.report.words import words
 from measure.verdict.record import Candidate, Verdict
 

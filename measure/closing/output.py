@@ -23,7 +23,7 @@ from flagdata.pages.render import render
 from measure.closing.artifacts import Answer, keep
 from measure.closing.joint import Joint
 from measure.report.document import as_document, plain
-from measure.report.page import FILTERS, TONES
+from measure.report.report_page import FILTERS, TONES
 from measure.report.sentences import after_label
 
 

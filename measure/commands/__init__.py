@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from measure.commands.close_loop import CloseLoopCommand
     from measure.commands.measured import read
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -20,7 +20,7 @@ from flagdata.shared_options import FILM, HOW, WRITTEN, AsJson, Keeping
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
-    from measure.anemometer.network import Network
+    from measure.anemometer.networks import Network
     from measure.commands.measuring import Request
     from measure.estimate.measuring import Measurement, Options
     from measure.estimate.series import Beside
@@ -86,7 +86,7 @@ def measure(chosen: MeasureCommand) -> None:
     if chosen.cache is not None and chosen.refine is None:
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
     from flagdata.outputs import check_file, check_folder
-    from measure.anemometer.network import network
+    from measure.anemometer.networks import network
     from measure.commands.measuring import Request
     from measure.film.source import subjects
 

@@ -20,7 +20,7 @@ from flagdata.lake.results import Placed
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
-from measure.anemometer.network import Network
+from measure.anemometer.networks import Network
 from measure.estimate.measuring import Measurement
 from measure.estimate.series import WIND, Beside
 from measure.film.source import Reading, Subject

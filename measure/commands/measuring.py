@@ -17,7 +17,7 @@ from flagdata.lake import Lake
 from flagdata.measured import Answer, Estimate, Measured, Windows
 from flagdata.stated import Stated
 from measure.anemometer.measuring import measure_by
-from measure.anemometer.network import Network, gate_beside, network
+from measure.anemometer.networks import Network, gate_beside, network
 from measure.estimate.answer import Quantity
 from measure.estimate.combine import of_model
 from measure.estimate.material import weight_of

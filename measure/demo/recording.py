@@ -34,7 +34,7 @@ from sim.integrate.implicit import BackwardEuler
 from sim.material import named
 from sim.mesh import Diagonals, Mesh, grid
 from sim.render import Meshes, RenderParameters, prior
-from sim.render.stage import stage
+from sim.render.staging import stage
 from sim.scene import Scene, assemble, roughened
 from sim.state import State
 from sim.system import System

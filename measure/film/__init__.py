@@ -10,6 +10,6 @@ if TYPE_CHECKING:
     from measure.film.conditioned import ConditionedFilm
     from measure.film.similarity import FlagSize, scaled_back, sizes
     from measure.film.source import Reading, Subject, subjects
-    from measure.film.windows import Layout, findings_of
+    from measure.film.windows import Layout, WindowReader, findings_of
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -19,7 +19,7 @@ from measure.films.side_by_side import side_by_side
 from measure.films.weigh import hypothesis
 from measure.films.words import level_of
 from measure.report import figures, sentences
-from measure.report.page import FILTERS, TONES, opening
+from measure.report.report_page import FILTERS, TONES, opening
 from measure.verdict import quantity
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Verdict

@@ -8,7 +8,7 @@ from dataclasses import replace
 from measure.calibrate.observed import Observed, constant_wind
 from measure.films.departures import Departure
 from measure.observables import OBSERVABLES
-from measure.report.lead import lead
+from measure.report.lead_sentences import lead
 from measure.report.sentences import listed
 from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.quantity import number

@@ -11,6 +11,8 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.report.document import as_document, from_document
+    from measure.report.lead_sentences import lead
+    from measure.report.report_page import page
     from measure.report.statement import by_draw, stated
 
 __getattr__ = lazy_exports(__name__, __file__)

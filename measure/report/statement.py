@@ -17,7 +17,7 @@ from measure.nulls.conformal import MOST_KINDS
 from measure.observe.trajectory import Experiment, Specimen
 from measure.probes.course import ALONG, LEFT, Variation
 from measure.probes.lines import STROUHAL, Line
-from measure.report.lead import lead
+from measure.report.lead_sentences import lead
 from measure.report.sentences import listed
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.quantity import number, with_error

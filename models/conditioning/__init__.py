@@ -14,7 +14,7 @@ from models.conditioning.conditioning import Conditioned, Conditioning, Follower
 if TYPE_CHECKING:
     from models.conditioning.conditioning import VERSION, Conditioning, Follower, conditioned, conditioning_of
     from models.conditioning.grain import grained
-    from models.conditioning.instants import Interpolator
+    from models.conditioning.instants import Interpolator, TimedFrame
     from models.conditioning.mask_network import MaskNetwork, inputs_of
     from models.conditioning.outline import Outliner
     from models.conditioning.repeats import Distinct

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sim.datasets.cast import Cast, Roll, casts
     from sim.datasets.films import EPOCH, Film, Sequences
     from sim.datasets.picture import coded, settings
-    from sim.datasets.reading import load, parse
+    from sim.datasets.reading import DATASETS, load, parse
     from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, Truth
 
 __getattr__ = lazy_exports(__name__, __file__)

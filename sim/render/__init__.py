@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from sim.render.prior import RenderPrior, named
     from sim.render.raster import Raster
     from sim.render.renderer import Renderer
+    from sim.render.staging import stage
 
 
 __all__ = ["RENDERERS", "Meshes", "RenderParameters", "Renderer"]

@@ -26,7 +26,7 @@ from sim.render.develop import develop, plate
 from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
 from sim.render.shutter import moved
-from sim.render.stage import POLE_ALBEDO, Stage, stage
+from sim.render.staging import POLE_ALBEDO, Stage, stage
 
 _MOST_PICTURES = 8
 _LEAST_TIMEOUT = 120.0  # s for one picture

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from flagdata.errors import InputError
 from sim.render.meshes import Meshes
-from sim.render.stage import Stage
+from sim.render.staging import Stage
 
 NEAR = 0.02
 """What is nearer to the camera's plane is not drawn [m]."""

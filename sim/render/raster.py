@@ -18,7 +18,7 @@ from sim.render.parameters import RenderParameters
 from sim.render.raster_kernel import library
 from sim.render.sampling import Samples
 from sim.render.shutter import Motion
-from sim.render.stage import Stage, stage
+from sim.render.staging import Stage, stage
 from sim.render.texture import Pyramid
 from sim.render.view import View
 

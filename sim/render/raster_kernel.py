@@ -12,7 +12,7 @@ from sim.compiler import compiled
 from sim.render.geometry import Geometry
 from sim.render.light import Light
 from sim.render.shadow import SIZE, basis
-from sim.render.stage import POLE_ALBEDO
+from sim.render.staging import POLE_ALBEDO
 from sim.render.texture import Pyramid
 from sim.render.view import View
 

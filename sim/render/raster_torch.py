@@ -11,7 +11,7 @@ from sim.render.coverage import GRID, Triangles, fragments
 from sim.render.geometry import NEAR, Geometry
 from sim.render.light import Light
 from sim.render.shadow import ShadowMaps
-from sim.render.stage import POLE_ALBEDO
+from sim.render.staging import POLE_ALBEDO
 from sim.render.texture import Pyramid
 from sim.render.view import View
 

@@ -14,8 +14,17 @@ import pytest
 
 from flagdata.errors import ConflictError
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake, MeshSequence, doctor, object_names, read_meshes, verify, verify_catalog
-from flagdata.lake.collect import collect
+from flagdata.lake import (
+    Artifact,
+    Lake,
+    MeshSequence,
+    collect,
+    doctor,
+    object_names,
+    read_meshes,
+    verify,
+    verify_catalog,
+)
 from flagdata.record import Record
 from flagdata.schema import CATALOG, FORMAT_VERSION, Kind, catalog_schema
 

@@ -65,7 +65,7 @@ def test_a_measurement_loads_neither_torchs_compiler_nor_what_only_other_command
         "import sys\nfrom measure.anemometer import network\n"
         "from measure.commands import measure, measured\n"
         "from measure.estimate import measuring, series\n"
-        "network.network(None, lake=None, at=None)\n"
+        "network(None, lake=None, at=None)\n"
         f"print('LOADED', sorted(set({heavy!r}) & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -7,8 +7,7 @@ import re
 
 import pytest
 
-from measure.report import by_draw, from_document
-from measure.report.lead import lead
+from measure.report import by_draw, from_document, lead
 from measure.report.words import words
 from measure.verdict import Verdict
 from tests.docs.pages import DOCS

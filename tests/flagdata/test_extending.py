@@ -17,12 +17,12 @@ import torch
 import flagdata
 from flagdata import extend
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer.formats.registry import FORMATS
+from flagdata.ingest import FORMATS
 from flagdata.lake import Lake
 from flagdata.registry import PlugInError, Registry
 from models.learner import Loss, build
 from models.registry import NETWORKS
-from sim.datasets.reading import DATASETS
+from sim.datasets import DATASETS
 from sim.effects import EFFECTS
 from sim.render import RENDERERS
 from tests.docs.pages import DOCS, blocks, files

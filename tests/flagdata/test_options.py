@@ -111,10 +111,10 @@ def test_a_measurement_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pyte
 
 
 def test_a_calibration_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pytest.MonkeyPatch) -> None:
-    from measure.calibrate.arrays import options_of
+    from measure.calibrate import options_of
+    from measure.commands import CloseLoopCommand
     from measure.commands.calibrate import CalibrateCommand
-    from measure.commands.close_loop import CloseLoopCommand
-    from measure.film.similarity import FlagSize
+    from measure.film import FlagSize
 
     words = "t.csv --flag-size 1.5x1.0 --azimuth 70±7 --elevation 3 --simulations 64 --seed 3 --material knit"
     of_command = typed_words("calibrate", CalibrateCommand, *words.split(), "--level", "0.8", "--attachment", "hoist")
@@ -144,7 +144,7 @@ def test_a_calibration_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pyte
 def test_an_ingest_is_asked_for_alike_and_keeps_its_recipes(monkeypatch: pytest.MonkeyPatch) -> None:
     from flagdata.commands.ingest import IngestCommand
     from flagdata.commands.ingest_options import Given
-    from flagdata.ingest.anemometer.confirm import UNASKED
+    from flagdata.ingest import UNASKED
 
     words = "a.mp4 b.csv --rate 10 --archive h264 --crop 1,2,30,40 --start 2026-05-01T12:00:00Z --unit km/h"
     of_command = typed_words("ingest", IngestCommand, *words.split(), "--azimuth", "90", "--missing", "-99.9")

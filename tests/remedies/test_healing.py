@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.lake import Artifact, Lake, Objects, Refs, clone
-from flagdata.lake.transfer import transfer
+from flagdata.lake import Artifact, Lake, Objects, Refs, clone, transfer
 from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import overwrite
 from tests.flagdata.lake.test_healing import cut, flip, lose
@@ -133,7 +132,7 @@ def test_a_disk_that_lets_nothing_be_deleted_keeps_what_gc_or_the_same_command_d
 def test_a_clone_that_was_killed_is_ended_by_the_push_that_is_named(user: User) -> None:
     with pytest.MonkeyPatch.context() as patch:
         stopped(patch, Objects, "publish", partial(clone, the_lake(user), Path("copy.lake"), bars=no_bar), at=0)
-    fix = user.meets("lake/transfer.py", "brings it up to date, a", "clone", "lake", "copy.lake")
+    fix = user.meets("lake/copying.py", "brings it up to date, a", "clone", "lake", "copy.lake")
     user.follows(*shlex.split(fix.partition("flagdata ")[2].partition(" brings")[0]))
     user.succeeds("doctor", "--lake", "copy.lake", shows="(?m)^healthy")
     user.succeeds("ls", "--lake", "copy.lake", shows="camera +first")

@@ -101,7 +101,7 @@ def test_lakes_that_went_apart_are_brought_together_in_a_clone(user: User) -> No
     user.succeeds("clone", "lake", "copy.lake")
     user.succeeds("label", "mast", "here=1")
     user.succeeds("label", "mast", "there=1", "--lake", "copy.lake")
-    fix = user.meets("lake/transfer.py", "commit there what it lacks", "push", "copy.lake")
+    fix = user.meets("lake/copying.py", "commit there what it lacks", "push", "copy.lake")
     cloning = fix.partition("flagdata ")[2].partition(",")[0].split()
     user.follows(*[word.replace("NEW", "new.lake") for word in cloning])
     user.succeeds("label", "mast", "here=1", "--lake", "new.lake")
@@ -112,10 +112,10 @@ def test_lakes_that_went_apart_are_brought_together_in_a_clone(user: User) -> No
 def test_versions_are_moved_the_way_that_they_went(user: User) -> None:
     user.succeeds("clone", "lake", "ahead.lake")
     user.succeeds("label", "mast", "there=1", "--lake", "ahead.lake")
-    user.meets("lake/transfer.py", "move them the other way", "push", "ahead.lake")
+    user.meets("lake/copying.py", "move them the other way", "push", "ahead.lake")
     user.follows("pull", "ahead.lake")
     user.succeeds("label", "mast", "more=1")
-    user.meets("lake/transfer.py", "move them the other way", "pull", "ahead.lake")
+    user.meets("lake/copying.py", "move them the other way", "pull", "ahead.lake")
     user.follows("push", "ahead.lake")
 
 

@@ -7,7 +7,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/lake/health.py", "; flagdata gc aborts it"),
         ("flagdata/object_cache.py", "run flagdata verify: it"),
     ),
-    "a change of bytes between two reads": (("flagdata/lake/transfer.py", "run flagdata verify"),),
+    "a change of bytes between two reads": (("flagdata/lake/copying.py", "run flagdata verify"),),
     "a definition, no remedy": (("flagdata/pages/glossary.py", "A regression that makes"),),
     "a disk that fails while it confirms": (("flagdata/lake/durable.py", "check the disk, then run"),),
     "a film of a minute or more that is itself looked at by a network, beside a log whose clock is off": (
@@ -75,10 +75,10 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "each finding that leads here has a fix of its own, which is said instead": (
         ("flagdata/lake/marking.py", "run flagdata doctor"),
-        ("flagdata/lake/transfer.py", "run flagdata doctor"),
+        ("flagdata/lake/copying.py", "run flagdata doctor"),
     ),
     "each guess that is no recording says what to do by itself": (
-        ("flagdata/ingest/classify.py", "see flagdata ingest --sn"),
+        ("flagdata/ingest/classification.py", "see flagdata ingest --sn"),
     ),
     "it is for the start file of a shell; tests/contract completes in each shell": (
         ("flagdata/commands/completion.py", "flagdata completion fish"),

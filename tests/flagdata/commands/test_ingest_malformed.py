@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from flagdata.errors import FlagdataError
-from flagdata.ingest import ingest_camera, ingest_wind
-from flagdata.ingest.classify import classify
+from flagdata.ingest import classify, ingest_camera, ingest_wind
 from flagdata.lake import Lake
 from flagdata.record import Record
 from tests.confirming import CONFIRMED

@@ -15,8 +15,7 @@ from flagdata.align.recording import Alignment
 from flagdata.errors import ConflictError, CorruptError
 from flagdata.export import Export, export
 from flagdata.export.mcap import ROWS
-from flagdata.ingest import Labels, ingest_camera, ingest_record, ingest_wind
-from flagdata.ingest.classify import classify
+from flagdata.ingest import Labels, classify, ingest_camera, ingest_record, ingest_wind
 from flagdata.lake import Lake
 from flagdata.record import Record
 from flagdata.schema import CATALOG, Kind

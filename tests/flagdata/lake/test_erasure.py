@@ -14,8 +14,7 @@ from flagdata.cli import root
 from flagdata.errors import ConflictError, NotFoundError
 from flagdata.export import Export, export
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake, doctor, lost, verify, verify_catalog
-from flagdata.lake.collect import collect
+from flagdata.lake import Artifact, Lake, collect, doctor, lost, verify, verify_catalog
 
 Put = Callable[..., Artifact]
 

@@ -10,8 +10,7 @@ import pytest
 
 from flagdata.errors import ConflictError, NotFoundError
 from flagdata.export import Export, export
-from flagdata.lake import Artifact, Lake, doctor, expire, is_healthy, last_version, lost, verify_catalog
-from flagdata.lake.collect import collect
+from flagdata.lake import Artifact, Lake, collect, doctor, expire, is_healthy, last_version, lost, verify_catalog
 from tests.program import invoke
 
 Put = Callable[..., Artifact]

@@ -21,8 +21,7 @@ from deltalake.exceptions import TableNotFoundError
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, NotFoundError, UsageError
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake, doctor
-from flagdata.lake.collect import collect
+from flagdata.lake import Artifact, Lake, collect, doctor
 from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import LINKS
 

@@ -21,8 +21,19 @@ from flagdata.ingest import (
     ingest_wind,
     records,
 )
-from flagdata.lake import Artifact, Lake, clone, doctor, is_healthy, labels_of, object_names, read_refs, results, verify
-from flagdata.lake.transfer import transfer
+from flagdata.lake import (
+    Artifact,
+    Lake,
+    clone,
+    doctor,
+    is_healthy,
+    labels_of,
+    object_names,
+    read_refs,
+    results,
+    transfer,
+    verify,
+)
 from flagdata.object_cache import forget
 from flagdata.schema import Kind
 from flagdata.storage import Place

@@ -24,15 +24,15 @@ from flagdata.lake import (
     Log,
     catalog,
     clone,
+    collect,
     doctor,
     is_healthy,
     locks,
     object_names,
+    transfer,
     verify,
     verify_catalog,
 )
-from flagdata.lake.collect import collect
-from flagdata.lake.transfer import transfer
 from flagdata.provenance import digest
 from flagdata.schema import Kind, catalog_schema
 from flagdata.storage import Place, RemotePath

@@ -14,8 +14,7 @@ import pytest
 
 from flagdata.errors import CorruptError, FlagdataError
 from flagdata.findings import Finding, Severity
-from flagdata.lake import Artifact, Lake, doctor, garbage, object_names, verify, verify_catalog
-from flagdata.lake.collect import collect
+from flagdata.lake import Artifact, Lake, collect, doctor, garbage, object_names, verify, verify_catalog
 from flagdata.lake.layout import FOLDERS, LinkError
 from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import LINKS

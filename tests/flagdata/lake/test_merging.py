@@ -12,8 +12,7 @@ import pytest
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.export import Export, prepare
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake, doctor
-from flagdata.lake.collect import collect
+from flagdata.lake import Artifact, Lake, collect, doctor
 from flagdata.lake.lineage import Removal
 from flagdata.lake.marking import mark
 from flagdata.schema import Kind

@@ -15,8 +15,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from flagdata.lake import Artifact, Lake, difference, doctor, is_healthy
-from flagdata.lake.collect import collect
+from flagdata.lake import Artifact, Lake, collect, difference, doctor, is_healthy
 from flagdata.schema import Kind
 
 TEXTS = st.sampled_from([f"text {i}" for i in range(6)])

@@ -28,6 +28,7 @@ from flagdata.lake import (
     Lake,
     Lease,
     Transaction,
+    collect,
     collecting,
     doctor,
     locks,
@@ -36,7 +37,6 @@ from flagdata.lake import (
     verify,
     verify_catalog,
 )
-from flagdata.lake.collect import collect
 from flagdata.lake.leases import last_written, leases
 from flagdata.schema import Kind
 from flagdata.storage import RemotePath, StoreError, plain

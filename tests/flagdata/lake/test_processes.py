@@ -13,8 +13,7 @@ import pytest
 
 from flagdata.errors import ConflictError
 from flagdata.findings import Severity
-from flagdata.lake import Lake, catalog, doctor, object_names, verify
-from flagdata.lake.collect import collect
+from flagdata.lake import Lake, catalog, collect, doctor, object_names, verify
 
 NOW = timedelta(0)
 

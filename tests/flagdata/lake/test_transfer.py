@@ -10,9 +10,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import ConflictError, CorruptError
-from flagdata.lake import Artifact, Lake, clone, doctor, object_names, verify, verify_catalog
-from flagdata.lake.collect import collect
-from flagdata.lake.transfer import transfer
+from flagdata.lake import Artifact, Lake, clone, collect, doctor, object_names, transfer, verify, verify_catalog
 from flagdata.object_cache import forget
 from tests.flagdata.lake.conftest import overwrite
 from tests.program import invoke

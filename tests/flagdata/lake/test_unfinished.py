@@ -18,16 +18,16 @@ from flagdata.lake import (
     Objects,
     Refs,
     clone,
+    collect,
     doctor,
     garbage,
     is_healthy,
     object_names,
+    transfer,
     verify,
     verify_catalog,
 )
-from flagdata.lake.collect import collect
 from flagdata.lake.removal import Erasure
-from flagdata.lake.transfer import transfer
 from tests.flagdata.lake.conftest import overwrite
 from tests.flagdata.lake.test_transfer import no_bar
 from tests.program import invoke

@@ -19,6 +19,7 @@ from flagdata.lake import (
     Artifact,
     Lake,
     catalog,
+    collect,
     collecting,
     difference,
     doctor,
@@ -29,7 +30,6 @@ from flagdata.lake import (
     verify,
     verify_catalog,
 )
-from flagdata.lake.collect import collect
 from flagdata.lake.leases import keeping_collectors_out, leases
 from flagdata.schema import Kind
 from flagdata.storage import Place

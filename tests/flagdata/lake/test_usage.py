@@ -7,8 +7,8 @@ from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
-from flagdata.lake import Artifact, Lake, usage
-from flagdata.lake.collect import CATALOG, OTHER, UNSHOWN, Usage, collect, files_of
+from flagdata.lake import Artifact, Lake, collect, usage
+from flagdata.lake.collection import CATALOG, OTHER, UNSHOWN, Usage, files_of
 from flagdata.schema import Kind
 from tests.program import Run, invoke
 

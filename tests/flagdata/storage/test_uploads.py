@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.findings import Severity
-from flagdata.lake import Lake, Lease, doctor, garbage
-from flagdata.lake.collect import collect
+from flagdata.lake import Lake, Lease, collect, doctor, garbage
 from flagdata.storage import RemotePath, StoreError, Upload, connection
 from flagdata.storage.path import BLOCK
 from flagdata.storage.uploads import unfinished

@@ -16,8 +16,7 @@ from flagdata.record import RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
-from measure.anemometer import calibration, making, measuring
-from measure.anemometer.network import network
+from measure.anemometer import calibration, making, measuring, network
 from measure.commands.calibrate import calibrate
 from measure.commands.measure import measure
 from tests.measure.anemometer.made import features, gusts, place
@@ -103,7 +102,7 @@ def test_a_recording_becomes_a_model_by_which_another_film_is_read(
 def test_a_model_whose_network_has_changed_is_refused(lake: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = ("monday", "--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer")
     assert _run(calibrate, *given).exit_code == 0
-    monkeypatch.setattr("measure.anemometer.network.file_hash", lambda _: "another")
+    monkeypatch.setattr("measure.anemometer.networks.file_hash", lambda _: "another")
     with pytest.raises(InputError, match="is another one"):
         network("monday-anemometer", lake=Lake.open(lake), at=None)
 

@@ -19,8 +19,9 @@ from flagdata.ingest import MarkerOptions, ingest_markers
 from flagdata.lake import Lake
 from measure.closing import Reading
 from measure.closing.sources import read
-from measure.commands.close_loop import CloseLoopCommand, with_warnings
+from measure.commands import CloseLoopCommand
 from measure.commands.close_loop import _setup as setup_of
+from measure.commands.close_loop import with_warnings
 from measure.observe import Setup, Up, parse
 from measure.verdict import Conclusion
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks

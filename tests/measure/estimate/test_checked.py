@@ -6,8 +6,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-from measure.anemometer import gate_beside
-from measure.anemometer.network import network
+from measure.anemometer import gate_beside, network
 from measure.gate import CheckedGate, FamiliarityGate, write
 from tests.measure.gate.made import learned
 

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding
-from measure.film import findings_of
-from measure.film.windows import WindowReader, cut, lay_out
-from models.conditioning import Distinct, Interpolator
-from models.conditioning.instants import TimedFrame
+from measure.film import WindowReader, findings_of
+from measure.film.windows import cut, lay_out
+from models.conditioning import Distinct, Interpolator, TimedFrame
 from tests.measure.gate.made import small_model
 
 

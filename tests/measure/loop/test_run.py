@@ -24,9 +24,7 @@ from measure.nulls import NullBatch
 from measure.nulls import bank as banks
 from measure.observe import Experiment, Specimen, Trajectory
 from measure.probes import projected
-from measure.report import as_document, from_document
-from measure.report.lead import lead
-from measure.report.page import page
+from measure.report import as_document, from_document, lead, page
 from measure.report.words import words
 from measure.verdict import NOT_REJECTED, Conclusion, Verdict, number
 from sim.cloth import Cloth

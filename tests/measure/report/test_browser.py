@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from measure.report.page import page
+from measure.report import page
 from measure.verdict import Conclusion
 from tests.measure.report.verdicts import FULL, verdict, with_holes
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from measure.report.lead import evidence, explained, lead, p_text
-from measure.report.page import page
+from measure.report import lead, page
+from measure.report.lead_sentences import evidence, explained, p_text
 from measure.verdict import Conclusion, with_level
 from tests.measure.report.pages import parsed
 from tests.measure.report.verdicts import about, verdict

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from measure.report.page import page
+from measure.report import page
 from measure.verdict import Conclusion, Estimate, Verdict
 from tests.measure.report.pages import parsed
 from tests.measure.report.verdicts import Size, residual, verdict, with_holes

@@ -7,9 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from measure.report import sentences
-from measure.report.lead import lead
-from measure.report.page import page
+from measure.report import lead, page, sentences
 from measure.report.sentences import titles
 from measure.report.words import words
 from measure.verdict import Conclusion, Estimate, NullTest

@@ -11,8 +11,7 @@ from measure.forecasting import Calibration, FieldColumn
 from measure.loop import Mode, Outcome
 from measure.observe import Experiment, Specimen, Trajectory, WindTrack
 from measure.probes import Line, Variation
-from measure.report import by_draw, stated
-from measure.report.lead import lead
+from measure.report import by_draw, lead, stated
 from measure.report.statement import assumptions, blowing, bounds, proposal, shedding
 from measure.verdict import Conclusion
 from tests.measure.report.verdicts import verdict

@@ -10,8 +10,8 @@ import torch
 
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.tables import Range, ends
-from sim.datasets import DatasetRecipe, Truth, casts, load, parse
-from sim.datasets.reading import DATASETS, with_renderer
+from sim.datasets import DATASETS, DatasetRecipe, Truth, casts, load, parse
+from sim.datasets.reading import with_renderer
 from sim.effects import FiniteSpanLoading
 from sim.run import Crew
 from tests.refusals import unrefused

@@ -11,15 +11,16 @@ import torch
 
 from flagdata.errors import UsageError
 from sim.air import QuadraticNormal, Stokes
-from sim.effects import AddedMass, Lift, Permeability, Porosity, PowerLawDrag, TangentialLinearDrag, apply
-from sim.effects.air_density import AirDensityChange
-from sim.effects.tangential_quadratic_drag import TangentialQuadraticDrag
+from sim.effects import EFFECTS, AddedMass, Lift, Permeability, Porosity, PowerLawDrag, TangentialLinearDrag, apply
 from sim.handles import Handles
 from sim.inertia import mean_normal_rates, mean_normals
 from sim.integrate import advance
 from sim.material import isotropic, named
 from sim.mesh import grid
 from sim.scene import Scene, assemble
+
+AirDensityChange = EFFECTS["air-density"]
+TangentialQuadraticDrag = EFFECTS["tangential-quadratic-drag"]
 
 NO_AIR = QuadraticNormal(density=0.0)
 

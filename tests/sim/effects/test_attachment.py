@@ -10,12 +10,13 @@ import torch
 
 from flagdata.errors import UsageError
 from sim.air import QuadraticNormal
-from sim.effects import Slack, apply
-from sim.effects.full_hoist import FullHoist
-from sim.effects.tilted_pole import TiltedPole
+from sim.effects import EFFECTS, Slack, apply
 from sim.handles import Handles, corners
 from sim.integrate import BackwardEuler, JointBatch, SplitEuler, advance
 from sim.mesh import grid
+
+FullHoist = EFFECTS["full-hoist"]
+TiltedPole = EFFECTS["tilted-pole"]
 
 STILL = QuadraticNormal(density=0.0)
 

@@ -12,15 +12,16 @@ import torch
 from flagdata.errors import UsageError
 from sim import bending
 from sim.air import QuadraticNormal
-from sim.effects import HemMass, InternalDamping, apply
-from sim.effects.hem_stiffness import HemStiffness
-from sim.effects.hysteresis import Hysteresis
-from sim.effects.rest_curvature import RestCurvature
-from sim.effects.wet_mass import WetMass
+from sim.effects import EFFECTS, HemMass, InternalDamping, apply
 from sim.handles import Handles
 from sim.integrate import advance, stable_step
 from sim.material import isotropic
 from sim.mesh import Mesh, grid
+
+HemStiffness = EFFECTS["hem-stiffness"]
+Hysteresis = EFFECTS["hysteresis"]
+RestCurvature = EFFECTS["rest-curvature"]
+WetMass = EFFECTS["wet-mass"]
 
 
 def rolled(mesh: Mesh, curvature: float) -> torch.Tensor:

@@ -9,19 +9,20 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
-from sim.effects import AnemometerLag, Sampling
-from sim.effects.anemometer_dead_zone import AnemometerDeadZone
-from sim.effects.anemometer_gain import AnemometerGain
-from sim.effects.anemometer_offset import AnemometerOffset
-from sim.effects.clock_drift import ClockDrift
-from sim.effects.clock_offset import ClockOffset
-from sim.effects.exposure_blur import ExposureBlur
-from sim.effects.frame_jitter import FrameJitter
-from sim.effects.frame_rate_error import FrameRateError
-from sim.effects.overspeeding import Overspeeding
-from sim.effects.rolling_shutter import RollingShutter
-from sim.effects.sensor_distance import SensorDistance
-from sim.effects.sensor_height import SensorHeight
+from sim.effects import SENSOR_EFFECTS, AnemometerLag, Sampling
+
+AnemometerDeadZone = SENSOR_EFFECTS["anemometer-dead-zone"]
+AnemometerGain = SENSOR_EFFECTS["anemometer-gain"]
+AnemometerOffset = SENSOR_EFFECTS["anemometer-offset"]
+ClockDrift = SENSOR_EFFECTS["clock-drift"]
+ClockOffset = SENSOR_EFFECTS["clock-offset"]
+ExposureBlur = SENSOR_EFFECTS["exposure-blur"]
+FrameJitter = SENSOR_EFFECTS["frame-jitter"]
+FrameRateError = SENSOR_EFFECTS["frame-rate-error"]
+Overspeeding = SENSOR_EFFECTS["overspeeding"]
+RollingShutter = SENSOR_EFFECTS["rolling-shutter"]
+SensorDistance = SENSOR_EFFECTS["sensor-distance"]
+SensorHeight = SENSOR_EFFECTS["sensor-height"]
 
 
 def column(values) -> torch.Tensor:

@@ -12,11 +12,12 @@ from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindSeries
-from sim.effects import Gusts, Shear, VerticalWind
-from sim.effects.direction_change import DirectionChange
-from sim.effects.logged_gusts import LoggedGusts
-from sim.effects.pole_wake import PoleWake
+from sim.effects import EFFECTS, Gusts, Shear, VerticalWind
 from tests.refusals import unrefused
+
+DirectionChange = EFFECTS["direction-change"]
+LoggedGusts = EFFECTS["logged-gusts"]
+PoleWake = EFFECTS["pole-wake"]
 
 WIND = torch.tensor([3.0, 4.0, 0.5], dtype=torch.float64)[:, None]
 

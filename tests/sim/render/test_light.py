@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
+from sim.render import stage
 from sim.render.sampling import Samples
-from sim.render.stage import stage
 from tests.sim.render.pieces import linear, meshes, sheet, together
 
 BYTE = 0.006  # linear; half a step of the bytes near white

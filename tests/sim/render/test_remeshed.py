@@ -10,9 +10,8 @@ import torch
 
 from flagdata.ingest import read_folder
 from flagdata.lake import RaggedMeshSequence
-from sim.render import Camera, Meshes
+from sim.render import Camera, Meshes, stage
 from sim.render.shutter import Motion
-from sim.render.stage import stage
 from tests.sim.render.pieces import linear
 
 

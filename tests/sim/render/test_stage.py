@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from sim.render.stage import stage
+from sim.render import stage
 from tests.sim.render.pieces import meshes, sheet
 
 ANCHOR = (2.0, -1.0, 0.7)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from sim.render.stage import stage
+from sim.render import stage
 from tests.sim.render.pieces import linear, meshes, sheet, together
 
 RED, GREEN, BLUE, YELLOW = (255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 0)

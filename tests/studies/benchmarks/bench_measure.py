@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from flagdata.film import Film
 from flagdata.rng import child_seed
-from measure.anemometer import Network, gate_beside
-from measure.anemometer.network import network
+from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options, measure, of_model
 from measure.film import FlagSize, Reading, subjects
 from measure.refine import Clip

@@ -37,8 +37,7 @@ from typing import Any
 
 from flagdata.cli import main
 from flagdata.findings import Severity
-from flagdata.lake import Lake, doctor, labels_of, object_names, verify
-from flagdata.lake.collect import collect
+from flagdata.lake import Lake, collect, doctor, labels_of, object_names, verify
 from flagdata.lake.objects import SUMS
 from flagdata.storage import RemotePath, connection
 from tests.evidence import circumstances

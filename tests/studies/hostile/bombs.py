@@ -276,8 +276,9 @@ def _beside(name: str, write: Callable[[Path], object], *options: str, doctor: b
 def _folder(write: Callable[..., object], suffix: str, **options: int) -> Callable[[Path], None]:
     def fill(folder: Path) -> None:
         folder.mkdir()
-        for k in range(3):
-            write(folder / f"{k:04d}.{suffix}", **options)
+        write(folder / f"0000.{suffix}", **options)
+        for k in (1, 2):
+            shutil.copy(folder / f"0000.{suffix}", folder / f"{k:04d}.{suffix}")
 
     return fill
 

@@ -24,8 +24,7 @@ from models.conditioning import HALVED, Conditioning, Stills, conditioned, frami
 from models.conditioning.camera import STILL
 from sim.assets import Assets
 from sim.datasets import coded, load, settings
-from sim.render import Meshes, Raster, RenderParameters, prior
-from sim.render.stage import stage
+from sim.render import Meshes, Raster, RenderParameters, prior, stage
 
 _CAMERA = "outdoor"
 """Data set whose cameras' noise and coding films get."""

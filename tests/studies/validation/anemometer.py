@@ -24,10 +24,9 @@ from numpy.typing import NDArray
 
 from flagdata.findings import Finding
 from flagdata.lake import Lake
-from measure.anemometer import Features, Network, Recording, calibrated
+from measure.anemometer import Features, Network, Recording, calibrated, network
 from measure.anemometer.features import features_of
 from measure.anemometer.measuring import measured_from
-from measure.anemometer.network import network
 from measure.calibrate import Log
 from measure.estimate import Measurement, Options, beside
 from measure.film import FlagSize, Reading, Subject, subjects

@@ -19,8 +19,7 @@ import torch
 
 from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.stated import Stated
-from measure.anemometer import Network, gate_beside
-from measure.anemometer.network import network
+from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Measurement, Options, measure, of_model
 from measure.film import FlagSize, Reading, subjects
 from measure.gate import REASONS, WindowGate

@@ -16,8 +16,7 @@ from typing import Any
 import torch
 
 from flagdata.errors import NotFoundError
-from measure.anemometer import Network, gate_beside
-from measure.anemometer.network import network
+from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options
 from measure.film import FlagSize
 from measure.gate import WindowGate

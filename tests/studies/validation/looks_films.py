@@ -20,8 +20,7 @@ from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, edges_of, 
 from sim.assets import Assets
 from sim.datasets import coded, load, settings
 from sim.mesh import Mesh
-from sim.render import Meshes, RenderParameters, prior
-from sim.render.stage import stage
+from sim.render import Meshes, RenderParameters, prior, stage
 
 RATE = 25.0
 """Frames a second [Hz]."""

@@ -32,8 +32,7 @@ from typing import Any, ClassVar
 
 from flagdata.errors import RefusedError
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake, doctor, object_names, verify
-from flagdata.lake.collect import collect
+from flagdata.lake import Artifact, Lake, collect, doctor, object_names, verify
 from flagdata.object_ranges import ObjectRanges
 from flagdata.provenance import code_version
 from flagdata.schema import Kind

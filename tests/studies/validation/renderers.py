@@ -19,8 +19,7 @@ from PIL import Image
 
 from flagdata.lake import MeshSequence
 from sim.assets import Assets
-from sim.render import Cycles, Meshes, Raster, Renderer, RenderParameters, Workbench, named, plate, to_bytes
-from sim.render.stage import stage
+from sim.render import Cycles, Meshes, Raster, Renderer, RenderParameters, Workbench, named, plate, stage, to_bytes
 from sim.run import Crew, Stepper, load
 from sim.run import run as simulate
 

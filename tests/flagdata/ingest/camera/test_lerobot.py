@@ -14,9 +14,8 @@ import pytest
 
 from flagdata.errors import CorruptError, InputError, NotFoundError, TimeError, UnknownNameError
 from flagdata.export import Export, export
-from flagdata.ingest import CameraIngest, CameraOptions, ingest_camera, open_camera
+from flagdata.ingest import CameraIngest, CameraOptions, classify, ingest_camera, open_camera
 from flagdata.ingest.camera.lerobot import stamps_of
-from flagdata.ingest.classify import classify
 from flagdata.lake import Lake
 from tests.flagdata.export.conftest import NOON
 from tests.flagdata.export.conftest import known as known

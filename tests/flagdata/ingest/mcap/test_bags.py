@@ -15,8 +15,16 @@ from click.testing import CliRunner
 
 from flagdata.cli import root
 from flagdata.errors import FlagdataError, InputError, UsageError
-from flagdata.ingest import CameraIngest, CameraOptions, WindOptions, examine, ingest_camera, open_camera, read_log
-from flagdata.ingest.classify import classify
+from flagdata.ingest import (
+    CameraIngest,
+    CameraOptions,
+    WindOptions,
+    classify,
+    examine,
+    ingest_camera,
+    open_camera,
+    read_log,
+)
 from flagdata.lake import Lake
 from tests.flagdata.ingest.mcap.conftest import NOON
 from tests.flagdata.ingest.mcap.ros import WIND, bag, channel, film, wind

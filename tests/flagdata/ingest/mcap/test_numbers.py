@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest import WindIngest, WindOptions, ingest_wind, read_log
-from flagdata.ingest.classify import classify
+from flagdata.ingest import WindIngest, WindOptions, classify, ingest_wind, read_log
 from flagdata.lake import Lake
 from flagdata.record import RecordWriter
 from flagdata.signals import Sensor, WindSeries

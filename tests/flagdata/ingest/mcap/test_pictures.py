@@ -12,8 +12,7 @@ import zstandard
 from mcap.writer import CompressionType, Writer
 
 from flagdata.errors import CorruptError, InputError, LimitError, UnknownNameError, UsageError
-from flagdata.ingest import CameraIngest, CameraOptions, guesses, ingest_camera, messages, open_camera, topics
-from flagdata.ingest.classify import classify
+from flagdata.ingest import CameraIngest, CameraOptions, classify, guesses, ingest_camera, messages, open_camera, topics
 from flagdata.ingest.mcap.pictures import TopicSource
 from flagdata.ingest.mcap.topics import index
 from flagdata.lake import Lake

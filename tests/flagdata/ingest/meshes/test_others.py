@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import FlagdataError
-from flagdata.ingest import read_folder
-from flagdata.ingest.classify import classify
+from flagdata.ingest import classify, read_folder
 from flagdata.ingest.meshes.others import format_of
 from tests.flagdata.ingest.meshes.conftest import square
 

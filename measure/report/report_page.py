@@ -18,7 +18,7 @@ from flagdata.pages.glossary import GLOSSARY
 from flagdata.pages.render import render
 from measure.report import cloth, figures, motion, rows, sentences
 from measure.report.chart import Linear, drawing
-from measure.report.lead import lead
+from measure.report.lead_sentences import lead
 from measure.report.sentences import readable
 from measure.verdict import quantity
 from measure.verdict.quantity import known, number
