@@ -73,7 +73,9 @@ class ResNet18(nn.Module):
     def __init__(self, *, channels: int = 1, width: int = 64) -> None:
         super().__init__()
         if channels < 1 or width < 1:
-            raise InputError(f"ResNet-18 with {channels} channels and width {width}", fix="give at least 1 of each")
+            raise InputError(
+                f"the ResNet-18 has {channels} channels and the width {width}", fix="give at least 1 of each"
+            )
         layers: list[nn.Module] = [
             nn.Conv2d(channels, width, 7, stride=2, padding=3, bias=False),
             nn.BatchNorm2d(width),

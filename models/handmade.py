@@ -88,7 +88,7 @@ def features(frames: Tensor, *, rate: float) -> Tensor:
     """
     if frames.ndim != 5 or frames.shape[1] != 1 or frames.shape[2] < 8 or min(frames.shape[3:]) < 16:
         raise InputError(
-            f"clips of shape {tuple(frames.shape)}",
+            f"the clips have the shape {tuple(frames.shape)}",
             fix="give gray clips (batch, 1, time, height, width) of at least 8 frames and 16×16 pixels",
         )
     if rate < 2 * BAND_EDGES[-1]:
@@ -167,7 +167,7 @@ def _band_shares(frequency: Tensor, width: float) -> Tensor:
 
 
 def _spectral(wave: tuple[Tensor, Tensor, Tensor], slope_x: Tensor, slope_y: Tensor, rate: float) -> list[Tensor]:
-    """Band powers and shape of the spectra of the change from frame to frame and of both slopes."""
+    """Computes band powers and shape of the spectra of the change from frame to frame and of both slopes."""
     powers: list[Tensor] = []
     shapes: list[Tensor] = []
     local: list[Tensor] = []
@@ -203,7 +203,8 @@ def _coverage(motion: Tensor) -> list[Tensor]:
 
 
 def _flow(change: Tensor, slope_x: Tensor, slope_y: Tensor, rate: float) -> list[Tensor]:
-    """Normal flow where there is slope, and the translation of each frame, both in widths of the reduced image."""
+    """Computes normal flow where there is slope, and the translation of each frame, both in widths of the reduced
+    image."""
     scale = rate / SIDE
     x, y = 0.5 * (slope_x[1:] + slope_x[:-1]), 0.5 * (slope_y[1:] + slope_y[:-1])
     xx, yy, xy = (x * x).mean(dim=(1, 2)), (y * y).mean(dim=(1, 2)), (x * y).mean(dim=(1, 2))
@@ -227,7 +228,7 @@ def _flow(change: Tensor, slope_x: Tensor, slope_y: Tensor, rate: float) -> list
 
 
 def _shape(motion: Tensor) -> list[Tensor]:
-    """Where the motion is and how it spreads: moments of its power over the image."""
+    """Computes moments of the motion's power over the image: moments of its power over the image."""
     height, width = motion.shape
     weight = motion + FLOOR
     x = (torch.arange(width, device=motion.device, dtype=motion.dtype) - (width - 1) / 2) / SIDE
@@ -251,7 +252,7 @@ def _shape(motion: Tensor) -> list[Tensor]:
 
 
 def _waves(transform: tuple[Tensor, Tensor, Tensor]) -> list[Tensor]:
-    """Coherence and wavenumber [rad/px] along x and y at the frequency that dominates the rate of change."""
+    """Computes coherence and wavenumber [rad/px] along x and y at the frequency that dominates the rate of change."""
     real, imaginary, frequency = transform
     power = (real.square() + imaginary.square()).mean(dim=(1, 2))
     wave = torch.complex(*(part[(power * frequency.square()).argmax()] for part in (real, imaginary)))

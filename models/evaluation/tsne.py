@@ -32,7 +32,7 @@ class Layout:
 
 
 def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXITY, most: int = CLIPS) -> Layout:
-    """Lay out the embedding of a model; the same for one seed.
+    """Lays out the embedding of a model; the same for one seed.
 
     Args:
         predictions: with an embedding and the wind among its targets.
@@ -59,7 +59,7 @@ def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXIT
         )
     if len(chosen) <= perplexity:
         raise InputError(
-            f"{len(chosen)} clips and a perplexity of {perplexity:g}",
+            f"{len(chosen)} clips do not admit a perplexity of {perplexity:g}",
             where=where,
             fix="lay out more clips, or lower it",
         )

@@ -64,9 +64,9 @@ def check_folder(folder: Path) -> None:
     files = {Path(LOCK)} | {
         Path(part) / name for part in (_LAST, _NEXT, _BEFORE) for name in (WEIGHTS, _BEST, _MOMENTS, CARD, SUMS)
     }
-    known = files | {file.parent for file in files}
+    expected = files | {file.parent for file in files}
     for path in sorted(folder.rglob("*")):
-        if path.relative_to(folder) not in known or path.is_symlink():
+        if path.relative_to(folder) not in expected or path.is_symlink():
             raise ConflictError(
                 "the run folder has files that no training wrote",
                 where=str(path),
@@ -119,9 +119,9 @@ def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bo
         RefusedError: it is of another recipe or of other data.
         CorruptError: all are damaged, or do not fit the recipe.
     """
-    found = [path for path in (folder / _LAST, folder / _BEFORE) if path.exists()]
+    checkpoints = [path for path in (folder / _LAST, folder / _BEFORE) if path.exists()]
     damage: CorruptError | None = None
-    for checkpoint in found:
+    for checkpoint in checkpoints:
         try:
             check_sums(checkpoint, fix=_ANEW)
         except CorruptError as error:
@@ -145,10 +145,10 @@ def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
     """Bring `standing` to where the checkpoint in `folder` itself, which is sound, was taken."""
     card = read_card(folder)
     stored = json.loads(json.dumps(identity))
-    kept = card.get("identity")
-    if not isinstance(kept, dict):
+    trained_on = card.get("identity")
+    if not isinstance(trained_on, dict):
         raise CorruptError("the checkpoint does not state its training", where=str(folder), fix=_ANEW)
-    different = [name for name in stored if kept.get(name) != stored[name]]
+    different = [name for name in stored if trained_on.get(name) != stored[name]]
     if different:
         raise RefusedError(
             f"the checkpoint is of another training: {', '.join(different)} differ",
@@ -171,21 +171,21 @@ def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
 
 
 def _moments(standing: Standing) -> dict[str, Tensor]:
-    """Adam's state by parameter, "0.exp_avg" …"""
+    """Flattens Adam's state by parameter, "0.exp_avg" …."""
     state = standing.optimiser.state_dict()["state"]
     return {f"{index}.{kind}": values[kind] for index, values in state.items() for kind in _KINDS if kind in values}
 
 
 def _take_moments(standing: Standing, tensors: dict[str, Tensor]) -> None:
     state = standing.optimiser.state_dict()
-    shapes = {place: tuple(weights.shape) for place, weights in enumerate(standing.learner.parameters())}
-    found: dict[int, dict[str, Tensor]] = {}
+    shapes = {index: tuple(weights.shape) for index, weights in enumerate(standing.learner.parameters())}
+    moments: dict[int, dict[str, Tensor]] = {}
     for name, tensor in tensors.items():
         index, _, kind = name.partition(".")
-        found.setdefault(int(index), {})[kind] = tensor
-    for index, values in found.items():
+        moments.setdefault(int(index), {})[kind] = tensor
+    for index, values in moments.items():
         wanted = {kind: () if kind == "step" else shapes[index] for kind in _KINDS}
         if {kind: tuple(tensor.shape) for kind, tensor in values.items()} != wanted:
             raise ValueError(f"the moments of parameter {index} are of other kinds or shapes")
-    state["state"] = found
+    state["state"] = moments
     standing.optimiser.load_state_dict(state)

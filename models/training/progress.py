@@ -50,7 +50,7 @@ class Course:
         return min(self.epochs, key=lambda epoch: epoch.validation, default=None)
 
     def stalled(self, patience: int) -> bool:
-        """Whether the last `patience` epochs were no better than the best before them."""
+        """Returns whether the last `patience` epochs were no better than the best before them."""
         best = self.best
         return best is not None and len(self.epochs) - 1 - best.number >= patience
 
@@ -59,7 +59,7 @@ class Course:
 
     @classmethod
     def of(cls, content: list[dict[str, Any]]) -> Course:
-        """From `as_list`.
+        """Rebuilds a course from `as_list`.
 
         Raises:
             AttributeError, KeyError, OverflowError, TypeError, ValueError: it is not from there.
@@ -67,7 +67,7 @@ class Course:
         return cls(epochs=[Epoch(**{name: _KINDS[name](value) for name, value in entry.items()}) for entry in content])
 
     def picture(self) -> bytes:
-        """The losses and the learning rate against the epoch: a PNG."""
+        """Draws the losses and the learning rate against the epoch: a PNG."""
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(7, 3.6), dpi=110, layout="constrained")
