@@ -55,7 +55,7 @@ def write_scene(file: ArcsimScene, folder: Path, *, name: str = "scene") -> Path
 
 
 def _expressible(scene: Scene) -> QuadraticNormal:
-    """The scene's wind force, where ArcSim's format can express it and all else."""
+    """Returns the scene's wind force, where ArcSim's format can express it and all else."""
     refused: list[str] = []
     if len(scene.handles.times) > 1 or any(any(offset) for offset in scene.handles.offsets):
         refused.append("moving handles")

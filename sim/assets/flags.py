@@ -36,7 +36,7 @@ class Sheet:
 
     @classmethod
     def blank(cls, *, rows: int, columns: int, colour: str) -> Sheet:
-        """A sheet of one colour."""
+        """Makes a sheet of one colour."""
         return cls(fine=np.zeros((rows * _FINE, columns * _FINE), dtype=np.uint8), colours=[colour])
 
     @cached_property
@@ -57,16 +57,16 @@ class Sheet:
         self.where(self.in_disc(x, y, radius), colour)
 
     def in_disc(self, x: float, y: float, radius: float) -> NDArray[np.bool_]:
-        """(sub-rows, sub-columns) which samples a disc covers."""
+        """Masks samples (sub-rows, sub-columns) that a disc covers."""
         px, py = self._grid
         return (px - np.float32(x)) ** 2 + (py - np.float32(y)) ** 2 <= np.float32(radius**2)
 
     def polygon(self, corners: Sequence[tuple[float, float]], colour: str) -> None:
-        """A polygon, by the non-zero winding rule: a pentagram is filled."""
+        """Fills a polygon, by the non-zero winding rule: a pentagram is filled."""
         self.where(self.inside(corners), colour)
 
     def star(self, x: float, y: float, radius: float, colour: str, *, points_to: float = -math.pi / 2) -> None:
-        """A five-pointed star on a circle.
+        """Fills a five-pointed star on a circle.
 
         Args:
             points_to: direction of one point from the middle, from +x towards +y, so clockwise as seen [rad].
@@ -83,7 +83,7 @@ class Sheet:
         return np.asarray(dx * c + dy * s, dtype=np.float32), np.asarray(dy * c - dx * s, dtype=np.float32)
 
     def inside(self, corners: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
-        """(sub-rows, sub-columns) which samples a polygon covers, by the non-zero winding rule."""
+        """Masks samples (sub-rows, sub-columns) that a polygon covers, by the non-zero winding rule."""
         px, py = self._grid
         winding = np.zeros(self.fine.shape, dtype=np.int8)
         for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
@@ -98,7 +98,7 @@ class Sheet:
         self.fine[mask] = self._index(colour)
 
     def bytes(self) -> NDArray[np.uint8]:
-        """(rows, columns, 3) sRGB, sub-samples averaged in linear light."""
+        """Averages sub-samples in linear light: (rows, columns, 3) sRGB."""
         rows, columns = (n // _FINE for n in self.fine.shape)
         blocks = self.fine.reshape(rows, _FINE, columns, _FINE)
         mean = np.zeros((rows, columns, 3))
@@ -194,7 +194,8 @@ def _south_africa(sheet: Sheet) -> None:
 
 
 def _arm(half: float, mirrored: bool) -> list[tuple[float, float]]:
-    """One arm of the pall and its level part: half its width on either side of (0, 0), (0.75, 0.5), (1.5, 0.5)."""
+    """Outlines one arm of the pall and its level part: half its width on either side of (0, 0), (0.75, 0.5), (1.5,
+    0.5)."""
     length = math.hypot(0.75, 0.5)
     along, aside = (0.75 / length, 0.5 / length), (0.5 / length * half, -0.75 / length * half)
     corners = [(1.5, 0.5 - half), (1.5, 0.5 + half)]

@@ -21,7 +21,7 @@ def expose(name: str, root: Path) -> None:
     folder = root / name
     spec = spec_from_file_location(name, folder / "__init__.py", submodule_search_locations=[str(folder)])
     if spec is None or spec.loader is None:
-        raise ImportError(f"no package {name} in {root}")
+        raise ImportError(f"there is no package {name} in {root}")
     module = module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)

@@ -99,10 +99,10 @@ class RenderParameters:
     def __post_init__(self) -> None:
         for name, entry in self.described().items():
             value = getattr(self, name)
-            whole = self._types()[name] is int
-            typed = isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
+            is_integer = self._types()[name] is int
+            typed = isinstance(value, int if is_integer else (int, float)) and not isinstance(value, bool)
             if not typed or not entry.least <= value <= entry.most:
-                noun = "a whole number" if whole else "a number"
+                noun = "a whole number" if is_integer else "a number"
                 unit = "" if entry.unit == "1" else f" {entry.unit}"
                 raise InputError(
                     f"{name} is {value!r}",
@@ -142,7 +142,7 @@ class RenderParameters:
 def _described(cls: type[Any]) -> Mapping[str, Described]:
     hints = get_type_hints(cls, include_extras=True)
     notes = {entry.name: getattr(hints[entry.name], "__metadata__", ()) for entry in fields(cls)}
-    return {name: note for name, found in notes.items() for note in found if isinstance(note, Described)}
+    return {name: note for name, described in notes.items() for note in described if isinstance(note, Described)}
 
 
 @functools.cache

@@ -39,7 +39,7 @@ class Raster:
     assets: Assets = field(default_factory=Assets)
 
     def render(self, meshes: Meshes, parameters: RenderParameters) -> Tensor:
-        """See `Renderer.render`.
+        """Renders the frames, see `Renderer.render`.
 
         Raises:
             InputError: cloth behind the camera, or assets that cannot be read.
@@ -74,7 +74,7 @@ class Raster:
 def _exposed(
     meshes: Meshes, motion: Motion | None, placed: Stage, samples: Samples, zeta: RenderParameters, pyramid: Pyramid
 ) -> Tensor:
-    """(frame, height, width, 4) linear radiance times coverage, and coverage."""
+    """Accumulates linear radiance times coverage, and coverage, over the samples: (frame, height, width, 4)."""
     out = torch.zeros((len(meshes), zeta.height, zeta.width, 4), device=meshes.device)
     geometry = Geometry.of(meshes, placed)
     code = _code(meshes.device)
@@ -96,5 +96,5 @@ def _developed(scene: Tensor, behind: Tensor, *, gain: float) -> Tensor:
 
 
 def _code(device: torch.device) -> ctypes.CDLL | None:
-    """The kernel, which is for CPUs."""
+    """Returns the kernel, which is for CPUs."""
     return library() if device.type == "cpu" else None
