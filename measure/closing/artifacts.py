@@ -87,7 +87,7 @@ def answer_of(
     models: tuple[NamedModel, ...],
     findings: tuple[Finding, ...],
 ) -> Answer:
-    """That of recordings of markers.
+    """Makes the answer of a verdict on recordings of markers.
 
     Args:
         name: what the measurement is called.
@@ -121,12 +121,12 @@ def answer_of(
 
 
 def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
-    """Publish a verdict and its models in one commit where it is new, see `flagdata.lake.results`.
+    """Publishes a verdict and its models in one commit where it is new, see `flagdata.lake.results`.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    place = results.keep(
+    kept = results.keep(
         lake,
         _measurement(answer),
         lambda staged: write(staged, answer.verdict, page=answer.page),
@@ -134,10 +134,10 @@ def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
         branch=branch,
         left=lambda verdict: [_model(answer, model, verdict) for model in answer.models],
     )
-    verdict = place.artifact
-    made = tuple(_model(answer, model, verdict).id for model in answer.models)
-    models = made if place.new else models_of(lake, verdict.id, branch)
-    return Kept(measurement=verdict.id, models=models, place=place)
+    verdict = kept.artifact
+    ids = tuple(_model(answer, model, verdict).id for model in answer.models)
+    models = ids if kept.new else models_of(lake, verdict.id, branch)
+    return Kept(measurement=verdict.id, models=models, place=kept)
 
 
 def models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
@@ -147,7 +147,7 @@ def models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
 
 
 def write(path: Path, verdict: Verdict, *, page: str) -> None:
-    """A new Zarr folder: `verdict` (UTF-8 JSON), `report` (UTF-8 HTML) and `nulls` (statistic of each)."""
+    """Writes a new Zarr folder: `verdict` (UTF-8 JSON), `report` (UTF-8 HTML) and `nulls` (statistic of each)."""
     import zarr
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
@@ -166,7 +166,7 @@ def write(path: Path, verdict: Verdict, *, page: str) -> None:
 
 
 def read(path: Path) -> tuple[Verdict, str]:
-    """The verdict and the report of a measurement's object.
+    """Reads the verdict and the report of a measurement's object.
 
     Raises:
         CorruptError: not such a folder, damaged, or of a newer format.
@@ -184,7 +184,7 @@ def read(path: Path) -> tuple[Verdict, str]:
 
 
 def fingerprint(experiment: Experiment) -> str:
-    """SHA-256 of an experiment with its uncertainties: cloth, pins, recordings and wind; not of names and
+    """Hashes an experiment with its uncertainties, SHA-256: cloth, pins, recordings and wind; not of names and
     files."""
     content, arrays = described(experiment.specimen)
     content["recordings"] = [[r.rate, r.noise, *r.wind.uncertainty] for r in experiment.recordings]

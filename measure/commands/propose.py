@@ -73,7 +73,7 @@ def propose(chosen: Proposing) -> None:
     outcome = seek(
         observed.experiment,
         tried,
-        known=[candidates.weighed(name) for name in chosen.known],
+        known=[candidates.library_column(name) for name in chosen.known],
         controls=controls,
         options=options,
         stage=stage_bars(),

@@ -82,7 +82,7 @@ class NullBatch:
     effects: tuple[Effect, ...] = ()
 
     def simulate(self) -> list[Trajectory]:
-        """One recording a calibration."""
+        """Simulates one recording a calibration."""
         flat, held = self._mesh()
         seen = np.einsum("mv,fvcb->fmcb", onto(flat.rest, self.markers), self._frames(flat, held))
         jitter = self.noise * stream(self.seed, "null", "markers").standard_normal(seen.shape)
@@ -106,8 +106,8 @@ class NullBatch:
         return self._mesh()[0].vertex_count * (2.0 if isinstance(integrator, Symplectic) else 1.0)
 
     def _mesh(self) -> tuple[Mesh, tuple[int, ...]]:
-        """A finer mesh in the fit's frame, and its vertices nearest to the attachments: a grid, or in half of the draws
-        one whose inner vertices are moved and joined anew (Delaunay), as other codes' meshes are."""
+        """Makes a finer mesh in the fit's frame, and finds its vertices nearest to the attachments: a grid, or in half
+        of the draws one whose inner vertices are moved and joined anew (Delaunay), as other codes' meshes are."""
         rng = stream(self.seed, "null", "mesh")
         rest = self.specimen.mesh.rest
         low, size = rest.min(axis=0), np.ptp(rest, axis=0)
@@ -118,8 +118,8 @@ class NullBatch:
         if rng.random() < 0.5:
             flat = irregular(flat, spacing, rng)
         flat = replace(flat, rest=flat.rest + low)
-        held = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
-        return flat, tuple(held)
+        nearest = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
+        return flat, tuple(nearest)
 
     def _frames(self, flat: Mesh, held: tuple[int, ...]) -> Floats:
         """(frame, vertex, 3, recording) [m], after the start has been forgotten.
@@ -203,7 +203,7 @@ class NullBatch:
         return after(SETTLE, self.duration, self.rate).start / self.rate
 
     def _times(self, period: float) -> Floats:
-        """(n,) of a run, so far apart, since the recording's first frame [s]."""
+        """Lists times (n,) of a run, so far apart, since the recording's first frame [s]."""
         return np.arange(math.ceil((SETTLE + self.duration) / period) + 2, dtype=np.float64) * period - self._begins
 
     def _blowing(self, system: System) -> SampledWind:
@@ -215,13 +215,14 @@ class NullBatch:
         return SampledWind(times=even, samples=blown, beyond=Beyond.HOLD)
 
     def _carrying(self, system: System) -> AnchorTracks:
-        """The ways of the attachments since the start of the run."""
+        """Samples the paths of the attachments since the start of the run."""
         places = np.stack([track.at(self._times(CARRIED)) for track in self.tracks], axis=-1)
         moved = torch.as_tensor(places - places[0], dtype=system.cloth.dtype, device=system.cloth.device)
         return AnchorTracks(start=0.0, period=CARRIED, samples=moved)
 
     def _method(self, halvings: int = 0) -> tuple[Integrator, float]:
-        """A method for these dampings with steps that were halved so often, and the damping it adds by itself [s]."""
+        """Chooses a method for these dampings with steps that were halved so often, and the damping it adds by itself
+        [s]."""
         if max(c.damping for c in self.calibrations) <= _GENTLE and not self.effects:
             return Symplectic(safety=SAFETY / 2**halvings), 0.0
         step = _STEPS[stream(self.seed, "null", "method").integers(len(_STEPS))] / 2**halvings
@@ -230,8 +231,8 @@ class NullBatch:
 
 
 def _hung(rest: Floats, seats: Floats, anchors: Floats) -> Floats:
-    """(vertex, 3) of a plane upright cloth below or beside its anchors (held, 3) [m], turned about the vertical as they
-    are; one that is held along a vertical stands along +x.
+    """Hangs a plane upright cloth below or beside its anchors (held, 3) [m], turned about the vertical as they are,
+    (vertex, 3); one that is held along a vertical stands along +x.
 
     Args:
         rest, seats: (vertex, 2) of the cloth, (held, 2) of its attachments [m].
@@ -246,7 +247,8 @@ def _hung(rest: Floats, seats: Floats, anchors: Floats) -> Floats:
 
 
 def irregular(flat: Mesh, spacing: float, rng: np.random.Generator) -> Mesh:
-    """A grid's vertices, those inside moved by up to `_UNEVEN` of the spacing [m] along each axis, joined anew."""
+    """Moves a grid's vertices, those inside by up to `_UNEVEN` of the spacing [m] along each axis, and joins them
+    anew."""
     low, high = flat.rest.min(axis=0), flat.rest.max(axis=0)
     inside = ((flat.rest > low + spacing / 2) & (flat.rest < high - spacing / 2)).all(axis=1)
     rest = flat.rest + np.where(inside[:, None], rng.uniform(-_UNEVEN, _UNEVEN, flat.rest.shape) * spacing, 0.0)

@@ -38,7 +38,7 @@ class EffectFile:
 
 
 def write(outcome: Outcome, folder: Path) -> EffectFile:
-    """The effect file, its contract tests and its pyproject.toml, into a folder.
+    """Writes the effect file, its contract tests and its pyproject.toml, into a folder.
 
     An earlier proposal from the same data that was changed since is kept; the new one gets the next free name.
 
@@ -103,7 +103,7 @@ def _is_free(folder: Path, module: str) -> bool:
 
 
 def _part(strength: Strength) -> dict[str, Any]:
-    """What the template needs of a strength whose name is `field_shape`."""
+    """Returns what the template needs of a strength whose name is `field_shape`."""
     term, estimate = Term.named(strength.name), strength.estimate
     reach = abs(estimate.high - estimate.low)
     least, _ = TermColumn.of(term).described.admissible

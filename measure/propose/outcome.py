@@ -173,5 +173,5 @@ class Outcome:
     seed: int
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values: an entry of the proposal log."""
+        """Returns JSON values: an entry of the proposal log."""
         return asdict(self)

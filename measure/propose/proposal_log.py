@@ -16,7 +16,7 @@ _FORMER_SCHEMA = "flagdata.ledger/1"
 
 
 def entries(path: Path) -> list[dict[str, Any]]:
-    """The entries of a log; empty where there is no file.
+    """Reads the entries of a log; empty where there is no file.
 
     Raises:
         CorruptError: the file is not a proposal log.
@@ -25,7 +25,7 @@ def entries(path: Path) -> list[dict[str, Any]]:
         return []
     content = read_json(path, noun="proposal log", fix="move it away")
     if content.get("schema") not in (SCHEMA, _FORMER_SCHEMA) or not isinstance(content.get("entries"), list):
-        raise CorruptError(f"not a proposal log of schema {SCHEMA}", where=str(path), fix="move it away")
+        raise CorruptError(f"it is not a proposal log of schema {SCHEMA}", where=str(path), fix="move it away")
     return content["entries"]
 
 
@@ -41,7 +41,7 @@ def check(path: Path) -> None:
 
 
 def add(path: Path, outcome: Outcome, *, effect: str) -> None:
-    """One more entry, after those that are there. Entries are never changed.
+    """Adds one more entry, after those that are there. Entries are never changed.
 
     Args:
         effect: name of the effect's file and class; empty where no term was accepted.
@@ -49,6 +49,6 @@ def add(path: Path, outcome: Outcome, *, effect: str) -> None:
     Raises:
         CorruptError: the file is not a proposal log.
     """
-    made = [*entries(path), {"effect": effect, **outcome.as_dict()}]
-    text = json.dumps({"schema": SCHEMA, "entries": made}, indent=1, allow_nan=False, ensure_ascii=False)
+    all_entries = [*entries(path), {"effect": effect, **outcome.as_dict()}]
+    text = json.dumps({"schema": SCHEMA, "entries": all_entries}, indent=1, allow_nan=False, ensure_ascii=False)
     rewrite(path, text + "\n")

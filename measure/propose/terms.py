@@ -48,9 +48,9 @@ class Shape:
         return f"{self.method}({', '.join(f'{p:g}' for p in self.place)})" if self.place else self.method
 
     def of(self, flat: Flat) -> Tensor:
-        """(vertex, 1, 1)."""
-        found = getattr(flat, self.method)
-        return found(*self.place) if self.place else found
+        """Computes the shape on a flat cloth, (vertex, 1, 1)."""
+        attribute = getattr(flat, self.method)
+        return attribute(*self.place) if self.place else attribute
 
 
 SHAPES: dict[str, str] = {
@@ -72,27 +72,27 @@ _LOCAL_WORDS = {
 
 
 def shape_named(name: str) -> Shape:
-    """A shape of `SHAPES`, or near_U_V, stripe_U, band_V with shares of the width and the height in hundredths.
+    """Parses a shape of `SHAPES`, or near_U_V, stripe_U, band_V with shares of the width and the height in hundredths.
 
     Raises:
         UsageError: no such shape.
     """
     if name in SHAPES:
         return Shape(method=name, words=SHAPES[name])
-    found = _LOCAL.fullmatch(name)
-    place = () if found is None else tuple(int(part) / 100 for part in found.groups()[1:] if part is not None)
-    if found is None or len(place) != (2 if found[1] == "near" else 1) or max(place) > 1:
+    match = _LOCAL.fullmatch(name)
+    arguments = () if match is None else tuple(int(part) / 100 for part in match.groups()[1:] if part is not None)
+    if match is None or len(arguments) != (2 if match[1] == "near" else 1) or max(arguments) > 1:
         raise UsageError(
-            f"no shape {name!r}",
+            f"there is no shape {name!r}",
             where="terms",
             fix=f"take one of {', '.join(SHAPES)}, or near_U_V, stripe_U, band_V in hundredths from 0 to 100",
         )
-    return Shape(method=found[1], place=place, words=_LOCAL_WORDS[found[1]].format(*place))
+    return Shape(method=match[1], place=arguments, words=_LOCAL_WORDS[match[1]].format(*arguments))
 
 
-def local(method: str, *place: float) -> str:
-    """Name of a local shape at shares of the width and the height."""
-    return "_".join([method, *(f"{round(100 * share):02d}" for share in place)])
+def local(method: str, *shares: float) -> str:
+    """Names a local shape at shares of the width and the height."""
+    return "_".join([method, *(f"{round(100 * share):02d}" for share in shares)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,12 +192,12 @@ class Term:
 
     def __post_init__(self) -> None:
         if self.field not in FIELDS:
-            raise UsageError(f"no field {self.field!r}", where="terms", fix=f"take one of {', '.join(FIELDS)}")
+            raise UsageError(f"there is no field {self.field!r}", where="terms", fix=f"take one of {', '.join(FIELDS)}")
         shape_named(self.shape)
 
     @classmethod
     def named(cls, name: str) -> Term:
-        """The term of a name.
+        """Parses the term of a name.
 
         Raises:
             UsageError: not a term's.
@@ -224,9 +224,9 @@ class Term:
         return shape_named(self.shape)
 
     def moved(self, *steps: float) -> Term:
-        """The same at a place of the cloth nearby, by shares of the width and the height."""
-        place = (min(1.0, max(0.0, p + step)) for p, step in zip(self.at.place, steps, strict=True))
-        return replace(self, shape=local(self.at.method, *place))
+        """Moves the term to a place of the cloth nearby, by shares of the width and the height."""
+        shifted = (min(1.0, max(0.0, p + step)) for p, step in zip(self.at.place, steps, strict=True))
+        return replace(self, shape=local(self.at.method, *shifted))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -274,7 +274,7 @@ class TermColumn(EffectColumn):
 
     @classmethod
     def of(cls, term: Term) -> TermColumn:
-        """With the step of its field."""
+        """Makes the column of a term, with the step of its field."""
         return cls(term=term, parameter=term.name, step=FIELDS[term.field].step)
 
     @cached_property
@@ -295,10 +295,10 @@ class TermColumn(EffectColumn):
 
 
 def dictionary() -> tuple[TermColumn, ...]:
-    """All terms that are tried."""
+    """Lists all terms that are tried."""
     return columns_of([Term(shape=shape, field=name) for name, entry in FIELDS.items() for shape in entry.shapes])
 
 
 def columns_of(terms: Sequence[Term]) -> tuple[TermColumn, ...]:
-    """The columns of terms."""
+    """Makes the columns of terms."""
     return tuple(TermColumn.of(term) for term in terms)

@@ -99,7 +99,7 @@ class Simulator:
         renderer: str = "raster",
         batch: int = 8,
     ) -> Simulator:
-        """A simulator of clips of this length [frames] and rate [Hz].
+        """Makes a simulator of clips of this length [frames] and rate [Hz].
 
         Args:
             recipes: a scene's, or those of several scenes of one space.
@@ -108,12 +108,13 @@ class Simulator:
             InputError: see `Space.of`; scenes of different spaces, or none; fewer than one flag in a batch.
         """
         if batch < 1:
-            raise InputError(f"batches of {batch}", fix="take at least one flag")
+            raise InputError(f"the batches are of {batch}", fix="take at least one flag")
         several = (recipes,) if isinstance(recipes, Recipe) else tuple(recipes)
         spaces = {Space.of(recipe).identity for recipe in several}
         if len(spaces) != 1:
             raise InputError(
-                f"{len(several)} scenes of {len(spaces)} different search spaces", fix="give scenes of the same ranges"
+                f"{len(several)} scenes have {len(spaces)} different search spaces",
+                fix="give scenes of the same ranges",
             )
         scenes = tuple(
             Scene(replace(recipe, time=replace(recipe.time, frames=frames, rate=rate))) for recipe in several
@@ -137,8 +138,8 @@ class Simulator:
 
     @property
     def identity(self) -> str:
-        """A hash of all that shapes a film beside its request."""
-        own = {
+        """Hashes all that shapes a film beside its request."""
+        ingredients = {
             "recipes": [scene.recipe.identity() for scene in self.scenes],
             "view": self.view.identity,
             "renderer": self.renderer,
@@ -147,18 +148,20 @@ class Simulator:
             "space": self.space.identity,
             "conditioning": VERSION,
         }
-        return digest(canonical(own))
+        return digest(canonical(ingredients))
 
     def films(self, requests: Sequence[Request]) -> list[Film]:
-        """Simulate, film and condition requests, those of each scene in batches."""
+        """Simulates, films and conditions requests, those of each scene in batches."""
         size = -(-self.batch // len(self.scenes))
-        found: dict[int, Film] = {}
+        films_made: dict[int, Film] = {}
         for number, scene in enumerate(self.scenes):
-            own = [place for place, request in enumerate(requests) if request.replicate % len(self.scenes) == number]
-            for first in range(0, len(own), size):
-                part = own[first : first + size]
-                found |= zip(part, self._batch(scene, [requests[place] for place in part], size=size), strict=True)
-        return [found[place] for place in range(len(requests))]
+            of_scene = [
+                index for index, request in enumerate(requests) if request.replicate % len(self.scenes) == number
+            ]
+            for first in range(0, len(of_scene), size):
+                part = of_scene[first : first + size]
+                films_made |= zip(part, self._batch(scene, [requests[index] for index in part], size=size), strict=True)
+        return [films_made[index] for index in range(len(requests))]
 
     def _batch(self, scene: Scene, requests: Sequence[Request], *, size: int) -> list[Film]:
         begun = time.perf_counter()
@@ -170,8 +173,8 @@ class Simulator:
             if outcome.sequence is not None:
                 zeta, camera = self.view.at(request.seed)
                 with torch.no_grad():
-                    seen = self._renderer.render(Meshes.flag(outcome.sequence, heading=0.0), zeta)
-                filmed = camera.filmed(seen.numpy(), seed=child_seed(request.seed, "camera"))
+                    rendered = self._renderer.render(Meshes.flag(outcome.sequence, heading=0.0), zeta)
+                filmed = camera.filmed(rendered.numpy(), seed=child_seed(request.seed, "camera"))
                 clip = FitFilm.of(filmed, np.arange(len(filmed)) / scene.recipe.time.rate).frames
             films.append(Film(clip=clip, seconds={"simulate": share, "render": time.perf_counter() - begun}))
         return films
@@ -200,7 +203,7 @@ class Scene:
         return Stepper.of(self.crew)
 
     def member(self, request: Request) -> Member:
-        """The flag of a request."""
+        """Makes the flag of a request."""
         values = self.space.values(np.array([request.point]))[0]
         scene = self._template.scene
         start = roughened(scene.position, scene.handles, stream(request.seed, "start"), START_NOISE)

@@ -11,6 +11,6 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.report.document import as_document, from_document
-    from measure.report.statement import by_draw, stated
+    from measure.report.statement import by_draw, with_sentences
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -75,7 +75,7 @@ def check_up(recording: Trajectory, specimen: Specimen) -> None:
 
 
 def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Refuse a cloth that flies upwind, and report one that flies far aside.
+    """Refuses a cloth that flies upwind, and reports one that flies far aside.
 
     Raises:
         InputError: on the average it streams against the wind as it was given.
@@ -84,17 +84,17 @@ def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding,
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())
     offset = (_centre(recording) - centre_of_pins(recording, specimen))[:2]
     wind = recording.wind.at(recording.times).mean(axis=0)[:2]
-    far, speed = float(np.hypot(*offset)), float(np.hypot(*wind))
-    if far < _FLIES * size or _ratio(specimen, recording.wind) < _BLOWS or speed == 0:
+    distance, speed = float(np.hypot(*offset)), float(np.hypot(*wind))
+    if distance < _FLIES * size or _ratio(specimen, recording.wind) < _BLOWS or speed == 0:
         return ()
-    angle = math.acos(float(np.clip(offset @ wind / (far * speed), -1, 1)))
+    angle = math.acos(float(np.clip(offset @ wind / (distance * speed), -1, 1)))
     heading, blown = (math.degrees(math.atan2(y, x)) for x, y in (offset, wind))
-    what = (
+    directions = (
         f"the cloth streams towards {heading:.0f}°, the wind as given blows towards {blown:.0f}° (from +x towards +y)"
     )
     if angle > _UPWIND:
         raise InputError(
-            f"the cloth streams upwind: {what}",
+            f"the cloth streams upwind: {directions}",
             where=where,
             fix="wind velocities say where the air goes to; turn a direction it comes from, and check the axes",
         )
@@ -102,7 +102,11 @@ def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding,
         return ()
     return (
         Finding.of(
-            "flies-aside", what, where=where, value=angle, fix="check the direction of the wind in the recording's axes"
+            "flies-aside",
+            directions,
+            where=where,
+            value=angle,
+            fix="check the direction of the wind in the recording's axes",
         ),
     )
 
@@ -181,23 +185,23 @@ def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
 
 
 def _centre(recording: Trajectory) -> Floats:
-    """(3,) mean position of the markers over all frames [m]."""
+    """Averages the markers' positions over all frames, (3,) [m]."""
     return recording.positions.mean(axis=(0, 1))
 
 
 def _pressure(specimen: Specimen, wind: WindTrack) -> float:
-    """ρU² [N/m²] of the base model's force."""
+    """Computes ρU² [N/m²] of the base model's force."""
     return specimen.air.plain.density * float((wind.velocity**2).sum(axis=1).mean())
 
 
 def _ratio(specimen: Specimen, wind: WindTrack) -> float:
-    """ρU²/(m g); infinite without gravity."""
+    """Computes ρU²/(m g); infinite without gravity."""
     weight = specimen.material.density * float(np.linalg.norm(specimen.gravity))
     return _pressure(specimen, wind) / weight if weight else math.inf
 
 
 def _sagging(offset: Floats, size: float, wind: WindTrack) -> str:
-    """Advice: the axis against which the cloth is off its pins, the wind's left aside."""
+    """Advises on the vertical: the axis against which the cloth is off its pins, the wind's left aside."""
     blown = np.abs(wind.velocity.mean(axis=0))
     candidates = np.abs(offset) / size - 2.0 * (blown > 0.5 * blown.max()) * (blown.max() > 0)
     axis = int(candidates.argmax())

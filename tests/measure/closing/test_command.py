@@ -46,7 +46,7 @@ def said(arguments: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[
     ("arguments", "code", "what"),
     [
         ([], 2, "no recordings"),
-        (["nowhere.csv"], 1, "no such file"),
+        (["nowhere.csv"], 1, "does not exist"),
         (["nowhere.csv", "nowhere.toml"], 1, "no such recipe"),
         (["nowhere.csv", "--nulls", "100"], 2, "100 nulls"),
         (["nowhere.csv", "--nulls", "200", "--bank", "."], 2, "both --nulls and --bank"),

@@ -194,7 +194,9 @@ def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: P
     nominal = [setting.calibration] * len(setting.segments)
     found, projection = projected(setting.forecaster, setting.segments, nominal, columns())
     null = banks.load(bank, words="made").model(setting.design)
-    whitened = WhitenedMisfit(found=found, projection=projection, null=null, speeds=setting.speeds[setting.recording])
+    whitened = WhitenedMisfit(
+        statistics=found, projection=projection, null=null, speeds=setting.speeds[setting.recording]
+    )
     modes = corrective_field(setting, whitened)
     assert [mode.column for mode in modes] == list(fields())
     across = next(mode for mode in modes if mode.column.name == "field.y.00")
@@ -205,7 +207,7 @@ def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: P
     segments, forecaster = setting.segments, setting.forecaster
     errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
     change = forecaster.sensitivities([across.column], segments, nominal, errors)[-1]
-    rest = corrective_field(setting, whitened, left=errors - across.value * change)
+    rest = corrective_field(setting, whitened, errors=errors - across.value * change)
     unmoved = next(mode for mode in rest if mode.column == across.column)
     assert abs(unmoved.value) < across.error
 

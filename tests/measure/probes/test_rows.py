@@ -49,7 +49,7 @@ def test_parts_are_joined_in_order() -> None:
 
 
 def test_what_is_looked_at_in_some_parts_alone_is_refused() -> None:
-    with pytest.raises(UsageError, match="inner of some parts alone"):
+    with pytest.raises(UsageError, match="only some parts have inner"):
         Outer.joined([outer(1), replace(outer(2), inner=None)])
     with pytest.raises(UsageError, match="nothing to join"):
         Outer.joined([])

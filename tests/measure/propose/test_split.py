@@ -38,14 +38,14 @@ def test_of_three_winds_the_middle_one_is_not_seen_at_all_nor_the_ends_of_the_ot
     """Recordings of 8.6 s have four segments of 2 s."""
     segments, speeds = of(7.0, 3.0, 5.0)
     parts = split(segments, speeds)
-    assert parts.seen.tolist() == [True, True, True, False] * 2 + [False] * 4
+    assert parts.used.tolist() == [True, True, True, False] * 2 + [False] * 4
     assert "5.0 m/s" in parts.words
 
 
 def test_of_two_winds_the_ends_are_not_seen() -> None:
     segments, speeds = of(3.0, 7.0, seconds=14.6)
     parts = split(segments, speeds)
-    assert parts.seen.tolist() == ([True] * 5 + [False] * 2) * 2
+    assert parts.used.tolist() == ([True] * 5 + [False] * 2) * 2
 
 
 def test_too_few_segments_are_refused() -> None:

@@ -11,7 +11,7 @@ from measure.forecasting import Calibration, FieldColumn
 from measure.loop import Mode, Outcome
 from measure.observe import Experiment, Specimen, Trajectory, WindTrack
 from measure.probes import Line, Variation
-from measure.report import by_draw, stated
+from measure.report import by_draw, with_sentences
 from measure.report.lead import lead
 from measure.report.statement import assumptions, blowing, bounds, proposal, shedding
 from measure.verdict import Conclusion
@@ -31,7 +31,7 @@ def test_the_most_certain_modes_are_reported_first() -> None:
     assert second.startswith("along the wind, hoist against fly (0.5")
     assert third.startswith("up, both ends against the middle (−4")
     assert "corner" not in said
-    assert "fits the remaining errors best, per mass: across" in proposal(modes, whole=False)
+    assert "fits the remaining errors best, per mass: across" in proposal(modes, is_all=False)
 
 
 def test_a_strength_that_is_another_in_every_recording_is_reported_with_its_values() -> None:
@@ -53,7 +53,7 @@ def test_a_line_is_reported_as_a_cylinders_vortex_shedding() -> None:
 
 
 def test_a_course_that_is_not_turbulence_is_given_in_percent_of_the_wind() -> None:
-    said = blowing(Variation(whole=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
+    said = blowing(Variation(total=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
     expected = "varies by 13 % of its mean along its own direction, by 12 % within two seconds, and by 0 % across it"
     assert expected in said
 
@@ -102,14 +102,14 @@ def outcome(specimen: Specimen) -> Outcome:
         at_bounds=("damping",),
         field=(Mode(column=FieldColumn(axis=1, mode=(0, 0)), value=3.0, error=0.2),),
         line=Line(far=9.0, reduced=0.2 / 0.15, direction=1),
-        course=Variation(whole=np.array([0.0169, 0.0, 0.0]), fast=np.array([0.0144, 0.0, 0.0])),
+        course=Variation(total=np.array([0.0169, 0.0, 0.0]), fast=np.array([0.0144, 0.0, 0.0])),
     )
 
 
 def test_an_outcome_without_an_answer_is_stated_with_its_line_its_course_and_its_field_in_this_order(
     outcome: Outcome,
 ) -> None:
-    said = stated(outcome)
+    said = with_sentences(outcome)
     assert said.words.startswith(lead(outcome.verdict))
     assert "at the bound of damping" in said.words
     assert said.proposal.index("as vortices") < said.proposal.index("a wind that varies") < said.proposal.index("force")
@@ -120,13 +120,13 @@ def test_an_outcome_without_an_answer_is_stated_with_its_line_its_course_and_its
 
 
 def test_a_field_beside_a_named_effect_is_of_what_remains(outcome: Outcome) -> None:
-    falling = Variation(whole=np.array([-0.01, 0.0, 0.0]), fast=np.array([0.0, 0.0, 0.0]))
-    said = stated(replace(outcome, whole=False, line=None, course=falling)).proposal
+    falling = Variation(total=np.array([-0.01, 0.0, 0.0]), fast=np.array([0.0, 0.0, 0.0]))
+    said = with_sentences(replace(outcome, whole=False, line=None, course=falling)).proposal
     assert said.startswith("The smooth force field that fits the remaining errors best")
 
 
 def test_an_outcome_with_an_answer_proposes_nothing(outcome: Outcome) -> None:
-    assert stated(replace(outcome, field=())).proposal == ""
+    assert with_sentences(replace(outcome, field=())).proposal == ""
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,7 @@ def _bank(folder: Path, observed: Observed, seed: int) -> Path:
             markers=first.markers,
             rate=1 / segments.period,
             noise=NOISE,
-            duration=segments.cut.lasting(banks.each(len(segments))),
+            duration=segments.cut.lasting(banks.segments_of_each(len(segments))),
             speeds=banks.around(*SPEEDS),
             seed=child_seed(seed, "foreign", "null", index),
         )
