@@ -33,7 +33,11 @@ _BANDS = tuple(f"{low:g}_{high:g}hz" for low, high in pairwise(BAND_EDGES))
 
 FEATURES: tuple[str, ...] = (
     *(f"log_power_{signal}_{band}" for signal in _SIGNALS for band in _BANDS),
-    *(f"{what}_{signal}" for signal in _SIGNALS for what in ("dominant_frequency", "mean_frequency", "bandwidth")),
+    *(
+        f"{quantity}_{signal}"
+        for signal in _SIGNALS
+        for quantity in ("dominant_frequency", "mean_frequency", "bandwidth")
+    ),
     "local_frequency_mean",
     "local_frequency_spread",
     "coverage_0.1",

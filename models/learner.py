@@ -23,7 +23,7 @@ from models.targets import Scaling
 def contrastive_loss(
     embedding: Tensor, seed: Tensor, *, margin: float = 1.0, positive_share: float | None = None
 ) -> Tensor:
-    """Pull clips of one simulation together and push others apart to the margin, over all pairs of the batch.
+    """Pulls clips of one simulation together and pushes others apart to the margin, over all pairs of the batch.
 
     The mean over all n(n − 1)/2 pairs (BatchAll) of y D² + (1 − y) max(0, m − D)², with D the Euclidean distance of the
     two embeddings and y = 1 where both clips are renders of one simulation (Hadsell, Chopra and LeCun, CVPR 2006,

@@ -91,7 +91,7 @@ def candidates(cloth: Cloth, contact: Contact, position: Tensor, adjacent: NDArr
 
     Args:
         position: (vertex, 3, batch) [m].
-        near: from `neighbours`.
+        adjacent: from `neighbours`.
     """
     separate = torch.as_tensor(~adjacent, device=position.device)
     pairs = []

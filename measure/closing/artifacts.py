@@ -126,7 +126,7 @@ def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    kept = results.keep(
+    entry = results.keep(
         lake,
         _measurement(answer),
         lambda staged: write(staged, answer.verdict, page=answer.page),
@@ -134,10 +134,10 @@ def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
         branch=branch,
         left=lambda verdict: [_model(answer, model, verdict) for model in answer.models],
     )
-    verdict = kept.artifact
+    verdict = entry.artifact
     ids = tuple(_model(answer, model, verdict).id for model in answer.models)
-    models = ids if kept.new else models_of(lake, verdict.id, branch)
-    return Kept(measurement=verdict.id, models=models, place=kept)
+    models = ids if entry.new else models_of(lake, verdict.id, branch)
+    return Kept(measurement=verdict.id, models=models, place=entry)
 
 
 def models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:

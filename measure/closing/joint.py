@@ -98,7 +98,9 @@ def joined(markers: Verdict, films: Verdict, *, level: float, nominal: Mapping[s
     tested = [verdict for verdict in verdicts if verdict.conclusion is not Conclusion.UNTESTED]
     rejecting = [verdict for verdict in tested if verdict.conclusion not in NOT_REJECTED]
     named = tuple(
-        name for name in (rejecting[0].named if rejecting else ()) if all(name in one.named for one in rejecting)
+        name
+        for name in (rejecting[0].named if rejecting else ())
+        if all(name in verdict.named for verdict in rejecting)
     )
     p = min([1.0, *(len(verdicts) * verdict.test.p_value.value for verdict in tested)])
     strengths = [_strength(name, markers, films) for name in named]

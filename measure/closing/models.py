@@ -93,12 +93,12 @@ def acted(effects: Sequence[Candidate]) -> dict[str, dict[str, dict[str, float]]
 def _model(
     name: str, verdict: Verdict, common: Mapping[str, Any], specimen: Specimen, effects: Sequence[Candidate]
 ) -> NamedModel:
-    own = fitted(verdict, effects)
+    fit = fitted(verdict, effects)
     material = _material(specimen.material)
     material |= {
-        "density": specimen.material.density * own["density"],
-        "bending-factor": own["bending"],
-        "damping": own["damping"],
+        "density": specimen.material.density * fit["density"],
+        "bending-factor": fit["bending"],
+        "damping": fit["damping"],
     }
     return NamedModel(name=name, content={"title": name, **common, "material": material, **acted(effects)})
 

@@ -134,17 +134,17 @@ def _written(answer: Answer, *, out: Path, lake: Lake | None, branch: str) -> di
     texts = [answer.page, content + "\n", *(dumps(model.content) for model in answer.models)]
     write_files(out, dict(zip_longest(FILES, texts)), command="close-loop")
     with in_steps(lambda: f"the report and the models in {out}"):
-        kept = None if lake is None else keep(lake, answer, branch=branch)
-    if kept is not None:
+        published = None if lake is None else keep(lake, answer, branch=branch)
+    if published is not None:
         as_written["artifacts"] = {
-            "measurement": kept.measurement,
-            "models": list(kept.models),
-            "existing": not kept.place.new,
-            "version": kept.place.version,
+            "measurement": published.measurement,
+            "models": list(published.models),
+            "existing": not published.place.new,
+            "version": published.place.version,
         }
-        say(f"measurement {kept.measurement}, {kept.place.sentence}")
-    if kept is not None and kept.place.new:
-        for model, identity in zip(answer.models, kept.models, strict=True):
+        say(f"measurement {published.measurement}, {published.place.sentence}")
+    if published is not None and published.place.new:
+        for model, identity in zip(answer.models, published.models, strict=True):
             say(f"model {identity} {model.name}")
     say(f"wrote {', '.join(str(out / file) for file in FILES[: 2 + len(answer.models)])}")
     return as_written

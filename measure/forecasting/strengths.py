@@ -103,11 +103,11 @@ class Suspicion:
     words: str
 
     @classmethod
-    def parse(cls, text: str, weighed: Sequence[Strengths]) -> Suspicion:
+    def parse(cls, text: str, candidates: Sequence[Strengths]) -> Suspicion:
         """Parses a suspicion such as `lift`, `vertical-wind-` or `tilted-pole.lean+`.
 
         Args:
-            weighed: the effects that may be suspected.
+            candidates: the effects that may be suspected.
 
         Raises:
             UnknownNameError: none of them.
@@ -115,11 +115,11 @@ class Suspicion:
         """
         sign = {"+": 1, "-": -1}.get(text[-1:], 0)
         wanted = text[:-1] if sign else text
-        matching = [strengths for strengths in weighed if wanted in (strengths.name, strengths.column.effect)]
+        matching = [strengths for strengths in candidates if wanted in (strengths.name, strengths.column.effect)]
         if not matching:
-            effects = dict.fromkeys(strengths.column.effect for strengths in weighed)
+            effects = dict.fromkeys(strengths.column.effect for strengths in candidates)
             raise UnknownNameError.of(
-                "effect", wanted, [*effects, *(strengths.name for strengths in weighed)], where=WHERE
+                "effect", wanted, [*effects, *(strengths.name for strengths in candidates)], where=WHERE
             )
         if len(matching) > 1:
             names = " or ".join(strengths.name for strengths in matching)

@@ -64,7 +64,7 @@ class Evidence(Rows):
         """Computes the evidence of segments with their wind's speed (segment,) [m/s].
 
         Args:
-            beside: (segment, column, k) how k coefficients more move r, along which nothing was taken: they become the
+            further: (segment, column, k) how k coefficients more move r, along which nothing was taken: they become the
                 columns after the statistics', and moments are not looked at.
 
         Raises:
@@ -275,9 +275,9 @@ def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
         inside, outside = evidence.select(folds != index), evidence.select(folds == index)
         base = inside.fit(())
         before = outside.misfit(base.active, base.value)
-        for place, chosen in enumerate(choices):
+        for row, chosen in enumerate(choices):
             fit = inside.fit(chosen)
-            result[place, folds == index] = (before - outside.misfit(fit.active, fit.value)) / 2
+            result[row, folds == index] = (before - outside.misfit(fit.active, fit.value)) / 2
     return result
 
 

@@ -38,8 +38,8 @@ def corrective_field(
     """Fits the modes of the corrective field together.
 
     Args:
-        left: (frame, marker, 3, segment) errors of a larger model [m]; None for those of the nominal one.
-        beside: columns of that model, whose strengths are fitted with the field.
+        errors: (frame, marker, 3, segment) errors of a larger model [m]; None for those of the nominal one.
+        along: columns of that model, whose strengths are fitted with the field.
     """
     forecaster, segments, modes = setting.forecaster, setting.segments, fields()
     nominal = [setting.calibration] * len(segments)

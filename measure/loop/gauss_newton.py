@@ -87,7 +87,7 @@ def refine(
     directions before.
 
     Args:
-        weighed: the columns of the statistics, but for the calibrated parameters.
+        columns: the columns of the statistics, but for the calibrated parameters.
 
     Raises:
         DivergedError: the model's cloth does not stay one, at an eighth of the way from the nominal base model neither.

@@ -114,7 +114,7 @@ def profiled(
     """Computes the misfit of a model across the strengths of one of its effects, the others as they are.
 
     Args:
-        place: of the effect.
+        index: of the effect.
     """
     column, coefficient = model.effects[index]
     sizes, sign = across(column, coefficient)
@@ -180,9 +180,9 @@ class Fits:
         keys = [(fitted.chosen, outside.tobytes()) for outside in outsides]
         new = [index for index, key in enumerate(keys) if key not in self._left]
         if new:
-            new_outsides = [outsides[place] for place in new]
+            new_outsides = [outsides[index] for index in new]
             fitted_anew = left_out(self.forecaster, self.segments, fitted, self.whitened, new_outsides)
-            self._left.update(zip([keys[place] for place in new], fitted_anew, strict=True))
+            self._left.update(zip([keys[index] for index in new], fitted_anew, strict=True))
         return [self._left[key] for key in keys]
 
     def errors(self, fitted: Refined) -> Tensor:

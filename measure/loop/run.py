@@ -73,7 +73,7 @@ def parameters(
 
     Args:
         reach: (theta,) standard errors to either side within which this code's nulls lie.
-        weighed: relative standard uncertainty of the density before anything was fitted.
+        density_uncertainty: relative standard uncertainty of the density before anything was fitted.
     """
     estimated: list[Parameter] = []
     for index, (name, _, _) in enumerate(THETA):

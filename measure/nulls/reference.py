@@ -424,8 +424,8 @@ class Reference:
         intervals' level, (theta,)."""
         return np.array(
             [
-                GroupedConformal(null=np.abs(own), kinds=self.kinds).quantile(CRITERIA.interval)
-                for own in self.deviations.T
+                GroupedConformal(null=np.abs(deviations), kinds=self.kinds).quantile(CRITERIA.interval)
+                for deviations in self.deviations.T
             ]
         )
 
@@ -526,15 +526,15 @@ class Reference:
         Raises:
             UsageError: it is of the data, and was not of the nulls.
         """
-        found = evidence.swing
-        if found is None:
+        observed = evidence.swing
+        if observed is None:
             return None
         columns = slice(len(self.spread) + 2, len(self.spread) + 2 + len(self.powers))
-        if len(self.centre[columns]) != len(found):
+        if len(self.centre[columns]) != len(observed):
             raise UsageError(
                 "only the data have courses of the wind", where="reference", fix="look at them in the nulls as well"
             )
-        damped = found * np.exp(-self.damping * self.powers)
+        damped = observed * np.exp(-self.damping * self.powers)
         return float(np.abs(self._by_tail(damped, columns)).max())
 
     def settles(self, evidence: Evidence) -> Floats | None:
@@ -592,7 +592,7 @@ def unscaled(evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] 
     moments about the pole are looked at, then the same drops of these, and what they leave.
 
     Args:
-        beside: columns that are fitted already.
+        along: columns that are fitted already.
     """
     drops, remainder = evidence.drops(along), evidence.fit(along).remainder
     gusts = fluctuation(evidence, columns.index(GUSTS), along).likelihood

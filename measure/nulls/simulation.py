@@ -83,21 +83,21 @@ class NullBatch:
 
     def simulate(self) -> list[Trajectory]:
         """Simulates one recording a calibration."""
-        flat, held = self._mesh()
-        seen = np.einsum("mv,fvcb->fmcb", onto(flat.rest, self.markers), self._frames(flat, held))
-        jitter = self.noise * stream(self.seed, "null", "markers").standard_normal(seen.shape)
-        made = [
+        flat, attached = self._mesh()
+        tracked = np.einsum("mv,fvcb->fmcb", onto(flat.rest, self.markers), self._frames(flat, attached))
+        jitter = self.noise * stream(self.seed, "null", "markers").standard_normal(tracked.shape)
+        trajectories = [
             Trajectory(
-                name=f"null {self.seed}-{place}",
+                name=f"null {self.seed}-{number}",
                 markers=self.markers,
-                positions=seen[..., place] + jitter[..., place],
+                positions=tracked[..., number] + jitter[..., number],
                 rate=self.rate,
                 wind=wind,
                 noise=self.noise,
             )
-            for place, wind in enumerate(self.winds or [WindTrack.constant((u, 0.0, 0.0)) for u in self.speeds])
+            for number, wind in enumerate(self.winds or [WindTrack.constant((u, 0.0, 0.0)) for u in self.speeds])
         ]
-        return [carried(recording, self.specimen.seats) for recording in made] if self.tracks else made
+        return [carried(recording, self.specimen.seats) for recording in trajectories] if self.tracks else trajectories
 
     @property
     def effort(self) -> float:
@@ -121,8 +121,8 @@ class NullBatch:
         nearest = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
         return flat, tuple(nearest)
 
-    def _frames(self, flat: Mesh, held: tuple[int, ...]) -> Floats:
-        """(frame, vertex, 3, recording) [m], after the start has been forgotten.
+    def _frames(self, flat: Mesh, attached: tuple[int, ...]) -> Floats:
+        """Computes positions (frame, vertex, 3, recording) [m], after the start has been forgotten.
 
         Cloth that is stretched beyond what a stable step is estimated for diverges; it is run anew in smaller steps.
 
@@ -131,7 +131,7 @@ class NullBatch:
         """
         for halvings in range(1 + _HALVINGS):
             with suppress(DivergedError):
-                return self._run(flat, held, *self._method(halvings))
+                return self._run(flat, attached, *self._method(halvings))
         raise FlagdataError(
             f"a simulation of nulls diverges, even in steps {2**_HALVINGS} times smaller than usual",
             where=f"{self.calibrations[0]}, stretching × {self.stiffness.stretching:.3g}, winds "
@@ -140,24 +140,24 @@ class NullBatch:
         )
 
     def as_fitted(self) -> Floats:
-        """(frame, marker, 3, recording) of the same by the mesh and the steps of the fit, without noise [m].
+        """Computes the same by the mesh and the steps of the fit, without noise, (frame, marker, 3, recording) [m].
 
         Raises:
             FlagdataError: it diverges.
         """
         specimen = self.specimen
         try:
-            found = self._run(specimen.mesh, specimen.held, SplitEuler(), 0.0)
+            frames = self._run(specimen.mesh, specimen.held, SplitEuler(), 0.0)
         except DivergedError:
             raise FlagdataError(
                 "a free run of the model diverges",
                 where=f"{self.calibrations[0]}",
                 fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
             ) from None
-        return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), found)
+        return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), frames)
 
-    def _run(self, flat: Mesh, held: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
-        """The same by a method that damps by itself so much [s].
+    def _run(self, flat: Mesh, attached: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
+        """Runs the flags by a method that damps by itself so much [s].
 
         Raises:
             DivergedError: a position is not finite.
@@ -169,7 +169,7 @@ class NullBatch:
         scenes = []
         for calibration, rough, speed, anchors in zip(self.calibrations, roughness, self.speeds, begun, strict=True):
             position = _hung(flat.rest, specimen.seats, anchors) + rough
-            position[list(held)] = anchors
+            position[list(attached)] = anchors
             material = calibration.material(self.stiffness.of(specimen.material))
             scenes.append(
                 Scene(
@@ -179,7 +179,7 @@ class NullBatch:
                     air=specimen.air,
                     wind=(speed, 0.0, 0.0),
                     material=replace(material, damping=max(material.damping - damped, 0.0)),
-                    handles=Handles(vertices=held, stiffness=specimen.stiffness),
+                    handles=Handles(vertices=attached, stiffness=specimen.stiffness),
                 )
             )
         system, state = assemble(scenes)
@@ -207,7 +207,7 @@ class NullBatch:
         return np.arange(math.ceil((SETTLE + self.duration) / period) + 2, dtype=np.float64) * period - self._begins
 
     def _blowing(self, system: System) -> SampledWind:
-        """The winds since the start of the run."""
+        """Samples the winds since the start of the run."""
         times = self._times(_SAMPLED)
         samples = np.stack([wind.at(times) for wind in self.winds], axis=-1)
         blown = torch.as_tensor(samples, dtype=system.cloth.dtype, device=system.cloth.device)

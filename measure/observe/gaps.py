@@ -201,7 +201,7 @@ def _carried(
     It is not finite in frames in which hardly a marker was tracked.
 
     Args:
-        near: the other markers, the nearest first.
+        neighbours: the other markers, the nearest first.
     """
     positions_by_neighbours = np.full((len(positions), 3), np.nan)
     nearest = [neighbours[in_frame[neighbours]][:_NEIGHBOURS] for in_frame in tracked]

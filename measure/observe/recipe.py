@@ -263,8 +263,8 @@ def read(recipe: ExperimentRecipe, lake: Lake | None = None) -> Observed:
 
 def _setup(form: _Form, folder: Path, *, where: str) -> Setup:
     cloth, pins, inside = form.cloth, form.pins, f"{where} [material]"
-    named = "name" in form.material or "file" in form.material
-    material = tables.entries(_MATERIAL | (_CHANGES if named else {}), form.material, where=inside)
+    from_catalog = "name" in form.material or "file" in form.material
+    material = tables.entries(_MATERIAL | (_CHANGES if from_catalog else {}), form.material, where=inside)
     air = tables.entries(_AIR, form.air, where=f"{where} [air]")
     gravity = air.pop("gravity", None)
     if material.get("mass-unknown") and "density-uncertainty" in material:
@@ -311,20 +311,20 @@ def _stiffness(pins: _Pins, *, where: str) -> float | None:
     return math.inf if pins.rigid else pins.stiffness
 
 
-def _material(given: Mapping[str, Any], folder: Path, *, where: str) -> Material | None:
-    name, file = given.get("name"), given.get("file")
+def _material(form: Mapping[str, Any], folder: Path, *, where: str) -> Material | None:
+    name, file = form.get("name"), form.get("file")
     if name is None and file is None:
         return None
     if name is not None and file is not None:
         raise UsageError("both name and file are given", where=where, fix="keep one of them")
     base = named(name, where=where) if name is not None else material_file(folder / local_path(file))
-    thicken = given.get("thicken", 1.0)
+    thicken = form.get("thicken", 1.0)
     material = base.scaled(
         density=thicken,
-        stretching=thicken * given.get("stretching-factor", 1.0),
-        bending=thicken * given.get("bending-factor", 1.0),
+        stretching=thicken * form.get("stretching-factor", 1.0),
+        bending=thicken * form.get("bending-factor", 1.0),
     )
-    return replace(material, **{key: given[key] for key in ("density", "damping") if key in given})
+    return replace(material, **{key: form[key] for key in ("density", "damping") if key in form})
 
 
 def _recording(content: Mapping[str, Any], folder: Path, *, where: str) -> RecordingSource:
@@ -337,29 +337,27 @@ def _wind(content: Any, folder: Path, *, where: str) -> WindSource:
     kinds = [key for key in _WINDS if content.get(key) not in (None, "", [])]
     if len(kinds) != 1:
         raise UsageError(f"{len(kinds)} winds are given", where=where, fix="give one of velocity, speed and log")
-    given = tables.read(_WINDS[kinds[0]], content, where=where)
-    if given.direction_sigma is not None and given.direction_sigma < 0:
-        raise InputError(
-            f"direction-sigma is {given.direction_sigma:g}", where=where, fix="give a number of at least 0"
-        )
-    source = WindSource(gain=given.gain_sigma, direction=given.direction_sigma, clock=given.clock_sigma)
-    if isinstance(given, _Log):
-        start = given.start
+    form = tables.read(_WINDS[kinds[0]], content, where=where)
+    if form.direction_sigma is not None and form.direction_sigma < 0:
+        raise InputError(f"direction-sigma is {form.direction_sigma:g}", where=where, fix="give a number of at least 0")
+    source = WindSource(gain=form.gain_sigma, direction=form.direction_sigma, clock=form.clock_sigma)
+    if isinstance(form, _Log):
+        start = form.start
         placement = LogPlacement(
-            axis=given.axis,
-            north=given.north,
-            offset=given.offset,
+            axis=form.axis,
+            north=form.north,
+            offset=form.offset,
             start=timebase.parse(start, where=f"{where} start") if start is not None else None,
         )
-        sensor = given.sensor
+        sensor = form.sensor
         if sensor is not None and (folder / local_path(sensor)).is_file():
             sensor = str(folder / sensor)
-        options, confirm = WindOptions(recipe=sensor, zone=given.zone), Accepting(given.accept)
-        return replace(source, log=given.log, placement=placement, options=options, confirm=confirm)
-    if isinstance(given, _Speed):
-        x, y = given.speed * math.cos(given.toward), given.speed * math.sin(given.toward)
+        options, confirm = WindOptions(recipe=sensor, zone=form.zone), Accepting(form.accept)
+        return replace(source, log=form.log, placement=placement, options=options, confirm=confirm)
+    if isinstance(form, _Speed):
+        x, y = form.speed * math.cos(form.toward), form.speed * math.sin(form.toward)
         return replace(source, velocity=(x, y, 0.0))
-    return replace(source, velocity=cast("_Velocity", given).velocity)
+    return replace(source, velocity=cast("_Velocity", form).velocity)
 
 
 def _observation(source: RecordingSource, recipe: ExperimentRecipe, lake: Lake | None) -> Observation:

@@ -211,7 +211,7 @@ def projected(
         parts.append(_with_log(piece, projection, off))
         along.append(projection)
     joined = Projection(
-        directions=torch.cat([own.directions for own in along]),
+        directions=torch.cat([projection.directions for projection in along]),
         scale=torch.cat([piece.scale for piece in pieces], dim=1),
         spectrum=_spectrum(forecaster, segments),
         pole_moment=PoleMoment.joined([piece.pole_moment for piece in pieces]),

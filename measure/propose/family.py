@@ -48,7 +48,7 @@ class Family:
         """Makes the family for the projected errors of data.
 
         Args:
-            found: of the data.
+            statistics: of the data.
             noise: of the data's markers [m].
 
         Raises:

@@ -134,11 +134,11 @@ class ProjectedSegments:
     directions: tuple[Tensor, ...]
 
     @classmethod
-    def of(cls, forecaster: Forecaster, segments: Segments, weighed: Sequence[Column]) -> ProjectedSegments:
+    def of(cls, forecaster: Forecaster, segments: Segments, null_columns: Sequence[Column]) -> ProjectedSegments:
         """Projects on the directions of the calibrated parameters and of the columns that the null bank weighs."""
         nominal = [Calibration()] * len(segments)
         base = forecaster.errors(*forecaster.system(segments, nominal), segments)
-        along = forecaster.sensitivities(weighed, segments, nominal, base)
+        along = forecaster.sensitivities(null_columns, segments, nominal, base)
         return cls(forecaster=forecaster, segments=segments, base=base, directions=tuple(along))
 
     def select(self, chosen: NDArray[np.int64]) -> ProjectedSegments:

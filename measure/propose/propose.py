@@ -65,7 +65,7 @@ def retest(
 
     Args:
         whitened: of all segments.
-        seen: (segment,) those that the models were fitted to, and that what is left of the numerics is fitted to.
+        used: (segment,) those that the models were fitted to, and that what is left of the numerics is fitted to.
         control: the same freedom spent on other terms; None where there are none of another direction.
         control_names: which.
         words: which data.
@@ -261,7 +261,7 @@ def weigh(
     """Weighs the candidates on recordings, given nulls.
 
     Args:
-        weighed: the columns that the nulls are known along, the calibrated parameters left out.
+        along: the columns that the nulls are known along, the calibrated parameters left out.
 
     Raises:
         InputError: nulls of segments of another length; too few segments.

@@ -65,7 +65,7 @@ def search(
     Args:
         names: of the evidence's columns.
         candidates: columns of the terms.
-        beside: columns of effects that are known to act.
+        acting: columns of effects that are known to act.
         level: of each step's test.
     """
     steps: list[Step] = []
@@ -133,7 +133,7 @@ def wrong(evidence: Evidence, pool: Sequence[int], taken: Sequence[int], acting:
 
     Args:
         pool: columns to choose from.
-        beside: columns of effects that are known to act.
+        acting: columns of effects that are known to act.
     """
     close = _cosines(evidence, acting)
     others_by_direction = [

@@ -108,7 +108,7 @@ def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
     for number, (target, trace, evaluator) in enumerate(
         zip(refinement.targets, refinement.traces, refinement.evaluators, strict=True)
     ):
-        shown = frames(trace, evaluator, steps=STEPS)
+        frames_shown = frames(trace, evaluator, steps=STEPS)
         nearest = evaluator.clip(trace.points[trace.incumbent()]) if in_motion else None
         rate = evaluator.estimator.front_end.rate
         clips.append(
@@ -123,7 +123,7 @@ def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
                         "wind": f"{s.wind:.2f}",
                         "distance": f"{s.distance:.3g}",
                     }
-                    for s in shown
+                    for s in frames_shown
                 ],
                 "motion": nearest is not None
                 and [moving(clip, rate=rate, side=SIDE) for clip in (target.clip, nearest)],

@@ -34,8 +34,8 @@ def as_document(verdict: Verdict) -> dict[str, Any]:
     """Returns the verdict as JSON values, with its schema tag."""
     content = plain({**verdict.as_dict(), "residuals": ()})
     content["residuals"] = [
-        {**plain({**own, **dict.fromkeys(_MOVING)}), **{name: _packed(own[name]) for name in _MOVING}}
-        for own in map(dataclasses.asdict, verdict.residuals)
+        {**plain({**residual, **dict.fromkeys(_MOVING)}), **{name: _packed(residual[name]) for name in _MOVING}}
+        for residual in map(dataclasses.asdict, verdict.residuals)
     ]
     return content
 

@@ -161,9 +161,9 @@ def power_text(verdict: Verdict) -> str:
     if not verdict.power:
         return ""
     chances = [
-        f"{title(one.effect, one.parameter)} {number(one.strength, digits=2)}"
-        f"{'' if one.unit == '1' else f' {one.unit}'} with {share(one.share)}"
-        for one in verdict.power
+        f"{title(power.effect, power.parameter)} {number(power.strength, digits=2)}"
+        f"{'' if power.unit == '1' else f' {power.unit}'} with {share(power.share)}"
+        for power in verdict.power
     ]
     return f"{power_mean(verdict)}: {', '.join(chances)}."
 

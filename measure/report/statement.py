@@ -129,7 +129,7 @@ def proposal(modes: Sequence[Mode], *, is_all: bool = True) -> str:
     """Describes the corrective field: the most significant modes.
 
     Args:
-        whole: whether it is all that the base model lacks, or what a named effect leaves.
+        is_all: whether it is all that the base model lacks, or what a named effect leaves.
     """
     largest = sorted(modes, key=lambda mode: -abs(mode.value / mode.error))[:3]
     terms = [f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in largest]

@@ -51,7 +51,7 @@ def square_about(box: tuple[float, float, float, float], *, width: int, height: 
     Args:
         box: left, top, right and bottom [px].
         width, height: of the picture [px].
-        whole: whether the largest centred square may be left as it is, where the box fills enough of it.
+        allow_centred: whether the largest centred square may be left as it is, where the box fills enough of it.
     """
     left, top, right, bottom = box
     extent = max(right - left, bottom - top)

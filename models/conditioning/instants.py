@@ -42,9 +42,9 @@ def at_instants(
     tolerance = NEAR if period <= instants[1] - instants[0] else NEAR_OF_SLOW
     times = np.array([time for time, _ in frames])
     before = np.searchsorted(times, instants, side="right").clip(1, len(times) - 1) - 1
-    place = ((instants - times[before]) / (times[before + 1] - times[before])).clip(0.0, 1.0)
+    fractions = ((instants - times[before]) / (times[before + 1] - times[before])).clip(0.0, 1.0)
     pictures, interpolated = [], 0
-    for k, instant, fraction in zip(before.tolist(), instants.tolist(), place.tolist(), strict=True):
+    for k, instant, fraction in zip(before.tolist(), instants.tolist(), fractions.tolist(), strict=True):
         nearest = round(fraction)
         if abs(fraction - nearest) <= tolerance:
             pictures.append(frames[k + nearest][1])
@@ -58,7 +58,7 @@ class Interpolator:
     """Pictures between frames of one film. Flows of the last pairs are kept.
 
     Args:
-        kept: how many.
+        capacity: how many are kept.
     """
 
     def __init__(self, *, capacity: int = _FLOWS) -> None:

@@ -45,7 +45,7 @@ class MaskNetwork(nn.Module):
         widths, inputs = _WIDTHS, 4 * CHANNELS
         self.down = nn.ModuleList(_twice(a, b) for a, b in zip((inputs, *widths[:-1]), widths, strict=True))
         self.up = nn.ModuleList(
-            _twice(below + own, own) for below, own in zip(widths[:0:-1], widths[-2::-1], strict=True)
+            _twice(below + width, width) for below, width in zip(widths[:0:-1], widths[-2::-1], strict=True)
         )
         self.fine = nn.Sequential(
             nn.Conv2d(widths[0] // 4 + CHANNELS, 8, 3, padding=1), nn.ReLU(inplace=True), nn.Conv2d(8, OUTPUTS, 1)

@@ -325,8 +325,8 @@ class _Desk:
     def _statement_text(self) -> str:
         """Describes in words what the user stated about all clips."""
         return "".join(
-            f", area weight given as {stated.text} kg/m² (which only distributions use)"
-            for stated in self._known.values()
+            f", area weight given as {statement.text} kg/m² (which only distributions use)"
+            for statement in self._known.values()
         )
 
     def _sequences(self, data: DataSpec) -> int:

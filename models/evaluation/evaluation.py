@@ -108,7 +108,7 @@ def evaluate(
     reads: Sequence[Read] = (),
     tsne_of: str | None = None,
 ) -> Evaluation:
-    """Score models that were tested on the same clips.
+    """Scores models that were tested on the same clips.
 
     Args:
         predictions: of each model; several of one label are its runs with other seeds.

@@ -37,7 +37,7 @@ _INK, _QUIET, _RULE = "#1c2326", "#56646b", "#d5dbde"
 _SERIES = ("#1f6f9c", "#b4531a", "#7a4a9a", "#2f8068", "#97700d", "#a8402d", "#5b6fb8", "#a84a7e", "#58702a", "#6b5848")
 _MARKERS = "osD^vPX<>h"
 _THEME = {_INK: "--ink", _QUIET: "--quiet", _RULE: "--rule"} | {
-    colour: f"--series-{place}" for place, colour in enumerate(_SERIES)
+    colour: f"--series-{number}" for number, colour in enumerate(_SERIES)
 }
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",

@@ -315,28 +315,28 @@ def _data(data: _Data, *, where: str) -> DataSpec:
     return DataSpec(datasets=tuple(datasets), sequences=data.sequences)
 
 
-def _input(given: _Input, *, where: str) -> tuple[FrontEnd, Cropping]:
-    front_end = FrontEnd(maps=cast("Maps", given.maps), size=given.size, frames=given.frames, rate=given.rate)
-    if (values := given.variants * math.prod(front_end.shape)) > FILM_LIMIT:
+def _input(form: _Input, *, where: str) -> tuple[FrontEnd, Cropping]:
+    front_end = FrontEnd(maps=cast("Maps", form.maps), size=form.size, frames=form.frames, rate=form.rate)
+    if (values := form.variants * math.prod(front_end.shape)) > FILM_LIMIT:
         raise LimitError(
-            f"{given.variants} variants of {math.prod(front_end.shape)} values are {values:.3g} values of each film",
+            f"{form.variants} variants of {math.prod(front_end.shape)} values are {values:.3g} values of each film",
             where=where,
             fix=f"at most {FILM_LIMIT} are kept: give fewer variants or a smaller size",
         )
-    if given.augment and not given.conditioned:
+    if form.augment and not form.conditioned:
         raise UsageError(
             "films that are not conditioned cannot be disturbed",
             where=f"{where} [augment]",
             fix="write conditioned = true in [input], or leave them out",
         )
-    scales = given.scales or Cropping.scales
+    scales = form.scales or Cropping.scales
     return front_end, Cropping(
-        frames=given.frames, size=given.size, scales=scales, mirror=given.mirror, conditioned=given.conditioned
+        frames=form.frames, size=form.size, scales=scales, mirror=form.mirror, conditioned=form.conditioned
     )
 
 
 def _network(content: Mapping[str, Any], front_end: FrontEnd, *, where: str) -> NetworkSpec:
-    name, options = content.get("name"), {key: each for key, each in content.items() if key != "name"}
+    name, options = content.get("name"), {key: entry for key, entry in content.items() if key != "name"}
     if not isinstance(name, str):
         raise InputError("no name is given", where=where, fix=f"add name, one of {', '.join(NETWORKS)}")
     takes = NETWORKS[name].takes

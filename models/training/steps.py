@@ -141,7 +141,7 @@ class Batches:
         }
 
     def take_up(self, state: Mapping[str, Any]) -> None:
-        """Go to where `state` was taken.
+        """Goes to where `state` was taken.
 
         Raises:
             RefusedError: it is of other data or other batches.

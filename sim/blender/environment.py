@@ -115,7 +115,7 @@ def find() -> Path:
 
 @functools.cache
 def check(python: Path) -> Environment:
-    """Import Blender with this Python, in a process of its own, and ask for its version.
+    """Imports Blender with this Python, in a process of its own, and asks for its version.
 
     Raises:
         BlenderError: it cannot be imported, or it is of another series than `SERIES`.

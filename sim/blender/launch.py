@@ -28,10 +28,10 @@ def expose(name: str, root: Path) -> None:
 
 
 if __name__ == "__main__":
-    beside = Path(__file__).resolve().parents[2]
-    if beside.parent.name == "flagdata":  # installed: the packages lie inside it
-        expose("flagdata", beside.parents[1])
+    root_folder = Path(__file__).resolve().parents[2]
+    if root_folder.parent.name == "flagdata":  # installed: the packages lie inside it
+        expose("flagdata", root_folder.parents[1])
     else:
         for package in PACKAGES:
-            expose(package, beside)
+            expose(package, root_folder)
     import_module("sim.blender.worker").main()

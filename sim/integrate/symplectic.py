@@ -165,7 +165,7 @@ def _base(
 def _each_step(
     system: System, drive: Drive, state: State, duration: float, *, steps: int, kernel: Kernel | None
 ) -> State:
-    """With what acts beside the base model by torch."""
+    """Takes the steps with what acts beside the base model by torch."""
     h = duration / steps
     x, v, memory = state.position, state.velocity, state.memory
     inverse_mass, acceleration = _inverse_mass(system), 0.0 * v

@@ -126,8 +126,8 @@ def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:
         InputError: missing, unknown or ill-typed entries, or a parameter that is given twice.
     """
     where = f"render prior {name!r}"
-    sections = {key: each for key, each in content.items() if key not in _GENERAL}
-    general = entries(_GENERAL, {key: each for key, each in content.items() if key in _GENERAL}, where=where)
+    sections = {key: section for key, section in content.items() if key not in _GENERAL}
+    general = entries(_GENERAL, {key: value for key, value in content.items() if key in _GENERAL}, where=where)
     described = RenderParameters.described()
     keys = {key: key.replace("_", "-") + (DEGREES if entry.unit == "rad" else "") for key, entry in described.items()}
     quantities: dict[str, Quantity] = {}

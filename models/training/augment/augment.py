@@ -132,7 +132,7 @@ class Augment:
 
         Args:
             source: the recording, after which its streams are named.
-            other: see `Drawn`.
+            other_film: see `Drawn`.
         """
         everywhere = np.ones(film.shape[1:], dtype=np.float32)
         return self._applied(BEFORE, film, times, (source,), other_film, everywhere)

@@ -177,7 +177,7 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
             InputError,
             "direction-sigma is -0.1",
         ),
-        ("[cloth]\nwidth = 1\n[[recording]]\nsource = 'a'", UsageError, "half given"),
+        ("[cloth]\nwidth = 1\n[[recording]]\nsource = 'a'", UsageError, "half a size"),
         ("[pins]\nat = 'hoist'\npoints = [[0, 0]]\n[[recording]]\nsource = 'a'", UsageError, "both at and points"),
         ("[pins]\nat = 'hoists'\n[[recording]]\nsource = 'a'", UnknownNameError, "did you mean 'hoist'"),
         (

@@ -119,7 +119,7 @@ def content(**changes: object) -> dict[str, object]:
 def test_a_prior_file_that_is_wrong_says_where() -> None:
     cases = [
         ({"mine": {"source": "me", "sun-hight": 3.0}}, UsageError, "sun-hight"),
-        ({"mine": {"sun-azimuth-deg": 3.0}}, InputError, "source is missing"),
+        ({"mine": {"sun-azimuth-deg": 3.0}}, InputError, "no source"),
         ({"mine": {"source": "me", "sun-height": 3.0}}, InputError, "given twice"),
         ({"textures": []}, InputError, "no textures"),
         ({"least-angle-deg": 90.0}, InputError, "from the heading"),
