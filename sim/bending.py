@@ -102,7 +102,7 @@ def energy(cloth: Cloth, position: Tensor) -> Tensor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Linearised:
+class LinearisedBending:
     """The Gauss–Newton stiffness of the hinges at one state: k S/2 ∇θ ∇θᵀ."""
 
     cloth: Cloth
@@ -110,7 +110,7 @@ class Linearised:
     k: Tensor
 
     @classmethod
-    def at(cls, cloth: Cloth, position: Tensor) -> Linearised:
+    def at(cls, cloth: Cloth, position: Tensor) -> LinearisedBending:
         f = fold(cloth, position)
         return cls(cloth=cloth, fold=f, k=stiffness(cloth, f.angle))
 

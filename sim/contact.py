@@ -63,7 +63,7 @@ class Contact:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pairs:
+class ContactPairs:
     """Vertices and faces that may touch: (pair,) indices of member, vertex and face."""
 
     member: Tensor
@@ -86,7 +86,7 @@ def neighbours(mesh: Mesh, contact: Contact) -> NDArray[np.bool_]:
     return distance < separation
 
 
-def candidates(cloth: Cloth, contact: Contact, position: Tensor, adjacent: NDArray[np.bool_]) -> Pairs:
+def candidates(cloth: Cloth, contact: Contact, position: Tensor, adjacent: NDArray[np.bool_]) -> ContactPairs:
     """Finds all pairs closer than the thickness by their bounding spheres, by looking at every pair of every member.
 
     Args:
@@ -104,7 +104,7 @@ def candidates(cloth: Cloth, contact: Contact, position: Tensor, adjacent: NDArr
         vertex, face = torch.nonzero(close, as_tuple=True)
         pairs.append((torch.full_like(vertex, member), vertex, face))
     member, vertex, face = (torch.cat(parts) for parts in zip(*pairs, strict=True))
-    return Pairs(member=member, vertex=vertex, face=face)
+    return ContactPairs(member=member, vertex=vertex, face=face)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +119,7 @@ class Touch:
         area: (pair,) rest area of the vertex [m²].
     """
 
-    pairs: Pairs
+    pairs: ContactPairs
     weights: Tensor
     normal: Tensor
     violation: Tensor
@@ -144,7 +144,7 @@ class Touch:
         return total.movedim(2, 1)
 
 
-def touching(cloth: Cloth, contact: Contact, position: Tensor, pairs: Pairs) -> Touch:
+def touching(cloth: Cloth, contact: Contact, position: Tensor, pairs: ContactPairs) -> Touch:
     """Selects the pairs that are closer than the thickness, with their geometry, for positions (vertex, 3, batch)
     [m]."""
     point = position[pairs.vertex, :, pairs.member]
@@ -162,7 +162,7 @@ def touching(cloth: Cloth, contact: Contact, position: Tensor, pairs: Pairs) -> 
     behind = torch.nonzero((normal * groups[vertex_of]).sum(1) < 0)[:, 0]
     second = behind[_closest_of_each(vertex_of[behind], distance[close][behind], pairs.face[close][behind])]
     keep = close[torch.cat([first, second])]
-    selected = Pairs(member=pairs.member[keep], vertex=pairs.vertex[keep], face=pairs.face[keep])
+    selected = ContactPairs(member=pairs.member[keep], vertex=pairs.vertex[keep], face=pairs.face[keep])
     areas = torch.as_tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)
     return Touch(
         pairs=selected,
@@ -219,7 +219,7 @@ def _square(point: Tensor, corners: Tensor, weights: Tensor) -> Tensor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Linearised:
+class LinearisedContact:
     """The contacts of one state, ready to be applied to many fields: k a v/h n nᵀ, and friction as a drag."""
 
     touch: Touch
@@ -229,7 +229,9 @@ class Linearised:
     rub: Tensor
 
     @classmethod
-    def at(cls, cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pairs: Pairs) -> Linearised:
+    def at(
+        cls, cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pairs: ContactPairs
+    ) -> LinearisedContact:
         touch = touching(cloth, contact, position, pairs)
         pressure = contact.stiffness * touch.area * touch.violation / contact.thickness
         push = pressure * touch.violation / 2
@@ -255,7 +257,7 @@ class Linearised:
         return self.touch.spread(self.cloth, self.rub[:, None] * slide, field)
 
 
-def force(cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pairs: Pairs) -> Tensor:
+def force(cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pairs: ContactPairs) -> Tensor:
     """Computes repulsion and friction: (vertex, 3, batch) [N]."""
     touch = touching(cloth, contact, position, pairs)
     relative = touch.relative(cloth, velocity)
@@ -273,7 +275,7 @@ def force(cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pa
     return touch.spread(cloth, push[:, None] * touch.normal - rub[:, None] * slide, position)
 
 
-def energy(cloth: Cloth, contact: Contact, position: Tensor, pairs: Pairs) -> Tensor:
+def energy(cloth: Cloth, contact: Contact, position: Tensor, pairs: ContactPairs) -> Tensor:
     """Computes the stored energy k a v³/(6 h): (batch,) [J]."""
     touch = touching(cloth, contact, position, pairs)
     stored = contact.stiffness * touch.area * touch.violation**3 / (6 * contact.thickness)

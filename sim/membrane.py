@@ -92,7 +92,7 @@ def energy(cloth: Cloth, position: Tensor) -> Tensor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Linearised:
+class LinearisedMembrane:
     """The stiffness of the faces at one state, ready to be applied to many fields.
 
     The geometric part of the Hessian is kept where it is positive (tension); where it is not, and for the shear term,
@@ -106,7 +106,7 @@ class Linearised:
     tension_v: Tensor
 
     @classmethod
-    def at(cls, cloth: Cloth, position: Tensor) -> Linearised:
+    def at(cls, cloth: Cloth, position: Tensor) -> LinearisedMembrane:
         e = strain(cloth, position)
         k0, k1, k2, k3 = stiffness(cloth, e)
         g00, g11 = e.g00.clamp(min=0), e.g11.clamp(min=0)

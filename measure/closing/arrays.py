@@ -16,7 +16,7 @@ from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake.meshes import MeshSequence
 from measure.closing.close import close_loop
 from measure.closing.findings import checked, with_warnings
-from measure.loop.run import Options
+from measure.loop.run import LoopOptions
 from measure.nulls.plan import FEWEST_NULLS
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
 from measure.observe.meshes import from_sequence
@@ -38,7 +38,7 @@ def closed(chosen: Closing) -> Closed:
     Raises:
         FlagdataError: see `flagdata.close_loop`.
     """
-    options = Options(
+    options = LoopOptions(
         seed=chosen.seed,
         workers=chosen.workers,
         level=CRITERIA.level if chosen.level is None else chosen.level,

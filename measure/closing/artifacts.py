@@ -21,7 +21,7 @@ from flagdata.lake.results import Placed
 from flagdata.provenance import array_hash, canonical, digest, file_hash
 from flagdata.schema import Kind
 from measure.closing.models import NamedModel, acting
-from measure.loop.run import Options
+from measure.loop.run import LoopOptions
 from measure.nulls.bank import files
 from measure.observe import Experiment
 from measure.observe.trajectory import described
@@ -50,7 +50,7 @@ class Kept:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Answer:
+class VerdictAnswer:
     """A loop that was closed, of whatever kind of recordings, as it is written and kept.
 
     Attributes:
@@ -81,12 +81,12 @@ class Answer:
 def answer_of(
     verdict: Verdict,
     experiment: Experiment,
-    options: Options,
+    options: LoopOptions,
     *,
     name: str,
     models: tuple[NamedModel, ...],
     findings: tuple[Finding, ...],
-) -> Answer:
+) -> VerdictAnswer:
     """Makes the answer of a verdict on recordings of markers.
 
     Args:
@@ -106,7 +106,7 @@ def answer_of(
     }
     if options.suspected is not None:  # results that were kept before keep their identity
         recipe["suspected"] = options.suspected.words
-    return Answer(
+    return VerdictAnswer(
         name=name,
         verdict=verdict,
         models=models,
@@ -120,7 +120,7 @@ def answer_of(
     )
 
 
-def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
+def keep(lake: Lake, answer: VerdictAnswer, *, branch: str = "main") -> Kept:
     """Publishes a verdict and its models in one commit where it is new, see `flagdata.lake.results`.
 
     Raises:
@@ -194,7 +194,7 @@ def fingerprint(experiment: Experiment) -> str:
     return array_hash(content, arrays)
 
 
-def _measurement(answer: Answer) -> Artifact:
+def _measurement(answer: VerdictAnswer) -> Artifact:
     verdict = answer.verdict
     fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
     fitted |= {f"{c.effect}.{c.parameter}": c.strength.value for c in answer.effects if c.strength.bound is None}
@@ -219,7 +219,7 @@ def _measurement(answer: Answer) -> Artifact:
     )
 
 
-def _model(answer: Answer, model: NamedModel, measurement: Artifact) -> Artifact:
+def _model(answer: VerdictAnswer, model: NamedModel, measurement: Artifact) -> Artifact:
     effects: Sequence[str] = list(model.content.get("effects", {}))
     report = {"schema": "flagdata.model-report/1", "words": answer.verdict.words, "findings": []}
     return Artifact(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from measure.forecasting.setting import Stage
-from measure.loop.run import Options, solve
+from measure.loop.run import LoopOptions, solve
 from measure.observe.trajectory import Experiment
 from measure.report.statement import with_sentences
 from measure.verdict.record import Verdict
 
 
-def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None = None) -> Verdict:
+def close_loop(experiment: Experiment, options: LoopOptions, *, stage: Stage | None = None) -> Verdict:
     """Reaches the verdict on an experiment.
 
     Args:

@@ -20,7 +20,7 @@ from flagdata.errors import InputError
 from flagdata.lake import Lake
 from flagdata.outputs import write_files
 from flagdata.pages.render import render
-from measure.closing.artifacts import Answer, keep
+from measure.closing.artifacts import VerdictAnswer, keep
 from measure.closing.joint import Joint
 from measure.report.document import as_document, plain
 from measure.report.page import FILTERS, TONES
@@ -86,7 +86,7 @@ JOINT = ("report.html", "verdict.json")
 KINDS = ("markers", "films")
 
 
-def deliver(answer: Answer, *, out: Path, lake: Lake | None, branch: str, as_json: bool) -> None:
+def deliver(answer: VerdictAnswer, *, out: Path, lake: Lake | None, branch: str, as_json: bool) -> None:
     """Write an answer's files, keep it in the lake, and print it.
 
     Raises:
@@ -101,7 +101,7 @@ def deliver(answer: Answer, *, out: Path, lake: Lake | None, branch: str, as_jso
 
 
 def deliver_joint(
-    joint: Joint, answers: Sequence[Answer], *, out: Path, lake: Lake | None, branch: str, as_json: bool
+    joint: Joint, answers: Sequence[VerdictAnswer], *, out: Path, lake: Lake | None, branch: str, as_json: bool
 ) -> None:
     """Delivers an answer by markers and films, each of which has its folder and its artifacts.
 
@@ -127,7 +127,7 @@ def deliver_joint(
             echo_lines(f"\nBy {kind}:\n{answer.words}")
 
 
-def _written(answer: Answer, *, out: Path, lake: Lake | None, branch: str) -> dict[str, Any]:
+def _written(answer: VerdictAnswer, *, out: Path, lake: Lake | None, branch: str) -> dict[str, Any]:
     """Writes and keeps an answer, and returns its document."""
     as_written = as_document(answer.verdict)
     content = json.dumps(as_written, indent=1, allow_nan=False)

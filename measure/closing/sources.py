@@ -25,7 +25,7 @@ _HERE = Path()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class SourceOptions:
     """How sources are to be read.
 
     Attributes:
@@ -52,7 +52,7 @@ class Reading:
     confirm: Confirm = UNASKED
 
 
-def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None) -> list[Observation]:
+def read(sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None) -> list[Observation]:
     """Reads the recordings of some sources.
 
     Args:
@@ -72,7 +72,7 @@ def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: L
 
 
 def _beside(
-    sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None
+    sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None
 ) -> list[tuple[Observation, RecordingSource, WindSource | None]]:
     """Returns the recordings of some sources as they are, each with its source and its wind; as `read`."""
     observations: list[tuple[Observation, RecordingSource]] = []
@@ -109,7 +109,7 @@ def _beside(
 
 
 def drafted(
-    sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None, *, folder: Path
+    sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None, *, folder: Path
 ) -> dict[str, Any]:
     """Returns what a recipe says of the recordings of some sources, see `measure.observe.recipe`.
 
@@ -160,7 +160,7 @@ def _is_log(text: str) -> bool:
     return False
 
 
-def _wind(text: str, reading: Reading) -> WindSource:
+def _wind(text: str, reading: SourceOptions) -> WindSource:
     if _is_log(text):
         placement = LogPlacement(axis=reading.axis, north=reading.north, offset=reading.offset)
         options = WindOptions(recipe=reading.sensor, zone=reading.zone)

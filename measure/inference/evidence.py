@@ -13,7 +13,7 @@ from flagdata.errors import UsageError
 from measure.forecasting.calibration import PRIOR, THETA
 from measure.inference.random_effect import NullModel
 from measure.probes.course import Course
-from measure.probes.rows import Rows
+from measure.probes.rows import StatisticRows
 from measure.probes.statistics import Statistics
 from measure.probes.wind_log import DIRECTION, NUISANCES, by_recording
 
@@ -25,7 +25,7 @@ _TINY = np.finfo(np.float64).tiny
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Evidence(Rows):
+class Evidence(StatisticRows):
     """Segments beside a null model, as quadratic forms: the misfit of coefficients δ is c − 2 g·δ + δᵀ H δ.
 
     Its columns are the statistics', then the null model's shifts, then what the log of each recording's wind may be off
@@ -133,7 +133,7 @@ class Evidence(Rows):
         curvature[self.nuisance, self.nuisance] += prior
         return curvature, self.score.sum(axis=0), float(self.energy.sum())
 
-    def fit(self, chosen: Chosen, *, centre: Sequence[float] | Floats = _HERE) -> Fit:
+    def fit(self, chosen: Chosen, *, centre: Sequence[float] | Floats = _HERE) -> CoefficientFit:
         """Fits the nuisance columns by generalised least squares, under their priors, and the chosen ones.
 
         Args:
@@ -146,7 +146,7 @@ class Evidence(Rows):
         energy += float(pull @ np.asarray(centre))
         covariance = np.asarray(np.linalg.inv(curvature[np.ix_(active, active)]), dtype=np.float64)
         value = covariance @ score[active]
-        return Fit(
+        return CoefficientFit(
             active=tuple(active), value=value, covariance=covariance, remainder=energy - float(score[active] @ value)
         )
 
@@ -238,7 +238,7 @@ class Evidence(Rows):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Fit:
+class CoefficientFit:
     """Coefficients of some columns, with their covariance, and the squared distance they leave, prior included."""
 
     active: tuple[int, ...]

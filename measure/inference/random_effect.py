@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from measure.forecasting.calibration import DAMPING, PRIOR, Calibration
 from measure.forecasting.setting import Design
 from measure.inference.growth import power
-from measure.probes.rows import Rows
+from measure.probes.rows import StatisticRows
 from measure.probes.statistics import Statistics
 
 Floats = NDArray[np.float64]
@@ -89,7 +89,7 @@ class NullModel:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Nulls(Rows):
+class Nulls(StatisticRows):
     """Segments of null recordings, with what they were made with.
 
     Attributes:

@@ -31,7 +31,7 @@ from measure.forecasting.model import Model
 from measure.forecasting.regressors import EffectColumn, columns, names
 from measure.forecasting.setting import Setting, Stage
 from measure.forecasting.strengths import WHERE, Suspicion
-from measure.inference.evidence import Evidence, Fit
+from measure.inference.evidence import CoefficientFit, Evidence
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.corrective_field import Mode, corrective_field
 from measure.loop.gauss_newton import Refined, cut
@@ -39,7 +39,7 @@ from measure.loop.refit import Fits, Refit, refit
 from measure.loop.residuals import residuals
 from measure.loop.selection import (
     GUST_COLUMN,
-    Judgement,
+    LibraryJudgement,
     Weighed,
     equivalent,
     finalists,
@@ -58,7 +58,7 @@ from measure.nulls.simulation import NullBatch
 from measure.observe.checks.attachment import hoist_stands_still
 from measure.observe.trajectory import Experiment
 from measure.probes.course import Variation
-from measure.probes.lines import Line
+from measure.probes.lines import SpectralLine
 from measure.probes.statistics import Projection, Statistics, projected
 from measure.probes.wind_log import lags
 from measure.verdict.criteria import CRITERIA
@@ -130,7 +130,7 @@ _LOOKS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(plan.NullOptions):
+class LoopOptions(plan.NullOptions):
     """How to close the loop: by which nulls, at which level of the global test.
 
     Attributes:
@@ -157,7 +157,7 @@ class Options(plan.NullOptions):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Outcome:
+class LoopOutcome:
     """The numerical result of an experiment, without sentences.
 
     Attributes:
@@ -177,11 +177,11 @@ class Outcome:
     at_bounds: tuple[str, ...]
     field: tuple[Mode, ...] = ()
     whole: bool = True
-    line: Line | None = None
+    line: SpectralLine | None = None
     course: Variation | None = None
 
 
-def solve(experiment: Experiment, options: Options, *, stage: Stage | None = None) -> Outcome:
+def solve(experiment: Experiment, options: LoopOptions, *, stage: Stage | None = None) -> LoopOutcome:
     """Solves an experiment: tests, fits, validates.
 
     Args:
@@ -236,7 +236,7 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
     return _outcome(solved, bank, trial, options, began, late)
 
 
-def _nulls_wanted(options: Options, nulls: int, reference: Reference, evidence: Evidence) -> int | None:
+def _nulls_wanted(options: LoopOptions, nulls: int, reference: Reference, evidence: Evidence) -> int | None:
     """Returns how many nulls to go on with after so many; None where those decide, or are given as a bank."""
     if options.bank is not None:
         return None
@@ -269,7 +269,7 @@ class Solved:
     setting: Setting
     fits: Fits
     reference: Reference
-    judgement: Judgement
+    judgement: LibraryJudgement
 
     @cached_property
     def evidence(self) -> Evidence:
@@ -373,13 +373,13 @@ def _settling(setting: Setting, fits: Fits, seed: int) -> Fits:
     return replace(fits, whitened=replace(fits.whitened, statistics=with_settled), settling=settling)
 
 
-def _base_fit(setting: Setting, fits: Fits) -> Fit:
+def _base_fit(setting: Setting, fits: Fits) -> CoefficientFit:
     """Fits the base model, linear where statistics were taken."""
     evidence = fits.whitened.evidence(fits.whitened.statistics)
     return evidence.fit((), centre=Calibration().steps_from(setting.calibration))
 
 
-def _trial(solved: Solved, options: Options) -> Trial:
+def _trial(solved: Solved, options: LoopOptions) -> Trial:
     """Compares before and after on what was left out, where an effect is named."""
     setting, larger = solved.setting, solved.larger
     if larger is None:
@@ -434,8 +434,8 @@ def _trial(solved: Solved, options: Options) -> Trial:
 
 
 def _outcome(
-    solved: Solved, bank: NullBank, trial: Trial, options: Options, began: float, late: tuple[float, ...]
-) -> Outcome:
+    solved: Solved, bank: NullBank, trial: Trial, options: LoopOptions, began: float, late: tuple[float, ...]
+) -> LoopOutcome:
     setting, larger, judgement = solved.setting, solved.larger, solved.judgement
     before = _unseen(setting, solved.base)
     after = None if larger is None else _unseen(setting, larger)
@@ -464,7 +464,7 @@ def _outcome(
     beyond = judgement.conclusion in (Conclusion.OUTSIDE, Conclusion.PARTLY)
     field = _field(solved) if beyond else ()
     fitted = solved.base if larger is None else larger
-    return Outcome(
+    return LoopOutcome(
         verdict=replace(verdict, seconds=time.perf_counter() - began),
         experiment=setting.experiment,
         lags=late,
@@ -476,7 +476,7 @@ def _outcome(
     )
 
 
-def _direction(judgement: Judgement) -> tuple[Parameter, ...]:
+def _direction(judgement: LibraryJudgement) -> tuple[Parameter, ...]:
     """Reports by how much the wind is turned from its logs, in degrees."""
     angle = judgement.direction
     if angle is None:
@@ -490,7 +490,7 @@ def _direction(judgement: Judgement) -> tuple[Parameter, ...]:
     )
 
 
-def _test(solved: Solved, bank: NullBank, options: Options) -> NullTest:
+def _test(solved: Solved, bank: NullBank, options: LoopOptions) -> NullTest:
     """Reports the global test of the base model, and whether other nulls could decide it otherwise."""
     conformal, judgement = solved.reference.test, solved.judgement
     low, high = conformal.interval(judgement.statistic, level=CRITERIA.interval)
@@ -512,7 +512,7 @@ def _test(solved: Solved, bank: NullBank, options: Options) -> NullTest:
     )
 
 
-def _power(judgement: Judgement) -> tuple[Power, ...]:
+def _power(judgement: LibraryJudgement) -> tuple[Power, ...]:
     """Reports the power of each effect that was tested for, the surest first."""
     by_name = {column.name: column for column in columns() if isinstance(column, EffectColumn)}
     return tuple(
@@ -565,7 +565,7 @@ def _ranking(solved: Solved, larger: Refined | None) -> tuple[Candidate, ...]:
     return tuple(candidates)
 
 
-def _effects_named(judgement: Judgement) -> tuple[str, ...]:
+def _effects_named(judgement: LibraryJudgement) -> tuple[str, ...]:
     names: list[str] = []
     for ranked in judgement.ranking:
         if ranked.column in judgement.named:

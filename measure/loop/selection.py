@@ -26,7 +26,7 @@ from measure.loop.validation import total_error
 from measure.nulls.directions import Move
 from measure.nulls.reference import GUSTS, Reference
 from measure.probes.course import ALONG, Variation
-from measure.probes.lines import Line
+from measure.probes.lines import SpectralLine
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import undecided
 from measure.verdict.quantity import number
@@ -79,7 +79,7 @@ class Weighed:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Judgement:
+class LibraryJudgement:
     """What was decided.
 
     Attributes:
@@ -105,7 +105,7 @@ class Judgement:
     confident: tuple[int, ...]
     statistic: float
     p_value: float
-    line: Line | None = None
+    line: SpectralLine | None = None
     course: Variation | None = None
     direction: Estimate | None = None
     departed: tuple[int, ...] = ()
@@ -120,7 +120,7 @@ def judge(
     level: float,
     refits: Mapping[int, Refit | None] | None = None,
     set_up: SetUp | None = None,
-) -> Judgement:
+) -> LibraryJudgement:
     """Weighs the library against the evidence of all recordings.
 
     Args:
@@ -168,13 +168,13 @@ def judge(
 
     def judgement(
         conclusion: Conclusion, accepted: Sequence[Weighed], why: str = "", reasons: tuple[str, ...] = ()
-    ) -> Judgement:
+    ) -> LibraryJudgement:
         taken = {w.column for w in accepted}
         reasoned = [
             replace(w, candidate=replace(w.candidate, why_not=_reason(ranking[0], w, why) * (w.column not in taken)))
             for w in ranking
         ]
-        return Judgement(
+        return LibraryJudgement(
             conclusion=conclusion,
             named=tuple(w.column for w in accepted),
             ranking=tuple(reasoned),
@@ -244,7 +244,7 @@ def _within(turned_wind: Weighed, direction: Estimate, tolerance: float) -> Weig
     )
 
 
-def withdrawn(judgement: Judgement) -> Judgement:
+def withdrawn(judgement: LibraryJudgement) -> LibraryJudgement:
     """Withdraws the effects that were named: with those that were, errors on unseen recordings are larger than
     without."""
     why = "with it, errors on unseen recordings are larger than without"
@@ -274,7 +274,7 @@ def _leads(first: Floats, second: Floats, recording: NDArray[np.int64]) -> bool:
     return bool((first - second).sum() > CRITERIA.lead * total_error(first - second, recording))
 
 
-def _swinging(evidence: Evidence, reference: Reference, level: float) -> Line | None:
+def _swinging(evidence: Evidence, reference: Reference, level: float) -> SpectralLine | None:
     """Finds the line of the spectra of what is left, where it alone would reject a model."""
     line = reference.line(evidence)
     return line if line is not None and reference.conformal.p(line.far) <= level else None
@@ -340,7 +340,7 @@ def heterogeneous(candidate: Candidate, level: float) -> bool:
     return candidate.heterogeneity is not None and candidate.heterogeneity <= level
 
 
-def finalists(judgement: Judgement) -> tuple[int, ...]:
+def finalists(judgement: LibraryJudgement) -> tuple[int, ...]:
     """Columns that are refitted: the confidence set, the first by held-out gains, and the largest statistics."""
     able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
     strongest = sorted(able, key=lambda w: -abs(w.candidate.z))

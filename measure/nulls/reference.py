@@ -22,8 +22,8 @@ from measure.inference.random_effect import NullModel, Nulls
 from measure.nulls.conformal import GroupedConformal, kinds_needed
 from measure.nulls.directions import APPEARS, NOTHING, Move, directed, moves, pulled, shares_of, standardised
 from measure.nulls.tails import as_normal, freedom
-from measure.probes.lines import Line, Lines, strongest
-from measure.probes.rows import Rows
+from measure.probes.lines import Lines, SpectralLine, strongest
+from measure.probes.rows import StatisticRows
 from measure.verdict.criteria import CRITERIA
 
 Floats = NDArray[np.float64]
@@ -160,7 +160,7 @@ class _Group:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _GroupStatistics(Rows):
+class _GroupStatistics(StatisticRows):
     """Statistics of null groups.
 
     Attributes:
@@ -555,7 +555,7 @@ class Reference:
             )
         return np.abs(self._by_tail(settled, columns))
 
-    def line(self, evidence: Evidence) -> Line | None:
+    def line(self, evidence: Evidence) -> SpectralLine | None:
         """Finds the most prominent line of data; None where spectra are not looked at.
 
         Raises:

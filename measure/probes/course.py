@@ -24,7 +24,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from measure.probes.rows import Rows
+from measure.probes.rows import StatisticRows
 from measure.verdict.criteria import CRITERIA
 
 Floats = NDArray[np.float64]
@@ -35,7 +35,7 @@ _WINDOW = 0.2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Course(Rows):
+class Course(StatisticRows):
     """The wind's course in segments.
 
     Attributes:

@@ -88,7 +88,7 @@ class Spectrum:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class SpectralLine:
     """The most prominent one.
 
     Attributes:
@@ -128,7 +128,7 @@ class Lines:
         is farthest, (group,)."""
         return ((groups - self.mean) / self.deviation).max(axis=1)
 
-    def line(self, prominence: Floats, *, centre: float, width: float) -> Line:
+    def line(self, prominence: Floats, *, centre: float, width: float) -> SpectralLine:
         """Finds the line in some segments (segment, reduced frequency, shape · axis).
 
         Args:
@@ -137,7 +137,9 @@ class Lines:
         values, places = _strongest(prominence)
         across = (values - self.mean) / self.deviation
         best = int(np.argmax(across))
-        return Line(far=float((across[best] - centre) / width), reduced=float(REDUCED[places[best]]), direction=best)
+        return SpectralLine(
+            far=float((across[best] - centre) / width), reduced=float(REDUCED[places[best]]), direction=best
+        )
 
 
 def strongest(prominence: Floats) -> Floats:

@@ -13,7 +13,7 @@ from flagdata.errors import UsageError
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rows:
+class StatisticRows:
     """Every field is an array with a row for each segment or group, another such record, or None where it is not looked
     at; but for those named in `_WHOLE`, which are of the record as a whole."""
 
@@ -44,7 +44,7 @@ class Rows:
 def _select_rows(value: Any, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Any:
     if value is None:
         return None
-    return value.select(chosen) if isinstance(value, Rows) else value[chosen]
+    return value.select(chosen) if isinstance(value, StatisticRows) else value[chosen]
 
 
 def _together(name: str, values: Sequence[Any]) -> Any:
@@ -53,4 +53,4 @@ def _together(name: str, values: Sequence[Any]) -> Any:
         raise UsageError(f"only some parts have {name}", where="joined", fix="look at it in all parts or in none")
     if not present:
         return None
-    return present[0].joined(present) if isinstance(present[0], Rows) else np.concatenate(present)
+    return present[0].joined(present) if isinstance(present[0], StatisticRows) else np.concatenate(present)

@@ -38,7 +38,7 @@ from measure.observe.interpolation import onto
 from measure.observe.trajectory import Floats, Specimen
 from measure.probes.course import Course, Gauge
 from measure.probes.lines import Spectrum
-from measure.probes.rows import Rows
+from measure.probes.rows import StatisticRows
 from measure.probes.wind_log import sensitivities
 
 
@@ -100,7 +100,7 @@ as for a point that moves evenly."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Statistics(Rows):
+class Statistics(StatisticRows):
     """Sums over the frames and markers of segments.
 
     Attributes:

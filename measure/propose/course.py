@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from measure.forecasting.model import Model
 from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.setting import Setting
-from measure.propose.outcome import Course, Line
+from measure.propose.outcome import PeriodogramLine, StrengthCourse
 from measure.verdict.record import Estimate
 from sim.effects import apply
 
@@ -30,13 +30,13 @@ _SLOW = 3
 """Periods in a recording below which a line is no more than a trend."""
 
 
-def course(setting: Setting, model: Model, effect: int) -> Course:
+def course(setting: Setting, model: Model, effect: int) -> StrengthCourse:
     """Computes the course of the effect at an index of a model, along all recordings."""
     column, fitted = model.effects[effect]
     amplitudes, period = _amplitudes(setting, model, column, fitted)
     stretch = max(1, round(BIN / period))
     binned: list[Floats] = []
-    lines: list[Line] = []
+    lines: list[PeriodogramLine] = []
     times: list[Floats] = []
     segments = setting.segments
     for index in range(len(setting.speeds)):
@@ -57,7 +57,7 @@ def course(setting: Setting, model: Model, effect: int) -> Course:
     spread = float(np.sqrt(np.mean([np.var(values, ddof=1) for values in binned])))
     speeds = [float(u) for u in setting.speeds]
     height = float(np.ptp(setting.experiment.specimen.mesh.rest[:, 1]))
-    return Course(
+    return StrengthCourse(
         bin=stretch * period,
         times=[t.tolist() for t in times],
         amplitudes=[a.tolist() for a in binned],
@@ -91,7 +91,7 @@ def _mean(values: Floats, unit: str) -> Estimate:
     return Estimate(value=value, low=value - reach, high=value + reach, unit=unit, level=_LEVEL)
 
 
-def line(values: Floats, period: float) -> Line:
+def line(values: Floats, period: float) -> PeriodogramLine:
     """Finds the largest line of the periodogram, of three periods or more (Fisher, Proc. R. Soc. A 125, 1929).
 
     Args:
@@ -109,10 +109,12 @@ def line(values: Floats, period: float) -> Line:
     # The sum alternates and cancels for small lines, which its first term bounds.
     p_value = min(1.0, terms[0]) if share < 0.05 else min(1.0, max(0.0, sum(terms)))
     frequency = float(np.fft.rfftfreq(len(values), period)[_SLOW + best])
-    return Line(frequency=frequency, share=share, p_value=p_value)
+    return PeriodogramLine(frequency=frequency, share=share, p_value=p_value)
 
 
-def _words(by_recording: list[Estimate], speeds: list[float], spread: float, lines: list[Line], height: float) -> str:
+def _words(
+    by_recording: list[Estimate], speeds: list[float], spread: float, lines: list[PeriodogramLine], height: float
+) -> str:
     unit = "" if by_recording[0].unit == "1" else f" {by_recording[0].unit}"
     means = "; ".join(
         f"{e.value:+.3g} [{e.low:.3g}, {e.high:.3g}]{unit} at {u:.1f} m/s"

@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from flagdata.errors import ConflictError, UsageError
 from flagdata.outputs import check_files, write_files
-from measure.propose.outcome import Outcome, Strength
+from measure.propose.outcome import ProposalOutcome, TermStrength
 from measure.propose.terms import MASS, Term, TermColumn
 
 _PROJECT = "pyproject.toml"
@@ -37,7 +37,7 @@ class EffectFile:
         return f"{self.path}:{self.class_name}"
 
 
-def write(outcome: Outcome, folder: Path) -> EffectFile:
+def write(outcome: ProposalOutcome, folder: Path) -> EffectFile:
     """Writes the effect file, its contract tests and its pyproject.toml, into a folder.
 
     An earlier proposal from the same data that was changed since is kept; the new one gets the next free name.
@@ -102,7 +102,7 @@ def _is_free(folder: Path, module: str) -> bool:
     return True
 
 
-def _part(strength: Strength) -> dict[str, Any]:
+def _part(strength: TermStrength) -> dict[str, Any]:
     """Returns what the template needs of a strength whose name is `field_shape`."""
     term, estimate = Term.named(strength.name), strength.estimate
     reach = abs(estimate.high - estimate.low)

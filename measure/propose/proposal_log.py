@@ -9,7 +9,7 @@ from typing import Any
 from flagdata.documents import read_json
 from flagdata.errors import CorruptError
 from flagdata.outputs import check_rewrite, rewrite
-from measure.propose.outcome import Outcome
+from measure.propose.outcome import ProposalOutcome
 
 SCHEMA = "flagdata.proposals/1"
 _FORMER_SCHEMA = "flagdata.ledger/1"
@@ -40,7 +40,7 @@ def check(path: Path) -> None:
     entries(path)
 
 
-def add(path: Path, outcome: Outcome, *, effect: str) -> None:
+def add(path: Path, outcome: ProposalOutcome, *, effect: str) -> None:
     """Adds one more entry, after those that are there. Entries are never changed.
 
     Args:

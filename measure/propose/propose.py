@@ -40,7 +40,7 @@ from measure.observe.trajectory import Experiment
 from measure.probes.statistics import Statistics
 from measure.propose.course import course
 from measure.propose.family import Family
-from measure.propose.outcome import Decision, Outcome, Ranked, Retest, Strength
+from measure.propose.outcome import Decision, ProposalOutcome, Ranked, Retest, TermStrength
 from measure.propose.projected import ProjectedSegments, evidence
 from measure.propose.search import Step, search, wrong
 from measure.propose.terms import MASS, TermColumn
@@ -94,7 +94,7 @@ def retest(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fitted:
+class FittedModel:
     """A model with standard errors of its calibrated parameters and strengths, as the null model has them."""
 
     model: Model
@@ -107,7 +107,7 @@ def fit(
     speeds: Floats,
     columns: Sequence[EffectColumn],
     start: Sequence[float],
-) -> Fitted:
+) -> FittedModel:
     """Fits calibrated parameters and strengths, by Gauss and Newton.
 
     Args:
@@ -121,7 +121,7 @@ def fit(
         step, errors = _step(projected, null, speeds, model)
         if np.abs(step / errors).max() < STAYS:
             break
-    return Fitted(model=model.moved(tuple(step)), errors=tuple(float(e) for e in errors))
+    return FittedModel(model=model.moved(tuple(step)), errors=tuple(float(e) for e in errors))
 
 
 def _step(projected: ProjectedSegments, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
@@ -211,7 +211,7 @@ def propose(
     controls: Sequence[EffectColumn] = (),
     options: plan.NullOptions,
     stage: Stage | None = None,
-) -> Outcome:
+) -> ProposalOutcome:
     """Seeks terms that a model lacks, and keeps them if they help on recordings that were not looked at.
 
     Args:
@@ -257,7 +257,7 @@ def weigh(
     controls: Sequence[EffectColumn] = (),
     options: plan.NullOptions,
     stage: Stage,
-) -> Outcome:
+) -> ProposalOutcome:
     """Weighs the candidates on recordings, given nulls.
 
     Args:
@@ -292,12 +292,12 @@ def weigh(
     stage("terms", 1, 1)
     taken = [step for step in steps if step.taken]
 
-    def fitted(columns: Sequence[int]) -> Fitted:
+    def fitted(columns: Sequence[int]) -> FittedModel:
         linear = projected_evidence.fit(columns)
         start = [linear.of(column)[0] for column in (*range(len(THETA)), *columns)]
         return fit(projected, null, speeds, [tried.columns[column - len(THETA)] for column in columns], start)
 
-    strengths: tuple[Strength, ...] = ()
+    strengths: tuple[TermStrength, ...] = ()
     tested = None
     decision, reason = Decision.REJECTED, steps[0].reason if steps else "no term was given"
     if taken:
@@ -320,7 +320,7 @@ def weigh(
         strengths = _strengths(setting, projected_evidence, family, taken, acting, after)
         decision, reason = tested.decided
         stage("test on untouched data", 1, 1)
-    return Outcome(
+    return ProposalOutcome(
         decision=decision,
         reason=reason,
         steps=steps,
@@ -414,12 +414,12 @@ def _strengths(
     family: Family,
     taken: Sequence[Step],
     acting: Sequence[int],
-    after: Fitted,
-) -> tuple[Strength, ...]:
+    after: FittedModel,
+) -> tuple[TermStrength, ...]:
     """Estimates strengths beyond the linear; errors are scaled by what makes the nulls' mean squared z 1."""
     chosen = [*acting, *(step.column for step in taken)]
     linear = projected_evidence.fit(chosen)
-    strengths: list[Strength] = []
+    strengths: list[TermStrength] = []
     for index, step in enumerate(taken, start=len(acting)):
         column, value = after.model.effects[index]
         first, claimed = linear.of(step.column)
@@ -430,7 +430,9 @@ def _strengths(
         strength = estimate(column.described.null + value, error, column.unit)
         words = _words(setting, column, value, after.model.calibration.density)
         strengths.append(
-            Strength(name=column.parameter, words=words, estimate=strength, course=course(setting, after.model, index))
+            TermStrength(
+                name=column.parameter, words=words, estimate=strength, course=course(setting, after.model, index)
+            )
         )
     return tuple(strengths)
 

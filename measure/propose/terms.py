@@ -29,7 +29,7 @@ _SOURCE = "none: to be found from what a model leaves"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shape:
+class TermShape:
     """Where a term is.
 
     Attributes:
@@ -71,14 +71,14 @@ _LOCAL_WORDS = {
 }
 
 
-def shape_named(name: str) -> Shape:
+def shape_named(name: str) -> TermShape:
     """Parses a shape of `SHAPES`, or near_U_V, stripe_U, band_V with shares of the width and the height in hundredths.
 
     Raises:
         UsageError: no such shape.
     """
     if name in SHAPES:
-        return Shape(method=name, words=SHAPES[name])
+        return TermShape(method=name, words=SHAPES[name])
     match = _LOCAL.fullmatch(name)
     arguments = () if match is None else tuple(int(part) / 100 for part in match.groups()[1:] if part is not None)
     if match is None or len(arguments) != (2 if match[1] == "near" else 1) or max(arguments) > 1:
@@ -87,7 +87,7 @@ def shape_named(name: str) -> Shape:
             where="terms",
             fix=f"take one of {', '.join(SHAPES)}, or near_U_V, stripe_U, band_V in hundredths from 0 to 100",
         )
-    return Shape(method=match[1], place=arguments, words=_LOCAL_WORDS[match[1]].format(*arguments))
+    return TermShape(method=match[1], place=arguments, words=_LOCAL_WORDS[match[1]].format(*arguments))
 
 
 def local(method: str, *shares: float) -> str:
@@ -96,7 +96,7 @@ def local(method: str, *shares: float) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Field:
+class TermField:
     """Description of a field.
 
     Attributes:
@@ -121,54 +121,58 @@ _PLACES = tuple(local("near", u, v) for u in (0.25, 0.5, 0.75, 1.0) for v in (0.
 _STRIPES = tuple(local("stripe", u) for u in (0.2, 0.4, 0.6, 0.8, 1.0))
 _BANDS = tuple(local("band", v) for v in (0.0, 0.25, 0.5, 0.75, 1.0))
 
-FIELDS: dict[str, Field] = {
-    "downwind": Field(unit="m/s²", step=0.5, words="a steady push downwind", shapes=_ALL),
-    "leftward": Field(unit="m/s²", step=0.5, words="a steady push across the wind, to its left", shapes=_ALL),
-    "upward": Field(unit="m/s²", step=0.5, words="a steady push upward", shapes=_ALL),
-    "downwind_squared": Field(
+FIELDS: dict[str, TermField] = {
+    "downwind": TermField(unit="m/s²", step=0.5, words="a steady push downwind", shapes=_ALL),
+    "leftward": TermField(unit="m/s²", step=0.5, words="a steady push across the wind, to its left", shapes=_ALL),
+    "upward": TermField(unit="m/s²", step=0.5, words="a steady push upward", shapes=_ALL),
+    "downwind_squared": TermField(
         unit="1/m", step=0.02, words="a push downwind as the square of the wind", shapes=_QUARTERS
     ),
-    "leftward_squared": Field(
+    "leftward_squared": TermField(
         unit="1/m", step=0.02, words="a push to the left as the square of the wind", shapes=_QUARTERS
     ),
-    "upward_squared": Field(unit="1/m", step=0.02, words="a push upward as the square of the wind", shapes=_QUARTERS),
-    "to_pole": Field(unit="m/s²", step=0.5, words="a steady pull to the pole, horizontally", shapes=_HALVES),
-    "toward_pole": Field(unit="1/s²", step=1.0, words="a spring to the pole, horizontally", shapes=_FLY),
-    "toward_height": Field(unit="1/s²", step=1.0, words="a spring to the height of the attachments", shapes=_FLY),
-    "against_motion": Field(unit="1/s", step=0.5, words="a resistance to motion", shapes=_QUARTERS),
-    "against_normal_motion": Field(unit="1/s", step=0.5, words="a resistance to normal motion", shapes=_QUARTERS),
-    "left_of_motion": Field(
+    "upward_squared": TermField(
+        unit="1/m", step=0.02, words="a push upward as the square of the wind", shapes=_QUARTERS
+    ),
+    "to_pole": TermField(unit="m/s²", step=0.5, words="a steady pull to the pole, horizontally", shapes=_HALVES),
+    "toward_pole": TermField(unit="1/s²", step=1.0, words="a spring to the pole, horizontally", shapes=_FLY),
+    "toward_height": TermField(unit="1/s²", step=1.0, words="a spring to the height of the attachments", shapes=_FLY),
+    "against_motion": TermField(unit="1/s", step=0.5, words="a resistance to motion", shapes=_QUARTERS),
+    "against_normal_motion": TermField(unit="1/s", step=0.5, words="a resistance to normal motion", shapes=_QUARTERS),
+    "left_of_motion": TermField(
         unit="1/s", step=0.5, words="a push to the left of the motion, as in a turning frame", shapes=("everywhere",)
     ),
-    "across": Field(unit="1/s", step=0.2, words="a pressure in proportion to the wind across it", shapes=_QUARTERS),
-    "across_squared": Field(
+    "across": TermField(unit="1/s", step=0.2, words="a pressure in proportion to the wind across it", shapes=_QUARTERS),
+    "across_squared": TermField(
         unit="1/m",
         step=0.1,
         words="a pressure as the square of the wind across it",
         shapes=("hoist", "fly", "upper", "lower", "upper_fly", "lower_fly"),
     ),
-    "across_even": Field(
+    "across_even": TermField(
         unit="1/m",
         step=0.1,
         words="a pressure as the square of the wind across it, always toward one side of the cloth",
         shapes=_QUARTERS,
     ),
-    "rising": Field(unit="1/s", step=0.2, words="the pressure of a wind that also blows upward", shapes=_HALVES),
-    "crossing": Field(unit="1/s", step=0.2, words="the pressure of a wind that also blows to the left", shapes=_HALVES),
-    "along": Field(unit="1/s", step=0.05, words="a friction in proportion to the wind along it", shapes=_QUARTERS),
-    "along_squared": Field(
+    "rising": TermField(unit="1/s", step=0.2, words="the pressure of a wind that also blows upward", shapes=_HALVES),
+    "crossing": TermField(
+        unit="1/s", step=0.2, words="the pressure of a wind that also blows to the left", shapes=_HALVES
+    ),
+    "along": TermField(unit="1/s", step=0.05, words="a friction in proportion to the wind along it", shapes=_QUARTERS),
+    "along_squared": TermField(
         unit="1/m", step=0.01, words="a friction as the square of the wind along it", shapes=_QUARTERS
     ),
-    "along_width": Field(
+    "along_width": TermField(
         unit="1/s", step=0.1, words="a friction in proportion to the wind along its width", shapes=("everywhere", "fly")
     ),
-    "along_height": Field(
+    "along_height": TermField(
         unit="1/s",
         step=0.1,
         words="a friction in proportion to the wind along its height",
         shapes=("everywhere", "fly"),
     ),
-    MASS: Field(
+    MASS: TermField(
         unit="1", step=0.5, words="more mass, as a share of the cloth's", shapes=(*_PLACES, *_STRIPES, *_BANDS)
     ),
 }
@@ -219,7 +223,7 @@ class Term:
         return f"{FIELDS[self.field].words}, {self.at.words}"
 
     @property
-    def at(self) -> Shape:
+    def at(self) -> TermShape:
         """Its shape."""
         return shape_named(self.shape)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from measure.propose.outcome import Outcome, Retest
+from measure.propose.outcome import ProposalOutcome, Retest
 from measure.verdict.record import Estimate
 
 _NEAREST = 4
 """Further terms that are listed."""
 
 
-def words(outcome: Outcome) -> str:
+def words(outcome: ProposalOutcome) -> str:
     """Describes what was tried, what was found, what became of it."""
     lines = [f"{outcome.decision.value}: {outcome.reason} ({outcome.tried} terms were tried; nulls: {outcome.nulls})"]
     for step in outcome.steps:

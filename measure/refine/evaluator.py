@@ -22,7 +22,7 @@ from flagdata.errors import CorruptError
 from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed
-from measure.refine.simulator import Request, Simulator
+from measure.refine.simulator import FilmRequest, Simulator
 from models.estimator import Estimator
 
 STAGES = ("simulate", "render", "embed")
@@ -97,15 +97,15 @@ class Evaluator:
         """Simulates all frames (frame, height, width) of one clip again; None where that fails."""
         return self.simulator.films([self._request(point.tolist(), replicate)])[0].clip
 
-    def _request(self, point: Iterable[float], replicate: int) -> Request:
+    def _request(self, point: Iterable[float], replicate: int) -> FilmRequest:
         rounded = tuple(round(float(value), _DECIMALS) + 0.0 for value in point)
-        return Request(
+        return FilmRequest(
             point=rounded,
             seed=child_seed(self.seed, "replicate", digest(repr(rounded)), replicate),
             replicate=replicate,
         )
 
-    def _simulated(self, requests: list[Request]) -> list[Evaluated]:
+    def _simulated(self, requests: list[FilmRequest]) -> list[Evaluated]:
         films = self.simulator.films(requests)
         clips = [film.clip for film in films if film.clip is not None]
         begun = time.perf_counter()
@@ -131,18 +131,18 @@ class Evaluator:
             rows.append(torch.cat(embedded, dim=1)[0].double().cpu().numpy())
         return np.stack(rows)
 
-    def _path(self, request: Request) -> Path | None:
+    def _path(self, request: FilmRequest) -> Path | None:
         if self.folder is None:
             return None
         return self.folder / self.identity[:32] / f"{digest(repr(request))[:32]}.npz"
 
-    def _cached(self, request: Request) -> Evaluated | None:
+    def _cached(self, request: FilmRequest) -> Evaluated | None:
         key, path = repr(request), self._path(request)
         if key not in self._kept and path is not None and path.exists():
             self._kept[key] = _read(path)
         return self._kept.get(key)
 
-    def _keep(self, request: Request, evaluated: Evaluated) -> None:
+    def _keep(self, request: FilmRequest, evaluated: Evaluated) -> None:
         self._kept[repr(request)] = evaluated
         path = self._path(request)
         if path is not None:

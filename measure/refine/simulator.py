@@ -42,7 +42,7 @@ START_NOISE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class FilmRequest:
     """A film to be made.
 
     Attributes:
@@ -57,7 +57,7 @@ class Request:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Film:
+class SimulatedFilm:
     """What became of a request.
 
     Attributes:
@@ -82,7 +82,7 @@ class Simulator:
         assets: textures and backgrounds.
     """
 
-    scenes: tuple[Scene, ...]
+    scenes: tuple[SimulatedScene, ...]
     view: View
     renderer: str = "raster"
     batch: int = 8
@@ -117,7 +117,7 @@ class Simulator:
                 fix="give scenes of the same ranges",
             )
         scenes = tuple(
-            Scene(replace(recipe, time=replace(recipe.time, frames=frames, rate=rate))) for recipe in several
+            SimulatedScene(replace(recipe, time=replace(recipe.time, frames=frames, rate=rate))) for recipe in several
         )
         return cls(scenes=scenes, view=view, renderer=renderer, batch=batch)
 
@@ -150,10 +150,10 @@ class Simulator:
         }
         return digest(canonical(ingredients))
 
-    def films(self, requests: Sequence[Request]) -> list[Film]:
+    def films(self, requests: Sequence[FilmRequest]) -> list[SimulatedFilm]:
         """Simulates, films and conditions requests, those of each scene in batches."""
         size = -(-self.batch // len(self.scenes))
-        films_made: dict[int, Film] = {}
+        films_made: dict[int, SimulatedFilm] = {}
         for number, scene in enumerate(self.scenes):
             of_scene = [
                 index for index, request in enumerate(requests) if request.replicate % len(self.scenes) == number
@@ -163,11 +163,11 @@ class Simulator:
                 films_made |= zip(part, self._batch(scene, [requests[index] for index in part], size=size), strict=True)
         return [films_made[index] for index in range(len(requests))]
 
-    def _batch(self, scene: Scene, requests: Sequence[Request], *, size: int) -> list[Film]:
+    def _batch(self, scene: SimulatedScene, requests: Sequence[FilmRequest], *, size: int) -> list[SimulatedFilm]:
         begun = time.perf_counter()
         outcomes = run(scene.crew, scene.stepper, [scene.member(request) for request in requests], size=size)
         share = (time.perf_counter() - begun) / len(requests)
-        films: list[Film] = []
+        films: list[SimulatedFilm] = []
         for request, outcome in zip(requests, outcomes, strict=True):
             begun, clip = time.perf_counter(), None
             if outcome.sequence is not None:
@@ -176,7 +176,7 @@ class Simulator:
                     rendered = self._renderer.render(Meshes.flag(outcome.sequence, heading=0.0), zeta)
                 filmed = camera.filmed(rendered.numpy(), seed=child_seed(request.seed, "camera"))
                 clip = FitFilm.of(filmed, np.arange(len(filmed)) / scene.recipe.time.rate).frames
-            films.append(Film(clip=clip, seconds={"simulate": share, "render": time.perf_counter() - begun}))
+            films.append(SimulatedFilm(clip=clip, seconds={"simulate": share, "render": time.perf_counter() - begun}))
         return films
 
     @cached_property
@@ -185,7 +185,7 @@ class Simulator:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class SimulatedScene:
     """A scene's recipe, and what is made of it once."""
 
     recipe: Recipe
@@ -202,7 +202,7 @@ class Scene:
     def stepper(self) -> Stepper:
         return Stepper.of(self.crew)
 
-    def member(self, request: Request) -> Member:
+    def member(self, request: FilmRequest) -> Member:
         """Makes the flag of a request."""
         values = self.space.values(np.array([request.point]))[0]
         scene = self._template.scene

@@ -27,7 +27,7 @@ DIMENSION = BENDING + 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quantity:
+class ReportedQuantity:
     """A quantity that is reported.
 
     Attributes:
@@ -44,16 +44,18 @@ class Quantity:
 
 
 QUANTITIES = (
-    Quantity(name="wind_speed", unit="m/s", about="wind speed", digits=2),
-    Quantity(name="density", unit="kg/m²", about="area weight", digits=3),
-    Quantity(name="bending_scale", unit="log10(N·m)", about="mean logarithm of the bending coefficients", digits=2),
-    Quantity(
+    ReportedQuantity(name="wind_speed", unit="m/s", about="wind speed", digits=2),
+    ReportedQuantity(name="density", unit="kg/m²", about="area weight", digits=3),
+    ReportedQuantity(
+        name="bending_scale", unit="log10(N·m)", about="mean logarithm of the bending coefficients", digits=2
+    ),
+    ReportedQuantity(
         name="anisotropy",
         unit="1",
         digits=2,
         about="mean logarithm of the coefficients along the warp less that of those along the weft",
     ),
-    Quantity(
+    ReportedQuantity(
         name="nonlinearity",
         unit="1",
         digits=2,

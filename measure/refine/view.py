@@ -31,7 +31,7 @@ _NAMED = "render."
 
 
 @dataclass(frozen=True, kw_only=True)
-class Camera:
+class FilmCamera:
     """The camera behind the picture: noise, then H.264.
 
     Attributes:
@@ -69,7 +69,7 @@ RANGES = {
 class View(Protocol):
     """Says by what ζ and camera a clip is filmed."""
 
-    def at(self, seed: int) -> tuple[RenderParameters, Camera]:
+    def at(self, seed: int) -> tuple[RenderParameters, FilmCamera]:
         """Returns ζ and the camera of the clip with this seed."""
         ...
 
@@ -84,9 +84,9 @@ class FixedView:
     """One ζ and camera for all clips, as the paper has it."""
 
     zeta: RenderParameters
-    camera: Camera
+    camera: FilmCamera
 
-    def at(self, seed: int) -> tuple[RenderParameters, Camera]:
+    def at(self, seed: int) -> tuple[RenderParameters, FilmCamera]:
         """Returns the same for every clip."""
         del seed
         return self.zeta, self.camera
@@ -103,9 +103,9 @@ class DrawnView:
     prior: RenderPrior
     assets: Assets
 
-    def at(self, seed: int) -> tuple[RenderParameters, Camera]:
+    def at(self, seed: int) -> tuple[RenderParameters, FilmCamera]:
         drawn = {name: entry.at(stream(seed, "camera", name).random()) for name, entry in RANGES.items()}
-        return self.prior.draw(child_seed(seed, "zeta"), self.assets), Camera(**drawn)
+        return self.prior.draw(child_seed(seed, "zeta"), self.assets), FilmCamera(**drawn)
 
     @property
     def identity(self) -> str:
@@ -135,4 +135,4 @@ def of_parameters(parameters: str | Mapping[str, Any], *, where: str) -> FixedVi
         for name, value in entries.items()
     }
     camera = {name: float(content[f"camera.{name}"]) for name in RANGES if f"camera.{name}" in content}
-    return FixedView(zeta=RenderParameters(**values), camera=Camera(**camera))
+    return FixedView(zeta=RenderParameters(**values), camera=FilmCamera(**camera))

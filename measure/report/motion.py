@@ -45,7 +45,7 @@ VIEW = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class MotionClip:
     """One recording's stretch, ready for the page.
 
     Attributes:
@@ -107,7 +107,7 @@ class Motion:
         }
 
 
-def motion(residual: Residual) -> Motion | None:
+def motion(residual: Residual) -> MotionClip | None:
     """Makes the stretch a residual holds, its markers thinned evenly; None where it holds none, or no times."""
     observed, before, after = (_array(p) for p in (residual.observed, residual.before, residual.after))
     rate = _rate(residual.times)
@@ -120,7 +120,7 @@ def motion(residual: Residual) -> Motion | None:
     centre = np.array([_centre(shown_positions[..., i]) for i in range(3)])
     shown_positions = shown_positions - centre
     first = before[part][:, chosen] - centre
-    return Motion(
+    return MotionClip(
         recording=residual.recording,
         held_out=residual.held_out,
         rate=rate,
@@ -137,7 +137,7 @@ def motion(residual: Residual) -> Motion | None:
     )
 
 
-def still(stretch: Motion, after_label: str) -> Markup:
+def still(stretch: MotionClip, after_label: str) -> Markup:
     """Draws the first frame as the player draws it: one panel a model, the observed cloth under the prediction.
 
     The view is from the side, turned and raised a little; `motion.js` uses the same projection.
@@ -162,7 +162,7 @@ def still(stretch: Motion, after_label: str) -> Markup:
     )
 
 
-def _wires(points: NDArray[np.float64], stretch: Motion, scale: float, centre: tuple[float, float]) -> str:
+def _wires(points: NDArray[np.float64], stretch: MotionClip, scale: float, centre: tuple[float, float]) -> str:
     """Writes path data of the edges between markers (marker, xyz), as seen from `stretch.azimuth` and `ELEVATION`."""
     x, y, z = points.T
     right = x * math.cos(stretch.azimuth) + y * math.sin(stretch.azimuth)

@@ -201,7 +201,7 @@ def _residuals(residuals: tuple[Residual, ...], after_label: str) -> dict[str, A
     }
 
 
-def _motions(motions: list[motion.Motion], after_label: str) -> dict[str, Any]:
+def _motions(motions: list[motion.MotionClip], after_label: str) -> dict[str, Any]:
     """Returns the player's data, unseen recordings first."""
     ordered = sorted(motions, key=lambda m: not m.held_out)
     stills = [motion.still(m, after_label) for m in ordered]

@@ -11,12 +11,12 @@ import numpy as np
 from measure.forecasting.regressors import FieldColumn, library
 from measure.forecasting.segments import Cut
 from measure.loop.corrective_field import Mode
-from measure.loop.run import Outcome
+from measure.loop.run import LoopOutcome
 from measure.nulls import bank as banks
 from measure.nulls.conformal import MOST_KINDS
 from measure.observe.trajectory import Experiment, Specimen
 from measure.probes.course import ALONG, LEFT, Variation
-from measure.probes.lines import STROUHAL, Line
+from measure.probes.lines import STROUHAL, SpectralLine
 from measure.report.lead import lead
 from measure.report.sentences import listed
 from measure.verdict.criteria import CRITERIA
@@ -45,7 +45,7 @@ _ROUGH = 0.1
 _AXES = ("along the wind", "across the wind", "up")
 
 
-def with_sentences(outcome: Outcome) -> Verdict:
+def with_sentences(outcome: LoopOutcome) -> Verdict:
     """States the verdict of an outcome, with all that it says in sentences."""
     verdict, experiment = outcome.verdict, outcome.experiment
     parts = [lead(verdict), *by_draw(verdict.test), *bounds(outcome.at_bounds), *ratios(experiment)]
@@ -58,7 +58,7 @@ def with_sentences(outcome: Outcome) -> Verdict:
     )
 
 
-def _lacking(outcome: Outcome) -> str:
+def _lacking(outcome: LoopOutcome) -> str:
     """Describes what the library lacks, where it has no answer or half of one."""
     if not outcome.field:
         return ""
@@ -137,7 +137,7 @@ def proposal(modes: Sequence[Mode], *, is_all: bool = True) -> str:
     return f"The smooth force field that {fitted}, per mass: {'; '.join(terms)}."
 
 
-def shedding(line: Line) -> str:
+def shedding(line: SpectralLine) -> str:
     """Describes a line of the errors' spectra."""
     return (
         f"The errors oscillate {_AXES[line.axis]} at {line.reduced:.2g} Hz for each m/s of wind, as vortices behind a "

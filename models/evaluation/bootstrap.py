@@ -21,7 +21,7 @@ DRAWS = 2000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class ScoreEstimate:
     """A score and its interval.
 
     Attributes:
@@ -105,13 +105,13 @@ def ratio(upper: NDArray[np.float64], lower: NDArray[np.float64]) -> NDArray[np.
     return np.divide(upper, lower, out=np.full(np.shape(upper), np.nan), where=lower > 0)
 
 
-def estimate(values: NDArray[np.float64], *, clips: int, groups: int) -> Estimate:
+def estimate(values: NDArray[np.float64], *, clips: int, groups: int) -> ScoreEstimate:
     """Returns the interval of values (1 + draws,), of which the first is the data's.
 
     Draws in which the score is undefined (none of a bin's groups occurs) are left out.
     """
     drawn = values[1:][np.isfinite(values[1:])]
     if groups < 2 or drawn.size == 0:
-        return Estimate(value=float(values[0]), low=math.nan, high=math.nan, clips=clips, groups=groups)
+        return ScoreEstimate(value=float(values[0]), low=math.nan, high=math.nan, clips=clips, groups=groups)
     low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return Estimate(value=float(values[0]), low=float(low), high=float(high), clips=clips, groups=groups)
+    return ScoreEstimate(value=float(values[0]), low=float(low), high=float(high), clips=clips, groups=groups)

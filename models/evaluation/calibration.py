@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from flagdata.errors import InputError
-from models.evaluation.bootstrap import Estimate, Resamples, estimate
+from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate
 from models.evaluation.predictions import Predictions
 
 LEVELS = (0.50, 0.80, 0.90)
@@ -58,7 +58,7 @@ class Coverage:
     """Share of truths within intervals of a nominal level."""
 
     level: float
-    share: Estimate
+    share: ScoreEstimate
 
 
 @dataclass(frozen=True, kw_only=True)

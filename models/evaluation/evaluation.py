@@ -18,7 +18,7 @@ from models.evaluation.curves import FramesPoint, LearningPoint
 from models.evaluation.linear import Readout
 from models.evaluation.predictions import WIND, Predictions
 from models.evaluation.scores import BinError, error_against
-from models.evaluation.tsne import Layout, layout
+from models.evaluation.tsne import TsneLayout, layout
 
 SCHEMA = "flagdata.evaluation/1"
 _LEVELS = tuple(sorted({*CURVE, *LEVELS}))
@@ -34,7 +34,7 @@ class WindError:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Calibration:
+class CalibrationCurve:
     """How far a model's distributions of one target are to be believed."""
 
     label: str
@@ -87,12 +87,12 @@ class Evaluation:
     reference: str | None
     differences: tuple[table.Difference, ...]
     wind_errors: tuple[WindError, ...]
-    calibrations: tuple[Calibration, ...]
+    calibrations: tuple[CalibrationCurve, ...]
     expected: tuple[Expected, ...]
     learning: tuple[LearningPoint, ...]
     frames: tuple[FramesPoint, ...]
     reads: tuple[Read, ...]
-    layout: Layout | None
+    layout: TsneLayout | None
     findings: tuple[Finding, ...]
 
 
@@ -166,7 +166,7 @@ def evaluate(
             WindError(label=label, bins=error_against(of, WIND, resamples)) for label, of in with_wind.items()
         ),
         calibrations=tuple(
-            Calibration(
+            CalibrationCurve(
                 label=label,
                 target=target,
                 curve=coverage(of, target, resamples, levels=_LEVELS),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding
-from models.evaluation.bootstrap import Estimate, Resamples, estimate
+from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate
 from models.evaluation.scores import SCORES
 
 COMPONENTS = 50
@@ -38,7 +38,7 @@ class Readout:
     targets: tuple[str, ...]
     truth: Array
     predicted: Array
-    pearson: tuple[Estimate, ...]
+    pearson: tuple[ScoreEstimate, ...]
     components: int
     findings: tuple[Finding, ...]
 

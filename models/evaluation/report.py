@@ -30,8 +30,8 @@ from models.evaluation import paper, table
 from models.evaluation.bootstrap import LEVEL
 from models.evaluation.calibration import BAND, CURVE, LEVELS, Coverage
 from models.evaluation.curves import FramesPoint, LearningPoint
-from models.evaluation.evaluation import Calibration, Evaluation, Expected, WindError, as_document
-from models.evaluation.tsne import Layout
+from models.evaluation.evaluation import CalibrationCurve, Evaluation, Expected, WindError, as_document
+from models.evaluation.tsne import TsneLayout
 
 _INK, _QUIET, _RULE = "#1c2326", "#56646b", "#d5dbde"
 _SERIES = ("#1f6f9c", "#b4531a", "#7a4a9a", "#2f8068", "#97700d", "#a8402d", "#5b6fb8", "#a84a7e", "#58702a", "#6b5848")
@@ -134,7 +134,7 @@ def error_against_wind(errors: Sequence[WindError]) -> Markup:
         return _svg(figure, "wind")
 
 
-def calibration(curves: Sequence[Calibration], expected: Sequence[Expected]) -> Markup:
+def calibration(curves: Sequence[CalibrationCurve], expected: Sequence[Expected]) -> Markup:
     """Draws covered over nominal shares: a panel a target, and one for all targets together."""
     targets = list(dict.fromkeys(curve.target for curve in curves))
     look = _look(curve.label for curve in curves)
@@ -178,7 +178,7 @@ def _coverage(axes: Axes, label: str, curve: tuple[Coverage, ...], look: Look) -
     )
 
 
-def ranks(curves: Sequence[Calibration]) -> Markup:
+def ranks(curves: Sequence[CalibrationCurve]) -> Markup:
     """Draws rank histograms, a row a model, a panel a target, with the band of a calibrated model."""
     labels = list(dict.fromkeys(curve.label for curve in curves))
     columns = max(sum(curve.label == label for curve in curves) for label in labels)
@@ -246,7 +246,7 @@ def frames(points: Sequence[FramesPoint]) -> Markup:
         return _svg(figure, "frames")
 
 
-def t_sne(layout: Layout) -> Markup:
+def t_sne(layout: TsneLayout) -> Markup:
     """Draws the embedding in the plane with the true wind as colour."""
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(6.2, 5.0), layout="constrained", dpi=150)
@@ -262,7 +262,7 @@ _COMMAND = "evaluate"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class TableLine:
     """A row of a table for people: cells as lines, the value first; `run` marks one run of the model above."""
 
     cells: tuple[tuple[str, ...], ...]
@@ -274,7 +274,7 @@ class Grid:
     """A table for people."""
 
     head: tuple[str, ...]
-    body: tuple[Line, ...]
+    body: tuple[TableLine, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -374,7 +374,7 @@ def _models(evaluation: Evaluation) -> Grid:
     return Grid(
         head=tuple(column.heading for column in table.COLUMNS),
         body=tuple(
-            Line(cells=tuple(column.cell(row) for column in table.COLUMNS), run=row.run is not None)
+            TableLine(cells=tuple(column.cell(row) for column in table.COLUMNS), run=row.run is not None)
             for row in evaluation.rows
         ),
     )
@@ -385,7 +385,7 @@ def _paper(evaluation: Evaluation) -> Grid:
     return Grid(
         head=("model, quoted", "input", "RMSE", "bound", "Acc@0.5", ""),
         body=tuple(
-            Line(
+            TableLine(
                 cells=(
                     (row.model,),
                     (row.input_size,),
@@ -432,7 +432,9 @@ def _differences(evaluation: Evaluation) -> Grid | None:
 
     return Grid(
         head=("model", *(_METRICS[name] for name in metrics)),
-        body=tuple(Line(cells=((label,), *(cell(of, name) for name in metrics))) for label, of in by_model.items()),
+        body=tuple(
+            TableLine(cells=((label,), *(cell(of, name) for name in metrics))) for label, of in by_model.items()
+        ),
     )
 
 
@@ -445,7 +447,7 @@ def _targets(evaluation: Evaluation) -> Grid:
 
     return Grid(
         head=("target", "model", *_SCORES.values()),
-        body=tuple(Line(cells=((row.target,), (row.label,), *cells(row))) for row in ordered),
+        body=tuple(TableLine(cells=((row.target,), (row.label,), *cells(row))) for row in ordered),
     )
 
 
@@ -455,7 +457,7 @@ def _linear(evaluation: Evaluation) -> Grid | None:
     return Grid(
         head=("model", "data", "components", "quantity", "Pearson r"),
         body=tuple(
-            Line(cells=((of.label,), (of.data,), (str(of.readout.components),), (target,), table.cell(r, 3)))
+            TableLine(cells=((of.label,), (of.data,), (str(of.readout.components),), (target,), table.cell(r, 3)))
             for of in evaluation.reads
             for target, r in zip(of.readout.targets, of.readout.pearson, strict=True)
         ),
@@ -468,7 +470,7 @@ def _learning(evaluation: Evaluation) -> Grid | None:
     return Grid(
         head=("model", "sequences", "wind RMSE [m/s]"),
         body=tuple(
-            Line(cells=((p.label,), (f"{p.sequences:,}",), _ends(p.rmse, p.interval))) for p in evaluation.learning
+            TableLine(cells=((p.label,), (f"{p.sequences:,}",), _ends(p.rmse, p.interval))) for p in evaluation.learning
         ),
     )
 
@@ -477,10 +479,12 @@ def _frames(evaluation: Evaluation) -> Grid | None:
     if not evaluation.frames:
         return None
     quoted = tuple(
-        Line(cells=(("SDN, quoted from the paper",), (str(size),), (f"{accuracy:.3f}",)))
+        TableLine(cells=(("SDN, quoted from the paper",), (str(size),), (f"{accuracy:.3f}",)))
         for size, accuracy in paper.TRIPLETS
     )
-    ours = tuple(Line(cells=((p.label,), (str(p.frames),), _ends(p.accuracy, p.interval))) for p in evaluation.frames)
+    ours = tuple(
+        TableLine(cells=((p.label,), (str(p.frames),), _ends(p.accuracy, p.interval))) for p in evaluation.frames
+    )
     return Grid(head=("model", "frames", "triplet accuracy"), body=(*ours, *quoted))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from models.evaluation.bootstrap import Estimate, Resamples, estimate, ratio
+from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate, ratio
 from models.evaluation.predictions import Predictions
 
 TOLERANCE = 0.5
@@ -107,8 +107,8 @@ class BinError:
 
     low: float
     high: float
-    rmse: Estimate
-    bias: Estimate
+    rmse: ScoreEstimate
+    bias: ScoreEstimate
 
 
 def error_against(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from models.evaluation.bootstrap import LEVEL, Estimate, Resamples, estimate
+from models.evaluation.bootstrap import LEVEL, Resamples, ScoreEstimate, estimate
 from models.evaluation.calibration import LEVELS, coverage_values
 from models.evaluation.predictions import DENSITY, WIND, Predictions
 from models.evaluation.scores import SCORES, rmse_bound
@@ -45,7 +45,7 @@ class Row:
     label: str
     run: int | None
     runs: int
-    scores: dict[str, Estimate]
+    scores: dict[str, ScoreEstimate]
     spread: dict[str, tuple[float, float]]
     bound: float | None
     parameters: int
@@ -73,7 +73,7 @@ class TargetRow:
 
     label: str
     target: str
-    scores: dict[str, Estimate]
+    scores: dict[str, ScoreEstimate]
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
@@ -88,7 +88,7 @@ class Difference:
     label: str
     reference: str
     metric: str
-    difference: Estimate
+    difference: ScoreEstimate
 
     @property
     def apart(self) -> bool:
@@ -276,7 +276,7 @@ def differences(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
+class TableColumn:
     """A column of the table: its heading, and its cell of a row as lines: the value first, what belongs to it below."""
 
     heading: str
@@ -293,7 +293,7 @@ def digits(error: float) -> int:
     return max(3, 2 - math.floor(math.log10(error))) if error > 0 else 3
 
 
-def cell(score: Estimate | None, digits: int) -> tuple[str, ...]:
+def cell(score: ScoreEstimate | None, digits: int) -> tuple[str, ...]:
     """Formats a value, and its interval where it has one."""
     if score is None:
         return (_NONE,)
@@ -329,17 +329,17 @@ def _coverage(row: Row) -> tuple[str, ...]:
 
 
 COLUMNS = (
-    Column(heading="model", cell=_model),
-    Column(heading="wind RMSE [m/s]", cell=_scored("rmse", 3)),
-    Column(heading="bound", cell=lambda row: (_NONE if row.bound is None else f"≥ {number(row.bound, 3)}",)),
-    Column(heading="Acc@0.5", cell=_scored("accuracy", 3)),
-    Column(heading="wind bias [m/s]", cell=_scored("bias", 3)),
-    Column(heading="area weight error / spread", cell=_scored("density_error", 3)),
-    Column(heading="wind covered [%] at 50 / 80 / 90", cell=_coverage),
-    Column(heading="triplet accuracy", cell=_scored("triplets", 3)),
-    Column(heading="parameters", cell=lambda row: (f"{row.parameters:,}",)),
-    Column(heading="ms a clip", cell=lambda row: (number(row.milliseconds, 1),)),
-    Column(heading="note", cell=lambda row: (row.note or _NONE,)),
+    TableColumn(heading="model", cell=_model),
+    TableColumn(heading="wind RMSE [m/s]", cell=_scored("rmse", 3)),
+    TableColumn(heading="bound", cell=lambda row: (_NONE if row.bound is None else f"≥ {number(row.bound, 3)}",)),
+    TableColumn(heading="Acc@0.5", cell=_scored("accuracy", 3)),
+    TableColumn(heading="wind bias [m/s]", cell=_scored("bias", 3)),
+    TableColumn(heading="area weight error / spread", cell=_scored("density_error", 3)),
+    TableColumn(heading="wind covered [%] at 50 / 80 / 90", cell=_coverage),
+    TableColumn(heading="triplet accuracy", cell=_scored("triplets", 3)),
+    TableColumn(heading="parameters", cell=lambda row: (f"{row.parameters:,}",)),
+    TableColumn(heading="ms a clip", cell=lambda row: (number(row.milliseconds, 1),)),
+    TableColumn(heading="note", cell=lambda row: (row.note or _NONE,)),
 )
 LEGEND = (
     f"Brackets: {100 * LEVEL:.0f} % intervals, sequences drawn with replacement; of several runs they are the mean's "

@@ -22,7 +22,7 @@ CLIPS = 2000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Layout:
+class TsneLayout:
     """Places (n, 2) of clips in the plane and their true wind (n,) [m/s], of `clips` that were tested."""
 
     label: str
@@ -31,7 +31,7 @@ class Layout:
     clips: int
 
 
-def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXITY, most: int = CLIPS) -> Layout:
+def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXITY, most: int = CLIPS) -> TsneLayout:
     """Lays out the embedding of a model; the same for one seed.
 
     Args:
@@ -72,4 +72,4 @@ def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXIT
         random_state=rng.child_seed(seed, "evaluation", "t-sne", "optimiser") % 2**32,
     )
     places = optimiser.fit_transform(predictions.embedding[chosen]).astype(np.float64)
-    return Layout(label=predictions.label, places=places, wind=wind[chosen], clips=predictions.clips)
+    return TsneLayout(label=predictions.label, places=places, wind=wind[chosen], clips=predictions.clips)

@@ -24,7 +24,7 @@ from flagdata.lake.durable import flush_file
 from flagdata.locks import LOCK
 from models.learner import Learner
 from models.storage import CARD, WEIGHTS, read_card, read_tensors, write_card, write_tensors
-from models.training.progress import Course
+from models.training.progress import LossCourse
 
 _LOG = logging.getLogger("flagdata")
 _ANEW = "restore the folder from a copy, or delete all checkpoints beside it to train from the beginning"
@@ -50,7 +50,7 @@ class Standing:
     learner: Learner
     best: dict[str, Tensor] | None
     optimiser: torch.optim.Optimizer
-    course: Course
+    course: LossCourse
     batches: dict[str, Any]
     running: tuple[float, int] = (0.0, 0)
 
@@ -161,7 +161,7 @@ def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
         standing.best = read_tensors(folder / _BEST) if (folder / _BEST).exists() else None
         if standing.best is not None:
             copy.deepcopy(standing.learner).load_state_dict(standing.best)  # it is needed at the training's end
-        standing.course = Course.of(card["course"])
+        standing.course = LossCourse.of(card["course"])
         standing.batches = dict(card["batches"])
         standing.running = (float(card["running"][0]), int(card["running"][1]))
     except (KeyError, TypeError, ValueError, RuntimeError, IndexError, OverflowError, AttributeError) as error:

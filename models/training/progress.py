@@ -37,7 +37,7 @@ _KINDS: dict[str, Callable[[Any], Any]] = {
 
 
 @dataclass(kw_only=True)
-class Course:
+class LossCourse:
     """Attributes:
     epochs: that were completed.
     """
@@ -58,7 +58,7 @@ class Course:
         return [asdict(epoch) for epoch in self.epochs]
 
     @classmethod
-    def of(cls, content: list[dict[str, Any]]) -> Course:
+    def of(cls, content: list[dict[str, Any]]) -> LossCourse:
         """Rebuilds a course from `as_list`.
 
         Raises:

@@ -33,12 +33,12 @@ from models.learner import Learner, Loss
 from models.training import checkpoint
 from models.training.checkpoint import Standing
 from models.training.inputs import Prepared
-from models.training.progress import Course, Epoch
+from models.training.progress import Epoch, LossCourse
 from models.training.recipe import OptimiserSpec, Precision, Schedule, TrainingRecipe
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Batch:
+class TrainingBatch:
     """Attributes:
     inputs: (n, *shape) float32.
     entries: (n,) which.
@@ -88,14 +88,14 @@ class Batches:
         """Batches of an epoch."""
         return len(self.prepared) // self.size
 
-    def __iter__(self) -> Iterator[Batch]:
+    def __iter__(self) -> Iterator[TrainingBatch]:
         """Yields what is left of the epoch."""
         order, variant = self._order(self.epoch)
         part = self.size // self.share[1]
         while True:
             begin = self.cursor * self.size + self.share[0] * part
             entries = order[begin : begin + part]
-            batch = Batch(
+            batch = TrainingBatch(
                 inputs=self.prepared.batch(entries, variant[entries]),
                 entries=entries,
                 sequence=torch.from_numpy(self.prepared.sequence[entries]),
@@ -192,7 +192,7 @@ class Trained:
     """
 
     learner: Learner
-    course: Course
+    course: LossCourse
     seconds: float
 
 
@@ -232,7 +232,9 @@ class Training:
         values = self._values(self.train, learner)
         self._values(self.validation, learner)  # what cannot be learned is refused before the first step
         optimiser = torch.optim.Adam(learner.parameters(), lr=spec.rate, weight_decay=spec.decay)
-        standing = Standing(learner=learner, best=None, optimiser=optimiser, course=Course(), batches=batches.state())
+        standing = Standing(
+            learner=learner, best=None, optimiser=optimiser, course=LossCourse(), batches=batches.state()
+        )
         if checkpoint.restore(self.run, standing, identity=self.identity):
             batches.take_up(standing.batches)
         module = _Loss(learner)
@@ -325,7 +327,7 @@ class Training:
         standing.running, standing.batches = (0.0, 0), batches.state()
         self._save(standing)
 
-    def _step(self, standing: Standing, stepped: nn.Module, batch: Batch, values: Tensor, rate: float) -> float:
+    def _step(self, standing: Standing, stepped: nn.Module, batch: TrainingBatch, values: Tensor, rate: float) -> float:
         """Takes a step on one batch; returns its loss."""
         optimiser, spec = standing.optimiser, self.recipe.optimiser
         for group in optimiser.param_groups:

@@ -21,7 +21,7 @@ from sim.assets.photos import Photos
 PHOTO = "photo"
 
 
-class Kind(Protocol):
+class AssetKind(Protocol):
     """A family of pictures."""
 
     def draw(self, rng: np.random.Generator) -> str:

@@ -23,7 +23,7 @@ _FINE = 4  # sub-samples of a pixel in each direction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sheet:
+class FlagSheet:
     """A drawing of height 1: x to the right and y downwards from the upper left corner.
 
     Attributes:
@@ -35,7 +35,7 @@ class Sheet:
     colours: list[str]
 
     @classmethod
-    def blank(cls, *, rows: int, columns: int, colour: str) -> Sheet:
+    def blank(cls, *, rows: int, columns: int, colour: str) -> FlagSheet:
         """Makes a sheet of one colour."""
         return cls(fine=np.zeros((rows * _FINE, columns * _FINE), dtype=np.uint8), colours=[colour])
 
@@ -129,16 +129,16 @@ class NationalFlag:
 
     country: str
     source: str
-    draw: Callable[[Sheet], None]
+    draw: Callable[[FlagSheet], None]
 
 
-def _chile(sheet: Sheet) -> None:
+def _chile(sheet: FlagSheet) -> None:
     sheet.box(0, 0.5, 1.5, 0.5, "#d52b1e")
     sheet.box(0, 0, 0.5, 0.5, "#0039a6")
     sheet.star(0.25, 0.25, 0.125, _WHITE)
 
 
-def _china(sheet: Sheet) -> None:
+def _china(sheet: FlagSheet) -> None:
     unit = 1 / 20  # the upper hoist quarter is 15 by 10 units
     red, yellow = "#ee1c25", "#ffff00"
     sheet.fill(red)
@@ -148,16 +148,16 @@ def _china(sheet: Sheet) -> None:
         sheet.star(column * unit, row * unit, unit, yellow, points_to=towards)
 
 
-def _czechia(sheet: Sheet) -> None:
+def _czechia(sheet: FlagSheet) -> None:
     sheet.box(0, 0.5, 1.5, 0.5, "#d7141a")
     sheet.polygon([(0, 0), (0.75, 0.5), (0, 1)], "#11457e")
 
 
-def _france(sheet: Sheet) -> None:
+def _france(sheet: FlagSheet) -> None:
     _upright_thirds(sheet, "#000091", _WHITE, "#e1000f")
 
 
-def _greece(sheet: Sheet) -> None:
+def _greece(sheet: FlagSheet) -> None:
     blue, stripe = "#0d5eaf", 1 / 9
     for index in range(0, 9, 2):
         sheet.box(0, index * stripe, 1.5, stripe, blue)
@@ -166,20 +166,20 @@ def _greece(sheet: Sheet) -> None:
     sheet.box(2 * stripe, 0, stripe, 5 * stripe, _WHITE)
 
 
-def _italy(sheet: Sheet) -> None:
+def _italy(sheet: FlagSheet) -> None:
     _upright_thirds(sheet, "#008c45", "#f4f5f0", "#cd212a")
 
 
-def _japan(sheet: Sheet) -> None:
+def _japan(sheet: FlagSheet) -> None:
     sheet.disc(0.75, 0.5, 0.3, "#bc002d")
 
 
-def _netherlands(sheet: Sheet) -> None:
+def _netherlands(sheet: FlagSheet) -> None:
     sheet.box(0, 0, 1.5, 1 / 3, "#ae1c28")
     sheet.box(0, 2 / 3, 1.5, 1 / 3, "#21468b")
 
 
-def _south_africa(sheet: Sheet) -> None:
+def _south_africa(sheet: FlagSheet) -> None:
     triangle = [(0.0, 0.0), (0.75, 0.5), (0.0, 1.0)]
     sheet.box(0, 0, 1.5, 0.5, "#e03c31")
     sheet.box(0, 0.5, 1.5, 0.5, "#001489")
@@ -207,7 +207,7 @@ def _arm(half: float, mirrored: bool) -> list[tuple[float, float]]:
     return [(x, 1 - y) for x, y in corners] if mirrored else corners
 
 
-def _south_korea(sheet: Sheet) -> None:
+def _south_korea(sheet: FlagSheet) -> None:
     red, blue, black = "#cd2e3a", "#0047a0", "#000000"
     diagonal = math.atan2(2, 3)
     to_upper_hoist = sheet.turned(0.75, 0.5, math.pi + diagonal)  # its x axis runs to that corner, y to the right of it
@@ -231,7 +231,7 @@ def _south_korea(sheet: Sheet) -> None:
             sheet.where(bar & (np.abs(across) >= (0.25 / 24 if gap else 0.0)), black)
 
 
-def _turkey(sheet: Sheet) -> None:
+def _turkey(sheet: FlagSheet) -> None:
     red = "#e30a17"
     sheet.fill(red)
     sheet.disc(0.5, 0.5, 0.25, _WHITE)
@@ -240,12 +240,12 @@ def _turkey(sheet: Sheet) -> None:
     sheet.star(inner_edge + 1 / 3 + 0.125, 0.5, 0.125, _WHITE, points_to=math.pi)
 
 
-def _ukraine(sheet: Sheet) -> None:
+def _ukraine(sheet: FlagSheet) -> None:
     sheet.fill("#0057b7")
     sheet.box(0, 0.5, 1.5, 0.5, "#ffd700")
 
 
-def _upright_thirds(sheet: Sheet, hoist: str, middle: str, fly: str) -> None:
+def _upright_thirds(sheet: FlagSheet, hoist: str, middle: str, fly: str) -> None:
     sheet.fill(middle)
     sheet.box(0, 0, 0.5, 1, hoist)
     sheet.box(1, 0, 0.5, 1, fly)
@@ -308,7 +308,7 @@ class _National:
 
 @functools.cache
 def _painted(name: str) -> NDArray[np.uint8]:
-    sheet = Sheet.blank(rows=ROWS, columns=ROWS * 3 // 2, colour=_WHITE)
+    sheet = FlagSheet.blank(rows=ROWS, columns=ROWS * 3 // 2, colour=_WHITE)
     FLAGS[name].draw(sheet)
     image = sheet.bytes()
     image.setflags(write=False)

@@ -125,8 +125,8 @@ class BackwardEuler:
         if system.clamped:
             v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)
         mass = cloth.mass.unsqueeze(1)
-        faces = membrane.Linearised.at(cloth, x)
-        folds = bending.Linearised.at(cloth, x) if len(cloth.hinges) else None
+        faces = membrane.LinearisedMembrane.at(cloth, x)
+        folds = bending.LinearisedBending.at(cloth, x) if len(cloth.hinges) else None
         factor = h * (h + cloth.damping)
         tied = system.tied(time, x)
         normals = mean_normals(cloth, x) if system.loads else None
@@ -196,11 +196,11 @@ class BackwardEuler:
         return State(position=x, velocity=v, time=state.time + h, memory=memory)
 
 
-def _contacts(system: System, position: Tensor, velocity: Tensor) -> contact.Linearised | None:
+def _contacts(system: System, position: Tensor, velocity: Tensor) -> contact.LinearisedContact | None:
     if system.contact is None:
         return None
     pairs = contact.candidates(system.cloth, system.contact, position, system.neighbours)
-    return contact.Linearised.at(system.cloth, system.contact, position, velocity, pairs)
+    return contact.LinearisedContact.at(system.cloth, system.contact, position, velocity, pairs)
 
 
 def conjugate_gradients(

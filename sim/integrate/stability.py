@@ -54,7 +54,7 @@ def _stiffest_stretched(system: System, stretch: float) -> Tensor:
     cloth = system.cloth
     flat = torch.as_tensor(cloth.mesh.rest * stretch, dtype=cloth.dtype, device=cloth.device)
     position = torch.nn.functional.pad(flat, (0, 1)).unsqueeze(-1).repeat(1, 1, cloth.batch)
-    at = membrane.Linearised.at(cloth, position)
+    at = membrane.LinearisedMembrane.at(cloth, position)
     largest = cloth.samples.reshape(len(cloth.samples), -1, 4).amax(1)[cloth.table_of]
     k0, k1, k2, k3 = (largest[:, i].expand_as(k) for i, k in enumerate(at.k))
     area = cloth.areas[:, None]
@@ -65,7 +65,7 @@ def _stiffest_stretched(system: System, stretch: float) -> Tensor:
         tension_u=(area * (k0 * g00 + k1 * g11)).unsqueeze(1),
         tension_v=(area * (k2 * g11 + k1 * g00)).unsqueeze(1),
     )
-    folds = bending.Linearised.at(cloth, position)
+    folds = bending.LinearisedBending.at(cloth, position)
     bend = torch.tensor([float(m.bending.max()) for m in cloth.materials], dtype=cloth.dtype, device=cloth.device)
     bend = bend if cloth.stiffening is None else bend * (1 + cloth.stiffening)
     folds = replace(folds, k=(cloth.hinge_shape[:, None] / 2 * bend).expand_as(folds.k))

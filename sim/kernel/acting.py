@@ -31,7 +31,7 @@ class Kind(IntEnum):
 _FORCES = (Kind.FACE_FORCE, Kind.SHEET_FORCE, Kind.HINGE_MOMENT)
 
 
-class Entry(ctypes.Structure):
+class ActingEntry(ctypes.Structure):
     """Mirrors `Effect` of problem.hpp field by field."""
 
     _fields_ = [
@@ -55,13 +55,13 @@ class Acting:
         tensors: what the entries point to, kept alive here.
     """
 
-    entries: Sequence[Entry]
+    entries: Sequence[ActingEntry]
     remembering: int
     tensors: list[Tensor] = field(repr=False)
 
-    def with_memory(self, memory: Sequence[Tensor]) -> ctypes.Array[Entry]:
+    def with_memory(self, memory: Sequence[Tensor]) -> ctypes.Array[ActingEntry]:
         """Returns the entries with what forces remember, which is changed in place and must outlive the entries."""
-        array = (Entry * len(self.entries))(*self.entries)
+        array = (ActingEntry * len(self.entries))(*self.entries)
         for entry, past in zip(array[len(array) - self.remembering :], memory, strict=True):
             entry.memory = past.data_ptr()
         return array
@@ -77,7 +77,7 @@ def acting(system: System, kind: str, pack: Callable[[Tensor], Tensor]) -> Actin
     Raises:
         UsageError: C++ of a kind that does not fit where the effect enters the equations.
     """
-    entries: list[Entry] = []
+    entries: list[ActingEntry] = []
     tensors: list[Tensor] = []
     for part, fitting in _parts(system):
         built = None if part is None else _compiled(part, system.cloth, kind, fitting)
@@ -87,7 +87,7 @@ def acting(system: System, kind: str, pack: Callable[[Tensor], Tensor]) -> Actin
         cloth = system.cloth
         numbers = [torch.as_tensor(n, dtype=cloth.dtype).expand(cloth.batch) for n in given.numbers]
         numbers = pack(torch.stack(numbers) if numbers else cloth.mass[:0])
-        entry = Entry(kind=number, act=act, numbers=numbers.shape[1], number=numbers.data_ptr())
+        entry = ActingEntry(kind=number, act=act, numbers=numbers.shape[1], number=numbers.data_ptr())
         tensors.append(numbers)
         if given.own is not None:
             of_elements = pack(given.own)

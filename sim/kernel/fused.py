@@ -17,7 +17,7 @@ from torch import Tensor
 from sim.cloth import Cloth
 from sim.compiler import library
 from sim.contact import Contact, layers
-from sim.kernel.acting import Acting, Entry, acting
+from sim.kernel.acting import Acting, ActingEntry, acting
 from sim.limits import chebyshev_weights
 from sim.system import Drive, System
 from sim.tables import Evaluation
@@ -100,7 +100,7 @@ class _Problem(ctypes.Structure):
         ("ends", _Ends),
         *((name, ctypes.c_void_p) for name in _BLOCKED),
         ("effects", ctypes.c_int64),
-        ("effect", ctypes.POINTER(Entry)),
+        ("effect", ctypes.POINTER(ActingEntry)),
     ]
 
 

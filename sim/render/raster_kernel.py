@@ -14,7 +14,7 @@ from sim.render.light import Light
 from sim.render.shadow import SIZE, basis
 from sim.render.stage import POLE_ALBEDO
 from sim.render.texture import Pyramid
-from sim.render.view import View
+from sim.render.view import RasterView
 
 _COUNTS = ("frames", "width", "height", "vertices", "pole_start", "levels", "suns", "map")
 _POINTERS = (
@@ -65,7 +65,7 @@ def library() -> ctypes.CDLL | None:
 
 
 def add_sample(
-    code: ctypes.CDLL, out: Tensor, geometry: Geometry, *, view: View, light: Light, pyramid: Pyramid
+    code: ctypes.CDLL, out: Tensor, geometry: Geometry, *, view: RasterView, light: Light, pyramid: Pyramid
 ) -> None:
     """Adds a sample as `raster_torch.add_sample`, on the CPU."""
     places, depth = view.project(geometry.positions)

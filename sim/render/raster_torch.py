@@ -13,7 +13,7 @@ from sim.render.light import Light
 from sim.render.shadow import ShadowMaps
 from sim.render.stage import POLE_ALBEDO
 from sim.render.texture import Pyramid
-from sim.render.view import View
+from sim.render.view import RasterView
 
 _BITS = 32
 _LAST = (1 << 31) - 1
@@ -30,7 +30,7 @@ class _Visible:
     image_area: Tensor
 
 
-def add_sample(out: Tensor, geometry: Geometry, *, view: View, light: Light, pyramid: Pyramid) -> None:
+def add_sample(out: Tensor, geometry: Geometry, *, view: RasterView, light: Light, pyramid: Pyramid) -> None:
     """Adds one sample's share to all frames.
 
     Args:
@@ -63,7 +63,7 @@ def add_sample(out: Tensor, geometry: Geometry, *, view: View, light: Light, pyr
     out.view(-1, 4).index_add_(0, visible.pixel, radiance)
 
 
-def _visible(geometry: Geometry, view: View) -> _Visible:
+def _visible(geometry: Geometry, view: RasterView) -> _Visible:
     x, camera = geometry.positions, view.camera
     size = camera.width * camera.height
     places, depth = view.project(x)

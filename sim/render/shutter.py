@@ -15,7 +15,7 @@ _INWARD = 1e-5  # share by which a material point on the very edge is moved towa
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class VertexMotion:
     """Where vertices are around the instants of their frames.
 
     Positions are linear in time between frames, and go on at the same velocity before the first and after the last one;
@@ -34,7 +34,7 @@ class Motion:
     back: Tensor
 
     @classmethod
-    def of(cls, meshes: Meshes) -> Motion:
+    def of(cls, meshes: Meshes) -> VertexMotion:
         """Estimates the motion of a sequence.
 
         Raises:
@@ -51,7 +51,7 @@ class Motion:
             back = torch.cat([_step(meshes, i, i - 1 if i > 0 else 1) for i in range(n)])
         return cls(positions=x, rate=meshes.rate, forth=forth, back=back)
 
-    def part(self, first: int, last: int) -> Motion:
+    def part(self, first: int, last: int) -> VertexMotion:
         """Selects the motion of some vertices, by their range among all."""
         rows = slice(first, last)
         return replace(self, positions=self.positions[rows], forth=self.forth[rows], back=self.back[rows])
@@ -64,8 +64,8 @@ class Motion:
 
 
 def moved(meshes: Meshes, offset: float) -> Meshes:
-    """Moves every frame of the meshes to `offset` seconds later than its instant, see `Motion`."""
-    return replace(meshes, positions=Motion.of(meshes).at(offset)) if offset else meshes
+    """Moves every frame of the meshes to `offset` seconds later than its instant, see `VertexMotion`."""
+    return replace(meshes, positions=VertexMotion.of(meshes).at(offset)) if offset else meshes
 
 
 def _step(meshes: Meshes, index: int, other_index: int) -> Tensor:

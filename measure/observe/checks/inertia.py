@@ -33,7 +33,7 @@ _CALM = 0.5  # m/s
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class MarkerMotion:
     """The model's mesh as the markers show it, between the frames on either side.
 
     Attributes:
@@ -49,7 +49,7 @@ class Motion:
     mass: Floats
 
     @classmethod
-    def of(cls, recording: Trajectory, specimen: Specimen) -> Motion:
+    def of(cls, recording: Trajectory, specimen: Specimen) -> MarkerMotion:
         """Differentiates by central differences over about `_PERIOD`."""
         stride = max(1, int(recording.rate * _PERIOD))
         step = stride / recording.rate
@@ -95,7 +95,7 @@ def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
     if axis is None:
         return None
     origin, direction = axis
-    motion, mesh = Motion.of(recording, specimen), specimen.mesh
+    motion, mesh = MarkerMotion.of(recording, specimen), specimen.mesh
     arms = motion.position - origin
     needed = motion.mass[:, None] * (motion.acceleration - np.array(specimen.gravity))
     moment = _centred((np.cross(arms, needed) @ direction).sum(axis=1))
@@ -131,7 +131,7 @@ def swing(recording: Trajectory, specimen: Specimen) -> float | None:
 
     It is 1 less what friction takes, and goes with the square of the frame rate.
     """
-    motion = Motion.of(recording, specimen)
+    motion = MarkerMotion.of(recording, specimen)
     step = float(motion.times[1] - motion.times[0])
     kinetic = (motion.mass[:, None] * motion.velocity**2).sum(axis=(1, 2)) / 2
     height = -np.einsum("v,fvi,i->f", motion.mass, motion.position, np.array(specimen.gravity))

@@ -10,16 +10,16 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
-from measure.probes import Rows
+from measure.probes import StatisticRows
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Inner(Rows):
+class Inner(StatisticRows):
     size: NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Outer(Rows):
+class Outer(StatisticRows):
     _WHOLE: ClassVar = frozenset({"count"})
 
     place: NDArray[np.int64]

@@ -12,7 +12,7 @@ import pytest
 from flagdata.errors import CorruptError, InputError
 from measure.forecasting import Segments
 from measure.observe import Trajectory, WindTrack
-from measure.propose import Decision, Outcome, proposal_log
+from measure.propose import Decision, ProposalOutcome, proposal_log
 from measure.propose.propose import data_hash, split
 
 MARKERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
@@ -61,8 +61,8 @@ def test_the_hash_is_of_positions_and_wind() -> None:
     assert len({data_hash(s) for s in (segments, stronger, moved, segments.select([0]))}) == 4
 
 
-def outcome(seed: int) -> Outcome:
-    return Outcome(
+def outcome(seed: int) -> ProposalOutcome:
+    return ProposalOutcome(
         decision=Decision.REJECTED,
         reason="nulls show as much",
         steps=(),
