@@ -19,7 +19,7 @@ SMALLEST = 64
 
 
 def evenly_spaced(clip_frames: int, count: int) -> Tensor:
-    """Return the indices of the frames in the middle of `count` equal parts of a clip: (count,) int64.
+    """Returns the indices of the frames in the middle of `count` equal parts of a clip: (count,) int64.
 
     Raises:
         InputError: more frames than the clip has.
@@ -33,7 +33,7 @@ def evenly_spaced(clip_frames: int, count: int) -> Tensor:
 
 
 def _selected(x: Tensor, count: int) -> Tensor:
-    """Return evenly spaced frames of clips (batch, 1, time, height, width) as images (batch · count, 1, h, w)."""
+    """Returns evenly spaced frames of clips (batch, 1, time, height, width) as images (batch · count, 1, h, w)."""
     if x.ndim != 5 or x.shape[1] != 1 or min(x.shape[3:]) < SMALLEST:
         raise InputError(
             f"the clips have the shape {tuple(x.shape)}",
@@ -170,7 +170,7 @@ class Yang(nn.Module):
 
 
 def _convolution(inputs: int, width: int, *, size: int, stride: int, padding: int) -> list[nn.Module]:
-    """Return a convolution, its batch normalisation and rectification."""
+    """Returns a convolution, its batch normalisation and rectification."""
     return [
         nn.Conv2d(inputs, width, size, stride=stride, padding=padding, bias=False),
         nn.BatchNorm2d(width),

@@ -12,7 +12,7 @@ from flagdata.errors import InputError
 
 
 def initialise(module: nn.Module) -> None:
-    """Draw the weights of all convolutions from N(0, 2/fan_out) with torch's own generator; normalisations start at 1.
+    """Draws the weights of all convolutions from N(0, 2/fan_out) with torch's own generator; normalisations start at 1.
 
     Fan-out keeps the variance of the gradients from layer to layer (He et al. 2015, section 2.2, backward case).
     Weights without memory (`torch.device("meta")`) are left as they are: there is nothing to draw, and drawing it would
@@ -53,7 +53,7 @@ class BasicBlock(nn.Module):
         )
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return max(0, residual(x) + shortcut(x)): (n, width, ⌈h/s⌉, ⌈w/s⌉)."""
+        """Returns max(0, residual(x) + shortcut(x)): (n, width, ⌈h/s⌉, ⌈w/s⌉)."""
         return (self.residual(x) + self.shortcut(x)).relu_()
 
 
@@ -93,5 +93,5 @@ class ResNet18(nn.Module):
         initialise(self)
 
     def forward(self, images: Tensor) -> Tensor:
-        """Return the last feature maps, before any pooling."""
+        """Returns the last feature maps, before any pooling."""
         return self.layers(images)

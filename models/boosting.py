@@ -37,12 +37,12 @@ class Boosting:
     features: int
 
     def predict(self, features: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Estimate the mean of the targets of clips with features (n, f): (n, t)."""
+        """Estimates the mean of the targets of clips with features (n, f): (n, t)."""
         self._require(features)
         return np.stack([model.predict(features) for model in self.means], axis=1)
 
     def predict_quantiles(self, features: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Estimate quantiles of the targets: (n, level, t), ascending.
+        """Estimates quantiles of the targets: (n, level, t), ascending.
 
         Ensembles of neighbouring levels know nothing of each other and may cross; sorting them never makes a quantile
         worse (Chernozhukov, Fernández-Val and Galichon, Econometrica 78, 2010).
@@ -52,7 +52,7 @@ class Boosting:
         return np.sort(np.asarray(quantiles).transpose(2, 1, 0), axis=1)
 
     def samples(self, features: NDArray[np.floating], *, count: int) -> NDArray[np.float32]:
-        """Return `count` equally probable values of each target by itself: (n, count, t) float32.
+        """Returns `count` equally probable values of each target by itself: (n, count, t) float32.
 
         They stand at the levels (i + ½)/count of the quantile function, linear between the fitted levels and constant
         beyond the outermost: no interval is wider than the one between these, and the samples do not show how targets
@@ -85,7 +85,7 @@ def fit_boosting(
     leaves: int = 15,
     levels: Sequence[float] = LEVELS,
 ) -> Boosting:
-    """Fit trees to clips.
+    """Fits trees to clips.
 
     The number of rounds is fixed: stopping early on clips drawn at random would judge by other clips of the same
     sequences.

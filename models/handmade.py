@@ -74,7 +74,7 @@ FEATURES: tuple[str, ...] = (
 
 
 def features(frames: Tensor, *, rate: float) -> Tensor:
-    """Measure the features of clips: (batch, len(FEATURES)) float32, none of them changed by contrast or brightness.
+    """Measures the features of clips: (batch, len(FEATURES)) float32, none of them changed by contrast or brightness.
 
     Powers are logarithms to base 10 of variances over the clip's own; frequencies in Hz; flows in
     log10(px/s) and positions and lengths in px, over `SIDE`. Flow is the normal flow of Horn and Schunck (1981),
@@ -131,7 +131,7 @@ def _of_clip(clip: Tensor, rate: float) -> Tensor:
 
 
 def _reduced(clip: Tensor) -> Tensor:
-    """Return the clip averaged over whole blocks of pixels, so that its shorter side is near `SIDE`."""
+    """Returns the clip averaged over whole blocks of pixels, so that its shorter side is near `SIDE`."""
     block = max(1, round(min(clip.shape[1:]) / SIDE))
     height, width = (side // block * block for side in clip.shape[1:])
     parts = [clip[:, i:height:block, j:width:block] for i in range(block) for j in range(block)]
@@ -143,7 +143,7 @@ def _log(power: Tensor) -> Tensor:
 
 
 def _transform(signal: Tensor, rate: float) -> tuple[Tensor, Tensor, Tensor]:
-    """Return real and imaginary part (bin, height, width) of the windowed transform without its mean, and Hz (bin,).
+    """Returns real and imaginary part (bin, height, width) of the windowed transform without its mean, and Hz (bin,).
 
     One matrix product: the Hann window (Σw² = n) and the subtraction of the mean are part of the matrix, and |F|²/n² is
     the part of the variance in a bin, but for the factor 2 of negative frequencies.
@@ -163,7 +163,7 @@ def _transform(signal: Tensor, rate: float) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def _band_shares(frequency: Tensor, width: float) -> Tensor:
-    """Return the share of each bin, f ± width/2, in each band: (band, bin). Bands finer than the bins share them."""
+    """Returns the share of each bin, f ± width/2, in each band: (band, bin). Bands finer than the bins share them."""
     edges = torch.tensor(BAND_EDGES, dtype=frequency.dtype, device=frequency.device)
     low = torch.maximum(edges[:-1, None], frequency - width / 2)
     high = torch.minimum(edges[1:, None], frequency + width / 2)

@@ -127,7 +127,7 @@ class Learner(nn.Module):
         self.register_buffer("spread", torch.ones(len(targets)))
 
     def fit_scale(self, values: Tensor) -> None:
-        """Take mean and deviation of what is learned from the training set's targets (n, target).
+        """Takes mean and deviation of what is learned from the training set's targets (n, target).
 
         Raises:
             InputError: a target that is the same in all of it.
@@ -236,7 +236,7 @@ def build(
 
 
 def _check_option(key: str, value: object) -> None:
-    """Make sure that an option is a positive number, a text, or a short list of them.
+    """Checks that an option is a positive number, a text, or a short list of them.
 
     Raises:
         InputError, LimitError: it is not.

@@ -76,7 +76,7 @@ class Mixture:
         )
 
     def sample_given(self, columns: Sequence[int], values: Tensor, generator: torch.Generator) -> Tensor:
-        """Draw from the distribution of all targets given some of them: (n, p, t).
+        """Draws from the distribution of all targets given some of them: (n, p, t).
 
         With the given targets first, a component's covariance has the Cholesky factor [[A, 0], [B, C]]; given y of
         them, the others have the mean m + B A⁻¹ (y − m_y) and the covariance C Cᵀ, and the component's weight is
@@ -128,7 +128,7 @@ class Mixture:
         return (self.log_weight.exp()[..., None] * torch.special.ndtr(score)).sum(dim=1)
 
     def sample(self, count: int, generator: torch.Generator) -> Tensor:
-        """Draw from each mixture: (n, count, t).
+        """Draws from each mixture: (n, count, t).
 
         Args:
             count: draws of each.
@@ -143,7 +143,7 @@ class Mixture:
         return location + (factor @ noise.unsqueeze(-1)).squeeze(-1)
 
     def rescaled(self, *, scale: Tensor, shift: Tensor) -> Mixture:
-        """Return the mixture of scale · y + shift, scale (t,) above 0 and shift (t,), or (n, 1, t) for each clip."""
+        """Returns the mixture of scale · y + shift, scale (t,) above 0 and shift (t,), or (n, 1, t) for each clip."""
         return Mixture(
             log_weight=self.log_weight,
             location=self.location * scale + shift,
@@ -204,7 +204,7 @@ class MixtureHead(nn.Module):
             self.linear.bias.copy_(bias.flatten())
 
     def forward(self, embedding: Tensor) -> Mixture:
-        """Return the mixtures of a batch of embeddings (n, dimension)."""
+        """Returns the mixtures of a batch of embeddings (n, dimension)."""
         t = self.targets
         raw = self.linear(embedding).unflatten(1, (self.components, -1))
         logit, location, diagonal, below = raw.split([1, t, t, raw.shape[2] - 1 - 2 * t], dim=2)

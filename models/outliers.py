@@ -17,7 +17,7 @@ from flagdata.errors import InputError
 
 
 def shrunk_covariance(points: NDArray[np.floating]) -> tuple[NDArray[np.float64], float]:
-    """Return the covariance (d, d) of points (n, d), drawn towards m·1, and by how much, from 0 to 1.
+    """Returns the covariance (d, d) of points (n, d), drawn towards m·1, and by how much, from 0 to 1.
 
     Σ* = ρ m 1 + (1 − ρ) S with S = XᵀX/n, m = tr S/d, ρ = b²/d², d² = ‖S − m 1‖²/d and b² = min(d²,
     Σ ‖x xᵀ − S‖²/(d n²)): Ledoit and Wolf 2004, lemmas 3.2 to 3.4 and equation 14.
@@ -75,7 +75,7 @@ class Familiarity:
 
     @classmethod
     def of(cls, training: NDArray[np.floating], validation: NDArray[np.floating]) -> Familiarity:
-        """Measure it on summaries (n, d) of training clips and of validation clips.
+        """Measures it on summaries (n, d) of training clips and of validation clips.
 
         The stated rate holds for a clip that is exchangeable with the validation clips, so take one clip of each
         sequence for these: clips of one sequence are alike.
@@ -141,7 +141,7 @@ class Familiarity:
         return self.distance(summaries) > self.threshold(false_alarm)
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
-        """Return all of its state by name, as it can be stored."""
+        """Returns all of its state by name, as it can be stored."""
         return {"centre": self.centre, "whitening": self.whitening, "reference": self.reference}
 
     @classmethod

@@ -35,7 +35,7 @@ class Ridge:
     penalty: NDArray[np.float64]
 
     def predict(self, features: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Estimate the targets of clips with features (n, f): (n, t)."""
+        """Estimates the targets of clips with features (n, f): (n, t)."""
         if features.ndim != 2 or features.shape[1] != len(self.centre):
             raise InputError(
                 f"the features have the shape {features.shape}, and the ridge takes {len(self.centre)}",
@@ -44,7 +44,7 @@ class Ridge:
         return (features - self.centre) / self.scale @ self.weights + self.intercept
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
-        """Return all of its state by name, as it can be stored."""
+        """Returns all of its state by name, as it can be stored."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @classmethod
@@ -54,7 +54,7 @@ class Ridge:
 
 
 def fit_ridge(features: NDArray[np.floating], targets: NDArray[np.floating], *, group: NDArray[np.integer]) -> Ridge:
-    """Fit a ridge to clips, for each target with the penalty of least squared error on sequences left out.
+    """Fits a ridge to clips, for each target with the penalty of least squared error on sequences left out.
 
     Sequences are dealt out to `FOLDS` folds in the order of their numbers: clips of one sequence are in one fold, since
     they share all that is to be estimated.
@@ -90,7 +90,7 @@ def fit_ridge(features: NDArray[np.floating], targets: NDArray[np.floating], *, 
 
 
 def require_table(features: NDArray[np.float64], targets: NDArray[np.float64], group: NDArray[np.integer]) -> None:
-    """Check that features (n, f), targets (n, t) and groups (n,) are of the same clips, and finite.
+    """Checks that features (n, f), targets (n, t) and groups (n,) are of the same clips, and finite.
 
     Raises:
         InputError: they are not.
@@ -106,7 +106,7 @@ def require_table(features: NDArray[np.float64], targets: NDArray[np.float64], g
 
 
 def _path(x: NDArray[np.float64], y: NDArray[np.float64]) -> list[Ridge]:
-    """Return the ridge of each of `PENALTIES`, by one singular value decomposition."""
+    """Returns the ridge of each of `PENALTIES`, by one singular value decomposition."""
     centre, spread = x.mean(axis=0), x.std(axis=0)
     scale = np.where(spread > 1e-12 * (1 + np.abs(centre)), spread, 1.0)
     standardised = np.where(spread > 1e-12 * (1 + np.abs(centre)), (x - centre) / scale, 0.0)

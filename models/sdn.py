@@ -78,7 +78,7 @@ class SpectralNetwork(nn.Module):
         initialise(self)
 
     def scaled(self, maps: Tensor) -> Tensor:
-        """Return the maps as the first block sees them: log(1 + P/floor) and f/f_Nyquist, of the same shape."""
+        """Returns the maps as the first block sees them: log(1 + P/floor) and f/f_Nyquist, of the same shape."""
         power, frequency = maps.chunk(2, dim=1)
         return torch.cat([(power / self.floor).log1p(), frequency / self.nyquist], dim=1)
 

@@ -32,7 +32,7 @@ _OBJECT = re.compile(r"([0-9a-f]{64})\.model")
 
 
 def check_model(folder: Path) -> None:
-    """Make sure that the files of a model are as they were written.
+    """Checks that the files of a model are as they were written.
 
     Models of a lake are checked by the hash in their name; others by their checksums.
 
@@ -76,7 +76,7 @@ def card_bytes(card: Mapping[str, Any]) -> bytes:
 
 
 def write_card(folder: Path, card: Mapping[str, Any]) -> None:
-    """Write the card of a model."""
+    """Writes the card of a model."""
     (folder / CARD).write_bytes(card_bytes(card))
 
 
@@ -102,7 +102,7 @@ def tensor_bytes(tensors: Mapping[str, Tensor]) -> bytes:
 
 
 def write_tensors(path: Path, tensors: Mapping[str, Tensor]) -> None:
-    """Write tensors by name.
+    """Writes tensors by name.
 
     Raises:
         OSError: what the disk refuses.

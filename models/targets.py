@@ -239,7 +239,7 @@ class Scaling:
         return tuple(texts)
 
     def check(self, values: NDArray[np.float64], *, where: str) -> None:
-        """Make sure that all values (n, target) that are to be learned lie within their ranges.
+        """Checks that all values (n, target) that are to be learned lie within their ranges.
 
         Raises:
             InputError: some do not; it names the range, how many they are, and targets whose range is wide enough.

@@ -197,7 +197,7 @@ def incidence(elements: NDArray[np.int64], vertex_count: int) -> NDArray[np.int6
 
 
 def gather_sum(corners: Sequence[Tensor], slots: Tensor) -> Tensor:
-    """Sum corner contributions at the vertices, in a fixed order: no atomics, so the same bits every time.
+    """Sums corner contributions at the vertices, in a fixed order: no atomics, so the same bits every time.
 
     Args:
         corners: one (element, 3, batch) tensor for each corner.

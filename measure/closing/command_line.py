@@ -70,7 +70,7 @@ def nulls_given(recipe: ExperimentRecipe | None, chosen: ByNulls, *, level: floa
 
 
 def refuse(findings: Sequence[Finding]) -> None:
-    """Report what was found, up to an error, which ends it."""
+    """Reports what was found, up to an error, which ends it."""
     for finding in findings:
         checked((finding,))
         say(finding_text(finding), mark=finding.severity.value)

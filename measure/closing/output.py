@@ -87,7 +87,7 @@ KINDS = ("markers", "films")
 
 
 def deliver(answer: VerdictAnswer, *, out: Path, lake: Lake | None, branch: str, as_json: bool) -> None:
-    """Write an answer's files, keep it in the lake, and print it.
+    """Writes an answer's files, keeps it in the lake, and prints it.
 
     Raises:
         FlagdataError: a file or the lake that cannot be written.

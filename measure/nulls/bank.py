@@ -149,7 +149,7 @@ def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]
 
 
 def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:
-    """Evaluate the batches that the folder lacks, each into a file of its own; long ones first, so that no worker is
+    """Evaluates the batches that the folder lacks, each into a file of its own; long ones first, so that no worker is
     left alone with one.
 
     Args:

@@ -99,7 +99,7 @@ class GroupedConformal:
         return float(self.null[order][rank]) if rank < len(order) else math.inf
 
     def _as_far(self, value: float) -> float:
-        """Sum over the kinds of the share of each one's groups."""
+        """Sums, over the kinds, the share of each one's groups that are at least as far."""
         return float(self._weight[self.null >= value].sum())
 
     @cached_property

@@ -112,7 +112,7 @@ def load_bank(folder: Path, setting: Setting) -> NullBank:
 
 
 def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None:
-    """Refuse nulls that do not fit the recordings.
+    """Refuses nulls that do not fit the recordings.
 
     Raises:
         InputError: segments of another length, anchors known in another way, or cloths held in another way.

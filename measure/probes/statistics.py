@@ -190,7 +190,7 @@ class Projection:
 def statistics(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
 ) -> Statistics:
-    """Run the base model, its parameters and every column along segments, each with its calibration.
+    """Runs the base model, its parameters and every column along segments, each with its calibration.
 
     The columns of the result are `THETA`'s, then those given.
     """

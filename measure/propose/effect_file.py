@@ -85,7 +85,7 @@ def write(outcome: ProposalOutcome, folder: Path) -> EffectFile:
 
 
 def check(folder: Path) -> None:
-    """Refuse a folder in which `write` cannot write, before any term is sought; raises as `write`."""
+    """Refuses a folder in which `write` cannot write, before any term is sought; raises as `write`."""
     check_files(folder, _PROJECT, command=_COMMAND)
 
 

@@ -155,7 +155,7 @@ class ProjectedSegments:
         [m/s]."""
         recording, noise = self.segments.recording, self.segments.noise
         return WhitenedMisfit(
-            found=reduced(self.base, self.directions, recording, noise, self.segments.counted),
+            statistics=reduced(self.base, self.directions, recording, noise, self.segments.counted),
             projection=Projection.along(
                 self.directions, error_scale(self.base, recording, noise, self.segments.counted)
             ),

@@ -30,7 +30,7 @@ def entries(path: Path) -> list[dict[str, Any]]:
 
 
 def check(path: Path) -> None:
-    """Refuse a path at which no entry can be added, before any term is tried.
+    """Refuses a path at which no entry can be added, before any term is tried.
 
     Raises:
         ConflictError, CorruptError: the file is not a proposal log.

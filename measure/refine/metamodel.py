@@ -52,7 +52,7 @@ class Metamodel:
     def fit(
         cls, regressors: NDArray[np.float64], summaries: NDArray[np.float64], group: NDArray[np.int64]
     ) -> Metamodel:
-        """Fit it.
+        """Fits it.
 
         Args:
             regressors: (n, p − 1), without the constant.

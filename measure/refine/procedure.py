@@ -75,7 +75,7 @@ class ReplicateMetric:
 
     @classmethod
     def of(cls, groups: list[NDArray[np.float64]]) -> ReplicateMetric:
-        """Measure it on the embeddings (replicate, d) of some θ; failed ones are left out.
+        """Measures it on the embeddings (replicate, d) of some θ; failed ones are left out.
 
         Deviations from their θ's mean are enlarged by √(R/(R − 1)), so that their covariance is that of replicates.
 

@@ -30,7 +30,7 @@ _MARGIN = 1e-3  # of a logit's range: parameters at the very end of theirs have 
 
 
 def require(estimator: Estimator) -> None:
-    """Refuse a network that does not estimate `TARGETS`, each with a distribution.
+    """Refuses a network that does not estimate `TARGETS`, each with a distribution.
 
     Raises:
         InputError: it does not.

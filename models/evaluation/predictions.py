@@ -116,7 +116,7 @@ class Predictions:
 
 
 def save(predictions: Predictions, path: Path) -> None:
-    """Write the predictions as a compressed .npz of plain arrays to exactly `path`."""
+    """Writes the predictions as a compressed .npz of plain arrays to exactly `path`."""
     content: dict[str, NDArray] = {
         "schema": np.array(SCHEMA),
         "label": np.array(predictions.label),
@@ -137,7 +137,7 @@ def save(predictions: Predictions, path: Path) -> None:
 
 
 def load(path: Path) -> Predictions:
-    """Read what `save` wrote.
+    """Reads what `save` wrote.
 
     Raises:
         NotFoundError: the file does not exist.

@@ -288,7 +288,7 @@ class Picture:
 
 
 def write(evaluation: Evaluation, folder: Path, *, name: str = "evaluation") -> tuple[Path, Path, Path]:
-    """Write NAME.html, NAME.json and NAME.md into `folder`, which is made; returns their paths.
+    """Writes NAME.html, NAME.json and NAME.md into `folder`, which is made; returns their paths.
 
     Raises:
         ConflictError: one of them is there and was not written by an evaluation, or was changed since.
@@ -303,7 +303,7 @@ def write(evaluation: Evaluation, folder: Path, *, name: str = "evaluation") -> 
 
 
 def check(folder: Path, *, name: str) -> None:
-    """Refuse a folder in which `write` cannot write, before anything is evaluated; raises as `write`.
+    """Refuses a folder in which `write` cannot write, before anything is evaluated; raises as `write`.
 
     Raises:
         UsageError: a name that is more than the name of a file.

@@ -131,7 +131,7 @@ def models(predictions: Sequence[Predictions]) -> dict[str, tuple[Predictions, .
 
 
 def check_same_clips(first: Predictions, second: Predictions) -> None:
-    """Refuse two predictions that are not of the same clips in the same order.
+    """Refuses two predictions that are not of the same clips in the same order.
 
     Raises:
         InputError: another number of clips, other sequences, or another truth of a target that both have.

@@ -56,7 +56,7 @@ class Standing:
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse a folder in which checkpoints would be kept beside, or in place of, anything else.
+    """Refuses a folder in which checkpoints would be kept beside, or in place of, anything else.
 
     Raises:
         ConflictError: it holds something that no training wrote.
@@ -75,7 +75,7 @@ def check_folder(folder: Path) -> None:
 
 
 def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
-    """Take a checkpoint in `folder`; the one before it is kept beside it.
+    """Takes a checkpoint in `folder`; the one before it is kept beside it.
 
     Raises:
         FlagdataError: the disk refuses it; the last checkpoint is as it was.
@@ -111,7 +111,7 @@ def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
 
 
 def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bool:
-    """Bring `standing` to where the last sound checkpoint in `folder` was taken; False where there is none at all.
+    """Brings `standing` to where the last sound checkpoint in `folder` was taken; False where there is none at all.
 
     A damaged last one is passed over with a warning for the one before it, from which the same steps are taken again.
 
@@ -142,7 +142,7 @@ def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bo
 
 
 def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
-    """Bring `standing` to where the checkpoint in `folder` itself, which is sound, was taken."""
+    """Brings `standing` to where the checkpoint in `folder` itself, which is sound, was taken."""
     card = read_card(folder)
     stored = json.loads(json.dumps(identity))
     trained_on = card.get("identity")

@@ -104,7 +104,7 @@ def publish(
     batches: dict[str, Any],
     branch: str,
 ) -> tuple[Artifact, dict[str, Any], Healing | None]:
-    """Commit a model and return its row and card; one that is there already is kept, unless its object is damaged or
+    """Commits a model and returns its row and card; one that is there already is kept, unless its object is damaged or
     missing: what was done about that is returned, too. A recording that was withdrawn
     from the branch since the training began is not among its parents.
 

@@ -339,7 +339,7 @@ def _prepared(
 
 
 def _check_rate(pairs: Pairs, rows: NDArray[np.int64], front_end: FrontEnd) -> None:
-    """Refuse clips of another frame rate than the front end's frequencies assume."""
+    """Refuses clips of another frame rate than the front end's frequencies assume."""
     table = pairs.table
     seconds = (table.end[rows] - table.start[rows]) / NANOSECONDS
     rate = (table.frame_count[rows] - 1) / np.maximum(seconds, 1e-9)

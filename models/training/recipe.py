@@ -94,7 +94,7 @@ class DataSpec:
         return ExplicitSplit(where={side: self.where(side) for side in sides})
 
     def check(self, lake: Lake, *, at: str | None) -> None:
-        """Make sure that a lake has all of these data sets.
+        """Checks that a lake has all of these data sets.
 
         Raises:
             UnknownNameError: one that it has not; the nearest is named.
@@ -219,7 +219,7 @@ class TrainingRecipe:
         )
 
     def check(self) -> None:
-        """Make sure that the network takes what the front end gives, by shapes alone, before anything is prepared.
+        """Checks that the network takes what the front end gives, by shapes alone, before anything is prepared.
 
         Raises:
             InputError: options or clips that the network does not take.

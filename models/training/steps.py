@@ -220,7 +220,7 @@ class Training:
     checkpoint_seconds: float = CHECKPOINT_SECONDS
 
     def complete(self) -> Trained:
-        """Train from the beginning, or from the checkpoint, to the end.
+        """Trains from the beginning, or from the checkpoint, to the end.
 
         Raises:
             DivergedError: the loss is not finite.

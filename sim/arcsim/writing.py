@@ -23,7 +23,7 @@ from sim.tables import Evaluation
 
 
 def write_scene(file: ArcsimScene, folder: Path, *, name: str = "scene") -> Path:
-    """Write `name`.json with its mesh `name`.obj and its material, by which `sim.arcsim.read_scene` gives it back.
+    """Writes `name`.json with its mesh `name`.obj and its material, by which `sim.arcsim.read_scene` gives it back.
 
     ArcSim looks for the mesh and the material from where it is run: run it in the folder. Positions have nine
     significant digits, all else is exact.

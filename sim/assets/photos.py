@@ -30,7 +30,7 @@ class Photos:
 
     @classmethod
     def of(cls, folder: Path) -> Photos:
-        """List a folder.
+        """Lists a folder.
 
         Raises:
             InputError: it is no folder, or holds no photographs.

@@ -149,7 +149,7 @@ def check(python: Path) -> Environment:
 
 
 def create(folder: Path, *, python: str | None = None, say: Callable[[str], None]) -> Environment:
-    """Make Blender's environment, or complete the one that is in the folder.
+    """Makes Blender's environment, or completes the one that is in the folder.
 
     Nothing but the folder is changed. pip's own settings (its index, its cache) apply.
 

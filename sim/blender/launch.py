@@ -13,7 +13,7 @@ PACKAGES = ("flagdata", "sim")
 
 
 def expose(name: str, root: Path) -> None:
-    """Make the package that lies in a folder importable, without that folder's other packages.
+    """Makes the package that lies in a folder importable, without that folder's other packages.
 
     Raises:
         ImportError: it is not there.

@@ -114,7 +114,7 @@ class WorkerProcess:
         return answers
 
     def close(self) -> None:
-        """End the worker; it may be asked again afterwards, and is then started anew."""
+        """Ends the worker; it may be asked again afterwards, and is then started anew."""
         process = self._process
         if process is None:
             return

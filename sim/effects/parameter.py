@@ -72,7 +72,7 @@ class Parameter(Described):
     null: float
 
     def check(self, value: Value, *, where: str) -> None:
-        """Refuse what is not finite or not admissible.
+        """Refuses what is not finite or not admissible.
 
         Raises:
             InputError: with what is admissible.
@@ -116,7 +116,7 @@ class Parametrised:
 
     @classmethod
     def parameters(cls) -> Mapping[str, Parameter]:
-        """Name → description, in the order of the fields."""
+        """Returns name → description, in the order of the fields."""
         return _parameters(cls)
 
     @classmethod

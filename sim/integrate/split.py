@@ -135,7 +135,7 @@ class SplitEuler:
 
 
 def _times(start: float, h: float, steps: int) -> list[float]:
-    """Start and end of steps [s], added up as states are."""
+    """Returns start and end of steps [s], added up as states are."""
     return list(accumulate([h] * steps, initial=start))
 
 

@@ -307,7 +307,7 @@ class Kernel:
         return self.unpack(xb), self.unpack(vb), tuple(map(self.unpack, past))
 
     def _remember(self, problem: _Problem, memory: Sequence[Tensor]) -> list[Tensor]:
-        """Set what acts beside the base model; returned is what forces remember, which a call changes."""
+        """Sets what acts beside the base model; returned is what forces remember, which a call changes."""
         past = [self.pack(tensor) for tensor in memory]
         if self.beside is not None:
             problem.effects, problem.effect = len(self.beside.entries), self.beside.with_memory(past)
@@ -508,7 +508,7 @@ def _function(code: ctypes.CDLL, name: str, kind: str) -> Any:
 
 
 def _kind(system: System) -> str:
-    """Name of the kernel's functions by the type of the numbers, with narrow blocks where members are few.
+    """Names of the kernel's functions by the type of the numbers, with narrow blocks where members are few.
 
     Contact adds forces up in groups as wide as a block: with it, blocks are as wide for few members as for many, so
     that what one gets does not depend on their number.

@@ -62,7 +62,7 @@ class Cycles:
         self.close()
 
     def close(self) -> None:
-        """End the worker; rendering again starts another."""
+        """Ends the worker; rendering again starts another."""
         self.worker.close()
 
     def render(self, meshes: Meshes, parameters: RenderParameters) -> Tensor:

@@ -84,7 +84,7 @@ class Geometry:
 
 
 def check_in_front(positions: Tensor, meshes: Meshes, placed: Stage) -> None:
-    """Make sure that the cloth is in front of the camera.
+    """Checks that the cloth is in front of the camera.
 
     Args:
         positions: (all vertices, 3) of the cloth at some instant of each frame, as the meshes have them [m].

@@ -126,7 +126,7 @@ class RenderParameters:
 
     @classmethod
     def described(cls) -> Mapping[str, RenderQuantity]:
-        """Name → unit and bounds of every number, in the order of the fields."""
+        """Names → unit and bounds of every number, in the order of the fields."""
         return _described(cls)
 
     @classmethod

@@ -167,7 +167,7 @@ def without_stuck_markers(observation: Observation) -> Observation:
 
 
 def check_motion(positions: Floats, sigma: float, size: float, *, where: str) -> None:
-    """Refuse a cloth that stands still.
+    """Refuses a cloth that stands still.
 
     Args:
         positions: (frame, marker, 3) without gaps [m].

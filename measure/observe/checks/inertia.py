@@ -64,7 +64,7 @@ class MarkerMotion:
 
 
 def check_inertia(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Report a wind or a clock with which the cloth's inertia does not fit."""
+    """Reports a wind or a clock with which the cloth's inertia does not fit."""
     if recording.wind.speed < _CALM:
         return _check_swing(recording, specimen)
     factor = wind_shown(recording, specimen)

@@ -152,7 +152,7 @@ def without_strays(observation: Observation, edges: Edges, sigma: float) -> Obse
 
 
 def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Finding, ...]:
-    """Report parts of the cloth that are far from any marker.
+    """Reports parts of the cloth that are far from any marker.
 
     Args:
         corners: (corner, 2) of its outline.

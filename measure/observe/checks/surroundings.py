@@ -24,7 +24,7 @@ _CALM, _FLAT, _STRONG, _LIMP = 0.1, 0.5, 10.0, 0.25
 
 
 def check_overlap(recording: Trajectory) -> None:
-    """Refuse a log that does not cover the recording. A constant wind covers all.
+    """Refuses a log that does not cover the recording. A constant wind covers all.
 
     Raises:
         InputError: it covers less than 98 % of it.
@@ -45,7 +45,7 @@ def check_overlap(recording: Trajectory) -> None:
 
 
 def check_up(recording: Trajectory, specimen: Specimen) -> None:
-    """Refuse a cloth that lies above its pins, or sags sideways: z is not up.
+    """Refuses a cloth that lies above its pins, or sags sideways: z is not up.
 
     Raises:
         InputError: so it does.
@@ -112,7 +112,7 @@ def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding,
 
 
 def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Report a cloth that hangs in a strong wind or flies in none: wrong units, or not the wind at the flag."""
+    """Reports a cloth that hangs in a strong wind or flies in none: wrong units, or not the wind at the flag."""
     ratio = _ratio(specimen, recording.wind)
     pins = centre_of_pins(recording, specimen)
     seats = specimen.mesh.rest[list(specimen.held)].mean(axis=0)
@@ -136,7 +136,7 @@ def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, 
 
 
 def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
-    """Report rest coordinates whose v runs downward: top and bottom, and the two faces, are exchanged."""
+    """Reports rest coordinates whose v runs downward: top and bottom, and the two faces, are exchanged."""
     design = np.concatenate([recording.markers, np.ones((len(recording.markers), 1))], axis=1)
     slope = np.linalg.lstsq(design, recording.positions.mean(axis=0), rcond=None)[0]
     if slope[1, 2] > -_DOWNWARD:
@@ -153,7 +153,7 @@ def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
 
 
 def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
-    """Refuse accelerations far from what gravity and the wind's force give: another frame rate, or another unit.
+    """Refuses accelerations far from what gravity and the wind's force give: another frame rate, or another unit.
 
     Raises:
         InputError: their root mean square is beyond 0.01 to 30 times g + ρU²/m, or below a fiftieth of what a
