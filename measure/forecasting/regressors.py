@@ -175,7 +175,7 @@ class WindColumn(StepColumn):
 
 def blown(shares: Tensor, system: System, state: State) -> tuple[System, State]:
     """Makes the batch's wind stronger, turned and rising by (part, batch) or (part, 1) shares of its mean."""
-    samples = shares[:, None].expand(-1, 2, -1)
+    samples = shares[None].expand(2, -1, -1)
     return apply([Gusts(intensity=1.0, lateral=1.0, vertical=1.0, samples=samples)], system, state)
 
 

@@ -87,7 +87,7 @@ def test_a_pressure_that_varies_alone_is_not_turbulence() -> None:
     # Noise alone makes a part of it seem to vary, by chance: seldom by so much.
     assert sum(v.turbulent for v in found) <= 2
     assert all(
-        "varies across its mean by" in v.words for v in found if not v.turbulent and v.fast[ALONG] < v.whole[ALONG] / 2
+        "varies across its mean by" in v.words for v in found if not v.turbulent and v.fast[ALONG] < v.total[ALONG] / 2
     )
 
 
