@@ -124,11 +124,12 @@ def _record(value: Any, kind: Any, where: str) -> Any:
         for f in dataclasses.fields(kind)
         if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
     }
-    for name, wrong in (("unknown", content.keys() - hints.keys()), ("missing", needed - content.keys())):
+    for has, wrong in (
+        ("it has the unknown field", content.keys() - hints.keys()),
+        ("it lacks the field", needed - content.keys()),
+    ):
         if wrong:
-            raise InputError(
-                f"{name} field {', '.join(sorted(wrong))}", where=where, fix=f"the fields are {', '.join(hints)}"
-            )
+            raise InputError(f"{has} {', '.join(sorted(wrong))}", where=where, fix=f"the fields are {', '.join(hints)}")
     return kind(**{name: _read(item, hints[name], f"{where}.{name}") for name, item in content.items()})
 
 

@@ -103,7 +103,7 @@ def test_the_document_holds_every_field_by_its_name() -> None:
         ({"named": "lift"}, "verdict.named", "of type str, not a list"),
         ({"findings": [["kind"]]}, "verdict.findings[0]", "1 entries"),
         ({"colour": "blue"}, "verdict", "unknown field colour"),
-        ({"test": {"statistic": 1.0}}, "verdict.test", "missing field critical, kinds, level, null, nulls, p_value"),
+        ({"test": {"statistic": 1.0}}, "verdict.test", "lacks the field critical, kinds, level, null, nulls, p_value"),
     ],
 )
 def test_a_document_that_does_not_fit_is_refused_with_the_place(change: dict[str, Any], where: str, what: str) -> None:
