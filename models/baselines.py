@@ -19,23 +19,24 @@ SMALLEST = 64
 
 
 def evenly_spaced(clip_frames: int, count: int) -> Tensor:
-    """Return the indices of the frames in the middle of `count` equal parts of a clip: (count,) int64.
+    """Returns the indices of the frames in the middle of `count` equal parts of a clip: (count,) int64.
 
     Raises:
         InputError: more frames than the clip has.
     """
     if not 1 <= count <= clip_frames:
         raise InputError(
-            f"{count} frames of a clip of {clip_frames}", fix=f"take from 1 to {clip_frames} frames, or longer clips"
+            f"{count} frames cannot be selected from a clip of {clip_frames}",
+            fix=f"take from 1 to {clip_frames} frames, or longer clips",
         )
     return ((2 * torch.arange(count) + 1) * clip_frames) // (2 * count)
 
 
 def _selected(x: Tensor, count: int) -> Tensor:
-    """Return evenly spaced frames of clips (batch, 1, time, height, width) as images (batch · count, 1, h, w)."""
+    """Returns evenly spaced frames of clips (batch, 1, time, height, width) as images (batch · count, 1, h, w)."""
     if x.ndim != 5 or x.shape[1] != 1 or min(x.shape[3:]) < SMALLEST:
         raise InputError(
-            f"clips of shape {tuple(x.shape)}",
+            f"the clips have the shape {tuple(x.shape)}",
             fix=f"give gray clips (batch, 1, time, height, width) of at least {SMALLEST}×{SMALLEST} pixels",
         )
     index = evenly_spaced(x.shape[2], count).to(x.device)
@@ -63,13 +64,13 @@ class ResNetOfFrames(nn.Module):
     def __init__(self, *, frames: int = 10, width: int = 64) -> None:
         super().__init__()
         if frames < 1:
-            raise InputError(f"{frames} frames", fix="give at least 1")
+            raise InputError(f"the clips have {frames} frames", fix="give at least 1")
         self.frames = frames
         self.trunk = ResNet18(channels=1, width=width)
         self.dimension = self.trunk.width
 
     def forward(self, x: Tensor) -> Tensor:
-        """Embed clips (batch, 1, time, height, width): (batch, dimension)."""
+        """Embeds clips (batch, 1, time, height, width) as (batch, dimension). (batch, dimension)."""
         images = _selected(x, self.frames)
         return self.trunk(images).mean(dim=(2, 3)).unflatten(0, (-1, self.frames)).mean(dim=1)
 
@@ -98,7 +99,9 @@ class Cardona(nn.Module):
     def __init__(self, *, frames: int = 30, hidden: int = 1000, grid: int = 3, width: int = 64) -> None:
         super().__init__()
         if min(frames, hidden, grid) < 1:
-            raise InputError(f"{frames} frames, {hidden} units, grid {grid}", fix="give at least 1 of each")
+            raise InputError(
+                f"the network has {frames} frames, {hidden} units and the grid {grid}", fix="give at least 1 of each"
+            )
         self.frames = frames
         self.dimension = hidden
         self.trunk = ResNet18(channels=1, width=width)
@@ -106,7 +109,7 @@ class Cardona(nn.Module):
         self.memory = nn.LSTM(self.trunk.width * grid**2, hidden, num_layers=2, batch_first=True)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Embed clips (batch, 1, time, height, width): (batch, dimension)."""
+        """Embeds clips (batch, 1, time, height, width) as (batch, dimension). (batch, dimension)."""
         descriptions = self.pool(self.trunk(_selected(x, self.frames))).flatten(1)
         states, _ = self.memory(descriptions.unflatten(0, (-1, self.frames)))
         return states[:, -1]
@@ -140,7 +143,8 @@ class Yang(nn.Module):
         super().__init__()
         if min(frames, hidden, grid, features) < 1:
             raise InputError(
-                f"{frames} frames, {hidden} units, grid {grid}, {features} features", fix="give at least 1 of each"
+                f"the network has {frames} frames, {hidden} units, the grid {grid} and {features} features",
+                fix="give at least 1 of each",
             )
         self.frames = frames
         self.dimension = hidden
@@ -159,14 +163,14 @@ class Yang(nn.Module):
         initialise(self)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Embed clips (batch, 1, time, height, width): (batch, dimension)."""
+        """Embeds clips (batch, 1, time, height, width) as (batch, dimension). (batch, dimension)."""
         features = self.sixth(self.convolutions(_selected(x, self.frames)).flatten(1))
         states, _ = self.memory(features.unflatten(0, (-1, self.frames)))
         return states[:, -1]
 
 
 def _convolution(inputs: int, width: int, *, size: int, stride: int, padding: int) -> list[nn.Module]:
-    """Return a convolution, its batch normalisation and rectification."""
+    """Returns a convolution, its batch normalisation and rectification."""
     return [
         nn.Conv2d(inputs, width, size, stride=stride, padding=padding, bias=False),
         nn.BatchNorm2d(width),

@@ -12,7 +12,7 @@ from flagdata.errors import InputError
 
 
 def initialise(module: nn.Module) -> None:
-    """Draw the weights of all convolutions from N(0, 2/fan_out) with torch's own generator; normalisations start at 1.
+    """Draws the weights of all convolutions from N(0, 2/fan_out) with torch's own generator; normalisations start at 1.
 
     Fan-out keeps the variance of the gradients from layer to layer (He et al. 2015, section 2.2, backward case).
     Weights without memory (`torch.device("meta")`) are left as they are: there is nothing to draw, and drawing it would
@@ -53,7 +53,7 @@ class BasicBlock(nn.Module):
         )
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return max(0, residual(x) + shortcut(x)): (n, width, ⌈h/s⌉, ⌈w/s⌉)."""
+        """Returns max(0, residual(x) + shortcut(x)): (n, width, ⌈h/s⌉, ⌈w/s⌉)."""
         return (self.residual(x) + self.shortcut(x)).relu_()
 
 
@@ -73,7 +73,9 @@ class ResNet18(nn.Module):
     def __init__(self, *, channels: int = 1, width: int = 64) -> None:
         super().__init__()
         if channels < 1 or width < 1:
-            raise InputError(f"ResNet-18 with {channels} channels and width {width}", fix="give at least 1 of each")
+            raise InputError(
+                f"the ResNet-18 has {channels} channels and the width {width}", fix="give at least 1 of each"
+            )
         layers: list[nn.Module] = [
             nn.Conv2d(channels, width, 7, stride=2, padding=3, bias=False),
             nn.BatchNorm2d(width),
@@ -91,5 +93,5 @@ class ResNet18(nn.Module):
         initialise(self)
 
     def forward(self, images: Tensor) -> Tensor:
-        """Return the last feature maps, before any pooling."""
+        """Returns the last feature maps, before any pooling."""
         return self.layers(images)

@@ -37,29 +37,29 @@ class Boosting:
     features: int
 
     def predict(self, features: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Estimate the mean of the targets of clips with features (n, f): (n, t)."""
+        """Estimates the mean of the targets of clips with features (n, f): (n, t)."""
         self._require(features)
         return np.stack([model.predict(features) for model in self.means], axis=1)
 
     def predict_quantiles(self, features: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Estimate quantiles of the targets: (n, level, t), ascending.
+        """Estimates quantiles of the targets: (n, level, t), ascending.
 
         Ensembles of neighbouring levels know nothing of each other and may cross; sorting them never makes a quantile
         worse (Chernozhukov, Fernández-Val and Galichon, Econometrica 78, 2010).
         """
         self._require(features)
-        found = [[model.predict(features) for model in models] for models in self.quantiles]
-        return np.sort(np.asarray(found).transpose(2, 1, 0), axis=1)
+        quantiles = [[model.predict(features) for model in models] for models in self.quantiles]
+        return np.sort(np.asarray(quantiles).transpose(2, 1, 0), axis=1)
 
     def samples(self, features: NDArray[np.floating], *, count: int) -> NDArray[np.float32]:
-        """Return `count` equally probable values of each target by itself: (n, count, t) float32.
+        """Returns `count` equally probable values of each target by itself: (n, count, t) float32.
 
         They stand at the levels (i + ½)/count of the quantile function, linear between the fitted levels and constant
         beyond the outermost: no interval is wider than the one between these, and the samples do not show how targets
         vary together.
         """
         if count < 1:
-            raise InputError(f"{count} samples", fix="ask for at least 1")
+            raise InputError(f"{count} samples cannot be drawn", fix="ask for at least 1")
         level = (np.arange(count) + 0.5) / count
         upper = np.clip(np.searchsorted(self.levels, level), 1, len(self.levels) - 1)
         low, high = np.array(self.levels)[upper - 1], np.array(self.levels)[upper]
@@ -70,7 +70,8 @@ class Boosting:
     def _require(self, features: NDArray[np.floating]) -> None:
         if features.ndim != 2 or features.shape[1] != self.features:
             raise InputError(
-                f"features of shape {features.shape} for trees of {self.features}", fix=f"give (n, {self.features})"
+                f"the features have the shape {features.shape}, and the trees take {self.features}",
+                fix=f"give (n, {self.features})",
             )
 
 
@@ -84,7 +85,7 @@ def fit_boosting(
     leaves: int = 15,
     levels: Sequence[float] = LEVELS,
 ) -> Boosting:
-    """Fit trees to clips.
+    """Fits trees to clips.
 
     The number of rounds is fixed: stopping early on clips drawn at random would judge by other clips of the same
     sequences.
@@ -110,7 +111,7 @@ def fit_boosting(
         )
     ascending = tuple(float(level) for level in levels)
     if len(ascending) < 2 or ascending != tuple(sorted(set(ascending))) or not 0 < ascending[0] < ascending[-1] < 1:
-        raise InputError(f"levels {ascending}", fix="give at least two between 0 and 1, ascending")
+        raise InputError(f"the levels are {ascending}", fix="give at least two between 0 and 1, ascending")
 
     def fitted(target: NDArray[np.float64], loss: str, level: float | None) -> HistGradientBoostingRegressor:
         return HistGradientBoostingRegressor(

@@ -62,18 +62,19 @@ class Cropping:
     conditioned: bool = False
 
     def as_dict(self) -> dict[str, Any]:
-        """As JSON; the entry `conditioned` is left out where it is false, so that older recipes keep their hash."""
-        found = asdict(self)
-        return found if self.conditioned else {key: value for key, value in found.items() if key != "conditioned"}
+        """Returns JSON values; the entry `conditioned` is left out where it is false, so that older recipes keep their
+        hash."""
+        entries = asdict(self)
+        return entries if self.conditioned else {key: value for key, value in entries.items() if key != "conditioned"}
 
     def __post_init__(self) -> None:
         if not self.scales or not all(LEAST_SCALE <= scale <= 1 for scale in self.scales):
             raise InputError(
-                f"scales {self.scales} of crops", fix=f"give shares of the picture, from {LEAST_SCALE:g} to 1"
+                f"the scales of crops are {self.scales}", fix=f"give shares of the picture, from {LEAST_SCALE:g} to 1"
             )
 
     def draw(self, rng: np.random.Generator, shape: tuple[int, int, int]) -> Crop:
-        """A random part of a film of (frames, height, width).
+        """Draws a random part of a film of (frames, height, width).
 
         Raises:
             InputError: the film is shorter than a clip.
@@ -89,7 +90,7 @@ class Cropping:
         )
 
     def whole(self, shape: tuple[int, int, int], *, first: int = 0) -> Crop:
-        """The largest square about the middle of a film of (frames, height, width), from frame `first` on.
+        """Returns the largest square about the middle of a film of (frames, height, width), from frame `first` on.
 
         Raises:
             InputError: the film ends before the clip does.
@@ -101,8 +102,8 @@ class Cropping:
         return Crop(first=first, top=(height - side) // 2, left=(width - side) // 2, side=side, mirrored=False)
 
     def cut(self, film: NDArray[np.uint8], crop: Crop) -> Tensor:
-        """The part of a film (frames, height, width): (1, frames, size, size), uint8 where nothing was resized, else
-        float32 (bilinear; averaging where it shrinks)."""
+        """Cuts the part out of a film (frames, height, width): (1, frames, size, size), uint8 where nothing was
+        resized, else float32 (bilinear; averaging where it shrinks)."""
         part = film[
             crop.first : crop.first + self.frames,
             crop.top : crop.top + crop.side,
@@ -116,5 +117,5 @@ class Cropping:
 
     def _checked(self, shape: tuple[int, int, int]) -> tuple[int, int, int]:
         if shape[0] < self.frames:
-            raise InputError(f"a film of {shape[0]} frames", fix=f"give at least {self.frames}")
+            raise InputError(f"the film has {shape[0]} frames", fix=f"give at least {self.frames}")
         return shape

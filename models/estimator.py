@@ -57,13 +57,13 @@ class Estimates:
         return self.draws.mean(axis=1, dtype=np.float64)
 
     def interval(self, share: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The ends of the central interval with this share of each distribution: two of (n, target).
+        """Computes the ends of the central interval with this share of each distribution: two of (n, target).
 
         Raises:
             InputError: a share that is not between 0 and 1.
         """
         if not 0 < share < 1:
-            raise InputError(f"an interval of {share:g}", fix="give a share between 0 and 1")
+            raise InputError(f"an interval cannot have the share {share:g}", fix="give a share between 0 and 1")
         low, high = np.quantile(self.draws, [(1 - share) / 2, (1 + share) / 2], axis=1)
         return low, high
 
@@ -108,20 +108,21 @@ class Estimator:
         return next(self.learners[0].parameters()).device
 
     def to(self, device: torch.device | str) -> Estimator:
-        """The same on another device."""
+        """Moves the model to another device."""
         for learner in self.learners:
             learner.to(device)
         return self
 
     def inputs(self, clips: NDArray[np.uint8]) -> Tensor:
-        """What the networks take, of clips (n, frames, height, width) gray: the largest square about the middle.
+        """Computes what the networks take, of clips (n, frames, height, width) gray: the largest square about the
+        middle.
 
         Raises:
             InputError: clips of another length, or that are not uint8.
         """
         if clips.ndim != 4 or clips.dtype != np.uint8:
             raise InputError(
-                f"clips of shape {clips.shape} and type {clips.dtype}",
+                f"the clips have the shape {clips.shape} and the type {clips.dtype}",
                 fix="give uint8 of shape (clip, frame, height, width)",
             )
         if clips.shape[1] != self.front_end.frames:
@@ -137,7 +138,7 @@ class Estimator:
 
     @torch.no_grad()
     def estimate(self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS, known: Sequence[Known] = ()) -> Estimates:
-        """Estimates for inputs (n, *shape), see `inputs`.
+        """Estimates the targets for inputs (n, *shape), see `inputs`.
 
         Args:
             seed: of the draws; the same inputs and seed give the same draws.
@@ -160,34 +161,35 @@ class Estimator:
 
     @torch.no_grad()
     def embeddings(self, inputs: Tensor) -> list[Tensor]:
-        """(n, dimension) of each learner."""
+        """Computes (n, dimension) embeddings of each learner."""
         return [learner.network(inputs) for learner in self.learners]
 
     @torch.no_grad()
     def summaries(self, inputs: Tensor) -> Tensor:
-        """(n, dimension) of the first learner: what `cloud` is of."""
+        """Computes (n, dimension) embeddings of the first learner: what `cloud` is of."""
         return self.learners[0].network(inputs)
 
     @torch.no_grad()
     def logits(self, embeddings: Sequence[Tensor], *, seed: int, draws: int) -> Tensor:
-        """(n, draw, target) draws as the learners know them (`models.targets`), spread by `widening`.
+        """Draws logits (n, draw, target) from the learners' distributions (`models.targets`), spread by `widening`.
 
         Raises:
             InputError: a model without distributions.
         """
         share = -(-draws // len(self.learners))
-        found = []
-        for place, (learner, embedding) in enumerate(zip(self.learners, embeddings, strict=True)):
-            generator = torch_generator(seed, "draws", place, device=embedding.device)
+        draws_of_learners = []
+        for member, (learner, embedding) in enumerate(zip(self.learners, embeddings, strict=True)):
+            generator = torch_generator(seed, "draws", member, device=embedding.device)
             mixture = learner.mixture(embedding)
-            found.append(mixture.sample(share, generator) * learner.spread + learner.centre)
-        logits = torch.cat(found, dim=1)
+            draws_of_learners.append(mixture.sample(share, generator) * learner.spread + learner.centre)
+        logits = torch.cat(draws_of_learners, dim=1)
         centre = logits.mean(dim=1, keepdim=True)
         return centre + (logits - centre) * self.widening.to(logits)
 
     @torch.no_grad()
     def posterior(self, embeddings: Sequence[Tensor]) -> Mixture:
-        """The distributions that `logits` draws from, in closed form: float64, the learners' components side by side.
+        """Returns the distributions that `logits` draws from, in closed form: float64, the learners' components side by
+        side.
 
         Raises:
             InputError: a model without distributions.
@@ -206,7 +208,7 @@ class Estimator:
 
     @torch.no_grad()
     def given(self, posterior: Mixture, known: Sequence[Known], *, seed: int, draws: int) -> Restricted:
-        """Draws from distributions of `posterior` given what is known.
+        """Draws from distributions of `posterior` restricted to what is known.
 
         Raises:
             InputError: see `models.restriction.restricted`.
@@ -215,8 +217,8 @@ class Estimator:
         return restricted(posterior, self.learners[0].scaling, known, draws=draws, generator=generator)
 
     def prior(self, count: int) -> Mixture:
-        """What the training set's targets are like: `count` times the Gaussian of their logits' means and standard
-        deviations, as one component, float64."""
+        """Describes what the training set's targets are like: `count` times the Gaussian of their logits' means and
+        standard deviations, as one component, float64."""
         learner = self.learners[0]
         size = len(self.targets)
         centre, spread = learner.centre.double(), learner.spread.double()
@@ -228,7 +230,7 @@ class Estimator:
 
 
 def load(folder: Path) -> Estimator:
-    """The model in a folder, once its files were found to be as they were written.
+    """Loads the model in a folder, once its files were found to be as they were written.
 
     Raises:
         NotFoundError: there is none.
@@ -246,9 +248,9 @@ def load(folder: Path) -> Estimator:
             raise InputError("its crops have another size or number of frames than its front end takes", fix=_FIX)
         loss, network = recipe["loss"], recipe["network"]
         learners = []
-        for place in range(int(card.get("members", 1))):
-            prefix = f"{place}." if "members" in card else ""
-            own = {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
+        for member in range(int(card.get("members", 1))):
+            prefix = f"{member}." if "members" in card else ""
+            weights = {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
             learner = build(
                 network["name"],
                 network["options"],
@@ -258,7 +260,7 @@ def load(folder: Path) -> Estimator:
                 margin=loss["margin"],
             )
             learner.load_state_dict(
-                {name: value.float() if value.is_floating_point() else value for name, value in own.items()}
+                {name: value.float() if value.is_floating_point() else value for name, value in weights.items()}
             )
             learners.append(learner.eval())
         widening = torch.tensor(card.get("widening") or [1.0] * len(loss["targets"]), dtype=torch.float32)
@@ -285,7 +287,7 @@ _FIX = "train it again, or update flagdata"
 
 
 def shipped(name: str = DEFAULT) -> Estimator:
-    """A model that comes with the package.
+    """Loads a model that comes with the package.
 
     Raises:
         NotFoundError: no model of that name comes with it.

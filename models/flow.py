@@ -42,7 +42,7 @@ _SCALES = ("finest", "fine", "coarse")
 
 
 def channels(scales: int) -> tuple[str, ...]:
-    """Names of the maps on so many scales, in order.
+    """Names the maps on so many scales, in order.
 
     Flow is in pixels of its scale a frame: the first scale is half the clip's size, the next half of that. Powers P are
     log(1 + P/0.02²), centres and widths of spectra shares of the Nyquist frequency, phase gradients radians a place.
@@ -50,8 +50,8 @@ def channels(scales: int) -> tuple[str, ...]:
     Args:
         scales: 2 or 3.
     """
-    found = tuple(f"{scale}: {name}" for scale in _SCALES[-scales:] for name in _OF_SCALE)
-    return (*found, "mean picture", "log of its slope", "log standard deviation in time")
+    names = tuple(f"{scale}: {name}" for scale in _SCALES[-scales:] for name in _OF_SCALE)
+    return (*names, "mean picture", "log of its slope", "log standard deviation in time")
 
 
 CHANNELS = channels(2)
@@ -71,28 +71,29 @@ _TINY = 1e-6
 
 
 def pool(scales: int) -> int:
-    """By what the maps are smaller than the clip, in height and in width."""
+    """Returns by what the maps are smaller than the clip, in height and in width."""
     return 2**scales
 
 
 def flow_maps(frames: Tensor, *, scales: int = 2) -> Tensor:
-    """`channels(scales)` of a clip: (59 or 87, height/pool, width/pool) float32, pool as `pool(scales)`.
+    """Computes the maps `channels(scales)` of a clip: (59 or 87, height/pool, width/pool) float32, pool as
+    `pool(scales)`.
 
     Args:
         frames: (time, height, width) floating, standardised: of mean 0 and standard deviation 1; time at least 4,
             height and width multiples of the pool and at least three times as large.
         scales: 2 or 3.
     """
-    found: list[Tensor] = []
+    maps: list[Tensor] = []
     for remaining in reversed(range(scales)):
         frames = functional.avg_pool2d(frames, 2)
-        found.append(_statistics(*lucas_kanade(frames, stride=2**remaining)))
-    return torch.cat([*found, at_rest(frames)])
+        maps.append(_statistics(*lucas_kanade(frames, stride=2**remaining)))
+    return torch.cat([*maps, at_rest(frames)])
 
 
 def lucas_kanade(frames: Tensor, *, stride: int = 1) -> tuple[Tensor, Tensor]:
-    """The displacement [px] of each window from each frame to the next, (2, time − 1, h, w) along x and y, and the mean
-    square slope in it, (time − 1, h, w).
+    """Estimates the displacement [px] of each window from each frame to the next, (2, time − 1, h, w) along x and y,
+    and the mean square slope in it, (time − 1, h, w).
 
     The displacement (u, v) is the least-squares solution of u ∂I/∂x + v ∂I/∂y = −∂I/∂t over a window of 5 × 5 pixels,
     with the ridge `RIDGE`. Slopes are central differences of the mean of both frames.
@@ -116,7 +117,7 @@ def lucas_kanade(frames: Tensor, *, stride: int = 1) -> tuple[Tensor, Tensor]:
 
 
 def _statistics(flow: Tensor, slope: Tensor) -> Tensor:
-    """(28, h, w): what `_OF_SCALE` names, of the course in time of a flow (2, time, h, w)."""
+    """Computes (28, h, w) statistics, as `_OF_SCALE` names them, of the course in time of a flow (2, time, h, w)."""
     mean, power = flow.mean(dim=1), flow.square().mean(dim=1)
     variance = (power - mean.square()).clamp(min=0)
     change = (flow[:, 1:] - flow[:, :-1]).square().mean(dim=1)
@@ -124,24 +125,25 @@ def _statistics(flow: Tensor, slope: Tensor) -> Tensor:
     correlation = product / (variance.prod(dim=0).sqrt() + _SHARE)
     rows = fourier_rows(flow.shape[1]).to(flow)
     spectrum = torch.stack([(part @ flow.flatten(2)).unflatten(2, flow.shape[2:]) for part in rows])
-    logs = [log_power(own, floor=_FLOOR) for own in (power, variance, change)]
-    found = [mean, *logs, correlation[None]]
-    found += [_shape(spectrum, steps=flow.shape[1]), _phases(spectrum)]
-    return torch.cat([*found, (slope.mean(dim=0, keepdim=True) / RIDGE).log1p()])
+    logs = [log_power(moment, floor=_FLOOR) for moment in (power, variance, change)]
+    maps = [mean, *logs, correlation[None]]
+    maps += [_shape(spectrum, steps=flow.shape[1]), _phases(spectrum)]
+    return torch.cat([*maps, (slope.mean(dim=0, keepdim=True) / RIDGE).log1p()])
 
 
 def _shape(spectrum: Tensor, *, steps: int) -> Tensor:
-    """(14, h, w): centre and width of both components' spectra of so many steps, then the log power of each band."""
+    """Computes (14, h, w): centre and width of both components' spectra of so many steps, then the log power of each
+    band."""
     power = spectrum.square().sum(dim=0)  # (2, bin, h, w)
     share = shares_of_nyquist(power, steps=steps)
-    bands = (log_power(own, floor=_FLOOR) for own in band_powers(power, share, BANDS))
+    bands = (log_power(band, floor=_FLOOR) for band in band_powers(power, share, BANDS))
     return torch.cat([*centre_and_width(power, share, floor=_TINY), *bands])
 
 
 def _phases(spectrum: Tensor) -> Tensor:
-    """(4, h, w): phase gradient [rad a place] along x, averaged over frequencies by their cross power, and coherence;
-    then along y. The last column, or row, has no neighbour and is 0."""
-    found = []
+    """Computes (4, h, w): phase gradient [rad a place] along x, averaged over frequencies by their cross power, and
+    coherence; then along y. The last column, or row, has no neighbour and is 0."""
+    maps = []
     for axis, pad in ((-1, (0, 1)), (-2, (0, 0, 0, 1))):
         length = spectrum.shape[axis] - 1
         ahead, behind = spectrum.narrow(axis, 1, length), spectrum.narrow(axis, 0, length)
@@ -151,5 +153,5 @@ def _phases(spectrum: Tensor) -> Tensor:
         total = cross.sum(dim=0)
         gradient = (torch.atan2(imaginary, real) * cross).sum(dim=0) / (total + _TINY)
         power = ahead.square().sum(dim=(0, 1, 2)) * behind.square().sum(dim=(0, 1, 2))
-        found.append(functional.pad(torch.stack([gradient, total / (power.sqrt() + _TINY)]), pad))
-    return torch.cat(found)
+        maps.append(functional.pad(torch.stack([gradient, total / (power.sqrt() + _TINY)]), pad))
+    return torch.cat(maps)

@@ -47,7 +47,8 @@ _TRUNCATE = 4.0  # standard deviations, as scipy.ndimage.gaussian_filter1d does
 
 
 def gaussian(sigma: float, *, order: int = 0) -> Tensor:
-    """Taps (2r + 1,) of a Gaussian, r = round(4σ), or of its first derivative, for correlation: Σ h[i] x[n + i − r].
+    """Computes taps (2r + 1,) of a Gaussian, r = round(4σ), or of its first derivative, for correlation: Σ h[i] x[n + i
+    − r].
 
     The Gaussian's taps sum to 1. The derivative's are those of the same, normalised Gaussian: i/σ² times its taps, so
     that a ramp of slope 1 gives Σ i² g(i)/σ², 1 but for what is cut off.
@@ -60,16 +61,17 @@ def gaussian(sigma: float, *, order: int = 0) -> Tensor:
         InputError: σ that is not above 0, or another order.
     """
     if not sigma > 0 or order not in (0, 1):
-        raise InputError(f"a Gaussian of σ = {sigma:g} and order {order}", fix="give σ above 0 and order 0 or 1")
+        raise InputError(f"the Gaussian has σ = {sigma:g} and order {order}", fix="give σ above 0 and order 0 or 1")
     radius = int(_TRUNCATE * sigma + 0.5)
-    place = torch.arange(-radius, radius + 1, dtype=torch.float64)
-    taps = torch.exp(-(place**2) / (2 * sigma**2))
+    offset = torch.arange(-radius, radius + 1, dtype=torch.float64)
+    taps = torch.exp(-(offset**2) / (2 * sigma**2))
     taps = taps / taps.sum()
-    return taps if order == 0 else taps * place / sigma**2
+    return taps if order == 0 else taps * offset / sigma**2
 
 
 def smoothing_matrix(count: int, sigma: float) -> Tensor:
-    """(count, count) float64: the Gaussian along an axis of `count` samples, its ends repeated outwards."""
+    """Builds the matrix (count, count) float64 of the Gaussian along an axis of `count` samples, its ends repeated
+    outwards. the Gaussian along an axis of `count` samples, its ends repeated outwards."""
     taps = gaussian(sigma)
     radius = len(taps) // 2
     matrix = torch.zeros((count, count), dtype=torch.float64)
@@ -80,7 +82,8 @@ def smoothing_matrix(count: int, sigma: float) -> Tensor:
 
 
 def pooled_derivatives(frames: Tensor, *, sigma: float) -> Tensor:
-    """First derivatives of a Gaussian along x (the last axis) and along y, each pooled: (2, time, height/2, width/2).
+    """Filters by first derivatives of a Gaussian along x (the last axis) and along y, each pooled: (2, time, height/2,
+    width/2).
 
     Each derivative is smoothed by the Gaussian along the other axis. Beyond the edges the outermost samples are
     repeated. Of each two by two samples of the derivative the largest is taken.
@@ -94,7 +97,7 @@ def pooled_derivatives(frames: Tensor, *, sigma: float) -> Tensor:
     """
     if frames.ndim != 3 or not frames.is_floating_point() or frames.shape[1] % 2 or frames.shape[2] % 2:
         raise InputError(
-            f"frames of shape {tuple(frames.shape)} and type {frames.dtype}",
+            f"the frames have the shape {tuple(frames.shape)} and the type {frames.dtype}",
             fix="give floating (time, height, width) with an even height and width",
         )
     smooth, slope = (_band(sigma, order).to(device=frames.device, dtype=frames.dtype) for order in (0, 1))
@@ -110,7 +113,8 @@ def pooled_derivatives(frames: Tensor, *, sigma: float) -> Tensor:
 
 @functools.cache
 def _band(sigma: float, order: int) -> Tensor:
-    """(block + taps − 1, block): the part of the filter's matrix that one block of outputs sees."""
+    """Builds the part of the filter's matrix that one block of outputs sees, (block + taps − 1, block). the part of the
+    filter's matrix that one block of outputs sees."""
     taps = gaussian(sigma, order=order)
     band = torch.zeros((_BLOCK + len(taps) - 1, _BLOCK), dtype=torch.float64)
     for column in range(_BLOCK):
@@ -119,7 +123,7 @@ def _band(sigma: float, order: int) -> Tensor:
 
 
 def _along_height(frames: Tensor, *bands: Tensor) -> Tensor:
-    """(bands, time, blocks · 32, padded width): filters along the second axis of (time, height, width).
+    """Filters along the second axis of (time, height, width): (bands, time, blocks · 32, padded width).
 
     The outermost samples are repeated on all sides, as often as the filters see beyond the edge and as the last block
     has rows and columns too many.
@@ -129,21 +133,21 @@ def _along_height(frames: Tensor, *bands: Tensor) -> Tensor:
     below, right = (-size % _BLOCK for size in frames.shape[1:])
     padded = functional.pad(frames, (radius, radius + right, radius, radius + below), mode="replicate")
     rows = torch.cat(bands, dim=1).T  # (bands · 32, reach): one product for all filters
-    found = padded.new_empty((len(bands), len(frames), frames.shape[1] + below, padded.shape[2]))
-    for first in range(0, found.shape[2], _BLOCK):
+    filtered = padded.new_empty((len(bands), len(frames), frames.shape[1] + below, padded.shape[2]))
+    for first in range(0, filtered.shape[2], _BLOCK):
         product = torch.matmul(rows, padded[:, first : first + reach]).unflatten(1, (len(bands), _BLOCK))
-        found[:, :, first : first + _BLOCK] = product.transpose(0, 1)
-    return found
+        filtered[:, :, first : first + _BLOCK] = product.transpose(0, 1)
+    return filtered
 
 
 def _pooled_along_width(padded: Tensor, band: Tensor) -> Tensor:
-    """(time, height/2, blocks · 16): the largest of each two by two of the filter along the last axis of contiguous
-    (time, height, blocks · 32 + taps − 1)."""
+    """Filters along the last axis of contiguous (time, height, blocks · 32 + taps − 1) and takes the largest of each
+    two by two: (time, height/2, blocks · 16)."""
     time, height, width = padded.shape
     blocks = (width - len(band)) // _BLOCK + 1
     view = padded.as_strided((blocks, time * height, len(band)), (_BLOCK, width, 1))
-    found = torch.bmm(view, band.expand(blocks, -1, -1)).view(blocks, time, height // 2, 2, _BLOCK)
-    rows = torch.maximum(found[:, :, :, 0], found[:, :, :, 1])
+    filtered = torch.bmm(view, band.expand(blocks, -1, -1)).view(blocks, time, height // 2, 2, _BLOCK)
+    rows = torch.maximum(filtered[:, :, :, 0], filtered[:, :, :, 1])
     return torch.maximum(rows[..., 0::2], rows[..., 1::2]).permute(1, 2, 0, 3).flatten(2)
 
 
@@ -217,17 +221,18 @@ class FrontEnd:
         least = flow.pool(_FLOW_SCALES.get(self.maps, 2))
         if self.frames < 4 or self.size < least or self.size % least:
             raise InputError(
-                f"{self.frames} frames of {self.size} px", fix=f"give 4 frames or more, and a multiple of {least} px"
+                f"the front end takes {self.frames} frames of {self.size} px",
+                fix=f"give 4 frames or more, and a multiple of {least} px",
             )
         if self.frames > FRAMES_LIMIT or self.frames * self.size**2 > PIXELS_LIMIT:
             raise LimitError(
-                f"clips of {self.frames:.3g} frames of {self.size:.3g} px",
+                f"the front end takes clips of {self.frames:.3g} frames of {self.size:.3g} px",
                 fix=f"give at most {FRAMES_LIMIT} frames, and {PIXELS_LIMIT} px in all of them together",
             )
         within = (self.rate <= RATE_LIMIT, self.temporal_sigma <= self.frames, self.spatial_sigma <= self.size)
         if not (min(self.rate, self.temporal_sigma, self.spatial_sigma) > 0 and all(within)):
             raise InputError(
-                f"rate {self.rate:g} Hz, σ of {self.temporal_sigma:g} frames and {self.spatial_sigma:g} px",
+                f"the rate is {self.rate:g} Hz, σ is {self.temporal_sigma:g} frames and {self.spatial_sigma:g} px",
                 fix=f"give values above 0: at most {RATE_LIMIT:g} Hz, {self.frames} frames and {self.size} px",
             )
 
@@ -264,11 +269,12 @@ class FrontEnd:
         expected = (1, self.frames, self.size, self.size)
         if clips.ndim != 5 or tuple(clips.shape[1:]) != expected:
             raise InputError(
-                f"clips of shape {tuple(clips.shape[1:])}", fix=f"give (channel, time, height, width) = {expected}"
+                f"the clips have the shape {tuple(clips.shape[1:])}",
+                fix=f"give (channel, time, height, width) = {expected}",
             )
-        return torch.stack([self._one(clip[0]) for clip in clips])
+        return torch.stack([self._maps_of(clip[0]) for clip in clips])
 
-    def _one(self, clip: Tensor) -> Tensor:
+    def _maps_of(self, clip: Tensor) -> Tensor:
         frames = standardised(clip)
         if self.maps == "frames":
             return frames.unsqueeze(0)
@@ -302,14 +308,15 @@ class FrontEnd:
         share = shares_of_nyquist(power, steps=self.frames)
         centre, width = centre_and_width(power, share, floor=_TINY)
         peaks, places = power.topk(min(2, power.shape[1]), dim=1)
-        banded = [_logarithm(own) for own in band_powers(power, share, BANDS)]
-        found = [_logarithm(peaks), share[places], torch.stack([_logarithm(power.sum(dim=1)), centre, width], dim=1)]
-        found += [torch.stack(banded, dim=1), _phases(real, imaginary, places[:, :1])]
-        return torch.cat(found, dim=1).flatten(0, 1)
+        banded = [_logarithm(band) for band in band_powers(power, share, BANDS)]
+        maps = [_logarithm(peaks), share[places], torch.stack([_logarithm(power.sum(dim=1)), centre, width], dim=1)]
+        maps += [torch.stack(banded, dim=1), _phases(real, imaginary, places[:, :1])]
+        return torch.cat(maps, dim=1).flatten(0, 1)
 
 
 def standardised(clip: Tensor) -> Tensor:
-    """A clip less its mean, over its standard deviation, float32; one without contrast is 0 everywhere."""
+    """Standardises a clip: less its mean, over its standard deviation, float32; one without contrast is 0
+    everywhere."""
     frames = clip.float()
     frames = frames - frames.mean()
     flat = frames.flatten()
@@ -325,14 +332,15 @@ def _sum_of_four(values: Tensor) -> Tensor:
     return rows[..., 0::2] + rows[..., 1::2]
 
 
-def _phases(real: Tensor, imaginary: Tensor, place: Tensor) -> Tensor:
-    """(2, 4, h/2, w/2): phase gradient along x and y [π a pixel] at bin `place` (2, 1, h/2, w/2), and their coherence.
+def _phases(real: Tensor, imaginary: Tensor, frequency: Tensor) -> Tensor:
+    """Computes the phase gradient along x and y [π a pixel] at bin `frequency` (2, 1, h/2, w/2), and their coherence:
+    (2, 4, h/2, w/2).
 
     Along x it is the angle of C = Σ F(x + 1, y) F*(x, y) over the two pairs of neighbours in each two by two pixels,
     and the coherence is |C|/√(Σ|F(x + 1)|² Σ|F(x)|²), 1 for a plane wave.
     """
     corners = [
-        (part[..., row::2, column::2].gather(1, place).squeeze(1))
+        (part[..., row::2, column::2].gather(1, frequency).squeeze(1))
         for part in (real, imaginary)
         for row in (0, 1)
         for column in (0, 1)
@@ -340,8 +348,8 @@ def _phases(real: Tensor, imaginary: Tensor, place: Tensor) -> Tensor:
     (a, b, c, d), (e, f, g, h) = corners[:4], corners[4:]
     power = [re.square() + im.square() for re, im in ((a, e), (b, f), (c, g), (d, h))]
 
-    def crossed(one: tuple[Tensor, Tensor], other: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
-        return one[0] * other[0] + one[1] * other[1], one[1] * other[0] - one[0] * other[1]
+    def crossed(ahead: tuple[Tensor, Tensor], behind: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+        return ahead[0] * behind[0] + ahead[1] * behind[1], ahead[1] * behind[0] - ahead[0] * behind[1]
 
     def along(pairs: list[tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]], norm: Tensor) -> tuple[Tensor, Tensor]:
         crosses = [crossed(later, earlier) for later, earlier in pairs]

@@ -33,7 +33,11 @@ _BANDS = tuple(f"{low:g}_{high:g}hz" for low, high in pairwise(BAND_EDGES))
 
 FEATURES: tuple[str, ...] = (
     *(f"log_power_{signal}_{band}" for signal in _SIGNALS for band in _BANDS),
-    *(f"{what}_{signal}" for signal in _SIGNALS for what in ("dominant_frequency", "mean_frequency", "bandwidth")),
+    *(
+        f"{quantity}_{signal}"
+        for signal in _SIGNALS
+        for quantity in ("dominant_frequency", "mean_frequency", "bandwidth")
+    ),
     "local_frequency_mean",
     "local_frequency_spread",
     "coverage_0.1",
@@ -70,7 +74,7 @@ FEATURES: tuple[str, ...] = (
 
 
 def features(frames: Tensor, *, rate: float) -> Tensor:
-    """Measure the features of clips: (batch, len(FEATURES)) float32, none of them changed by contrast or brightness.
+    """Measures the features of clips: (batch, len(FEATURES)) float32, none of them changed by contrast or brightness.
 
     Powers are logarithms to base 10 of variances over the clip's own; frequencies in Hz; flows in
     log10(px/s) and positions and lengths in px, over `SIDE`. Flow is the normal flow of Horn and Schunck (1981),
@@ -88,7 +92,7 @@ def features(frames: Tensor, *, rate: float) -> Tensor:
     """
     if frames.ndim != 5 or frames.shape[1] != 1 or frames.shape[2] < 8 or min(frames.shape[3:]) < 16:
         raise InputError(
-            f"clips of shape {tuple(frames.shape)}",
+            f"the clips have the shape {tuple(frames.shape)}",
             fix="give gray clips (batch, 1, time, height, width) of at least 8 frames and 16×16 pixels",
         )
     if rate < 2 * BAND_EDGES[-1]:
@@ -127,7 +131,7 @@ def _of_clip(clip: Tensor, rate: float) -> Tensor:
 
 
 def _reduced(clip: Tensor) -> Tensor:
-    """Return the clip averaged over whole blocks of pixels, so that its shorter side is near `SIDE`."""
+    """Returns the clip averaged over whole blocks of pixels, so that its shorter side is near `SIDE`."""
     block = max(1, round(min(clip.shape[1:]) / SIDE))
     height, width = (side // block * block for side in clip.shape[1:])
     parts = [clip[:, i:height:block, j:width:block] for i in range(block) for j in range(block)]
@@ -139,7 +143,7 @@ def _log(power: Tensor) -> Tensor:
 
 
 def _transform(signal: Tensor, rate: float) -> tuple[Tensor, Tensor, Tensor]:
-    """Return real and imaginary part (bin, height, width) of the windowed transform without its mean, and Hz (bin,).
+    """Returns real and imaginary part (bin, height, width) of the windowed transform without its mean, and Hz (bin,).
 
     One matrix product: the Hann window (Σw² = n) and the subtraction of the mean are part of the matrix, and |F|²/n² is
     the part of the variance in a bin, but for the factor 2 of negative frequencies.
@@ -159,7 +163,7 @@ def _transform(signal: Tensor, rate: float) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def _band_shares(frequency: Tensor, width: float) -> Tensor:
-    """Return the share of each bin, f ± width/2, in each band: (band, bin). Bands finer than the bins share them."""
+    """Returns the share of each bin, f ± width/2, in each band: (band, bin). Bands finer than the bins share them."""
     edges = torch.tensor(BAND_EDGES, dtype=frequency.dtype, device=frequency.device)
     low = torch.maximum(edges[:-1, None], frequency - width / 2)
     high = torch.minimum(edges[1:, None], frequency + width / 2)
@@ -167,7 +171,7 @@ def _band_shares(frequency: Tensor, width: float) -> Tensor:
 
 
 def _spectral(wave: tuple[Tensor, Tensor, Tensor], slope_x: Tensor, slope_y: Tensor, rate: float) -> list[Tensor]:
-    """Band powers and shape of the spectra of the change from frame to frame and of both slopes."""
+    """Computes band powers and shape of the spectra of the change from frame to frame and of both slopes."""
     powers: list[Tensor] = []
     shapes: list[Tensor] = []
     local: list[Tensor] = []
@@ -203,7 +207,8 @@ def _coverage(motion: Tensor) -> list[Tensor]:
 
 
 def _flow(change: Tensor, slope_x: Tensor, slope_y: Tensor, rate: float) -> list[Tensor]:
-    """Normal flow where there is slope, and the translation of each frame, both in widths of the reduced image."""
+    """Computes normal flow where there is slope, and the translation of each frame, both in widths of the reduced
+    image."""
     scale = rate / SIDE
     x, y = 0.5 * (slope_x[1:] + slope_x[:-1]), 0.5 * (slope_y[1:] + slope_y[:-1])
     xx, yy, xy = (x * x).mean(dim=(1, 2)), (y * y).mean(dim=(1, 2)), (x * y).mean(dim=(1, 2))
@@ -227,7 +232,7 @@ def _flow(change: Tensor, slope_x: Tensor, slope_y: Tensor, rate: float) -> list
 
 
 def _shape(motion: Tensor) -> list[Tensor]:
-    """Where the motion is and how it spreads: moments of its power over the image."""
+    """Computes moments of the motion's power over the image: moments of its power over the image."""
     height, width = motion.shape
     weight = motion + FLOOR
     x = (torch.arange(width, device=motion.device, dtype=motion.dtype) - (width - 1) / 2) / SIDE
@@ -251,7 +256,7 @@ def _shape(motion: Tensor) -> list[Tensor]:
 
 
 def _waves(transform: tuple[Tensor, Tensor, Tensor]) -> list[Tensor]:
-    """Coherence and wavenumber [rad/px] along x and y at the frequency that dominates the rate of change."""
+    """Computes coherence and wavenumber [rad/px] along x and y at the frequency that dominates the rate of change."""
     real, imaginary, frequency = transform
     power = (real.square() + imaginary.square()).mean(dim=(1, 2))
     wave = torch.complex(*(part[(power * frequency.square()).argmax()] for part in (real, imaginary)))

@@ -23,7 +23,7 @@ from models.targets import Scaling
 def contrastive_loss(
     embedding: Tensor, seed: Tensor, *, margin: float = 1.0, positive_share: float | None = None
 ) -> Tensor:
-    """Pull clips of one simulation together and push others apart to the margin, over all pairs of the batch.
+    """Pulls clips of one simulation together and pushes others apart to the margin, over all pairs of the batch.
 
     The mean over all n(n − 1)/2 pairs (BatchAll) of y D² + (1 − y) max(0, m − D)², with D the Euclidean distance of the
     two embeddings and y = 1 where both clips are renders of one simulation (Hadsell, Chopra and LeCun, CVPR 2006,
@@ -43,23 +43,23 @@ def contrastive_loss(
     """
     if embedding.ndim != 2 or seed.shape != embedding.shape[:1]:
         raise InputError(
-            f"embeddings of shape {tuple(embedding.shape)} with seeds of shape {tuple(seed.shape)}",
+            f"the embeddings have the shape {tuple(embedding.shape)}, the seeds {tuple(seed.shape)}",
             fix="give (n, dimension) and (n,)",
         )
     if margin <= 0 or (positive_share is not None and not 0 < positive_share < 1):
         raise InputError(
-            f"margin {margin}, share of positive pairs {positive_share}",
+            f"the margin is {margin}, share of positive pairs {positive_share}",
             fix="give a margin above 0 and a share between 0 and 1",
         )
     first, second = torch.triu_indices(len(seed), len(seed), offset=1, device=seed.device)
     positive = seed[first] == seed[second]
-    found = int(positive.sum())
-    if found == 0:
+    positives = int(positive.sum())
+    if positives == 0:
         raise InputError(
             f"none of the {len(seed)} clips of this batch are of one simulation",
             fix="draw batches by simulation, at least two clips of each",
         )
-    if found == len(positive):
+    if positives == len(positive):
         raise InputError(
             f"all {len(seed)} clips of this batch are of one simulation", fix="draw at least two simulations a batch"
         )
@@ -110,7 +110,7 @@ class Learner(nn.Module):
         super().__init__()
         if (loss is Loss.CONTRASTIVE) == bool(targets):
             raise InputError(
-                f"the {loss.value} loss with {len(targets)} targets",
+                f"the {loss.value} loss cannot have {len(targets)} targets",
                 fix="give targets to all losses but the contrastive",
             )
         self.network = network
@@ -127,7 +127,7 @@ class Learner(nn.Module):
         self.register_buffer("spread", torch.ones(len(targets)))
 
     def fit_scale(self, values: Tensor) -> None:
-        """Take mean and deviation of what is learned from the training set's targets (n, target).
+        """Takes mean and deviation of what is learned from the training set's targets (n, target).
 
         Raises:
             InputError: a target that is the same in all of it.
@@ -144,7 +144,7 @@ class Learner(nn.Module):
         self.spread.copy_(spread)
 
     def loss(self, inputs: Tensor, values: Tensor, sequence: Tensor) -> Tensor:
-        """The mean loss of a batch: a scalar.
+        """Computes the mean loss of a batch: a scalar.
 
         Args:
             inputs: as the network takes them.
@@ -163,14 +163,14 @@ class Learner(nn.Module):
         return -self.head(embedding).log_prob(wanted).mean()
 
     def point_estimates(self, embedding: Tensor) -> Tensor:
-        """(n, target) values of a regression's embeddings, or the means of a posterior's components."""
-        found = self.head(embedding)
-        if isinstance(found, Mixture):
-            found = found.mean()
-        return self._values(found * self.spread + self.centre)
+        """Returns (n, target) values of a regression's embeddings, or the means of a posterior's components."""
+        predicted = self.head(embedding)
+        if isinstance(predicted, Mixture):
+            predicted = predicted.mean()
+        return self._values(predicted * self.spread + self.centre)
 
     def mixture(self, embedding: Tensor) -> Mixture:
-        """The distributions over standardised logits.
+        """Predicts the distributions over standardised logits.
 
         Raises:
             InputError: a learner of another loss.
@@ -189,7 +189,7 @@ class Learner(nn.Module):
 def build(
     network: str, options: Mapping[str, Any], *, loss: Loss, targets: tuple[str, ...], components: int, margin: float
 ) -> Learner:
-    """A named network with its head, its weights drawn by torch's generator as it stands.
+    """Builds a named network with its head, its weights drawn by torch's generator as it stands.
 
     It is built without memory for its weights first, so that no recipe or card takes more than `WEIGHTS_LIMIT`.
 
@@ -203,12 +203,12 @@ def build(
         InputError: options that the network does not take, or targets that do not go with the loss.
         LimitError: numbers or lists beyond any network's, or more weights than `WEIGHTS_LIMIT`.
     """
-    given = {key: tuple(value) if isinstance(value, list) else value for key, value in options.items()}
-    for key, value in {**given, "components": components, "margin": margin}.items():
+    arguments = {key: tuple(value) if isinstance(value, list) else value for key, value in options.items()}
+    for key, value in {**arguments, "components": components, "margin": margin}.items():
         _check_option(key, value)
 
-    def made() -> Learner:
-        module: nn.Module = NETWORKS[network](**given)
+    def learner() -> Learner:
+        module: nn.Module = NETWORKS[network](**arguments)
         if not isinstance(module, Network):
             raise InputError(
                 f"the network {network} lacks one of takes, recurrent, dimension and forward",
@@ -219,7 +219,7 @@ def build(
 
     try:
         with torch.device("meta"):
-            weights = sum(values.numel() for values in made().state_dict().values())
+            weights = sum(values.numel() for values in learner().state_dict().values())
     except (TypeError, ValueError, RuntimeError, ArithmeticError) as error:
         raise InputError(
             f"the network {network} does not take that: {error}",
@@ -232,11 +232,11 @@ def build(
             where="[network]",
             fix=f"at most {WEIGHTS_LIMIT} are trained or read; give smaller widths",
         )
-    return made()
+    return learner()
 
 
 def _check_option(key: str, value: object) -> None:
-    """Make sure that an option is a positive number, a text, or a short list of them.
+    """Checks that an option is a positive number, a text, or a short list of them.
 
     Raises:
         InputError, LimitError: it is not.
@@ -244,10 +244,10 @@ def _check_option(key: str, value: object) -> None:
     many = value if isinstance(value, tuple) else (value,)
     if len(many) > LIST_LIMIT:
         raise LimitError(f"{key} has {len(many)} entries", where="[network]", fix=f"give at most {LIST_LIMIT}")
-    for one in many:
-        if isinstance(one, str):
+    for entry in many:
+        if isinstance(entry, str):
             continue
-        if isinstance(one, bool) or not isinstance(one, int | float) or not one > 0:
-            raise InputError(f"{key} is {one!r}", where="[network]", fix="give a positive number")
-        if one > NUMBER_LIMIT:
-            raise LimitError(f"{key} is {str(one)[:20]}", where="[network]", fix=f"give at most {NUMBER_LIMIT}")
+        if isinstance(entry, bool) or not isinstance(entry, int | float) or not entry > 0:
+            raise InputError(f"{key} is {entry!r}", where="[network]", fix="give a positive number")
+        if entry > NUMBER_LIMIT:
+            raise LimitError(f"{key} is {str(entry)[:20]}", where="[network]", fix=f"give at most {NUMBER_LIMIT}")

@@ -44,16 +44,18 @@ class MapsNetwork(nn.Module):
         channels: tuple[str, ...] | None = None,
     ) -> None:
         super().__init__()
-        known, chosen = self.known, self.known if channels is None else channels
+        names, chosen = self.known, self.known if channels is None else channels
         strides = self.reduces if strides is None else strides
-        unknown = set(chosen) - set(known)
+        unknown = set(chosen) - set(names)
         if unknown or not chosen:
-            raise InputError(f"maps {sorted(unknown)} are not known", fix=f"name some of {', '.join(known)}")
+            raise InputError(f"maps {sorted(unknown)} are not known", fix=f"name some of {', '.join(names)}")
         if len(widths) != len(strides) or not widths:
-            raise InputError(f"{len(widths)} widths and {len(strides)} strides", fix="give one of each for every block")
+            raise InputError(
+                f"there are {len(widths)} widths and {len(strides)} strides", fix="give one of each for every block"
+            )
         self.dimension = dimension
-        self.channels = len(known)
-        self._chosen = [known.index(name) for name in chosen]
+        self.channels = len(names)
+        self._chosen = [names.index(name) for name in chosen]
         self.standardise = nn.BatchNorm2d(len(chosen), affine=False)
         ins = (len(chosen), *widths[:-1])
         self.blocks = nn.Sequential(
@@ -66,7 +68,7 @@ class MapsNetwork(nn.Module):
         self.summary = nn.Sequential(nn.Linear(2 * widths[-1], 128), nn.ReLU(), nn.Linear(128, dimension))
 
     def forward(self, maps: Tensor) -> Tensor:
-        """The summary (batch, dimension)."""
-        seen = maps if len(self._chosen) == maps.shape[1] else maps[:, self._chosen]
-        features = self.blocks(self.standardise(seen))
+        """Computes the summary (batch, dimension)."""
+        used = maps if len(self._chosen) == maps.shape[1] else maps[:, self._chosen]
+        features = self.blocks(self.standardise(used))
         return self.summary(torch.cat([features.mean(dim=(2, 3)), features.amax(dim=(2, 3))], dim=1))

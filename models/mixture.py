@@ -48,12 +48,12 @@ class Mixture:
             )
 
     def log_prob(self, y: Tensor) -> Tensor:
-        """Logarithm of the density at y (n, t): (n,)."""
+        """Computes the logarithm of the density at y (n, t): (n,)."""
         self._require(y)
         return self.log_density(y[:, None])[:, 0]
 
     def log_density(self, y: Tensor) -> Tensor:
-        """Logarithm of the density at p points of each clip, y (n, p, t): (n, p)."""
+        """Computes the logarithm of the density at p points of each clip, y (n, p, t): (n, p)."""
         return torch.logsumexp(self._log_joint(y), dim=1)
 
     def _log_joint(self, y: Tensor) -> Tensor:
@@ -66,7 +66,7 @@ class Mixture:
         return self.log_weight[..., None] + component
 
     def marginal(self, columns: Sequence[int]) -> Mixture:
-        """The mixture of some targets, in the order that is given."""
+        """Returns the mixture of some targets, in the order that is given."""
         chosen = list(columns)
         factor = self.factor[..., chosen, :]
         return Mixture(
@@ -76,7 +76,7 @@ class Mixture:
         )
 
     def sample_given(self, columns: Sequence[int], values: Tensor, generator: torch.Generator) -> Tensor:
-        """Draw from the distribution of all targets given some of them: (n, p, t).
+        """Draws from the distribution of all targets given some of them: (n, p, t).
 
         With the given targets first, a component's covariance has the Cholesky factor [[A, 0], [B, C]]; given y of
         them, the others have the mean m + B A⁻¹ (y − m_y) and the covariance C Cᵀ, and the component's weight is
@@ -89,50 +89,53 @@ class Mixture:
         """
         rest = [column for column in range(self.location.shape[2]) if column not in columns]
         order = [*columns, *rest]
-        given = len(columns)
-        own = self.marginal(order)
+        conditioned = len(columns)
+        ordered = self.marginal(order)
         first = Mixture(
-            log_weight=own.log_weight, location=own.location[..., :given], factor=own.factor[..., :given, :given]
+            log_weight=ordered.log_weight,
+            location=ordered.location[..., :conditioned],
+            factor=ordered.factor[..., :conditioned, :conditioned],
         )
         share = first._log_joint(values).softmax(dim=1).mT
         component = torch.multinomial(share.flatten(0, 1), 1, generator=generator).reshape(values.shape[:2])
         row = torch.arange(len(values), device=values.device)[:, None]
-        location, factor = own.location[row, component], own.factor[row, component]
-        offset = (values - location[..., :given]).unsqueeze(-1)
-        whitened = torch.linalg.solve_triangular(factor[..., :given, :given], offset, upper=False)
+        location, factor = ordered.location[row, component], ordered.factor[row, component]
+        offset = (values - location[..., :conditioned]).unsqueeze(-1)
+        whitened = torch.linalg.solve_triangular(factor[..., :conditioned, :conditioned], offset, upper=False)
         noise = torch.randn(
             (*values.shape[:2], len(rest), 1), generator=generator, dtype=values.dtype, device=values.device
         )
-        others = factor[..., given:, :given] @ whitened + factor[..., given:, given:] @ noise
-        drawn = torch.cat([values, location[..., given:] + others.squeeze(-1)], dim=-1)
+        deviation = factor[..., conditioned:, :conditioned] @ whitened + factor[..., conditioned:, conditioned:] @ noise
+        drawn = torch.cat([values, location[..., conditioned:] + deviation.squeeze(-1)], dim=-1)
         return drawn[..., torch.tensor(order).argsort()]
 
     def mean(self) -> Tensor:
-        """Mean of each target: (n, t)."""
+        """Computes the mean of each target: (n, t)."""
         return (self.log_weight.exp()[..., None] * self.location).sum(dim=1)
 
     def covariance(self) -> Tensor:
-        """Covariance of the targets, within and between components: (n, t, t)."""
+        """Computes the covariance of the targets, within and between components: (n, t, t)."""
         weight = self.log_weight.exp()[..., None, None]
         offset = (self.location - self.mean()[:, None]).unsqueeze(-1)
         return (weight * (self.factor @ self.factor.mT + offset @ offset.mT)).sum(dim=1)
 
     def cdf(self, y: Tensor) -> Tensor:
-        """Marginal cumulative probability of each target at y (n, t): (n, t). Uniform on [0, 1] if calibrated."""
+        """Computes the marginal cumulative probability of each target at y (n, t): (n, t). Uniform on [0, 1] if
+        calibrated."""
         self._require(y)
         deviation = self.factor.square().sum(dim=-1).sqrt()
         score = (y[:, None] - self.location) / deviation
         return (self.log_weight.exp()[..., None] * torch.special.ndtr(score)).sum(dim=1)
 
     def sample(self, count: int, generator: torch.Generator) -> Tensor:
-        """Draw from each mixture: (n, count, t).
+        """Draws from each mixture: (n, count, t).
 
         Args:
             count: draws of each.
             generator: on the device of the tensors.
         """
         if count < 1:
-            raise InputError(f"{count} draws", fix="ask for at least 1")
+            raise InputError(f"{count} draws are too few", fix="ask for at least 1")
         component = torch.multinomial(self.log_weight.exp(), count, replacement=True, generator=generator)
         row = torch.arange(len(component), device=component.device)[:, None]
         location, factor = self.location[row, component], self.factor[row, component]
@@ -140,7 +143,7 @@ class Mixture:
         return location + (factor @ noise.unsqueeze(-1)).squeeze(-1)
 
     def rescaled(self, *, scale: Tensor, shift: Tensor) -> Mixture:
-        """Return the mixture of scale · y + shift, scale (t,) above 0 and shift (t,), or (n, 1, t) for each clip."""
+        """Returns the mixture of scale · y + shift, scale (t,) above 0 and shift (t,), or (n, 1, t) for each clip."""
         return Mixture(
             log_weight=self.log_weight,
             location=self.location * scale + shift,
@@ -148,12 +151,12 @@ class Mixture:
         )
 
     def rows(self, places: Sequence[int]) -> Mixture:
-        """The mixtures of some of the clips."""
+        """Selects the mixtures of some of the clips."""
         chosen = list(places)
         return Mixture(log_weight=self.log_weight[chosen], location=self.location[chosen], factor=self.factor[chosen])
 
     def double(self) -> Mixture:
-        """The same in float64."""
+        """Converts the mixture to float64."""
         return Mixture(
             log_weight=self.log_weight.double(), location=self.location.double(), factor=self.factor.double()
         )
@@ -161,7 +164,7 @@ class Mixture:
     def _require(self, y: Tensor) -> None:
         expected = (self.location.shape[0], self.location.shape[2])
         if tuple(y.shape) != expected:
-            raise InputError(f"targets of shape {tuple(y.shape)}", fix=f"give {expected} for these mixtures")
+            raise InputError(f"the targets have the shape {tuple(y.shape)}", fix=f"give {expected} for these mixtures")
 
 
 class MixtureHead(nn.Module):
@@ -181,7 +184,8 @@ class MixtureHead(nn.Module):
         super().__init__()
         if min(dimension, targets, components) < 1:
             raise InputError(
-                f"dimension {dimension}, {targets} targets, {components} components", fix="give at least 1 of each"
+                f"the head has dimension {dimension}, {targets} targets and {components} components",
+                fix="give at least 1 of each",
             )
         self.targets = targets
         self.components = components
@@ -200,7 +204,7 @@ class MixtureHead(nn.Module):
             self.linear.bias.copy_(bias.flatten())
 
     def forward(self, embedding: Tensor) -> Mixture:
-        """Return the mixtures of a batch of embeddings (n, dimension)."""
+        """Returns the mixtures of a batch of embeddings (n, dimension)."""
         t = self.targets
         raw = self.linear(embedding).unflatten(1, (self.components, -1))
         logit, location, diagonal, below = raw.split([1, t, t, raw.shape[2] - 1 - 2 * t], dim=2)

@@ -28,5 +28,5 @@ class Network(Protocol):
     dimension: int
 
     def forward(self, x: Tensor) -> Tensor:
-        """Embed a batch: (batch, dimension)."""
+        """Embeds a batch: (batch, dimension)."""
         ...

@@ -17,7 +17,7 @@ from flagdata.errors import InputError
 
 
 def shrunk_covariance(points: NDArray[np.floating]) -> tuple[NDArray[np.float64], float]:
-    """Return the covariance (d, d) of points (n, d), drawn towards m·1, and by how much, from 0 to 1.
+    """Returns the covariance (d, d) of points (n, d), drawn towards m·1, and by how much, from 0 to 1.
 
     Σ* = ρ m 1 + (1 − ρ) S with S = XᵀX/n, m = tr S/d, ρ = b²/d², d² = ‖S − m 1‖²/d and b² = min(d²,
     Σ ‖x xᵀ − S‖²/(d n²)): Ledoit and Wolf 2004, lemmas 3.2 to 3.4 and equation 14.
@@ -27,7 +27,9 @@ def shrunk_covariance(points: NDArray[np.floating]) -> tuple[NDArray[np.float64]
     """
     x = np.asarray(points, dtype=np.float64)
     if x.ndim != 2 or len(x) < 2 or not np.isfinite(x).all():
-        raise InputError(f"summaries of shape {x.shape}, or not finite", fix="give (n, d) with at least 2 clips")
+        raise InputError(
+            f"the summaries have the shape {x.shape}, or are not finite", fix="give (n, d) with at least 2 clips"
+        )
     x = x - x.mean(axis=0)
     n, d = x.shape
     sample = x.T @ x / n
@@ -73,7 +75,7 @@ class Familiarity:
 
     @classmethod
     def of(cls, training: NDArray[np.floating], validation: NDArray[np.floating]) -> Familiarity:
-        """Measure it on summaries (n, d) of training clips and of validation clips.
+        """Measures it on summaries (n, d) of training clips and of validation clips.
 
         The stated rate holds for a clip that is exchangeable with the validation clips, so take one clip of each
         sequence for these: clips of one sequence are alike.
@@ -93,24 +95,29 @@ class Familiarity:
         )
         reference = np.sort(cloud.distance(validation))
         if len(reference) == 0 or not np.isfinite(reference).all():
-            raise InputError("no validation summaries, or some that are not finite", fix="give at least one, finite")
+            raise InputError(
+                "there are no validation summaries, or some are not finite", fix="give at least one, finite"
+            )
         return cls(centre=cloud.centre, whitening=cloud.whitening, reference=reference)
 
     def distance(self, summaries: NDArray[np.floating]) -> NDArray[np.float64]:
         """Mahalanobis distance of summaries (n, d) from the training clips: (n,), infinite where not finite."""
         x = np.asarray(summaries, dtype=np.float64)
         if x.ndim != 2 or x.shape[1] != len(self.centre):
-            raise InputError(f"summaries of shape {x.shape}", fix=f"give (n, {len(self.centre)})")
+            raise InputError(f"the summaries have the shape {x.shape}", fix=f"give (n, {len(self.centre)})")
         finite = np.asarray(np.isfinite(x).all(axis=1))
         offset = np.where(finite[:, None], x, self.centre) - self.centre
         return np.where(finite, np.linalg.norm(offset @ self.whitening.T, axis=1), np.inf)
 
     def p_value(self, summaries: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Conformal p of summaries (n, d): (1 + validation clips at least as far)/(validation clips + 1), (n,)."""
+        """Computes the conformal p of summaries (n, d): (1 + validation clips at least as far)/(validation clips + 1),
+        (n,).
+        """
         return conformal_p(self.reference, self.distance(summaries))
 
     def threshold(self, false_alarm: float) -> float:
-        """Distance beyond which a clip is called unfamiliar, such that this happens to familiar ones at most so often.
+        """Returns the distance beyond which a clip is called unfamiliar, such that this happens to familiar ones at
+        most so often.
 
         Args:
             false_alarm: share of familiar clips, above 0.
@@ -120,7 +127,7 @@ class Familiarity:
         """
         n = len(self.reference)
         if not 0 < false_alarm < 1:
-            raise InputError(f"false-alarm rate {false_alarm}", fix="give a share between 0 and 1")
+            raise InputError(f"the false-alarm rate is {false_alarm}", fix="give a share between 0 and 1")
         exceeded = int(np.floor(false_alarm * (n + 1) + 1e-9))
         if exceeded < 1:
             raise InputError(
@@ -130,16 +137,16 @@ class Familiarity:
         return float(self.reference[n - exceeded])
 
     def unfamiliar(self, summaries: NDArray[np.floating], *, false_alarm: float) -> NDArray[np.bool_]:
-        """Which summaries (n, d) lie outside: beyond `threshold`, which is p ≤ false_alarm: (n,)."""
+        """Masks the summaries (n, d) that lie outside: beyond `threshold`, which is p ≤ false_alarm: (n,)."""
         return self.distance(summaries) > self.threshold(false_alarm)
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
-        """Return all of its state by name, as it can be stored."""
+        """Returns all of its state by name, as it can be stored."""
         return {"centre": self.centre, "whitening": self.whitening, "reference": self.reference}
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Familiarity:
-        """Rebuild it from what `arrays` gave.
+        """Rebuilds it from what `arrays` gave.
 
         Raises:
             KeyError, InputError: arrays that `arrays` does not give.
@@ -152,7 +159,7 @@ class Familiarity:
             or not len(reference)
         ):
             raise InputError(
-                f"a cloud of shapes {centre.shape}, {whitening.shape} and {reference.shape}",
+                f"the cloud has the shapes {centre.shape}, {whitening.shape} and {reference.shape}",
                 fix="give (d,), (d, d) and (clips,)",
             )
         return cls(centre=centre, whitening=whitening, reference=reference)

@@ -61,19 +61,20 @@ class Known:
     sigma: NDArray[np.float64]
 
     @classmethod
-    def stated(cls, name: str, stated: Stated, *, scale: NDArray[np.float64]) -> Known:
-        """A statement about a quantity that is `scale` (n, m) times the one of the network."""
-        low, high, sigma = (np.asarray(end / scale) for end in (stated.low, stated.high, stated.sigma))
+    def stated(cls, name: str, statement: Stated, *, scale: NDArray[np.float64]) -> Known:
+        """States a quantity that is `scale` (n, m) times the one of the network."""
+        low, high, sigma = (np.asarray(end / scale) for end in (statement.low, statement.high, statement.sigma))
         return cls(name=name, low=low, high=high, sigma=sigma)
 
     @classmethod
-    def everywhere(cls, name: str, stated: Stated, *, count: int) -> Known:
-        """The same statement for all of `count` clips."""
-        return cls.stated(name, stated, scale=np.ones((count, 1)))
+    def everywhere(cls, name: str, statement: Stated, *, count: int) -> Known:
+        """Repeats a statement for all of `count` clips."""
+        return cls.stated(name, statement, scale=np.ones((count, 1)))
 
     @classmethod
     def of_aspect(cls, length: float, height: float, *, count: int) -> Known:
-        """The ratio of a flag's length to its height, of a model that estimates it, the same for all of `count` clips.
+        """States the ratio of a flag's length to its height, of a model that estimates it, the same for all of `count`
+        clips.
 
         Args:
             length, height: of the flag, in one unit.
@@ -84,10 +85,11 @@ class Known:
         shape = self.low.shape
         if self.low.ndim != 2 or self.high.shape != shape or self.sigma.shape != shape:
             raise InputError(
-                f"ends of the {self.name} of shapes {shape}, {self.high.shape}, {self.sigma.shape}", fix="give (n, m)"
+                f"the ends of the {self.name} have the shapes {shape}, {self.high.shape}, {self.sigma.shape}",
+                fix="give (n, m)",
             )
         if (self.low > self.high).any() or (self.sigma < 0).any():
-            raise InputError(f"a range of the {self.name} whose ends are not in order", fix="give the lower end first")
+            raise InputError(f"the ends of the {self.name} are not in order", fix="give the lower end first")
         wide, blurred = self.high > self.low, self.sigma > 0
         if wide.any() != wide.all() or blurred.any() != blurred.all() or (wide & blurred).any():
             raise InputError(
@@ -100,21 +102,22 @@ class Known:
         return bool((self.low == self.high).all() and not self.sigma.any())
 
     def reach(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(n, m) ends of where the quantity can lie."""
+        """Returns (n, m) ends of where the quantity can lie."""
         return self.low - REACH * self.sigma, self.high + REACH * self.sigma
 
 
 def stated_aspect(length: float, height: float) -> Stated:
-    """What a flag's size states of the logarithm of its length over its height."""
+    """States the logarithm of length over height by a flag's size."""
     middle = math.log(length / height)
     return Stated(low=middle - ASPECT_SLACK, high=middle + ASPECT_SLACK)
 
 
 def usable_aspect(targets: Sequence[Target], length: float, height: float) -> Stated | None:
-    """The same for a model of these targets; None where it estimates no aspect, or none so large or small."""
-    own = stated_aspect(length, height)
-    known = next((target for target in targets if target.name == ASPECT), None)
-    return own if known is not None and known.low <= own.low and own.high <= known.high else None
+    """States the aspect as `stated_aspect` does, for a model of these targets; None where it estimates no aspect, or
+    none so large or small."""
+    aspect = stated_aspect(length, height)
+    estimated = next((target for target in targets if target.name == ASPECT), None)
+    return aspect if estimated is not None and estimated.low <= aspect.low and aspect.high <= estimated.high else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -134,7 +137,7 @@ class Restricted:
 def restricted(
     mixture: Mixture, scaling: Scaling, known: Sequence[Known], *, draws: int, generator: torch.Generator
 ) -> Restricted:
-    """Draw from mixtures given statements about some of their quantities.
+    """Draws from mixtures restricted by statements about some of their quantities.
 
     Args:
         mixture: n of them, over the targets' logits, float64.
@@ -147,24 +150,24 @@ def restricted(
         InputError: a quantity that the model does not estimate or that is named twice, a statement that leaves the
             model's range for all draws, or more than two that are inexact.
     """
-    order = sorted(known, key=lambda one: one.exact)
-    columns = [_column(scaling, one.name) for one in order]
-    soft = sum(not one.exact for one in order)
+    order = sorted(known, key=lambda statement: statement.exact)
+    columns = [_column(scaling, statement.name) for statement in order]
+    soft = sum(not statement.exact for statement in order)
     if not order or len(set(columns)) < len(columns) or soft > max(CELLS):
         raise InputError(
-            f"{len(order)} statements about {', '.join(one.name for one in order) or 'nothing'}",
+            f"{len(order)} statements about {', '.join(statement.name for statement in order) or 'nothing'}",
             fix=f"state each quantity once, at most {max(CELLS)} of them inexactly",
         )
-    for one, column in zip(order, columns, strict=True):
-        _check(one, scaling, column)
+    for statement, column in zip(order, columns, strict=True):
+        _check(statement, scaling, column)
     ends = _Ends.of(scaling, columns, like=mixture.location)
-    own = mixture.marginal(columns)
-    exact = [ends.tensor(one.low) for one in order[soft:]]
+    marginal = mixture.marginal(columns)
+    exact = [ends.tensor(statement.low) for statement in order[soft:]]
     if soft:
-        values, log_mass = _drawn(own, ends, order[:soft], exact, draws=draws, generator=generator)
+        values, log_mass = _drawn(marginal, ends, order[:soft], exact, draws=draws, generator=generator)
     else:
         values = torch.stack(torch.broadcast_tensors(*exact), dim=-1)
-        log_mass = own.log_density(ends.logits(values)) + ends.log_slope(values)
+        log_mass = marginal.log_density(ends.logits(values)) + ends.log_slope(values)
         log_mass = torch.where(ends.inside(values), log_mass, -torch.inf)
     values = values.expand(-1, draws, -1)
     logits = mixture.sample_given(columns, ends.logits(values), generator)
@@ -172,7 +175,7 @@ def restricted(
 
 
 def _drawn(
-    own: Mixture,
+    marginal: Mixture,
     ends: _Ends,
     soft: Sequence[Known],
     exact: Sequence[Tensor],
@@ -180,30 +183,32 @@ def _drawn(
     draws: int,
     generator: torch.Generator,
 ) -> tuple[Tensor, Tensor]:
-    """(n, draw, s) values of what is stated, the inexact first, from p(κ | x) L(κ), and (n, m) log Z."""
+    """Draws (n, draw, s) values of what is stated, the inexact first, from p(κ | x) L(κ), and computes (n, m) log Z."""
     cells = CELLS[len(soft)]
-    at = torch.cartesian_prod(*[torch.arange(cells)] * len(soft)).reshape(-1, len(soft)).to(own.location.device)
-    log_likelihood = torch.zeros(1).to(own.location)
+    at = torch.cartesian_prod(*[torch.arange(cells)] * len(soft)).reshape(-1, len(soft)).to(marginal.location.device)
+    log_likelihood = torch.zeros(1).to(marginal.location)
     below, above, points = [], [], []
-    for place, one in enumerate(soft):
-        reach = [ends.tensor(end).clamp(ends.least[place], ends.most[place]) for end in one.reach()]
+    for column, statement in enumerate(soft):
+        reach = [ends.tensor(end).clamp(ends.least[column], ends.most[column]) for end in statement.reach()]
         first, last = reach[0].amin(dim=1, keepdim=True), reach[1].amax(dim=1, keepdim=True)
         edges = first + (last - first) * torch.linspace(0, 1, cells + 1).to(first)
         lower, upper = edges[:, None, :-1], edges[:, None, 1:]
         middle = (lower + upper) / 2
-        low, high, sigma = (ends.tensor(end)[..., None] for end in (one.low, one.high, one.sigma))
-        if one.sigma.any():
+        low, high, sigma = (ends.tensor(end)[..., None] for end in (statement.low, statement.high, statement.sigma))
+        if statement.sigma.any():
             likelihood = (upper - lower).log() - 0.5 * ((middle - low) / sigma).square()
         else:
             lower, upper = torch.maximum(lower, low), torch.minimum(upper, high)
             likelihood = (upper - lower).clamp(min=0).log()
-        log_likelihood = log_likelihood + likelihood[..., at[:, place]]
-        points.append(middle[..., at[:, place]])
-        below.append(lower[..., at[:, place]])
-        above.append(upper[..., at[:, place]])
+        log_likelihood = log_likelihood + likelihood[..., at[:, column]]
+        points.append(middle[..., at[:, column]])
+        below.append(lower[..., at[:, column]])
+        above.append(upper[..., at[:, column]])
     points += [value[..., None].expand(-1, -1, len(at)) for value in exact]
     centre = torch.stack(torch.broadcast_tensors(*points), dim=-1)
-    density = own.log_density(ends.logits(centre).flatten(1, 2)).reshape(centre.shape[:-1]) + ends.log_slope(centre)
+    density = marginal.log_density(ends.logits(centre).flatten(1, 2)).reshape(centre.shape[:-1]) + ends.log_slope(
+        centre
+    )
     weight = torch.where(ends.inside(centre), density, -torch.inf) + log_likelihood
     log_mass = torch.logsumexp(weight, dim=-1)
     share = torch.where(log_mass[..., None] > -torch.inf, weight, 0.0).softmax(dim=-1)
@@ -239,16 +244,16 @@ class _Ends:
         return torch.from_numpy(values).to(self.low)
 
     def inside(self, values: Tensor) -> Tensor:
-        """(…,) whether values (…, s) lie in the network's ranges, but for rounding."""
+        """Returns whether values (…, s) lie in the network's ranges, but for rounding: (…,)."""
         slack = _SLACK * (self.most - self.least)
         return ((values >= self.least - slack) & (values <= self.most + slack)).all(dim=-1)
 
     def logits(self, values: Tensor) -> Tensor:
-        """(…, s) of values (…, s); one beyond the network's range is taken at its end."""
+        """Transforms values (…, s) to logits (…, s); one beyond the network's range is taken at its end."""
         return torch.logit(self._share(values))
 
     def log_slope(self, values: Tensor) -> Tensor:
-        """(…,) logarithm of the logits' density over that of the values."""
+        """Computes the logarithm of the logits' density over that of the values, (…,)."""
         share = self._share(values)
         return -(share.log() + (-share).log1p() + (self.high - self.low).log()).sum(dim=-1)
 
@@ -259,18 +264,18 @@ class _Ends:
 _SLACK = 1e-9
 
 
-def _check(known: Known, scaling: Scaling, column: int) -> None:
+def _check(statement: Known, scaling: Scaling, column: int) -> None:
     """Raises:
     InputError: a statement that leaves the model's range everywhere.
     """
     target = scaling.targets[column]
     slack = _SLACK * (target.high - target.low)
-    inside = (known.low >= target.low - slack) & (known.high <= target.high + slack)
+    inside = (statement.low >= target.low - slack) & (statement.high <= target.high + slack)
     if not inside.any():
-        low, high = known.low.min(), known.high.max()
-        given = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+        low, high = statement.low.min(), statement.high.max()
+        extent = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
         raise InputError(
-            f"a {target.about} of {given} {target.unit}; the model was trained on {target.low:g} to {target.high:g}",
+            f"the {target.about} is {extent} {target.unit}; the model was trained on {target.low:g} to {target.high:g}",
             fix="give one within that",
         )
 

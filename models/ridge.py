@@ -35,26 +35,26 @@ class Ridge:
     penalty: NDArray[np.float64]
 
     def predict(self, features: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Estimate the targets of clips with features (n, f): (n, t)."""
+        """Estimates the targets of clips with features (n, f): (n, t)."""
         if features.ndim != 2 or features.shape[1] != len(self.centre):
             raise InputError(
-                f"features of shape {features.shape} for a ridge of {len(self.centre)}",
+                f"the features have the shape {features.shape}, and the ridge takes {len(self.centre)}",
                 fix=f"give (n, {len(self.centre)})",
             )
         return (features - self.centre) / self.scale @ self.weights + self.intercept
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
-        """Return all of its state by name, as it can be stored."""
+        """Returns all of its state by name, as it can be stored."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Ridge:
-        """Rebuild it from what `arrays` gave."""
+        """Rebuilds it from what `arrays` gave."""
         return cls(**{field.name: np.asarray(arrays[field.name]) for field in fields(cls)})
 
 
 def fit_ridge(features: NDArray[np.floating], targets: NDArray[np.floating], *, group: NDArray[np.integer]) -> Ridge:
-    """Fit a ridge to clips, for each target with the penalty of least squared error on sequences left out.
+    """Fits a ridge to clips, for each target with the penalty of least squared error on sequences left out.
 
     Sequences are dealt out to `FOLDS` folds in the order of their numbers: clips of one sequence are in one fold, since
     they share all that is to be estimated.
@@ -75,9 +75,9 @@ def fit_ridge(features: NDArray[np.floating], targets: NDArray[np.floating], *, 
     fold = sequence % FOLDS
     error = np.zeros((len(PENALTIES), y.shape[1]))
     for left_out in range(FOLDS):
-        kept = fold != left_out
-        for row, ridge in enumerate(_path(x[kept], y[kept])):
-            error[row] += np.square(ridge.predict(x[~kept]) - y[~kept]).sum(axis=0)
+        training = fold != left_out
+        for row, ridge in enumerate(_path(x[training], y[training])):
+            error[row] += np.square(ridge.predict(x[~training]) - y[~training]).sum(axis=0)
     best = error.argmin(axis=0)
     path = list(_path(x, y))
     return Ridge(
@@ -90,14 +90,14 @@ def fit_ridge(features: NDArray[np.floating], targets: NDArray[np.floating], *, 
 
 
 def require_table(features: NDArray[np.float64], targets: NDArray[np.float64], group: NDArray[np.integer]) -> None:
-    """Check that features (n, f), targets (n, t) and groups (n,) are of the same clips, and finite.
+    """Checks that features (n, f), targets (n, t) and groups (n,) are of the same clips, and finite.
 
     Raises:
         InputError: they are not.
     """
     if features.ndim != 2 or targets.ndim != 2 or not len(features) == len(targets) == len(group):
         raise InputError(
-            f"features of shape {features.shape}, targets {targets.shape}, groups {group.shape}",
+            f"the features have the shape {features.shape}, the targets {targets.shape}, the groups {group.shape}",
             fix="give (n, f), (n, t) and (n,) of the same clips",
         )
     if not (np.isfinite(features).all() and np.isfinite(targets).all()):
@@ -106,22 +106,22 @@ def require_table(features: NDArray[np.float64], targets: NDArray[np.float64], g
 
 
 def _path(x: NDArray[np.float64], y: NDArray[np.float64]) -> list[Ridge]:
-    """Return the ridge of each of `PENALTIES`, by one singular value decomposition."""
+    """Returns the ridge of each of `PENALTIES`, by one singular value decomposition."""
     centre, spread = x.mean(axis=0), x.std(axis=0)
     scale = np.where(spread > 1e-12 * (1 + np.abs(centre)), spread, 1.0)
     standardised = np.where(spread > 1e-12 * (1 + np.abs(centre)), (x - centre) / scale, 0.0)
-    left, singular, right = np.linalg.svd(standardised, full_matrices=False)
-    along = left.T @ (y - y.mean(axis=0))
-    found = []
+    u, singular, vt = np.linalg.svd(standardised, full_matrices=False)
+    along = u.T @ (y - y.mean(axis=0))
+    ridges = []
     for penalty in PENALTIES:
         shrunk = singular / (np.square(singular) + penalty * len(x))
-        found.append(
+        ridges.append(
             Ridge(
                 centre=centre,
                 scale=scale,
-                weights=right.T @ (shrunk[:, None] * along),
+                weights=vt.T @ (shrunk[:, None] * along),
                 intercept=y.mean(axis=0),
                 penalty=np.full(y.shape[1], penalty),
             )
         )
-    return found
+    return ridges

@@ -59,10 +59,10 @@ class SpectralNetwork(nn.Module):
         if channels < 2 or channels % 2:
             raise InputError(f"{channels} channels are not powers and as many frequencies", fix="give an even number")
         if len(widths) != 3:
-            raise InputError(f"{len(widths)} widths for three blocks", fix="give three, such as [64, 128, 280]")
+            raise InputError(f"{len(widths)} widths do not fit three blocks", fix="give three, such as [64, 128, 280]")
         if min(*widths, grid, dimension, floor, nyquist) <= 0:
             raise InputError(
-                f"widths {tuple(widths)}, grid {grid}, dimension {dimension}, floor {floor}, nyquist {nyquist}",
+                f"the widths are {tuple(widths)}, grid {grid}, dimension {dimension}, floor {floor}, nyquist {nyquist}",
                 fix="give positive numbers",
             )
         self.channels = channels
@@ -78,18 +78,19 @@ class SpectralNetwork(nn.Module):
         initialise(self)
 
     def scaled(self, maps: Tensor) -> Tensor:
-        """Return the maps as the first block sees them: log(1 + P/floor) and f/f_Nyquist, of the same shape."""
+        """Returns the maps as the first block sees them: log(1 + P/floor) and f/f_Nyquist, of the same shape."""
         power, frequency = maps.chunk(2, dim=1)
         return torch.cat([(power / self.floor).log1p(), frequency / self.nyquist], dim=1)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Embed spectral maps: (batch, dimension).
+        """Embeds spectral maps: (batch, dimension).
 
         Raises:
             InputError: maps of another number of channels or dimensions.
         """
         if x.ndim != 4 or x.shape[1] != self.channels:
             raise InputError(
-                f"maps of shape {tuple(x.shape)}", fix=f"give (batch, {self.channels}, height, width) to this network"
+                f"the maps have the shape {tuple(x.shape)}",
+                fix=f"give (batch, {self.channels}, height, width) to this network",
             )
         return self.linear(self.pool(self.blocks(self.scaled(x))).flatten(1))

@@ -12,7 +12,7 @@ from flagdata.errors import InputError
 
 
 def periodogram(signal: Tensor, *, rate: float) -> tuple[Tensor, Tensor]:
-    """Power and frequency of real signals along dimension 2 (time) of a video volume.
+    """Computes power and frequency of real signals along dimension 2 (time) of a video volume.
 
     I(ω) = |F(jω)|² / N_t of the signal less its mean, under a Hann window w scaled so that Σw² = N_t: white noise then
     keeps its power, and a sinusoid of amplitude a at a bin's centre has its peak at a² N_t / 6.
@@ -29,7 +29,7 @@ def periodogram(signal: Tensor, *, rate: float) -> tuple[Tensor, Tensor]:
     """
     if signal.ndim != 5 or not signal.is_floating_point():
         raise InputError(
-            f"a volume of shape {tuple(signal.shape)} and type {signal.dtype}",
+            f"the volume has the shape {tuple(signal.shape)} and type {signal.dtype}",
             fix="give floating (batch, channel, time, height, width)",
         )
     frames = signal.shape[2]
@@ -58,7 +58,9 @@ class SpectralDecomposition(nn.Module):
     def __init__(self, *, rate: float, peaks: int = 1) -> None:
         super().__init__()
         if rate <= 0 or peaks < 1:
-            raise InputError(f"rate {rate} Hz, {peaks} peaks", fix="give a rate above 0 and at least one peak")
+            raise InputError(
+                f"the rate is {rate} Hz, with {peaks} peaks", fix="give a rate above 0 and at least one peak"
+            )
         self.rate = rate
         self.peaks = peaks
 
@@ -66,7 +68,8 @@ class SpectralDecomposition(nn.Module):
         power, frequency = periodogram(clip, rate=self.rate)
         if self.peaks > power.shape[2]:
             raise InputError(
-                f"{self.peaks} peaks of {power.shape[2]} frequencies", fix="use more frames or fewer peaks"
+                f"{self.peaks} peaks cannot be taken of {power.shape[2]} frequencies",
+                fix="use more frames or fewer peaks",
             )
         strongest, index = power.topk(self.peaks, dim=2)
         return torch.cat([strongest.flatten(1, 2), frequency[index].flatten(1, 2)], dim=1)

@@ -32,7 +32,7 @@ _OBJECT = re.compile(r"([0-9a-f]{64})\.model")
 
 
 def check_model(folder: Path) -> None:
-    """Make sure that the files of a model are as they were written.
+    """Checks that the files of a model are as they were written.
 
     Models of a lake are checked by the hash in their name; others by their checksums.
 
@@ -40,25 +40,25 @@ def check_model(folder: Path) -> None:
         NotFoundError: there is no model.
         CorruptError: a file has changed, is missing or was added, or nothing states what the files should hold.
     """
-    whole = folder.resolve()
-    if not (whole / CARD).is_file():
+    resolved = folder.resolve()
+    if not (resolved / CARD).is_file():
         raise NotFoundError("there is no model here", where=str(folder), fix="name a trained model")
-    if named := _OBJECT.fullmatch(whole.name):
-        if content_hash(whole) != named[1]:
+    if stored := _OBJECT.fullmatch(resolved.name):
+        if content_hash(resolved) != stored[1]:
             raise CorruptError("the model's files have changed since it was stored", where=str(folder), fix=_AGAIN)
-    elif not (whole / SUMS).is_file():
+    elif not (resolved / SUMS).is_file():
         raise CorruptError(
             f"the model has no {SUMS}, so that damage to it cannot be found",
             where=str(folder),
             fix=f"name it by its lake, or state that its files are whole: (cd FOLDER && sha256sum * > {SUMS})",
         )
     else:
-        check_sums(whole, fix=_AGAIN)
+        check_sums(resolved, fix=_AGAIN)
 
 
 def renew(folder: Path, name: str, content: bytes) -> None:
-    """Replace a file of a stored model, or add one, and state its checksum. Each of the two files is the old one or the
-    new one at any time; a process that is killed between them leaves a model that is refused by the file's name.
+    """Replaces a file of a stored model, or adds one, and states its checksum. Each of the two files is the old one or
+    the new one at any time; a process that is killed between them leaves a model that is refused by the file's name.
 
     Raises:
         CorruptError: the model's checksums cannot be read.
@@ -70,18 +70,18 @@ def renew(folder: Path, name: str, content: bytes) -> None:
 
 
 def card_bytes(card: Mapping[str, Any]) -> bytes:
-    """The card of a model as it is stored."""
+    """Encodes the card of a model as it is stored."""
     text = json.dumps({"format": FORMAT, **card}, indent=2, allow_nan=False, ensure_ascii=False)
     return f"{text}\n".encode()
 
 
 def write_card(folder: Path, card: Mapping[str, Any]) -> None:
-    """Write the card of a model."""
+    """Writes the card of a model."""
     (folder / CARD).write_bytes(card_bytes(card))
 
 
 def read_card(folder: Path) -> dict[str, Any]:
-    """The card of the model in a folder.
+    """Reads the card of the model in a folder.
 
     Raises:
         NotFoundError: there is none.
@@ -102,7 +102,7 @@ def tensor_bytes(tensors: Mapping[str, Tensor]) -> bytes:
 
 
 def write_tensors(path: Path, tensors: Mapping[str, Tensor]) -> None:
-    """Write tensors by name.
+    """Writes tensors by name.
 
     Raises:
         OSError: what the disk refuses.
@@ -122,7 +122,7 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
         raise NotFoundError("there are no weights here", where=str(path), fix="name a trained model")
     try:
         if (size := path.stat().st_size) > TENSORS_LIMIT:
-            raise LimitError(f"a file of {size} bytes", where=str(path), fix=f"at most {TENSORS_LIMIT} are read")
+            raise LimitError(f"the file has {size} bytes", where=str(path), fix=f"at most {TENSORS_LIMIT} are read")
         tensors = load(path.read_bytes())
     except (SafetensorError, OSError, ValueError) as error:
         raise CorruptError(f"the weights cannot be read: {error}", where=str(path), fix=_AGAIN) from None

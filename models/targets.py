@@ -137,7 +137,7 @@ TARGETS = {**_OF_FLAGS, **_OF_FLAGS_OF_ANY_FABRIC, **_OF_FLAGS_OUTDOORS, **_OF_H
 
 
 def truth(parameters: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -> NDArray[np.float64]:
-    """The targets of clips from their parameters: (n, target), NaN where a clip does not know them.
+    """Computes the targets of clips from their parameters: (n, target), NaN where a clip does not know them.
 
     Args:
         parameters: name → (n,) values, as simulated records state them ("wind_speed", "density", "bending.0" …; "width"
@@ -148,10 +148,10 @@ def truth(parameters: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -
         UnknownNameError: a name that is none.
         InputError: no clip states what a target is made of.
     """
-    return np.stack([_one(parameters, name) for name in names], axis=1)
+    return np.stack([_target_values(parameters, name) for name in names], axis=1)
 
 
-def _one(parameters: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np.float64]:
+def _target_values(parameters: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np.float64]:
     if name not in TARGETS:
         raise UnknownNameError.of("target", name, TARGETS)
     quantity = TARGETS[name].name
@@ -220,51 +220,53 @@ class Scaling:
         return low - margin, high + margin
 
     def beyond(self, values: NDArray[np.float64]) -> tuple[str, ...]:
-        """For each target of which some of the values (n, target) lie beyond its widened range, how many and how far.
+        """Describes, for each target of which some of the values (n, target) lie beyond its widened range, how many and
+        how far.
 
         A network of these targets can state no such value; NaN lies nowhere.
         """
         low, high = (bound.numpy() for bound in self.bounds)
-        found = []
+        texts = []
         for column, (name, target) in enumerate(zip(self.names, self.targets, strict=True)):
-            own = values[:, column]
-            count = int(((own < low[column]) | (own > high[column])).sum())
+            entries = values[:, column]
+            count = int(((entries < low[column]) | (entries > high[column])).sum())
             if count:
-                found.append(
-                    f"{count} of {len(own)} clips lie beyond the range of the target {name}, {target.low:g} to "
-                    f"{target.high:g} {target.unit}: they reach from {np.nanmin(own):.4g} to {np.nanmax(own):.4g}"
+                texts.append(
+                    f"{count} of {len(entries)} clips lie beyond the range of the target {name}, {target.low:g} to "
+                    f"{target.high:g} {target.unit}: they reach from {np.nanmin(entries):.4g} to "
+                    f"{np.nanmax(entries):.4g}"
                 )
-        return tuple(found)
+        return tuple(texts)
 
     def check(self, values: NDArray[np.float64], *, where: str) -> None:
-        """Make sure that all values (n, target) that are to be learned lie within their ranges.
+        """Checks that all values (n, target) that are to be learned lie within their ranges.
 
         Raises:
             InputError: some do not; it names the range, how many they are, and targets whose range is wide enough.
         """
-        found = self.beyond(values)
-        if not found:
+        beyond = self.beyond(values)
+        if not beyond:
             return
         wide = [name for name in TARGETS if self._covers(name, values)]
         fix = f"name the target {' or '.join(wide)} in [loss] targets" if wide else "leave that target out"
         raise InputError(
-            "; ".join(found), where=where, fix=f"{fix}, or train on a data set whose values lie within the range"
+            "; ".join(beyond), where=where, fix=f"{fix}, or train on a data set whose values lie within the range"
         )
 
     def _covers(self, name: str, values: NDArray[np.float64]) -> bool:
-        """Whether the target of that name is another one of the same quantity and cloth, whose range holds all of the
-        values."""
-        other = TARGETS[name]
+        """Returns whether the target of that name is another one of the same quantity and cloth, whose range holds all
+        of the values."""
+        wanted = TARGETS[name]
         columns = [
             column
-            for column, own in enumerate(self.targets)
-            if (own.name, own.cloth) == (other.name, other.cloth) and name not in self.names
+            for column, target in enumerate(self.targets)
+            if (target.name, target.cloth) == (wanted.name, wanted.cloth) and name not in self.names
         ]
         ranges = Scaling(names=(name,))
         return any(not ranges.beyond(values[:, [column]]) for column in columns)
 
     def learned(self, values: Tensor) -> Tensor:
-        """(n, target) logits of values; one outside of its range is taken at its end, less a millionth.
+        """Transforms values to (n, target) logits; one outside of its range is taken at its end, less a millionth.
 
         What is trained on is refused before it comes to that, see `check`.
         """
@@ -273,7 +275,7 @@ class Scaling:
         return torch.logit(share, eps=1e-6).float()
 
     def values(self, learned: Tensor) -> Tensor:
-        """(…, target) values of logits."""
+        """Transforms logits to (…, target) values."""
         low, high = (bound.to(device=learned.device, dtype=learned.dtype) for bound in self.bounds)
         return low + (high - low) * learned.sigmoid()
 

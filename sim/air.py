@@ -35,7 +35,8 @@ class AirForce(Protocol):
     """A model of the air's force on the cloth."""
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N] for a wind (3, batch), or (vertex, 3, batch) where it differs in space [m/s]."""
+        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch), or (vertex, 3, batch) where it differs in space
+        [m/s]."""
         ...
 
     @property
@@ -49,7 +50,7 @@ class AirForce(Protocol):
         ...
 
     def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """What `force` has more than `plain`: (vertex, 3, batch) [N]."""
+        """Computes what `force` has more than `plain`: (vertex, 3, batch) [N]."""
         ...
 
 
@@ -74,7 +75,7 @@ class FaceWind:
 
 
 def face_wind(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> FaceWind:
-    """The relative wind on the faces, for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+    """Computes the relative wind on the faces, for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
     if on_mesh.usable(position, velocity, wind):
         normal, relative, across = on_mesh.face_wind(cloth.faces, position, velocity, wind)
         return FaceWind(normal=normal, relative=relative, across=across)
@@ -118,14 +119,16 @@ class QuadraticNormal:
         return ()
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
-        seen = face_wind(cloth, position, velocity, wind)
+        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+        relative = face_wind(cloth, position, velocity, wind)
         third = (cloth.areas / 3)[:, None, None]
-        push = third * (self.density * seen.across.abs() * seen.across * seen.normal + self.drag * seen.along)
+        push = third * (
+            self.density * relative.across.abs() * relative.across * relative.normal + self.drag * relative.along
+        )
         return cloth.shared_out(push)
 
     def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """Nothing: (vertex, 3, batch) [N]."""
+        """Returns zeros: (vertex, 3, batch) [N]."""
         return torch.zeros_like(position)
 
 
@@ -159,13 +162,13 @@ class Stokes:
         return None
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
         areas = torch.tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)
         coefficient = 6 * math.pi * self.viscosity * (areas / math.pi).sqrt()
         return coefficient[:, None, None] * (wind - velocity)
 
     def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """All of it: (vertex, 3, batch) [N]."""
+        """Returns all of the force: (vertex, 3, batch) [N]."""
         return self.force(cloth, position, velocity, wind)
 
 

@@ -32,14 +32,14 @@ class AnchorTracks:
         shape = tuple(self.samples.shape)
         if len(shape) != 4 or shape[0] < 2 or shape[2] != 3 or not torch.isfinite(self.samples).all():
             raise InputError(
-                f"tracks of anchors of shape {shape}, or not finite",
+                f"the tracks of anchors have the shape {shape}, or are not finite",
                 where="anchors",
                 fix="give two or more samples, (n, held, 3, batch), in metres",
             )
         if not self.period > 0:
-            raise InputError(f"a period of {self.period!r} s", where="anchors", fix="give seconds between samples")
+            raise InputError(f"the period is {self.period!r} s", where="anchors", fix="give seconds between samples")
 
     def displacement(self, time: float) -> Tensor:
-        """(held, 3, batch) [m] at a time [s]."""
+        """Interpolates displacements (held, 3, batch) [m] at a time [s]."""
         even = Even(start=self.start, period=self.period, count=len(self.samples))
         return between(self.samples, *place(even, time, Beyond.HOLD))

@@ -30,7 +30,7 @@ class Fold:
 
 
 def fold(cloth: Cloth, position: Tensor) -> Fold:
-    """Fold angles of positions (vertex, 3, batch) [m], in (−π, π]."""
+    """Computes fold angles of positions (vertex, 3, batch) [m], in (−π, π]."""
     if on_mesh.usable(position):
         angle, gradient = on_mesh.fold(cloth.hinges, position)
         return Fold(angle=angle, gradient=gradient)
@@ -61,12 +61,12 @@ def fold(cloth: Cloth, position: Tensor) -> Fold:
 
 
 def fold_angle(cloth: Cloth, position: Tensor) -> Tensor:
-    """Fold angles (hinge, batch) [rad] alone."""
+    """Computes fold angles (hinge, batch) [rad] alone."""
     return on_mesh.fold_angle(cloth.hinges, position) if on_mesh.usable(position) else fold(cloth, position).angle
 
 
 def stiffness(cloth: Cloth, angle: Tensor) -> Tensor:
-    """k S / 2 at fold angles (hinge, batch): (hinge, batch) [N·m/rad]."""
+    """Computes k S / 2 at fold angles (hinge, batch): (hinge, batch) [N·m/rad]."""
     curvature = angle * cloth.hinge_column[:, None]
     k = bending_stiffness(curvature, cloth.segments, cloth.hinge_rows, cloth.evaluation)
     k = k * (cloth.hinge_shape[:, None] / 2)
@@ -74,13 +74,13 @@ def stiffness(cloth: Cloth, angle: Tensor) -> Tensor:
 
 
 def corner_forces(cloth: Cloth, position: Tensor, velocity: Tensor) -> list[Tensor]:
-    """Elastic and damping forces on the four corners of every hinge: (hinge, 3, batch) each [N]."""
+    """Computes elastic and damping forces on the four corners of every hinge: (hinge, 3, batch) each [N]."""
     f = fold(cloth, position)
     return _corners(cloth, f, stiffness(cloth, f.angle), velocity)
 
 
 def _corners(cloth: Cloth, f: Fold, k: Tensor, velocity: Tensor) -> list[Tensor]:
-    """Corner forces (hinge, 3, batch) [N] of hinges of stiffness k (hinge, batch) [N·m/rad]."""
+    """Computes corner forces (hinge, 3, batch) [N] of hinges of stiffness k (hinge, batch) [N·m/rad]."""
     rate = torch.zeros_like(f.angle)
     for corner, gradient in enumerate(f.gradient):
         rate = rate + (gradient * velocity[cloth.hinges[:, corner]]).sum(1)
@@ -89,20 +89,20 @@ def _corners(cloth: Cloth, f: Fold, k: Tensor, velocity: Tensor) -> list[Tensor]
 
 
 def force(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
-    """Elastic and damping forces at the vertices: (vertex, 3, batch) [N]."""
+    """Computes elastic and damping forces at the vertices: (vertex, 3, batch) [N]."""
     if not len(cloth.hinges):
         return torch.zeros_like(position)
     return gather_sum(corner_forces(cloth, position, velocity), cloth.hinge_slots)
 
 
 def energy(cloth: Cloth, position: Tensor) -> Tensor:
-    """Stored energy k S θ²/4: (batch,) [J]; exact for constant stiffness."""
+    """Computes the stored energy k S θ²/4: (batch,) [J]; exact for constant stiffness."""
     angle = fold_angle(cloth, position)
     return (stiffness(cloth, angle) * angle**2).sum(0) / 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Linearised:
+class LinearisedBending:
     """The Gauss–Newton stiffness of the hinges at one state: k S/2 ∇θ ∇θᵀ."""
 
     cloth: Cloth
@@ -110,12 +110,12 @@ class Linearised:
     k: Tensor
 
     @classmethod
-    def at(cls, cloth: Cloth, position: Tensor) -> Linearised:
+    def at(cls, cloth: Cloth, position: Tensor) -> LinearisedBending:
         f = fold(cloth, position)
         return cls(cloth=cloth, fold=f, k=stiffness(cloth, f.angle))
 
     def force(self) -> Tensor:
-        """The elastic force at this state: (vertex, 3, batch) [N]."""
+        """Computes the elastic force at this state: (vertex, 3, batch) [N]."""
         moment = (-self.k * self.fold.angle).unsqueeze(1)
         return gather_sum([moment * g for g in self.fold.gradient], self.cloth.hinge_slots)
 
@@ -128,5 +128,5 @@ class Linearised:
         return [moment * gradient for gradient in self.fold.gradient]
 
     def diagonal(self) -> list[Tensor]:
-        """The diagonal at the corners: (hinge, 3, batch) each [N/m]."""
+        """Computes the diagonal at the corners: (hinge, 3, batch) each [N/m]."""
         return [self.k.unsqueeze(1) * gradient**2 for gradient in self.fold.gradient]

@@ -83,7 +83,7 @@ class Cloth:
             InputError: no materials.
         """
         if not materials:
-            raise InputError("a batch without members", where="cloth", fix="give one material for each member")
+            raise InputError("the batch has no members", where="cloth", fix="give one material for each member")
 
         def real(values: NDArray[np.float64]) -> Tensor:
             return torch.tensor(values, dtype=dtype, device=device)
@@ -119,17 +119,17 @@ class Cloth:
 
     @classmethod
     def joined(cls, parts: Sequence[Cloth]) -> Cloth:
-        """The members of batches on one mesh, in order.
+        """Joins the members of batches on one mesh, in order.
 
         Raises:
             UsageError: batches that differ in more than mass, bending and damping.
         """
         first = parts[0]
-        own = {f.name for f in fields(cls)} - {"mesh", "evaluation", "grid", "materials", "stiffening", *_OF_MEMBERS}
+        shared = {f.name for f in fields(cls)} - {"mesh", "evaluation", "grid", "materials", "stiffening", *_OF_MEMBERS}
         for part in parts:
-            if part.mesh is not first.mesh or any(not torch.equal(getattr(part, f), getattr(first, f)) for f in own):
+            if part.mesh is not first.mesh or any(not torch.equal(getattr(part, f), getattr(first, f)) for f in shared):
                 raise UsageError(
-                    "batches that differ in mesh or stretching", where="cloth", fix="simulate them one by one"
+                    "the batches differ in mesh or stretching", where="cloth", fix="simulate them one by one"
                 )
         stiffening = None
         if any(part.stiffening is not None for part in parts):
@@ -145,12 +145,12 @@ class Cloth:
         )
 
     def at_corners(self, field: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """A vertex field (vertex, …) at the three corners of the faces: (face, …) each."""
+        """Selects a vertex field (vertex, …) at the three corners of the faces: (face, …) each."""
         first, second, third = field.index_select(0, self._corner).unflatten(0, (3, len(self.faces)))
         return first, second, third
 
     def shared_out(self, share: Tensor) -> Tensor:
-        """What each face (face, 3, batch) gives to each of its corners, summed at the vertices: (vertex, 3, batch)."""
+        """Sums at the vertices what each face (face, 3, batch) gives to each of its corners: (vertex, 3, batch)."""
         return gather_sum([share], self._around)
 
     @cached_property
@@ -178,7 +178,7 @@ class Cloth:
 
 
 def incidence(elements: NDArray[np.int64], vertex_count: int) -> NDArray[np.int64]:
-    """Which corners of which elements meet at each vertex.
+    """Lists which corners of which elements meet at each vertex.
 
     Args:
         elements: (element, corner) vertex indices.
@@ -197,7 +197,7 @@ def incidence(elements: NDArray[np.int64], vertex_count: int) -> NDArray[np.int6
 
 
 def gather_sum(corners: Sequence[Tensor], slots: Tensor) -> Tensor:
-    """Sum corner contributions at the vertices, in a fixed order: no atomics, so the same bits every time.
+    """Sums corner contributions at the vertices, in a fixed order: no atomics, so the same bits every time.
 
     Args:
         corners: one (element, 3, batch) tensor for each corner.
@@ -209,8 +209,8 @@ def gather_sum(corners: Sequence[Tensor], slots: Tensor) -> Tensor:
     if on_mesh.usable(*corners):
         return on_mesh.gather_sum(corners, slots)
     stacked = torch.cat([*corners, torch.zeros_like(corners[0][:1])])
-    first, *others = stacked.index_select(0, slots.reshape(-1)).unflatten(0, tuple(slots.shape))
+    first, *remaining = stacked.index_select(0, slots.reshape(-1)).unflatten(0, tuple(slots.shape))
     total = first.clone()
-    for other in others:
-        total += other
+    for contribution in remaining:
+        total += contribution
     return total

@@ -74,7 +74,7 @@ def simulate(
 
 
 def _cores(device: str) -> int:
-    """Number of cores that the process may use; 1 on any other device, which takes one batch at a time."""
+    """Counts the cores that the process may use; 1 on any other device, which takes one batch at a time."""
     if not device.startswith("cpu"):
         return 1
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

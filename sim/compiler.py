@@ -49,7 +49,7 @@ _SOURCES = (
 
 
 def compiler() -> str | None:
-    """The C++ compiler: CXX, or the first of g++, clang++, c++ that is there."""
+    """Finds the C++ compiler: CXX, or the first of g++, clang++, c++ that is there."""
     for name in (os.environ.get("CXX"), "g++", "clang++", "c++"):
         if name and (path := shutil.which(name)):
             return path
@@ -58,12 +58,12 @@ def compiler() -> str | None:
 
 @functools.cache
 def library() -> ctypes.CDLL | None:
-    """The simulator's compiled kernel; None, with one warning, where it cannot be built."""
+    """Loads the simulator's compiled kernel; None, with one warning, where it cannot be built."""
     return compiled("sim.kernel", _SOURCES, without="the simulator runs as plain torch, many times slower")
 
 
 def compiled(package: str, sources: tuple[str, ...], *, without: str) -> ctypes.CDLL | None:
-    """C++ sources of a package as a library; None, with one warning, where it cannot be built.
+    """Compiles C++ sources of a package to a library; None, with one warning, where it cannot be built.
 
     Args:
         sources: file names; the first is compiled and includes the others.
@@ -77,7 +77,7 @@ def compiled(package: str, sources: tuple[str, ...], *, without: str) -> ctypes.
 
 @functools.cache
 def of_effect(header: Path) -> ctypes.CDLL | None:
-    """The library of an effect's C++ (see effect.hpp); None, with one warning, where it cannot be built.
+    """Compiles the library of an effect's C++ (see effect.hpp); None, with one warning, where it cannot be built.
 
     Args:
         header: whose name ends in .hpp; its content when it is first asked for counts.
@@ -88,7 +88,7 @@ def of_effect(header: Path) -> ctypes.CDLL | None:
 
 
 def _loaded(sources: dict[str, bytes], without: str) -> ctypes.CDLL | None:
-    """The library that the first of the sources, by name, makes with the others."""
+    """Loads the library that the first of the sources, by name, makes with the others."""
     path = compiler()
     if path is None:
         _warn("no C++ compiler found (CXX, g++, clang++, c++)", without)
@@ -120,35 +120,35 @@ def _built(path: str, sources: dict[str, bytes]) -> Path:
         check_owned(target)
         return target
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        code, made = Path(scratch) / main, Path(scratch) / "made.so"
+        code, built = Path(scratch) / main, Path(scratch) / "made.so"
         for part, text in sources.items():
             (Path(scratch) / part).write_bytes(text)
-        subprocess.run([path, *_FLAGS, "-o", str(made), str(code)], capture_output=True, check=True, text=True)
-        made.replace(target)  # atomic: several processes may build at once
+        subprocess.run([path, *_FLAGS, "-o", str(built), str(code)], capture_output=True, check=True, text=True)
+        built.replace(target)  # atomic: several processes may build at once
     return target
 
 
 def _make(folder: Path) -> None:
-    """The folder and those above it that are missing, for the user alone."""
+    """Makes the folder and those above it that are missing, for the user alone."""
     for part in (*reversed(folder.parents), folder):
         if not part.exists():
             part.mkdir(mode=0o700, exist_ok=True)
 
 
 def check_owned(path: Path) -> None:
-    """Whether only this user and root could have written a library, or what lies in a folder.
+    """Checks that only this user and root could have written a library, or what lies in a folder.
 
     Raises:
         UsageError: another user owns it or may write to it, or owns or may write to a folder above it; in folders
             above, a sticky bit keeps others from replacing what is not theirs.
     """
-    whole = path.resolve()
-    for part in (whole, *whole.parents):
-        found = part.stat()
-        sticky = part != whole and part.is_dir() and bool(found.st_mode & stat.S_ISVTX)
-        foreign = found.st_uid not in (os.getuid(), 0)
-        writable = bool(found.st_mode & stat.S_IWOTH) or (
-            bool(found.st_mode & stat.S_IWGRP) and not _alone(found.st_gid)
+    resolved = path.resolve()
+    for part in (resolved, *resolved.parents):
+        status = part.stat()
+        sticky = part != resolved and part.is_dir() and bool(status.st_mode & stat.S_ISVTX)
+        foreign = status.st_uid not in (os.getuid(), 0)
+        writable = bool(status.st_mode & stat.S_IWOTH) or (
+            bool(status.st_mode & stat.S_IWGRP) and not _alone(status.st_gid)
         )
         if foreign or (writable and not sticky):
             raise UsageError(
@@ -159,22 +159,22 @@ def check_owned(path: Path) -> None:
 
 
 def _alone(group: int) -> bool:
-    """Whether the group is the user's own, with nobody else in it."""
+    """Returns whether the group is the user's own, with nobody else in it."""
     import grp
     import pwd
 
     try:
-        user, found = pwd.getpwuid(os.getuid()).pw_name, grp.getgrgid(group)
+        user, entry = pwd.getpwuid(os.getuid()).pw_name, grp.getgrgid(group)
     except KeyError:
         return False
-    return found.gr_name == user and set(found.gr_mem) <= {user}
+    return entry.gr_name == user and set(entry.gr_mem) <= {user}
 
 
 def _processor() -> bytes:
-    """What -march=native depends on: a cache folder may be shared between machines."""
+    """Describes what -march=native depends on: a cache folder may be shared between machines."""
     info = Path("/proc/cpuinfo")
     if info.exists():
         lines = info.read_text(encoding="utf-8", errors="replace").splitlines()
-        kept = {line for line in lines if line.startswith(("flags", "Features", "model name", "CPU part"))}
-        return "\n".join(sorted(kept)).encode()
+        relevant = {line for line in lines if line.startswith(("flags", "Features", "model name", "CPU part"))}
+        return "\n".join(sorted(relevant)).encode()
     return f"{platform.machine()} {platform.processor()}".encode()

@@ -63,7 +63,7 @@ class Contact:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pairs:
+class ContactPairs:
     """Vertices and faces that may touch: (pair,) indices of member, vertex and face."""
 
     member: Tensor
@@ -80,31 +80,31 @@ def layers(mesh: Mesh, contact: Contact) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def neighbours(mesh: Mesh, contact: Contact) -> NDArray[np.bool_]:
-    """(vertex, face) whether they are too close at rest to count as different layers."""
-    centre, apart = layers(mesh, contact)
+    """Masks pairs (vertex, face) that are too close at rest to count as different layers."""
+    centre, separation = layers(mesh, contact)
     distance = np.linalg.norm(mesh.rest[:, None] - centre, axis=2)
-    return distance < apart
+    return distance < separation
 
 
-def candidates(cloth: Cloth, contact: Contact, position: Tensor, near: NDArray[np.bool_]) -> Pairs:
-    """All pairs closer than the thickness by their bounding spheres, by looking at every pair of every member.
+def candidates(cloth: Cloth, contact: Contact, position: Tensor, adjacent: NDArray[np.bool_]) -> ContactPairs:
+    """Finds all pairs closer than the thickness by their bounding spheres, by looking at every pair of every member.
 
     Args:
         position: (vertex, 3, batch) [m].
-        near: from `neighbours`.
+        adjacent: from `neighbours`.
     """
-    apart = torch.as_tensor(~near, device=position.device)
-    found = []
+    separate = torch.as_tensor(~adjacent, device=position.device)
+    pairs = []
     for member in range(cloth.batch):
         x = position[..., member]
         corners = x[cloth.faces]
         centre = corners.mean(1)
         reach = (corners - centre[:, None]).norm(dim=2).amax(1) + contact.thickness
-        close = (torch.cdist(x, centre) < reach) & apart
+        close = (torch.cdist(x, centre) < reach) & separate
         vertex, face = torch.nonzero(close, as_tuple=True)
-        found.append((torch.full_like(vertex, member), vertex, face))
-    member, vertex, face = (torch.cat(parts) for parts in zip(*found, strict=True))
-    return Pairs(member=member, vertex=vertex, face=face)
+        pairs.append((torch.full_like(vertex, member), vertex, face))
+    member, vertex, face = (torch.cat(parts) for parts in zip(*pairs, strict=True))
+    return ContactPairs(member=member, vertex=vertex, face=face)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,20 +119,21 @@ class Touch:
         area: (pair,) rest area of the vertex [m²].
     """
 
-    pairs: Pairs
+    pairs: ContactPairs
     weights: Tensor
     normal: Tensor
     violation: Tensor
     area: Tensor
 
     def relative(self, cloth: Cloth, field: Tensor) -> Tensor:
-        """(pair, 3) a vertex field (vertex, 3, batch) at the vertex less that at the closest point."""
+        """Subtracts a vertex field (vertex, 3, batch) at the closest point from that at the vertex: (pair, 3)."""
         p = self.pairs
         corners = field[cloth.faces[p.face], :, p.member[:, None]]
         return field[p.vertex, :, p.member] - (self.weights[..., None] * corners).sum(1)
 
     def spread(self, cloth: Cloth, push: Tensor, like: Tensor) -> Tensor:
-        """(vertex, 3, batch) a force (pair, 3) on the vertex, and its opposite on the face at the closest point."""
+        """Adds up forces (pair, 3) on the vertices, and their opposites on the faces at the closest points: (vertex, 3,
+        batch)."""
         p = self.pairs
         total = torch.zeros_like(like).movedim(1, 2).contiguous()
         flat = total.view(-1, 3)
@@ -143,8 +144,9 @@ class Touch:
         return total.movedim(2, 1)
 
 
-def touching(cloth: Cloth, contact: Contact, position: Tensor, pairs: Pairs) -> Touch:
-    """The pairs that are closer than the thickness, with their geometry, for positions (vertex, 3, batch) [m]."""
+def touching(cloth: Cloth, contact: Contact, position: Tensor, pairs: ContactPairs) -> Touch:
+    """Selects the pairs that are closer than the thickness, with their geometry, for positions (vertex, 3, batch)
+    [m]."""
     point = position[pairs.vertex, :, pairs.member]
     corners = position[cloth.faces[pairs.face], :, pairs.member[:, None]]
     weights = closest(point, corners)
@@ -160,14 +162,14 @@ def touching(cloth: Cloth, contact: Contact, position: Tensor, pairs: Pairs) -> 
     behind = torch.nonzero((normal * groups[vertex_of]).sum(1) < 0)[:, 0]
     second = behind[_closest_of_each(vertex_of[behind], distance[close][behind], pairs.face[close][behind])]
     keep = close[torch.cat([first, second])]
-    kept = Pairs(member=pairs.member[keep], vertex=pairs.vertex[keep], face=pairs.face[keep])
+    selected = ContactPairs(member=pairs.member[keep], vertex=pairs.vertex[keep], face=pairs.face[keep])
     areas = torch.as_tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)
     return Touch(
-        pairs=kept,
+        pairs=selected,
         weights=weights[keep],
         normal=offset[keep] / distance[keep, None],
         violation=contact.thickness - distance[keep],
-        area=areas[kept.vertex],
+        area=areas[selected.vertex],
     )
 
 
@@ -183,7 +185,8 @@ def _closest_of_each(group: Tensor, distance: Tensor, face: Tensor) -> Tensor:
 
 
 def closest(point: Tensor, corners: Tensor) -> Tensor:
-    """Barycentric coordinates (pair, 3) of the points of triangles (pair, corner, 3) closest to points (pair, 3).
+    """Computes barycentric coordinates (pair, 3) of the points of triangles (pair, corner, 3) closest to points (pair,
+    3).
 
     The foot on the plane where it is inside, else the closest of the three edges' clamped feet.
     """
@@ -216,7 +219,7 @@ def _square(point: Tensor, corners: Tensor, weights: Tensor) -> Tensor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Linearised:
+class LinearisedContact:
     """The contacts of one state, ready to be applied to many fields: k a v/h n nᵀ, and friction as a drag."""
 
     touch: Touch
@@ -226,7 +229,9 @@ class Linearised:
     rub: Tensor
 
     @classmethod
-    def at(cls, cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pairs: Pairs) -> Linearised:
+    def at(
+        cls, cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pairs: ContactPairs
+    ) -> LinearisedContact:
         touch = touching(cloth, contact, position, pairs)
         pressure = contact.stiffness * touch.area * touch.violation / contact.thickness
         push = pressure * touch.violation / 2
@@ -236,7 +241,7 @@ class Linearised:
         return cls(touch=touch, cloth=cloth, stiffness=pressure, push=push, rub=rub)
 
     def force(self, like: Tensor) -> Tensor:
-        """Repulsion at this state: (vertex, 3, batch) [N]."""
+        """Computes repulsion at this state: (vertex, 3, batch) [N]."""
         return self.touch.spread(self.cloth, self.push[:, None] * self.touch.normal, like)
 
     def product(self, field: Tensor) -> Tensor:
@@ -246,14 +251,14 @@ class Linearised:
         return self.touch.spread(self.cloth, (self.stiffness * along)[:, None] * normal, field)
 
     def drag(self, field: Tensor) -> Tensor:
-        """Friction's coefficients times a field (vertex, 3, batch) of velocities: what resists it [N]."""
+        """Multiplies friction's coefficients with a field (vertex, 3, batch) of velocities: what resists it [N]."""
         relative, normal = self.touch.relative(self.cloth, field), self.touch.normal
         slide = relative - (relative * normal).sum(1, keepdim=True) * normal
         return self.touch.spread(self.cloth, self.rub[:, None] * slide, field)
 
 
-def force(cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pairs: Pairs) -> Tensor:
-    """Repulsion and friction: (vertex, 3, batch) [N]."""
+def force(cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pairs: ContactPairs) -> Tensor:
+    """Computes repulsion and friction: (vertex, 3, batch) [N]."""
     touch = touching(cloth, contact, position, pairs)
     relative = touch.relative(cloth, velocity)
     approach = -(relative * touch.normal).sum(1)
@@ -270,8 +275,8 @@ def force(cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pa
     return touch.spread(cloth, push[:, None] * touch.normal - rub[:, None] * slide, position)
 
 
-def energy(cloth: Cloth, contact: Contact, position: Tensor, pairs: Pairs) -> Tensor:
-    """Stored energy k a v³/(6 h): (batch,) [J]."""
+def energy(cloth: Cloth, contact: Contact, position: Tensor, pairs: ContactPairs) -> Tensor:
+    """Computes the stored energy k a v³/(6 h): (batch,) [J]."""
     touch = touching(cloth, contact, position, pairs)
     stored = contact.stiffness * touch.area * touch.violation**3 / (6 * contact.thickness)
     return torch.zeros_like(cloth.damping).index_add(0, touch.pairs.member, stored)

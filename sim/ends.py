@@ -42,7 +42,7 @@ class Ends:
     weights: Floats
 
     def continued(self, field: Tensor) -> Tensor:
-        """A field (vertex, …) with its values at the ends from those within."""
+        """Replaces a field's values (vertex, …) at the ends by those continued from within."""
         if not len(self.vertices):
             return field
         at, within = (torch.as_tensor(index, device=field.device) for index in (self.vertices, self.within))
@@ -51,7 +51,7 @@ class Ends:
 
 
 def ends_of(rest: Floats) -> Ends:
-    """The ends of a cloth of rest coordinates (vertex, 2), which run along it first [m].
+    """Finds the ends of a cloth of rest coordinates (vertex, 2), which run along it first [m].
 
     Vertices beside which too few others lie for a parabola are left out.
     """
@@ -59,29 +59,29 @@ def ends_of(rest: Floats) -> Ends:
     u = rest[:, 0]
     at_end = (u - u.min() <= _SAME * size[0]) | (u.max() - u <= _SAME * size[0])
     inner = np.flatnonzero(~at_end)
-    found: list[tuple[int, NDArray[np.int64], Floats]] = []
+    ends: list[tuple[int, NDArray[np.int64], Floats]] = []
     for vertex in np.flatnonzero(at_end).tolist():
         offsets = rest[inner] - rest[vertex]
         row = np.flatnonzero(np.abs(offsets[:, 1]) <= _SAME * size[1])
-        near = row[np.argsort(np.abs(offsets[row, 0]), kind="stable")[:3]]
-        if len(near) == 3:
-            weights = _exact(offsets[near, :1] ** np.arange(3))
+        nearest = row[np.argsort(np.abs(offsets[row, 0]), kind="stable")[:3]]
+        if len(nearest) == 3:
+            weights = _exact(offsets[nearest, :1] ** np.arange(3))
         else:
-            near = np.argsort(np.hypot(*offsets.T), kind="stable")[:_NEAREST]
-            a, b = offsets[near].T
-            weights = _exact(np.stack([np.ones(len(near)), a, b, a * a, a * b, b * b], axis=1))
+            nearest = np.argsort(np.hypot(*offsets.T), kind="stable")[:_NEAREST]
+            a, b = offsets[nearest].T
+            weights = _exact(np.stack([np.ones(len(nearest)), a, b, a * a, a * b, b * b], axis=1))
         if weights is not None and np.abs(weights).sum() <= _LARGEST:
-            found.append((vertex, inner[near], weights))
-    width = max((len(near) for _, near, _ in found), default=0)
-    within, weights = np.zeros((len(found), width), dtype=np.int64), np.zeros((len(found), width))
-    for place, (_, near, own) in enumerate(found):
-        within[place], weights[place, : len(near)] = np.resize(near, width), own
-    return Ends(vertices=np.array([vertex for vertex, *_ in found], dtype=np.int64), within=within, weights=weights)
+            ends.append((vertex, inner[nearest], weights))
+    width = max((len(nearest) for _, nearest, _ in ends), default=0)
+    within, weights = np.zeros((len(ends), width), dtype=np.int64), np.zeros((len(ends), width))
+    for index, (_, nearest, of_vertex) in enumerate(ends):
+        within[index], weights[index, : len(nearest)] = np.resize(nearest, width), of_vertex
+    return Ends(vertices=np.array([vertex for vertex, *_ in ends], dtype=np.int64), within=within, weights=weights)
 
 
 def _exact(terms: Floats) -> Floats | None:
-    """(k,) least weights of values at offsets that give polynomials of terms (k, term) their value at no offset; None
-    where none do."""
+    """Computes least weights (k,) of values at offsets that give polynomials of terms (k, term) their value at no
+    offset; None where none do."""
     if len(terms) < terms.shape[1]:
         return None
     scaled = terms / np.maximum(np.abs(terms).max(0), np.finfo(float).tiny)

@@ -45,7 +45,7 @@ class Handles:
         shape = np.shape(self.offsets)
         if shape != (len(self.times), 3) or not self.times or not np.isfinite(self.offsets).all():
             raise InputError(
-                f"{len(self.times)} key times with offsets of shape {shape}",
+                f"there are {len(self.times)} key times with offsets of shape {shape}",
                 where="handles",
                 fix="give one finite (x, y, z) offset for each key time",
             )
@@ -57,7 +57,7 @@ class Handles:
         return math.isinf(self.stiffness)
 
     def offset(self, time: float) -> NDArray[np.float64]:
-        """(3,) displacement of the anchors at a time [m]."""
+        """Interpolates the displacement of the anchors at a time, (3,) [m]."""
         if len(self.times) == 1:
             return np.array(self.offsets[0])
         keys = np.asarray(self.offsets)
@@ -65,7 +65,7 @@ class Handles:
 
 
 def corners(rest: NDArray[np.float64]) -> tuple[int, int]:
-    """The two hoist corners of a flag: the lowest and the highest vertex of those with the smallest u.
+    """Finds the two hoist corners of a flag: the lowest and the highest vertex of those with the smallest u.
 
     Args:
         rest: (vertex, 2) material coordinates [m].
@@ -75,14 +75,14 @@ def corners(rest: NDArray[np.float64]) -> tuple[int, int]:
 
 
 def full_hoist(rest: NDArray[np.float64]) -> tuple[int, ...]:
-    """All vertices of the hoist (smallest u), from low v to high v."""
+    """Lists all vertices of the hoist (smallest u), from low v to high v."""
     width = float(np.ptp(rest[:, 0]))
     edge = np.flatnonzero(rest[:, 0] <= rest[:, 0].min() + 1e-9 * width)
     return tuple(int(v) for v in edge[np.argsort(rest[edge, 1], kind="stable")])
 
 
 def top_corners(rest: NDArray[np.float64]) -> tuple[int, int]:
-    """The two upper corners of a hanging cloth: smallest and largest u of those with the largest v."""
+    """Finds the two upper corners of a hanging cloth: smallest and largest u of those with the largest v."""
     height = float(np.ptp(rest[:, 1]))
     edge: Sequence[int] = np.flatnonzero(rest[:, 1] >= rest[:, 1].max() - 1e-9 * height).tolist()
     ordered = sorted(edge, key=lambda v: float(rest[v, 0]))

@@ -21,22 +21,22 @@ from sim.cloth import Cloth
 
 
 def rest_areas(cloth: Cloth) -> Tensor:
-    """(vertex,) a third of the faces' rest areas around each vertex [m²]."""
+    """Computes a third of the faces' rest areas around each vertex, (vertex,) [m²]."""
     return torch.as_tensor(cloth.mesh.vertex_areas, dtype=cloth.dtype, device=cloth.device)
 
 
 def mean_normals(cloth: Cloth, position: Tensor) -> Tensor:
-    """Mean normals at the vertices (see above): (vertex, 3, batch)."""
+    """Computes mean normals at the vertices (see above): (vertex, 3, batch)."""
     return cloth.shared_out(_sixths(cloth, position)) / rest_areas(cloth)[:, None, None]
 
 
 def mean_normal_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
-    """Their time derivative: (vertex, 3, batch) [1/s]."""
+    """Computes the time derivative of `mean_normals`: (vertex, 3, batch) [1/s]."""
     return cloth.shared_out(_sixth_rates(cloth, position, velocity)) / rest_areas(cloth)[:, None, None]
 
 
 def _sixths(cloth: Cloth, position: Tensor) -> Tensor:
-    """A third of the faces' normals, as long as the faces are large: (face, 3, batch) [m²]."""
+    """Computes a third of the faces' normals, as long as the faces are large: (face, 3, batch) [m²]."""
     if on_mesh.usable(position):
         return on_mesh.sixths(cloth.faces, position)
     x0, x1, x2 = cloth.at_corners(position)
@@ -44,7 +44,7 @@ def _sixths(cloth: Cloth, position: Tensor) -> Tensor:
 
 
 def _sixth_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
-    """Their time derivative: (face, 3, batch) [m²/s]."""
+    """Computes the time derivative of `_sixths`: (face, 3, batch) [m²/s]."""
     if on_mesh.usable(position, velocity):
         return on_mesh.sixth_rates(cloth.faces, position, velocity)
     x0, x1, x2 = cloth.at_corners(position)
@@ -53,7 +53,8 @@ def _sixth_rates(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
 
 
 def effective(force: Tensor, *, mass: Tensor, added: Tensor, normals: Tensor) -> Tensor:
-    """The force that gives the cloth's own mass the acceleration it has with the added mass: (vertex, 3, batch) [N].
+    """Computes the force that gives the cloth's own mass the acceleration it has with the added mass: (vertex, 3,
+    batch) [N].
 
     Args:
         force: (vertex, 3, batch) [N].

@@ -52,17 +52,17 @@ class StrainLimits:
                 fix="give a low one in [0, 1) and a high one above 1",
             )
         if self.sweeps < 1:
-            raise InputError(f"{self.sweeps} sweeps", where="strain limits", fix="give at least one")
+            raise InputError(f"the limits take {self.sweeps} sweeps", where="strain limits", fix="give at least one")
 
 
 def stretches(cloth: Cloth, position: Tensor) -> tuple[Tensor, Tensor]:
-    """Larger and smaller principal stretch of the faces: (face, batch) each."""
+    """Computes larger and smaller principal stretch of the faces: (face, batch) each."""
     _, squares = _decomposed(cloth, position)
     return squares[0].sqrt(), squares[1].sqrt()
 
 
 def _decomposed(cloth: Cloth, position: Tensor) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
-    """x_u, x_v (face, 3, batch), and the eigenvalues of FᵀF, larger first (face, batch)."""
+    """Computes x_u, x_v (face, 3, batch), and the eigenvalues of FᵀF, larger first (face, batch)."""
     corners = cloth.at_corners(position)
     d = cloth.gradients[..., None, None]
     xu = d[:, 0, 0] * corners[0] + d[:, 0, 1] * corners[1] + d[:, 0, 2] * corners[2]
@@ -74,7 +74,7 @@ def _decomposed(cloth: Cloth, position: Tensor) -> tuple[tuple[Tensor, Tensor], 
 
 
 def correction(cloth: Cloth, limits: StrainLimits, position: Tensor) -> Tensor:
-    """What one sweep moves the vertices by: (vertex, 3, batch) [m]."""
+    """Computes what one sweep moves the vertices by: (vertex, 3, batch) [m]."""
     (xu, xv), (large, small) = _decomposed(cloth, position)
     scale_large = large.sqrt().clamp(limits.low, limits.high) / large.sqrt()
     scale_small = small.sqrt().clamp(limits.low, limits.high) / small.sqrt()
@@ -108,7 +108,7 @@ def limited(
 
 
 def chebyshev_weights(sweeps: int) -> list[float]:
-    """ω of each sweep: 1, then 2/(2 − ρ²), then 4/(4 − ρ² ω) of the one before."""
+    """Computes ω of each sweep: 1, then 2/(2 − ρ²), then 4/(4 − ρ² ω) of the one before."""
     weights = [1.0] * min(sweeps, PLAIN_SWEEPS)
     square = SPECTRAL_RADIUS**2
     while len(weights) < sweeps:

@@ -64,38 +64,40 @@ class Material:
         if self.stretching[:, [0, 2]].min() < 0:
             raise self._error("a direct stretching stiffness (k0 or k2) is negative", "give N/m, all at least 0")
 
-    def _error(self, what: str, fix: str) -> InputError:
-        return InputError(what, where=f"material {self.name!r}", fix=fix)
+    def _error(self, message: str, fix: str) -> InputError:
+        return InputError(message, where=f"material {self.name!r}", fix=fix)
 
-    def _table(self, values: ArrayLike, shape: tuple[int, int], what: str) -> NDArray[np.float64]:
+    def _table(self, values: ArrayLike, shape: tuple[int, int], table_name: str) -> NDArray[np.float64]:
         try:
             table = np.array(values, dtype=np.float64)
         except (TypeError, ValueError, OverflowError) as error:
-            raise self._error(f"{what} is not a table of numbers", f"give {shape[0]} rows of {shape[1]}") from error
+            raise self._error(
+                f"{table_name} is not a table of numbers", f"give {shape[0]} rows of {shape[1]}"
+            ) from error
         if table.shape != shape:
-            raise self._error(f"{what} has shape {table.shape}", f"give {shape[0]} rows of {shape[1]}")
+            raise self._error(f"{table_name} has shape {table.shape}", f"give {shape[0]} rows of {shape[1]}")
         if not np.isfinite(table).all():
-            raise self._error(f"{what} holds a value that is not finite", "give finite numbers")
+            raise self._error(f"{table_name} holds a value that is not finite", "give finite numbers")
         table.setflags(write=False)
         return table
 
     @classmethod
     def from_mapping(cls, content: Mapping[str, Any], *, name: str) -> Material:
-        """A material from a parsed catalog file.
+        """Makes a material from a parsed catalog file.
 
         Raises:
             InputError: missing, unknown or ill-typed keys.
         """
-        known = {"title", "source", "density", "stretching", "bending", "damping"}
-        unknown = sorted(set(content) - known)
+        keys = {"title", "source", "density", "stretching", "bending", "damping"}
+        unknown = sorted(set(content) - keys)
         missing = sorted({"source", "density", "stretching", "bending"} - set(content))
         where = f"material {name!r}"
         if unknown:
             raise InputError(
-                f"unknown keys {', '.join(unknown)}", where=where, fix=f"known: {', '.join(sorted(known))}"
+                f"these keys are unknown: {', '.join(unknown)}", where=where, fix=f"known: {', '.join(sorted(keys))}"
             )
         if missing:
-            raise InputError(f"keys missing: {', '.join(missing)}", where=where, fix="add them")
+            raise InputError(f"these keys are missing: {', '.join(missing)}", where=where, fix="add them")
         numbers = {key: content[key] for key in ("density", "damping") if key in content}
         wrong = [key for key, value in numbers.items() if not _is_number(value)]
         if wrong:
@@ -115,7 +117,7 @@ class Material:
         return hashlib.sha256(b"".join(n.astype("<f8").tobytes() for n in numbers)).hexdigest()
 
     def scaled(self, *, density: float = 1.0, stretching: float = 1.0, bending: float = 1.0) -> Material:
-        """This material with its density and tables multiplied."""
+        """Multiplies this material's density and tables."""
         return replace(
             self,
             density=self.density * density,
@@ -131,7 +133,7 @@ def _is_number(value: Any) -> bool:
 def isotropic(
     *, name: str, density: float, stretching: float, shear: float, bending: float, damping: float = 0.0
 ) -> Material:
-    """A sheet of constant stiffness without Poisson effect, for comparison with closed forms.
+    """Makes a sheet of constant stiffness without Poisson effect, for comparison with closed forms.
 
     Args:
         density: [kg/m²].
@@ -153,7 +155,7 @@ def isotropic(
 
 @functools.cache
 def named(name: str, *, where: str | None = None) -> Material:
-    """A material of the catalog.
+    """Reads a material of the catalog.
 
     Args:
         where: the name stands, for the error message.
@@ -161,5 +163,5 @@ def named(name: str, *, where: str | None = None) -> Material:
     Raises:
         UnknownNameError: with the nearest name that is there.
     """
-    found = MATERIALS.named(name, where=where)
-    return Material.from_mapping(parsed(found.text, where=found.where), name=name)
+    entry = MATERIALS.named(name, where=where)
+    return Material.from_mapping(parsed(entry.text, where=entry.where), name=name)

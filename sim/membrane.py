@@ -31,7 +31,7 @@ class Strain:
 
 
 def _derivatives(cloth: Cloth, field: Tensor) -> tuple[Tensor, Tensor]:
-    """∂/∂u and ∂/∂v of a vertex field (vertex, 3, batch) on the faces: (face, 3, batch) each."""
+    """Computes ∂/∂u and ∂/∂v of a vertex field (vertex, 3, batch) on the faces: (face, 3, batch) each."""
     corners = cloth.at_corners(field)
     d = cloth.gradients[..., None, None]
     u = d[:, 0, 0] * corners[0] + d[:, 0, 1] * corners[1] + d[:, 0, 2] * corners[2]
@@ -40,7 +40,7 @@ def _derivatives(cloth: Cloth, field: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def strain(cloth: Cloth, position: Tensor) -> Strain:
-    """Green strain of positions (vertex, 3, batch) [m]."""
+    """Computes the Green strain of positions (vertex, 3, batch) [m]."""
     xu, xv = _derivatives(cloth, position)
     return Strain(
         xu=xu,
@@ -52,12 +52,12 @@ def strain(cloth: Cloth, position: Tensor) -> Strain:
 
 
 def stiffness(cloth: Cloth, e: Strain) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """k0, k1, k2, k3 at a strain: (face, batch) each [N/m]."""
+    """Computes k0, k1, k2, k3 at a strain: (face, batch) each [N/m]."""
     return stretching_stiffness(e.g00, e.g11, e.g01, cloth.samples, cloth.table_of, cloth.grid)
 
 
 def corner_forces(cloth: Cloth, position: Tensor, velocity: Tensor) -> list[Tensor]:
-    """Elastic and damping forces on the three corners of every face: (face, 3, batch) each [N]."""
+    """Computes elastic and damping forces on the three corners of every face: (face, 3, batch) each [N]."""
     e = strain(cloth, position)
     k0, k1, k2, k3 = stiffness(cloth, e)
     vu, vv = _derivatives(cloth, velocity)
@@ -69,7 +69,7 @@ def corner_forces(cloth: Cloth, position: Tensor, velocity: Tensor) -> list[Tens
 
 
 def _corners(cloth: Cloth, e: Strain, t00: Tensor, t11: Tensor, t01: Tensor) -> list[Tensor]:
-    """Corner forces of a stress (face, batch) [N/m]: −a (t00 ∇G00 + t11 ∇G11 + 2 t01 ∇G01)."""
+    """Computes corner forces of a stress (face, batch) [N/m]: −a (t00 ∇G00 + t11 ∇G11 + 2 t01 ∇G01)."""
     a = cloth.areas[:, None]
     t00, t11, t01 = ((a * t).unsqueeze(1) for t in (t00, t11, t01))
     pu = t00 * e.xu + t01 * e.xv
@@ -79,12 +79,12 @@ def _corners(cloth: Cloth, e: Strain, t00: Tensor, t11: Tensor, t01: Tensor) -> 
 
 
 def force(cloth: Cloth, position: Tensor, velocity: Tensor) -> Tensor:
-    """Elastic and damping forces at the vertices: (vertex, 3, batch) [N]."""
+    """Computes elastic and damping forces at the vertices: (vertex, 3, batch) [N]."""
     return gather_sum(corner_forces(cloth, position, velocity), cloth.face_slots)
 
 
 def energy(cloth: Cloth, position: Tensor) -> Tensor:
-    """Stored energy: (batch,) [J]; exact for constant stiffness (module docstring)."""
+    """Computes the stored energy: (batch,) [J]; exact for constant stiffness (module docstring)."""
     e = strain(cloth, position)
     k0, k1, k2, k3 = stiffness(cloth, e)
     density = k0 * e.g00**2 + 2 * k1 * e.g00 * e.g11 + k2 * e.g11**2 + 2 * k3 * e.g01**2
@@ -92,7 +92,7 @@ def energy(cloth: Cloth, position: Tensor) -> Tensor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Linearised:
+class LinearisedMembrane:
     """The stiffness of the faces at one state, ready to be applied to many fields.
 
     The geometric part of the Hessian is kept where it is positive (tension); where it is not, and for the shear term,
@@ -106,7 +106,7 @@ class Linearised:
     tension_v: Tensor
 
     @classmethod
-    def at(cls, cloth: Cloth, position: Tensor) -> Linearised:
+    def at(cls, cloth: Cloth, position: Tensor) -> LinearisedMembrane:
         e = strain(cloth, position)
         k0, k1, k2, k3 = stiffness(cloth, e)
         g00, g11 = e.g00.clamp(min=0), e.g11.clamp(min=0)
@@ -115,7 +115,7 @@ class Linearised:
         return cls(cloth=cloth, e=e, k=(k0, k1, k2, k3), tension_u=tension_u, tension_v=tension_v)
 
     def force(self) -> Tensor:
-        """The elastic force at this state: (vertex, 3, batch) [N]."""
+        """Computes the elastic force at this state: (vertex, 3, batch) [N]."""
         k0, k1, k2, k3 = self.k
         e = self.e
         corners = _corners(self.cloth, e, k0 * e.g00 + k1 * e.g11, k2 * e.g11 + k1 * e.g00, k3 * e.g01)
@@ -135,7 +135,7 @@ class Linearised:
         return [-c + g[:, 0, i] * tu + g[:, 1, i] * tv for i, c in enumerate(corners)]
 
     def diagonal(self) -> list[Tensor]:
-        """The 3×3 diagonal blocks' diagonals at the corners: (face, 3, batch) each [N/m]."""
+        """Computes the 3×3 diagonal blocks' diagonals at the corners: (face, 3, batch) each [N/m]."""
         k0, k1, k2, k3 = self.k
         e, a = self.e, self.cloth.areas[:, None, None]
         g = self.cloth.gradients[..., None, None]

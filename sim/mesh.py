@@ -170,7 +170,7 @@ class Mesh:
         return np.arctan2(edge[:, 1], edge[:, 0])
 
     def components(self) -> NDArray[np.int64]:
-        """(vertex,) label of the connected piece each vertex belongs to."""
+        """Labels the connected piece that each vertex belongs to, (vertex,)."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -197,7 +197,7 @@ class Diagonals(StrEnum):
 
 
 def grid(*, width: float, height: float, columns: int, rows: int, diagonals: Diagonals = Diagonals.ALTERNATE) -> Mesh:
-    """A rectangle of `columns × rows` cells, each two triangles.
+    """Makes a rectangle of `columns × rows` cells, each two triangles.
 
     Vertex `i * (rows + 1) + j` is at u = width·i/columns, v = height·j/rows: the hoist (u = 0) comes first.
 
@@ -205,9 +205,9 @@ def grid(*, width: float, height: float, columns: int, rows: int, diagonals: Dia
         InputError: a size that is not positive, or no cells.
     """
     if not (width > 0 and height > 0):
-        raise InputError(f"grid of {width} m × {height} m", where="mesh", fix="give positive sizes")
+        raise InputError(f"the grid measures {width} m × {height} m", where="mesh", fix="give positive sizes")
     if columns < 1 or rows < 1:
-        raise InputError(f"grid of {columns} × {rows} cells", where="mesh", fix="give at least one of each")
+        raise InputError(f"the grid has {columns} × {rows} cells", where="mesh", fix="give at least one of each")
     i, j = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1), indexing="ij")
     rest = np.stack([width * i.ravel() / columns, height * j.ravel() / rows], axis=1)
     ci, cj = (index.ravel() for index in np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"))

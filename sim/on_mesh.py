@@ -25,7 +25,8 @@ class _View(ctypes.Structure):
 
 
 def usable(*tensors: Tensor) -> bool:
-    """Whether the library can take these: on a CPU, of one type that it knows, not traced, and no gradient wanted."""
+    """Returns whether the library can take these: on a CPU, of one type that it knows, not traced, and no gradient
+    wanted."""
     first = tensors[0]
     if torch.compiler.is_compiling() or first.dtype not in _NAMES:
         return False
@@ -36,8 +37,8 @@ def usable(*tensors: Tensor) -> bool:
 
 
 def face_wind(faces: Tensor, position: Tensor, velocity: Tensor, wind: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Unit normals (face, 3, batch), relative wind (face, 3, batch) and its part along the normals (face, 1, batch),
-    see `sim.air.FaceWind`.
+    """Computes unit normals (face, 3, batch), relative wind (face, 3, batch) and its part along the normals (face, 1,
+    batch), see `sim.air.FaceWind`.
 
     Args:
         faces: (face, 3) vertices.
@@ -52,7 +53,7 @@ def face_wind(faces: Tensor, position: Tensor, velocity: Tensor, wind: Tensor) -
 
 
 def sixths(faces: Tensor, position: Tensor) -> Tensor:
-    """(x₁ − x₀) × (x₂ − x₀)/6 of faces (face, 3) at positions (vertex, 3, batch): (face, 3, batch)."""
+    """Computes (x₁ − x₀) × (x₂ − x₀)/6 of faces (face, 3) at positions (vertex, 3, batch): (face, 3, batch)."""
     batch = position.shape[-1]
     x, sixth = _side_by_side(position, batch), position.new_empty((len(faces), 3, batch))
     _call("normals", faces, len(faces), batch, _view(x), sixth)
@@ -60,7 +61,7 @@ def sixths(faces: Tensor, position: Tensor) -> Tensor:
 
 
 def sixth_rates(faces: Tensor, position: Tensor, velocity: Tensor) -> Tensor:
-    """The time derivative of `sixths`: (face, 3, batch)."""
+    """Computes the time derivative of `sixths`: (face, 3, batch)."""
     batch = position.shape[-1]
     x, v = (_side_by_side(field, batch) for field in (position, velocity))
     sixth = position.new_empty((len(faces), 3, batch))
@@ -69,22 +70,23 @@ def sixth_rates(faces: Tensor, position: Tensor, velocity: Tensor) -> Tensor:
 
 
 def gather_sum(corners: Sequence[Tensor], slots: Tensor) -> Tensor:
-    """See `sim.cloth.gather_sum`, whose sums these are to the bit."""
-    given = [corner.contiguous() for corner in corners]
-    elements, parts, batch = given[0].shape
-    total = given[0].new_empty((slots.shape[1], parts, batch))
-    _call("gather", _places(given), len(given), elements, slots, *slots.shape, parts * batch, total)
+    """Sums as `sim.cloth.gather_sum`, to the bit."""
+    contiguous = [corner.contiguous() for corner in corners]
+    elements, parts, batch = contiguous[0].shape
+    total = contiguous[0].new_empty((slots.shape[1], parts, batch))
+    _call("gather", _places(contiguous), len(contiguous), elements, slots, *slots.shape, parts * batch, total)
     return total
 
 
 def fold(hinges: Tensor, position: Tensor) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor, Tensor]]:
-    """Fold angles (hinge, batch) of hinges (hinge, 4) and their gradients at the corners: see `sim.bending.Fold`."""
+    """Computes fold angles (hinge, batch) of hinges (hinge, 4) and their gradients at the corners: see
+    `sim.bending.Fold`."""
     i, j, k, opposite = (position.new_empty((len(hinges), 3, position.shape[-1])) for _ in range(4))
     return _folded(hinges, position, _places([i, j, k, opposite])), (i, j, k, opposite)
 
 
 def fold_angle(hinges: Tensor, position: Tensor) -> Tensor:
-    """Fold angles (hinge, batch) alone."""
+    """Computes fold angles (hinge, batch) alone."""
     return _folded(hinges, position, None)
 
 
@@ -96,13 +98,14 @@ def _folded(hinges: Tensor, position: Tensor, gradients: ctypes.Array[ctypes.c_v
 
 
 def _side_by_side(field: Tensor, batch: int) -> Tensor:
-    """A field of vectors whose members lie side by side."""
+    """Expands a field of vectors so that its members lie side by side."""
     field = field.expand(*field.shape[:-1], batch)
     return field if field.stride(-1) == 1 else field.contiguous()
 
 
 def _view(field: Tensor) -> _View:
-    """A view of (vertex, 3, batch), or of (3, batch) that is the same at all vertices. The tensor must outlive it."""
+    """Makes a view of (vertex, 3, batch), or of (3, batch) that is the same at all vertices. The tensor must outlive
+    it."""
     vertex = field.stride(0) if field.ndim == 3 else 0
     return _View(data=field.data_ptr(), vertex=vertex, component=field.stride(-2))
 
@@ -112,7 +115,7 @@ def _places(tensors: Sequence[Tensor]) -> ctypes.Array[ctypes.c_void_p]:
 
 
 def _call(name: str, *arguments: Tensor | int | _View | ctypes.Array[ctypes.c_void_p] | None) -> None:
-    """A function of the library, for numbers of the type of the last tensor that is passed."""
+    """Calls a function of the library, for numbers of the type of the last tensor that is passed."""
     dtype = next(a.dtype for a in reversed(arguments) if isinstance(a, Tensor))
     function = getattr(library(), f"{name}_{_NAMES[dtype]}")
     function.restype = None

@@ -77,7 +77,7 @@ class Scene:
         outside = [v for v in self.handles.vertices if v >= self.mesh.vertex_count]
         if outside:
             raise InputError(
-                f"held vertex {outside[0]} of a mesh with {self.mesh.vertex_count}",
+                f"the held vertex {outside[0]} is not one of the mesh's {self.mesh.vertex_count}",
                 where="handles",
                 fix="correct the index",
             )
@@ -93,7 +93,7 @@ class Scene:
 
 
 def upright(mesh: Mesh) -> NDArray[np.float64]:
-    """The mesh in the y–z plane, u along y and v along z: across a wind in +x, as the reference scenes start.
+    """Places the mesh in the y–z plane, u along y and v along z: across a wind in +x, as the reference scenes start.
 
     Returns:
         (vertex, 3) [m].
@@ -120,7 +120,7 @@ def flag(
     columns: int = 30,
     evaluation: Evaluation = Evaluation.ARCSIM,
 ) -> Scene:
-    """A flag held at its two hoist corners, in a wind along +x [m/s]; rows follow from the aspect ratio.
+    """Makes a flag held at its two hoist corners, in a wind along +x [m/s]; rows follow from the aspect ratio.
 
     Raises:
         InputError: see `Scene` and `sim.mesh.grid`.
@@ -144,7 +144,7 @@ def hanging_cloth(
     columns: int = 20,
     evaluation: Evaluation = Evaluation.ARCSIM,
 ) -> Scene:
-    """A square cloth held at its two top corners, in a horizontal wind (x, y) [m/s].
+    """Makes a square cloth held at its two top corners, in a horizontal wind (x, y) [m/s].
 
     Raises:
         InputError: see `Scene` and `sim.mesh.grid`.
@@ -163,13 +163,14 @@ def hanging_cloth(
 def assemble(
     scenes: Sequence[Scene], *, dtype: torch.dtype = torch.float32, device: torch.device | str = "cpu"
 ) -> tuple[System, State]:
-    """The batch of these scenes, and their start at rest. Members differ in start, material, wind and gravity.
+    """Assembles the batch of these scenes, and their start at rest. Members differ in start, material, wind and
+    gravity.
 
     Raises:
         UsageError: no scenes, or scenes with different meshes, handles, wind forces, evaluations or contacts.
     """
     if not scenes:
-        raise UsageError("no scenes to simulate", fix="give at least one")
+        raise UsageError("there are no scenes to simulate", fix="give at least one")
     first = scenes[0]
     for index, scene in enumerate(scenes):
         same = scene.mesh is first.mesh or (

@@ -24,10 +24,10 @@ class State:
     memory: tuple[Tensor, ...] = ()
 
     def select(self, members: slice) -> State:
-        """Where some members are and how fast, without what is remembered."""
+        """Selects where some members are and how fast, without what is remembered."""
         return State(position=self.position[..., members], velocity=self.velocity[..., members], time=self.time)
 
     def healthy(self, *, speed_limit: float = SPEED_LIMIT) -> Tensor:
-        """(batch,) bool: finite, and no vertex faster than the limit [m/s]."""
+        """Checks each member, (batch,) bool: finite, and no vertex faster than the limit [m/s]."""
         finite = torch.isfinite(self.position).all(0).all(0) & torch.isfinite(self.velocity).all(0).all(0)
         return finite & ((self.velocity**2).sum(1).amax(0) < speed_limit**2)

@@ -34,7 +34,8 @@ class Effect(Protocol):
     """A force the base model lacks."""
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N] at a time [s], for a wind (3, batch), or (vertex, 3, batch) where it varies [m/s]."""
+        """Computes forces (vertex, 3, batch) [N] at a time [s], for a wind (3, batch), or (vertex, 3, batch) where it
+        varies [m/s]."""
         ...
 
 
@@ -42,7 +43,8 @@ class Flow(Protocol):
     """What makes the wind differ from place to place."""
 
     def field(self, time: float, position: Tensor, wind: Tensor) -> Tensor:
-        """The air at the vertices, (vertex, 3, batch) [m/s], for a wind (3, batch) or (vertex, 3, batch) so far."""
+        """Computes the air at the vertices, (vertex, 3, batch) [m/s], for a wind (3, batch) or (vertex, 3, batch) so
+        far."""
         ...
 
 
@@ -50,7 +52,7 @@ class Load(Protocol):
     """Mass of air that the cloth takes along."""
 
     def added_mass(self, cloth: Cloth) -> Tensor:
-        """(vertex, batch) [kg], for motion along the normals (see `sim.inertia`)."""
+        """Computes the added mass (vertex, batch) [kg], for motion along the normals (see `sim.inertia`)."""
         ...
 
 
@@ -77,7 +79,7 @@ class AnchorMotion(Protocol):
     """Anchors that move one by one, as observed."""
 
     def displacement(self, time: float) -> Tensor:
-        """(held, 3, batch) from where the system has the anchors [m], at a time [s]."""
+        """Computes displacements (held, 3, batch) from where the system has the anchors [m], at a time [s]."""
         ...
 
 
@@ -85,19 +87,19 @@ class Tie(Protocol):
     """Springs beside the handles, damped as those are. Where it loosens handles it makes up the difference to them."""
 
     def springs(self, cloth: Cloth) -> Springs:
-        """All that it is."""
+        """Describes the tie as springs."""
         ...
 
     def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
-        """The elastic part: (vertex, 3, batch) [N]."""
+        """Computes the elastic part: (vertex, 3, batch) [N]."""
         ...
 
     def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
-        """(vertex, batch) the same on each axis [N/m]."""
+        """Computes stiffnesses (vertex, batch), the same on each axis [N/m]."""
         ...
 
     def stiffest(self, cloth: Cloth) -> Tensor:
-        """(vertex, batch) an upper bound of it at any time and shape, at least 0 [N/m]."""
+        """Bounds the stiffness from above at any time and shape, (vertex, batch), at least 0 [N/m]."""
         ...
 
 
@@ -108,17 +110,17 @@ class Remembering(Protocol):
     """
 
     def start(self, cloth: Cloth, position: Tensor) -> Tensor:
-        """What is remembered when nothing has happened."""
+        """Returns what is remembered when nothing has happened."""
         ...
 
     def update(
         self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor, elapsed: float
     ) -> Tensor:
-        """What is remembered after a step of `elapsed` [s] to a position."""
+        """Returns what is remembered after a step of `elapsed` [s] to a position."""
         ...
 
     def force(self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N]."""
+        """Computes forces (vertex, 3, batch) [N]."""
         ...
 
 
@@ -141,20 +143,20 @@ class Drive:
     drift: Tensor
 
     def part(self, start: float, end: float) -> Drive:
-        """Between two shares of it, each from 0 to 1."""
+        """Returns the part of the drive between two shares of it, each from 0 to 1."""
 
-        def both(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+        def between(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
             return torch.lerp(*pair, start), torch.lerp(*pair, end)
 
-        return replace(self, wind=both(self.wind), targets=both(self.targets), offset=both(self.offset))
+        return replace(self, wind=between(self.wind), targets=between(self.targets), offset=between(self.offset))
 
     def select(self, members: slice) -> Drive:
-        """The same for some members only."""
+        """Selects the drive of some members only."""
 
-        def own(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+        def selected(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
             return pair[0][..., members], pair[1][..., members]
 
-        return replace(self, wind=own(self.wind), targets=own(self.targets), rate=self.rate[..., members])
+        return replace(self, wind=selected(self.wind), targets=selected(self.targets), rate=self.rate[..., members])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -198,7 +200,7 @@ class System:
     def __post_init__(self) -> None:
         if self.motion is not None and self.ties:
             raise InapplicableError(
-                "ties beside handles whose anchors move one by one",
+                "ties cannot act beside handles whose anchors move one by one",
                 where="system",
                 fix="leave out the effects that loosen or add attachments, or move all handles together",
             )
@@ -223,7 +225,8 @@ class System:
         return limited(self.cloth, self.limits, position, velocity, step, self.loose)
 
     def effective(self, position: Tensor, force: Tensor) -> Tensor:
-        """The force that gives the cloth's own mass its acceleration (see `sim.inertia`): (vertex, 3, batch) [N]."""
+        """Computes the force that gives the cloth's own mass its acceleration (see `sim.inertia`): (vertex, 3, batch)
+        [N]."""
         if not self.loads:
             return force
         normals = inertia.mean_normals(self.cloth, position)
@@ -238,7 +241,7 @@ class System:
         return total
 
     def tied(self, time: float, position: Tensor) -> Tensor | None:
-        """(vertex, 1, batch) stiffness of the ties [N/m]; None where there are none."""
+        """Computes the stiffness of the ties (vertex, 1, batch) [N/m]; None where there are none."""
         if not self.ties:
             return None
         return torch.stack([tie.stiffness(self.cloth, time, position) for tie in self.ties]).sum(0).unsqueeze(1)
@@ -253,8 +256,8 @@ class System:
         *,
         elapsed: float,
     ) -> tuple[Tensor, ...]:
-        """What forces remember after a step of `elapsed` [s] to a time [s], a position and a velocity
-        (vertex, 3, batch) [m, m/s], in a wind (3, batch) [m/s]."""
+        """Computes what forces remember after a step of `elapsed` [s] to a time [s], a position and a velocity (vertex,
+        3, batch) [m, m/s], in a wind (3, batch) [m/s]."""
         if not self.remembering:
             return self.checked(memory)
         local = self.local(wind, time, position)
@@ -264,27 +267,28 @@ class System:
         )
 
     def checked(self, memory: tuple[Tensor, ...]) -> tuple[Tensor, ...]:
-        """What forces remember, as it is.
+        """Returns what forces remember, unchanged.
 
         Raises:
             UsageError: none of some, or too many.
         """
         if len(memory) != len(self.remembering):
             raise UsageError(
-                f"a state with {len(memory)} memories for {len(self.remembering)} forces that remember",
+                f"the state has {len(memory)} memories for {len(self.remembering)} forces that remember",
                 where="system",
                 fix="start from the state that `sim.effects.apply` returns with the system",
             )
         return memory
 
     def local(self, wind: Tensor, time: float, position: Tensor) -> Tensor:
-        """Air at the vertices [m/s]: (vertex, 3, batch), or the wind (3, batch) itself where nothing disturbs it."""
+        """Computes the air at the vertices [m/s]: (vertex, 3, batch), or the wind (3, batch) itself where nothing
+        disturbs it."""
         for flow in self.flows:
             wind = flow.field(time, position, wind)
         return wind
 
     def internal(self, position: Tensor, velocity: Tensor) -> Tensor:
-        """Membrane, bending and contact, elastic and damping: (vertex, 3, batch) [N]."""
+        """Computes membrane, bending and contact forces, elastic and damping: (vertex, 3, batch) [N]."""
         total = membrane.force(self.cloth, position, velocity) + bending.force(self.cloth, position, velocity)
         if self.contact is None:
             return total
@@ -309,7 +313,7 @@ class System:
         air_position: Tensor | None = None,
         effect_velocity: Tensor | None = None,
     ) -> Tensor:
-        """Gravity, air, effects, ties and forces that remember: (vertex, 3, batch) [N].
+        """Computes gravity, air, effects, ties and forces that remember: (vertex, 3, batch) [N].
 
         Args:
             wind: (3, batch) [m/s].
@@ -318,9 +322,9 @@ class System:
             air_position: the shape the air sees, if another than `position` (see `integrate.implicit.AirShape`).
             effect_velocity: the velocity the effects see, if another than `velocity` (see `integrate.symplectic`).
         """
-        seen = position if air_position is None else air_position
-        wind = self.local(wind, time, seen)
-        total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(self.cloth, seen, velocity, wind)
+        shape = position if air_position is None else air_position
+        wind = self.local(wind, time, shape)
+        total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(self.cloth, shape, velocity, wind)
         for tie in self.ties:
             total = total + tie.force(self.cloth, time, position)
         moving = velocity if effect_velocity is None else effect_velocity
@@ -336,11 +340,11 @@ class System:
         return total
 
     def offset(self, time: float) -> Tensor:
-        """(3,) displacement of the handles' anchors at a time [m]."""
+        """Computes the displacement of the handles' anchors at a time, (3,) [m]."""
         return torch.as_tensor(self.handles.offset(time), dtype=self.anchors.dtype, device=self.anchors.device)
 
     def targets(self, time: float) -> Tensor:
-        """(held, 3, batch) where the handles are at a time [m]."""
+        """Computes where the handles are at a time, (held, 3, batch) [m]."""
         return self._targets(time, self.offset(time))
 
     def _targets(self, time: float, offset: Tensor) -> Tensor:
@@ -348,12 +352,12 @@ class System:
         return moved if self.motion is None else moved + self.motion.displacement(time)
 
     def drive(self, start: float, end: float) -> Drive:
-        """Wind and handles between two times [s], taken as linear."""
+        """Returns wind and handles between two times [s], taken as linear."""
         (drive,) = self.drives((start, end))
         return drive
 
     def drives(self, times: Sequence[float]) -> list[Drive]:
-        """The same between each two times that follow one another."""
+        """Returns the drives between each two times that follow one another."""
         winds = [self.wind.velocity(time) for time in times]
         offsets = [self.offset(time) for time in times]
         targets = [self._targets(time, offset) for time, offset in zip(times, offsets, strict=True)]
@@ -389,7 +393,7 @@ class System:
         memory: tuple[Tensor, ...] = (),
         effect_velocity: Tensor | None = None,
     ) -> Tensor:
-        """All forces: (vertex, 3, batch) [N]. Rigid handles add none.
+        """Computes all forces: (vertex, 3, batch) [N]. Rigid handles add none.
 
         Args:
             drive: wind and handles.
@@ -443,7 +447,7 @@ class System:
         memory: tuple[Tensor, ...] = (),
         effect_velocity: Tensor | None = None,
     ) -> Tensor:
-        """The part of `force` that is not the `base`'s: (vertex, 3, batch) [N]. Arguments as there.
+        """Computes the part of `force` that is not the `base`'s: (vertex, 3, batch) [N]. Arguments as there.
 
         Of the air, it is the difference to the base's.
         """
@@ -459,16 +463,16 @@ class System:
         return self._with_added(total, wind, time, position, moving, memory)
 
     def _tie_damping(self, drive: Drive, time: float, position: Tensor, velocity: Tensor) -> Tensor:
-        """Kelvin–Voigt damping of the ties, whose other ends move with the handles: (vertex, 3, batch) [N]."""
+        """Computes Kelvin–Voigt damping of the ties, whose other ends move with the handles: (vertex, 3, batch) [N]."""
         tied = self.tied(time, position)
         if tied is None:
             return torch.zeros_like(velocity)
         return -self.cloth.damping * tied * (velocity - drive.drift[:, None])
 
     def tensors(self) -> tuple[Tensor, ...]:
-        """The parameters that gradients may be wanted of."""
+        """Lists the parameters that gradients may be wanted of."""
         cloth = self.cloth
-        own = (cloth.mass, cloth.samples, cloth.segments, cloth.damping, self.gravity, self.anchors)
+        base = (cloth.mass, cloth.samples, cloth.segments, cloth.damping, self.gravity, self.anchors)
         parts = (
             cloth.stiffening,
             self.wind,
@@ -479,10 +483,10 @@ class System:
             *self.ties,
             *self.remembering,
         )
-        return (*own, *(tensor for part in parts for tensor in _tensors_of(part)))
+        return (*base, *(tensor for part in parts for tensor in _tensors_of(part)))
 
     def energies(self, state: State) -> dict[str, Tensor]:
-        """Kinetic, stretching, bending, gravity and handle energy: (batch,) each [J].
+        """Computes kinetic, stretching, bending, gravity and handle energy: (batch,) each [J].
 
         Gravity's is relative to the origin; stretching and bending are exact for constant stiffness.
         """
@@ -503,7 +507,7 @@ class System:
 
 
 def _tensors_of(part: object) -> Iterator[Tensor]:
-    """The tensors in the fields of a dataclass, and in those of the dataclasses it holds."""
+    """Yields the tensors in the fields of a dataclass, and in those of the dataclasses it holds."""
     if isinstance(part, Tensor):
         yield part
     elif isinstance(part, tuple):

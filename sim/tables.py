@@ -61,7 +61,7 @@ GRIDS = {
 
 
 def sample_stretching(table: NDArray[np.float64], evaluation: Evaluation) -> NDArray[np.float64]:
-    """The stretching stiffness at the nodes of the evaluation's grid.
+    """Samples the stretching stiffness at the nodes of the evaluation's grid.
 
     Args:
         table: (6, 4) [N/m].
@@ -94,7 +94,7 @@ def sample_stretching(table: NDArray[np.float64], evaluation: Evaluation) -> NDA
 def stretching_stiffness(
     g00: Tensor, g11: Tensor, g01: Tensor, samples: Tensor, table_of: Tensor, grid: StrainGrid
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Trilinear look-up; beyond the grid its edge values hold.
+    """Looks the stiffness up trilinearly; beyond the grid its edge values hold.
 
     Args:
         g00, g11, g01: (face, batch) Green strain.
@@ -106,11 +106,11 @@ def stretching_stiffness(
     """
     cells, shares = [], []
     for value, start, count in zip((g00, g11, g01.abs()), (grid.origin, grid.origin, 0.0), grid.counts, strict=True):
-        place = ((value - start) / grid.spacing).clamp(0, count - 1)
+        node = ((value - start) / grid.spacing).clamp(0, count - 1)
         # A member that has diverged (NaN) stays so through its share; its cell must only be one that is there.
-        cell = place.detach().nan_to_num(nan=0.0).floor().clamp(max=count - 2)
+        cell = node.detach().nan_to_num(nan=0.0).floor().clamp(max=count - 2)
         cells.append(cell.long())
-        shares.append(place - cell)
+        shares.append(node - cell)
     flat = samples.reshape(-1, 4)
     _, n1, n2 = grid.counts
     base = ((table_of * grid.counts[0] + cells[0]) * n1 + cells[1]) * n2 + cells[2]
@@ -123,7 +123,7 @@ def stretching_stiffness(
 
 
 def bending_segments(materials: Sequence[Material]) -> NDArray[np.float64]:
-    """The bending rows as coefficients of 1, c, (c − 1)₊, (c − 2)₊, (c − 3)₊ with c the curvature in columns.
+    """Computes the bending rows as coefficients of 1, c, (c − 1)₊, (c − 2)₊, (c − 3)₊ with c the curvature in columns.
 
     A piecewise linear function written as a sum vectorises where an indexed look-up does not.
 
@@ -136,7 +136,7 @@ def bending_segments(materials: Sequence[Material]) -> NDArray[np.float64]:
 
 
 def bending_stiffness(curvature: Tensor, segments: Tensor, rows: Tensor, evaluation: Evaluation) -> Tensor:
-    """Bending stiffness of hinges.
+    """Computes the bending stiffness of hinges.
 
     Args:
         curvature: (hinge, batch) α in units of the column spacing (α / 5 1/m).
@@ -159,7 +159,7 @@ def bending_stiffness(curvature: Tensor, segments: Tensor, rows: Tensor, evaluat
 
 
 def direction_rows(directions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weights of the table's rows (0, 45, 90°) for edges in these directions.
+    """Weighs the table's rows (0, 45, 90°) for edges in these directions.
 
     Args:
         directions: (hinge,) in [0, π/2].
@@ -167,6 +167,6 @@ def direction_rows(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     Returns:
         (hinge, 3), rows summing to 1.
     """
-    place = np.clip(directions * 4 / np.pi, 0, 2)
-    rows = [np.maximum(1 - place, 0), 1 - np.abs(place - 1), np.maximum(place - 1, 0)]
+    row = np.clip(directions * 4 / np.pi, 0, 2)
+    rows = [np.maximum(1 - row, 0), 1 - np.abs(row - 1), np.maximum(row - 1, 0)]
     return np.stack(rows, axis=1).astype(np.float64)

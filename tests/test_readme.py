@@ -213,7 +213,8 @@ def test_the_forces_counted_on_films_are_those_of_the_third_sheet() -> None:
     assert named is not None
     assert detected.count("one of") == int(named[1])
     assert stated == (
-        f"{alarms} false alarms in {len(nulls)}; of {len(single)} hidden forces {len(detected)} detected, {named[1]} named among several"
+        f"{alarms} false alarms in {len(nulls)}; of {len(single)} hidden forces {len(detected)} detected, "
+        f"{named[1]} named among several"
     )
 
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.closing.artifacts import Answer, answer_of
+    from measure.closing.artifacts import VerdictAnswer, answer_of
     from measure.closing.close import close_loop
     from measure.closing.joint import joined
     from measure.closing.models import acting
-    from measure.closing.sources import Reading
+    from measure.closing.sources import SourceOptions
 
 __getattr__ = lazy_exports(__name__, __file__)

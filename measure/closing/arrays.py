@@ -16,7 +16,7 @@ from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake.meshes import MeshSequence
 from measure.closing.close import close_loop
 from measure.closing.findings import checked, with_warnings
-from measure.loop.run import Options
+from measure.loop.run import LoopOptions
 from measure.nulls.plan import FEWEST_NULLS
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
 from measure.observe.meshes import from_sequence
@@ -38,7 +38,7 @@ def closed(chosen: Closing) -> Closed:
     Raises:
         FlagdataError: see `flagdata.close_loop`.
     """
-    options = Options(
+    options = LoopOptions(
         seed=chosen.seed,
         workers=chosen.workers,
         level=CRITERIA.level if chosen.level is None else chosen.level,
@@ -51,7 +51,7 @@ def closed(chosen: Closing) -> Closed:
 def _setup(chosen: Closing) -> Setup:
     if chosen.material not in MATERIALS.names():
         raise UnknownNameError.of("material", chosen.material, MATERIALS.names(), where="material")
-    names, pins = [one.value for one in Hold], chosen.pins
+    names, pins = [hold.value for hold in Hold], chosen.pins
     if isinstance(pins, str) and pins not in names:
         raise UnknownNameError.of("attachment", pins, names, where="pins")
     return Setup(
@@ -63,18 +63,18 @@ def _setup(chosen: Closing) -> Setup:
 
 
 def _tracked(chosen: Closing) -> list[Observation]:
-    """One of each recording, with the wind beside it."""
+    """Makes one observation of each recording, with the wind beside it."""
     several, wind = _several(chosen.recordings), chosen.wind
     winds = wind if isinstance(wind, list) else [wind] * len(several)
     if len(winds) != len(several):
         raise UsageError(
-            f"{len(winds)} winds for {len(several)} recordings",
+            f"there are {len(winds)} winds for {len(several)} recordings",
             where="wind",
             fix="give one, or a list with one for each recording",
         )
     return [
-        _observation(one, chosen, name=f"recording {number}", wind=_track(own))
-        for number, (one, own) in enumerate(zip(several, winds, strict=True), start=1)
+        _observation(recording, chosen, name=f"recording {number}", wind=_track(its_wind))
+        for number, (recording, its_wind) in enumerate(zip(several, winds, strict=True), start=1)
     ]
 
 
@@ -84,17 +84,17 @@ def _several(recordings: Recordings) -> list[ArrayLike | MeshSequence]:
     return list(recordings)  # type: ignore[arg-type]
 
 
-def _observation(one: ArrayLike | MeshSequence, chosen: Closing, *, name: str, wind: WindTrack) -> Observation:
-    if isinstance(one, MeshSequence):
-        return replace(from_sequence(one, name=name), wind=wind, noise=chosen.noise)
+def _observation(recording: ArrayLike | MeshSequence, chosen: Closing, *, name: str, wind: WindTrack) -> Observation:
+    if isinstance(recording, MeshSequence):
+        return replace(from_sequence(recording, name=name), wind=wind, noise=chosen.noise)
     if chosen.rest is None or chosen.rate is None:
-        raise UsageError("positions without rest coordinates and rate", where=name, fix="give rest= and rate=")
-    positions, places = (np.asarray(values, dtype=np.float64) for values in (one, chosen.rest))
+        raise UsageError("the positions have no rest coordinates or no rate", where=name, fix="give rest= and rate=")
+    positions, places = (np.asarray(values, dtype=np.float64) for values in (recording, chosen.rest))
     return from_arrays(name=name, positions=positions, rest=places, rate=chosen.rate, wind=wind, noise=chosen.noise)
 
 
 def _track(wind: Any) -> WindTrack:
-    """A speed along +x, a velocity, or times and velocities."""
+    """Makes a track of a speed along +x, a velocity, or times and velocities."""
     if isinstance(wind, tuple) and len(wind) == 2:
         times, velocity = (np.asarray(part, dtype=np.float64) for part in wind)
         return WindTrack(times=times, velocity=velocity)
@@ -103,7 +103,7 @@ def _track(wind: Any) -> WindTrack:
         velocity = np.array([velocity[0], 0.0, 0.0])
     if velocity.shape != (3,) or not math.isfinite(float(velocity.sum())):
         raise InputError(
-            f"a wind of shape {velocity.shape}",
+            f"the wind has the shape {velocity.shape}",
             where="wind",
             fix="give a speed, a velocity (x, y, z), or times (n,) and velocities (n, 3)",
         )
@@ -112,16 +112,16 @@ def _track(wind: Any) -> WindTrack:
 
 def _answer(verdict: Verdict) -> Closed:
     strengths = {
-        one.effect: Strength(
-            parameter=one.parameter,
-            value=one.strength.value,
-            low=one.strength.low,
-            high=one.strength.high,
-            unit=one.strength.unit,
-            level=one.strength.level,
-            bound=one.strength.bound,
+        candidate.effect: Strength(
+            parameter=candidate.parameter,
+            value=candidate.strength.value,
+            low=candidate.strength.low,
+            high=candidate.strength.high,
+            unit=candidate.strength.unit,
+            level=candidate.strength.level,
+            bound=candidate.strength.bound,
         )
-        for one in sentences.named_candidates(verdict)
+        for candidate in sentences.named_candidates(verdict)
     }
     return Closed(
         conclusion=verdict.conclusion.value,

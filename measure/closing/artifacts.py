@@ -21,7 +21,7 @@ from flagdata.lake.results import Placed
 from flagdata.provenance import array_hash, canonical, digest, file_hash
 from flagdata.schema import Kind
 from measure.closing.models import NamedModel, acting
-from measure.loop.run import Options
+from measure.loop.run import LoopOptions
 from measure.nulls.bank import files
 from measure.observe import Experiment
 from measure.observe.trajectory import described
@@ -50,7 +50,7 @@ class Kept:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Answer:
+class VerdictAnswer:
     """A loop that was closed, of whatever kind of recordings, as it is written and kept.
 
     Attributes:
@@ -81,13 +81,13 @@ class Answer:
 def answer_of(
     verdict: Verdict,
     experiment: Experiment,
-    options: Options,
+    options: LoopOptions,
     *,
     name: str,
     models: tuple[NamedModel, ...],
     findings: tuple[Finding, ...],
-) -> Answer:
-    """That of recordings of markers.
+) -> VerdictAnswer:
+    """Makes the answer of a verdict on recordings of markers.
 
     Args:
         name: what the measurement is called.
@@ -106,7 +106,7 @@ def answer_of(
     }
     if options.suspected is not None:  # results that were kept before keep their identity
         recipe["suspected"] = options.suspected.words
-    return Answer(
+    return VerdictAnswer(
         name=name,
         verdict=verdict,
         models=models,
@@ -120,13 +120,13 @@ def answer_of(
     )
 
 
-def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
-    """Publish a verdict and its models in one commit where it is new, see `flagdata.lake.results`.
+def keep(lake: Lake, answer: VerdictAnswer, *, branch: str = "main") -> Kept:
+    """Publishes a verdict and its models in one commit where it is new, see `flagdata.lake.results`.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    place = results.keep(
+    entry = results.keep(
         lake,
         _measurement(answer),
         lambda staged: write(staged, answer.verdict, page=answer.page),
@@ -134,10 +134,10 @@ def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
         branch=branch,
         left=lambda verdict: [_model(answer, model, verdict) for model in answer.models],
     )
-    verdict = place.artifact
-    made = tuple(_model(answer, model, verdict).id for model in answer.models)
-    models = made if place.new else models_of(lake, verdict.id, branch)
-    return Kept(measurement=verdict.id, models=models, place=place)
+    verdict = entry.artifact
+    ids = tuple(_model(answer, model, verdict).id for model in answer.models)
+    models = ids if entry.new else models_of(lake, verdict.id, branch)
+    return Kept(measurement=verdict.id, models=models, place=entry)
 
 
 def models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
@@ -147,7 +147,7 @@ def models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
 
 
 def write(path: Path, verdict: Verdict, *, page: str) -> None:
-    """A new Zarr folder: `verdict` (UTF-8 JSON), `report` (UTF-8 HTML) and `nulls` (statistic of each)."""
+    """Writes a new Zarr folder: `verdict` (UTF-8 JSON), `report` (UTF-8 HTML) and `nulls` (statistic of each)."""
     import zarr
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
@@ -166,7 +166,7 @@ def write(path: Path, verdict: Verdict, *, page: str) -> None:
 
 
 def read(path: Path) -> tuple[Verdict, str]:
-    """The verdict and the report of a measurement's object.
+    """Reads the verdict and the report of a measurement's object.
 
     Raises:
         CorruptError: not such a folder, damaged, or of a newer format.
@@ -184,7 +184,7 @@ def read(path: Path) -> tuple[Verdict, str]:
 
 
 def fingerprint(experiment: Experiment) -> str:
-    """SHA-256 of an experiment with its uncertainties: cloth, pins, recordings and wind; not of names and
+    """Hashes an experiment with its uncertainties, SHA-256: cloth, pins, recordings and wind; not of names and
     files."""
     content, arrays = described(experiment.specimen)
     content["recordings"] = [[r.rate, r.noise, *r.wind.uncertainty] for r in experiment.recordings]
@@ -194,7 +194,7 @@ def fingerprint(experiment: Experiment) -> str:
     return array_hash(content, arrays)
 
 
-def _measurement(answer: Answer) -> Artifact:
+def _measurement(answer: VerdictAnswer) -> Artifact:
     verdict = answer.verdict
     fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
     fitted |= {f"{c.effect}.{c.parameter}": c.strength.value for c in answer.effects if c.strength.bound is None}
@@ -219,7 +219,7 @@ def _measurement(answer: Answer) -> Artifact:
     )
 
 
-def _model(answer: Answer, model: NamedModel, measurement: Artifact) -> Artifact:
+def _model(answer: VerdictAnswer, model: NamedModel, measurement: Artifact) -> Artifact:
     effects: Sequence[str] = list(model.content.get("effects", {}))
     report = {"schema": "flagdata.model-report/1", "words": answer.verdict.words, "findings": []}
     return Artifact(

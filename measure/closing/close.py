@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from measure.forecasting.setting import Stage
-from measure.loop.run import Options, solve
+from measure.loop.run import LoopOptions, solve
 from measure.observe.trajectory import Experiment
-from measure.report.statement import stated
+from measure.report.statement import with_sentences
 from measure.verdict.record import Verdict
 
 
-def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None = None) -> Verdict:
-    """The verdict on an experiment.
+def close_loop(experiment: Experiment, options: LoopOptions, *, stage: Stage | None = None) -> Verdict:
+    """Reaches the verdict on an experiment.
 
     Args:
         stage: called with progress.
@@ -18,4 +18,4 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     Raises:
         InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before).
     """
-    return stated(solve(experiment, options, stage=stage))
+    return with_sentences(solve(experiment, options, stage=stage))

@@ -63,21 +63,21 @@ def nulls_given(recipe: ExperimentRecipe | None, chosen: ByNulls, *, level: floa
     """
     if chosen.bank is not None and chosen.nulls is not None:
         raise UsageError("both --nulls and --bank are given", where="--nulls", fix="keep one of them")
-    said = {"level": level, "nulls": chosen.nulls}
+    values = {"level": level, "nulls": chosen.nulls}
     if recipe is not None:
-        said = {name: getattr(recipe, name) if value is None else value for name, value in said.items()}
-    return {name: value for name, value in said.items() if value is not None}
+        values = {name: getattr(recipe, name) if value is None else value for name, value in values.items()}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def refuse(findings: Sequence[Finding]) -> None:
-    """Report what was found, up to an error, which ends it."""
+    """Reports what was found, up to an error, which ends it."""
     for finding in findings:
         checked((finding,))
         say(finding_text(finding), mark=finding.severity.value)
 
 
 def stage_bars() -> Stage:
-    """A bar for each stage; the nulls take most of the time."""
+    """Draws a bar for each stage; the nulls take most of the time."""
     import sys
 
     from tqdm import tqdm
@@ -85,13 +85,13 @@ def stage_bars() -> Stage:
     bars: dict[str, tqdm] = {}
     interval = 0.2 if sys.stderr.isatty() else 10.0  # a log file gets a line now and then, not an animation
 
-    def advance(what: str, done: int, total: int) -> None:
-        if what not in bars:
-            bars[what] = tqdm(
-                total=total, desc=printable(what), unit="part", ncols=100, mininterval=interval, file=sys.stderr
+    def advance(stage: str, done: int, total: int) -> None:
+        if stage not in bars:
+            bars[stage] = tqdm(
+                total=total, desc=printable(stage), unit="part", ncols=100, mininterval=interval, file=sys.stderr
             )
-        bars[what].update(done - bars[what].n)
+        bars[stage].update(done - bars[stage].n)
         if done >= total:
-            bars[what].close()
+            bars[stage].close()
 
     return advance

@@ -17,7 +17,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside", "still-
 
 
 def checked(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """The findings, none of which is an error: what is wrong with the data must not come out as an effect.
+    """Returns the findings, none of which is an error: what is wrong with the data must not come out as an effect.
 
     Raises:
         InputError: the first that is one.
@@ -29,14 +29,14 @@ def checked(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 
 
 def finding_text(finding: Finding) -> str:
-    """Where it was found, and what; a warning with what to do."""
+    """Words a finding: where it was found, and what; a warning with what to do."""
     where = f"{finding.where}: " if finding.where else ""
     fix = f" ({finding.fix})" if finding.fix and finding.severity is Severity.WARNING else ""
     return f"{where}{finding.what}{fix}"
 
 
 def with_warnings(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
-    """The verdict with the remarks on its data; with those in its words that may themselves be what was found."""
+    """Adds to the verdict the remarks on its data; with those in its words that may themselves be what was found."""
     warnings = [finding_text(finding) for finding in findings if finding.kind in _DOUBTFUL]
     beware = (
         f" The data themselves may be wrong, which would look like an effect: {'; '.join(warnings)}."

@@ -45,8 +45,8 @@ class NamedModel:
 
 
 def models(verdict: Verdict, experiment: Experiment, *, name: str, seed: int) -> tuple[NamedModel, ...]:
-    """The base model as calibrated and, where effects act, the larger one; none of a carried cloth, since recipes hold
-    cloth still.
+    """Makes the base model as calibrated and, where effects act, the larger one; none of a carried cloth, since recipes
+    hold cloth still.
 
     Args:
         name: that theirs begin with.
@@ -56,22 +56,22 @@ def models(verdict: Verdict, experiment: Experiment, *, name: str, seed: int) ->
         return ()
     turned = aligned(experiment)
     common = _common(turned, seed)
-    made = [_model(f"{name}-base", verdict, common, turned.specimen, ())]
+    models_made = [_model(f"{name}-base", verdict, common, turned.specimen, ())]
     if effects := acting(verdict):
-        made.append(
+        models_made.append(
             _model(
                 "-".join(dict.fromkeys([name, *(c.effect for c in effects)])), verdict, common, turned.specimen, effects
             )
         )
-    return tuple(made)
+    return tuple(models_made)
 
 
 def acting(verdict: Verdict) -> tuple[Candidate, ...]:
-    """The effects of the larger model: all that are named as acting, or the first of those that may be."""
+    """Lists the effects of the larger model: all that are named as acting, or the first of those that may be."""
     if not verdict.named:
         return ()
-    found = tuple(candidate for candidate in verdict.ranking if not candidate.why_not)
-    return found if verdict.conclusion is Conclusion.EFFECT else found[:1]
+    unrejected = tuple(candidate for candidate in verdict.ranking if not candidate.why_not)
+    return unrejected if verdict.conclusion is Conclusion.EFFECT else unrejected[:1]
 
 
 def fitted(verdict: Verdict, effects: Sequence[Candidate]) -> dict[str, float]:
@@ -80,25 +80,25 @@ def fitted(verdict: Verdict, effects: Sequence[Candidate]) -> dict[str, float]:
 
 
 def acted(effects: Sequence[Candidate]) -> dict[str, dict[str, dict[str, float]]]:
-    """The table `effects` of a recipe, with the fitted strengths; nothing where there are none."""
+    """Makes the table `effects` of a recipe, with the fitted strengths; nothing where there are none."""
     strengths: dict[str, dict[str, float]] = {}
     for candidate in effects:
         described = EFFECTS[candidate.effect].parameters()[candidate.parameter]
-        own = strengths.setdefault(candidate.effect, {})
-        own[candidate.parameter.replace("_", "-")] = described.nearest(candidate.strength.value)
-        own.update(SHAPES.get(candidate.effect, ()))
+        of_effect = strengths.setdefault(candidate.effect, {})
+        of_effect[candidate.parameter.replace("_", "-")] = described.nearest(candidate.strength.value)
+        of_effect.update(SHAPES.get(candidate.effect, ()))
     return {"effects": strengths} if strengths else {}
 
 
 def _model(
     name: str, verdict: Verdict, common: Mapping[str, Any], specimen: Specimen, effects: Sequence[Candidate]
 ) -> NamedModel:
-    own = fitted(verdict, effects)
+    fit = fitted(verdict, effects)
     material = _material(specimen.material)
     material |= {
-        "density": specimen.material.density * own["density"],
-        "bending-factor": own["bending"],
-        "damping": own["damping"],
+        "density": specimen.material.density * fit["density"],
+        "bending-factor": fit["bending"],
+        "damping": fit["damping"],
     }
     return NamedModel(name=name, content={"title": name, **common, "material": material, **acted(effects)})
 
@@ -120,16 +120,16 @@ def _common(experiment: Experiment, seed: int) -> dict[str, Any]:
 
 
 def _scene(specimen: Specimen) -> dict[str, Any]:
-    held: dict[str, Any] = {"start-noise": _ROUGH, "gravity": -specimen.gravity[2]}
+    start: dict[str, Any] = {"start-noise": _ROUGH, "gravity": -specimen.gravity[2]}
     if math.isinf(specimen.stiffness):
-        held["rigid"] = True
+        start["rigid"] = True
     elif specimen.stiffness != ARCSIM_STIFFNESS:
-        held["stiffness"] = specimen.stiffness
-    return {**(_flag(specimen) or _mesh(specimen)), **held}
+        start["stiffness"] = specimen.stiffness
+    return {**(_flag(specimen) or _mesh(specimen)), **start}
 
 
 def _flag(specimen: Specimen) -> dict[str, Any] | None:
-    """The scene of a plain flag; None for any other cloth."""
+    """Makes the scene of a plain flag; None for any other cloth."""
     rest = specimen.mesh.rest - specimen.mesh.rest.min(axis=0)
     width, height = (float(side) for side in rest.max(axis=0))
     columns = len(np.unique(rest[:, 0])) - 1
@@ -160,10 +160,12 @@ def _mesh(specimen: Specimen) -> dict[str, Any]:
 
 
 def _material(nominal: Material) -> dict[str, Any]:
-    """By its name, where the catalog's tables are its; else with its tables."""
+    """Names the material, where the catalog's tables are its; else gives its tables."""
     if nominal.name in MATERIALS.names():
-        known = named(nominal.name)
-        if np.array_equal(known.stretching, nominal.stretching) and np.array_equal(known.bending, nominal.bending):
+        catalogued = named(nominal.name)
+        if np.array_equal(catalogued.stretching, nominal.stretching) and np.array_equal(
+            catalogued.bending, nominal.bending
+        ):
             return {"name": nominal.name}
     table = {
         "title": nominal.name,
@@ -177,5 +179,5 @@ def _material(nominal: Material) -> dict[str, Any]:
 
 
 def _force(air: AirForce) -> dict[str, Any]:
-    name = next(known for known in AIR_FORCES if isinstance(air, AIR_FORCES[known]))
+    name = next(kind for kind in AIR_FORCES if isinstance(air, AIR_FORCES[kind]))
     return {"force": name, **vars(air)}

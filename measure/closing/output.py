@@ -20,7 +20,7 @@ from flagdata.errors import InputError
 from flagdata.lake import Lake
 from flagdata.outputs import write_files
 from flagdata.pages.render import render
-from measure.closing.artifacts import Answer, keep
+from measure.closing.artifacts import VerdictAnswer, keep
 from measure.closing.joint import Joint
 from measure.report.document import as_document, plain
 from measure.report.report_page import FILTERS, TONES
@@ -28,7 +28,7 @@ from measure.report.sentences import after_label
 
 
 def dumps(content: Mapping[str, Any]) -> str:
-    """TOML 1.0 of a mapping; plain values come before tables, as the format wants it.
+    """Writes TOML 1.0 of a mapping; plain values come before tables, as the format wants it.
 
     Raises:
         InputError: a value that TOML has no form for.
@@ -68,10 +68,10 @@ def _value(value: Any) -> str:
 
 
 def joint_page(joint: Joint) -> str:
-    """The page, HTML; it lies beside the folders `markers` and `films`."""
+    """Renders the page, HTML; it lies beside the folders `markers` and `films`."""
     kinds = [
-        {"name": name, "verdict": own, "after_label": after_label(own) if own.named else ""}
-        for name, own in (("markers", joint.markers), ("films", joint.films))
+        {"name": name, "verdict": verdict, "after_label": after_label(verdict) if verdict.named else ""}
+        for name, verdict in (("markers", joint.markers), ("films", joint.films))
     ]
     values = {"joint": joint, "tone": TONES[joint.conclusion], "kinds": kinds}
     return render("measure.report", "joint.html.j2", values, filters=FILTERS)
@@ -86,8 +86,8 @@ JOINT = ("report.html", "verdict.json")
 KINDS = ("markers", "films")
 
 
-def deliver(answer: Answer, *, out: Path, lake: Lake | None, branch: str, as_json: bool) -> None:
-    """Write an answer's files, keep it in the lake, and print it.
+def deliver(answer: VerdictAnswer, *, out: Path, lake: Lake | None, branch: str, as_json: bool) -> None:
+    """Writes an answer's files, keeps it in the lake, and prints it.
 
     Raises:
         FlagdataError: a file or the lake that cannot be written.
@@ -101,9 +101,9 @@ def deliver(answer: Answer, *, out: Path, lake: Lake | None, branch: str, as_jso
 
 
 def deliver_joint(
-    joint: Joint, answers: Sequence[Answer], *, out: Path, lake: Lake | None, branch: str, as_json: bool
+    joint: Joint, answers: Sequence[VerdictAnswer], *, out: Path, lake: Lake | None, branch: str, as_json: bool
 ) -> None:
-    """The same of an answer by markers and films, each of which has its folder and its artifacts.
+    """Delivers an answer by markers and films, each of which has its folder and its artifacts.
 
     Args:
         answers: by markers and by films.
@@ -111,11 +111,11 @@ def deliver_joint(
     Raises:
         FlagdataError: a file or the lake that cannot be written.
     """
-    each = {
+    documents = {
         kind: _written(answer, out=out / kind, lake=lake, branch=branch)
         for kind, answer in zip(KINDS, answers, strict=True)
     }
-    content = {**plain(joint.as_dict()), **each}
+    content = {**plain(joint.as_dict()), **documents}
     text = json.dumps({"schema": "flagdata.joint-verdict/1", **content}, indent=1, allow_nan=False, ensure_ascii=False)
     write_files(out, dict(zip(JOINT, (joint_page(joint), text + "\n"), strict=True)), command="close-loop")
     say(f"wrote {', '.join(str(out / file) for file in JOINT)}")
@@ -127,24 +127,24 @@ def deliver_joint(
             echo_lines(f"\nBy {kind}:\n{answer.words}")
 
 
-def _written(answer: Answer, *, out: Path, lake: Lake | None, branch: str) -> dict[str, Any]:
-    """The document of an answer that was written and kept."""
+def _written(answer: VerdictAnswer, *, out: Path, lake: Lake | None, branch: str) -> dict[str, Any]:
+    """Writes and keeps an answer, and returns its document."""
     as_written = as_document(answer.verdict)
     content = json.dumps(as_written, indent=1, allow_nan=False)
     texts = [answer.page, content + "\n", *(dumps(model.content) for model in answer.models)]
     write_files(out, dict(zip_longest(FILES, texts)), command="close-loop")
     with in_steps(lambda: f"the report and the models in {out}"):
-        kept = None if lake is None else keep(lake, answer, branch=branch)
-    if kept is not None:
+        published = None if lake is None else keep(lake, answer, branch=branch)
+    if published is not None:
         as_written["artifacts"] = {
-            "measurement": kept.measurement,
-            "models": list(kept.models),
-            "existing": not kept.place.new,
-            "version": kept.place.version,
+            "measurement": published.measurement,
+            "models": list(published.models),
+            "existing": not published.place.new,
+            "version": published.place.version,
         }
-        say(f"measurement {kept.measurement}, {kept.place.sentence}")
-    if kept is not None and kept.place.new:
-        for model, identity in zip(answer.models, kept.models, strict=True):
+        say(f"measurement {published.measurement}, {published.place.sentence}")
+    if published is not None and published.place.new:
+        for model, identity in zip(answer.models, published.models, strict=True):
             say(f"model {identity} {model.name}")
     say(f"wrote {', '.join(str(out / file) for file in FILES[: 2 + len(answer.models)])}")
     return as_written

@@ -25,7 +25,7 @@ _HERE = Path()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class SourceOptions:
     """How sources are to be read.
 
     Attributes:
@@ -52,8 +52,8 @@ class Reading:
     confirm: Confirm = UNASKED
 
 
-def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None) -> list[Observation]:
-    """The recordings of some sources.
+def read(sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None) -> list[Observation]:
+    """Reads the recordings of some sources.
 
     Args:
         winds: one for all recordings, one each, or none where the sources know theirs: a speed [m/s], a log, or an
@@ -64,39 +64,52 @@ def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: L
         UsageError: winds that do not fit the recordings.
         FlagdataError: as the readers.
     """
-    found = [(seen.turned(reading.up), source, wind) for seen, source, wind in _beside(sources, winds, reading, lake)]
-    return distinct([blown(seen, wind, _HERE, lake) for seen, _, wind in found])
+    observations = [
+        (observation.turned(reading.up), source, wind)
+        for observation, source, wind in _beside(sources, winds, reading, lake)
+    ]
+    return distinct([blown(observation, wind, _HERE, lake) for observation, _, wind in observations])
 
 
 def _beside(
-    sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None
+    sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None
 ) -> list[tuple[Observation, RecordingSource, WindSource | None]]:
     """Returns the recordings of some sources as they are, each with its source and its wind; as `read`."""
-    found: list[tuple[Observation, RecordingSource]] = []
+    observations: list[tuple[Observation, RecordingSource]] = []
     for text in sources:
         source = RecordingSource(source=text, rate=reading.rate, unit=reading.unit, noise=reading.noise)
         several = opened(source, _HERE, lake)
-        found += [(seen, replace(source, take=seen.name if len(several) > 1 else "")) for seen in several]
-    if len(winds) not in (0, 1, len(found)):
+        observations += [
+            (observation, replace(source, take=observation.name if len(several) > 1 else "")) for observation in several
+        ]
+    if len(winds) not in (0, 1, len(observations)):
         raise UsageError(
-            f"{len(winds)} winds for {len(found)} recordings", where="--wind", fix="give one, or one for each recording"
+            f"there are {len(winds)} winds for {len(observations)} recordings",
+            where="--wind",
+            fix="give one, or one for each recording",
         )
     if not any(map(_is_log, winds)):
-        given = {
+        options = {
             "offset": reading.offset,
             "sensor": reading.sensor,
             "zone": reading.zone,
             "accept": reading.confirm.accept,
         }
-        for name in given:
-            if given[name] is not None:
+        for name in options:
+            if options[name] is not None:
                 raise UsageError("no wind is a log", where=f"--{name}", fix="leave it out, or name a log by --wind")
-    each = [_wind(wind, reading) for wind in (winds if len(winds) == len(found) else [*winds[:1]] * len(found))]
-    return [(seen, source, wind) for (seen, source), wind in zip(found, each or [None] * len(found), strict=True)]
+    wind_sources = [
+        _wind(wind, reading)
+        for wind in (winds if len(winds) == len(observations) else [*winds[:1]] * len(observations))
+    ]
+    return [
+        (observation, source, wind)
+        for (observation, source), wind in zip(observations, wind_sources or [None] * len(observations), strict=True)
+    ]
 
 
 def drafted(
-    sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None, *, folder: Path
+    sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None, *, folder: Path
 ) -> dict[str, Any]:
     """Returns what a recipe says of the recordings of some sources, see `measure.observe.recipe`.
 
@@ -127,19 +140,19 @@ def drafted(
 
 def filled(table: Mapping[str, Any]) -> dict[str, Any]:
     """Returns a table of a recipe without what it says nothing of."""
-    kept: dict[str, Any] = {}
+    stated_entries: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
             value = filled(value)
         elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            value = [filled(one) for one in value]
+            value = [filled(entry) for entry in value]
         if value not in (None, "", {}, "m"):
-            kept[key.replace("_", "-")] = value
-    return kept
+            stated_entries[key.replace("_", "-")] = value
+    return stated_entries
 
 
 def _is_log(text: str) -> bool:
-    """Whether a wind is something other than a speed."""
+    """Returns whether a wind is something other than a speed."""
     try:
         float(text)
     except ValueError:
@@ -147,22 +160,22 @@ def _is_log(text: str) -> bool:
     return False
 
 
-def _wind(text: str, reading: Reading) -> WindSource:
+def _wind(text: str, reading: SourceOptions) -> WindSource:
     if _is_log(text):
         placement = LogPlacement(axis=reading.axis, north=reading.north, offset=reading.offset)
         options = WindOptions(recipe=reading.sensor, zone=reading.zone)
         return WindSource(log=text, placement=placement, options=options, confirm=reading.confirm)
     speed = float(text)
     if reading.axis is None:
-        raise UsageError("a speed without a direction", where=f"--wind {text}", fix="give --axis, not --north")
+        raise UsageError("the speed has no direction", where=f"--wind {text}", fix="give --axis, not --north")
     x, y, z = (speed * np.array(reading.axis) / float(np.linalg.norm(reading.axis))).tolist()
     return WindSource(velocity=(x, y, z))
 
 
-def distinct(found: Sequence[Recorded]) -> list[Recorded]:
-    """Recordings with names made different where two are the same."""
-    names = [seen.name for seen in found]
+def distinct(recordings: Sequence[Recorded]) -> list[Recorded]:
+    """Makes recordings' names different where two are the same."""
+    names = [recording.name for recording in recordings]
     return [
-        replace(seen, name=f"{seen.name} ({number})") if names.count(seen.name) > 1 else seen
-        for number, seen in enumerate(found, start=1)
+        replace(recording, name=f"{recording.name} ({number})") if names.count(recording.name) > 1 else recording
+        for number, recording in enumerate(recordings, start=1)
     ]

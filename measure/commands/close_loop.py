@@ -21,8 +21,8 @@ from measure.films.command_line import JudgingFilms, refuse_of_others
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
-    from measure.closing.artifacts import Answer
-    from measure.closing.sources import Reading
+    from measure.closing.artifacts import VerdictAnswer
+    from measure.closing.sources import SourceOptions
     from measure.observe import Setup, Up
     from measure.observe.recipe import ExperimentRecipe
     from sim.material import Material
@@ -176,7 +176,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     from measure.closing.sources import read
     from measure.films.sources import films_among
     from measure.forecasting.strengths import Suspicion, on_markers
-    from measure.loop.run import Options
+    from measure.loop.run import LoopOptions
     from measure.nulls.workload import of_recordings
     from measure.observe import Setup, observe
     from measure.observe import recipe as recipes
@@ -216,10 +216,10 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         _draft(chosen, tracked, lake)
         return
 
-    def of_markers(level: float | None) -> tuple[Answer, Material]:
+    def of_markers(level: float | None) -> tuple[VerdictAnswer, Material]:
         """The answer by markers, and the cloth's nominal material."""
         said = nulls_given(recipe, chosen, level=level)
-        options = Options(
+        options = LoopOptions(
             seed=chosen.seed,
             bank=chosen.bank,
             most_nulls=chosen.most_nulls,
@@ -249,7 +249,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         )
         return answer, cloth.material
 
-    def of_films(level: float | None) -> Answer:
+    def of_films(level: float | None) -> VerdictAnswer:
         from measure.films.command import close_films
 
         return close_films(films, chosen, lake=lake, branch=branch, name=names["films"], level=level)
@@ -286,11 +286,11 @@ def _refuse_beside(chosen: CloseLoopCommand, sources: tuple[str, ...]) -> None:
             )
 
 
-def _reading(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Reading:
+def _reading(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> SourceOptions:
     """How sources of the command line are read."""
-    from measure.closing.sources import Reading
+    from measure.closing.sources import SourceOptions
 
-    return Reading(
+    return SourceOptions(
         rate=chosen.rate,
         unit=chosen.unit,
         noise=chosen.noise,

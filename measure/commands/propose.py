@@ -11,7 +11,7 @@ from flagdata.shared_options import AsJson, NamedLake
 from measure.closing.command_line import ByNulls, nulls_given, refuse, stage_bars
 
 if TYPE_CHECKING:
-    from measure.propose.outcome import Outcome
+    from measure.propose.outcome import ProposalOutcome
 
 
 @options
@@ -73,7 +73,7 @@ def propose(chosen: Proposing) -> None:
     outcome = seek(
         observed.experiment,
         tried,
-        known=[candidates.weighed(name) for name in chosen.known],
+        known=[candidates.library_column(name) for name in chosen.known],
         controls=controls,
         options=options,
         stage=stage_bars(),
@@ -85,7 +85,7 @@ def propose(chosen: Proposing) -> None:
     _report(outcome, spec, folder, as_json=chosen.as_json, text=words(outcome))
 
 
-def _report(outcome: Outcome, spec: str, folder: Path, *, as_json: bool, text: str) -> None:
+def _report(outcome: ProposalOutcome, spec: str, folder: Path, *, as_json: bool, text: str) -> None:
     if as_json:
         document("proposal", {"effect": spec, **outcome.as_dict()})
     else:

@@ -20,7 +20,7 @@ from measure.calibrate.arrays import folder_of, options_of, sources_of
 from measure.calibrate.numerics import effort
 from measure.calibrate.simulation import COLUMNS, SETTLE, VERSION, mean_bending
 from measure.calibrate.workload import announced
-from measure.closing.artifacts import Answer
+from measure.closing.artifacts import VerdictAnswer
 from measure.closing.command_line import stage_bars
 from measure.closing.models import NamedModel, acted, acting, fitted
 from measure.closing.sources import distinct
@@ -49,7 +49,7 @@ def answer_of(
     models: tuple[NamedModel, ...],
     reading: Mapping[str, Any],
     parents: tuple[str, ...],
-) -> Answer:
+) -> VerdictAnswer:
     """That of films and of tables of observables.
 
     Args:
@@ -67,7 +67,7 @@ def answer_of(
         **reading,
         **outcome.options.recipe(),
     }
-    return Answer(
+    return VerdictAnswer(
         name=name,
         verdict=verdict,
         models=models,
@@ -148,7 +148,7 @@ def close_films(
     branch: str,
     name: str | None,
     level: float | None,
-) -> Answer:
+) -> VerdictAnswer:
     """Judges recordings of one flag.
 
     Args:

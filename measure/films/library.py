@@ -8,7 +8,7 @@ from functools import cached_property
 from flagdata.tables import Range, Scale
 from measure.calibrate.prior import Uncertain
 from measure.calibrate.simulation import Flag
-from measure.forecasting.strengths import Strengths, every
+from measure.forecasting.strengths import Strengths, all_strengths
 
 _HOIST = "full-hoist.stiffness"
 
@@ -33,6 +33,6 @@ def weighable(flag: Flag) -> tuple[Weighable, ...]:
     """The effects that are weighed for a flag: one that is held along its hoist cannot be held more."""
     return tuple(
         Weighable(column=one.column, low=one.low, high=one.high)
-        for one in every()
+        for one in all_strengths()
         if flag.attachment == "corners" or one.name != _HOIST
     )

@@ -14,7 +14,7 @@ _CALM = 0.3
 
 
 def aligned(experiment: Experiment) -> Experiment:
-    """Turned about the vertical through the lowest attachment, each recording by its own angle.
+    """Turns the experiment about the vertical through the lowest attachment, each recording by its own angle.
 
     Attachments on one vertical stay where they are; others are those of the first recording.
 
@@ -41,11 +41,11 @@ def aligned(experiment: Experiment) -> Experiment:
 
 
 def _turn(recording: Trajectory, lowest: int, base: Floats) -> Floats:
-    """(3, 3) rotation about z that takes the mean wind, or in calm the cloth's mean direction from its lowest
-    attachment, to +x."""
+    """Computes the rotation about z, (3, 3), that takes the mean wind, or in calm the cloth's mean direction from its
+    lowest attachment, to +x."""
     toward = recording.wind.velocity.mean(axis=0)[:2]
     if np.hypot(*toward) < _CALM:
-        held = base if recording.attachments is None else recording.attachments[:, lowest, None]
-        toward = np.nanmean(recording.positions - held, axis=(0, 1))[:2]
+        attachment = base if recording.attachments is None else recording.attachments[:, lowest, None]
+        toward = np.nanmean(recording.positions - attachment, axis=(0, 1))[:2]
     cosine, sine = toward / max(float(np.hypot(*toward)), 1e-12)
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])

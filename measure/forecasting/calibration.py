@@ -22,12 +22,12 @@ class Calibration:
     damping: float = 2.5e-3
 
     def material(self, nominal: Material) -> Material:
-        """The material they make of the nominal one."""
+        """Scales the nominal material by the calibration."""
         scaled = nominal.scaled(density=self.density, bending=self.bending)
         return replace(scaled, damping=self.damping)
 
     def moved(self, steps: Sequence[float]) -> Calibration:
-        """After steps along `THETA`, in its units, kept within its bounds."""
+        """Moves the calibration by steps along `THETA`, in its units, within its bounds."""
         density, bending, damping = steps
         return Calibration(
             density=float(np.clip(self.density * math.exp(density), *_DENSITY)),
@@ -35,12 +35,12 @@ class Calibration:
             damping=float(np.clip(self.damping * math.exp(damping), *_DAMPING)),
         )
 
-    def steps_from(self, other: Calibration) -> tuple[float, float, float]:
-        """Steps along `THETA` that lead here from another."""
+    def steps_from(self, origin: Calibration) -> tuple[float, float, float]:
+        """Computes the steps along `THETA` that lead here from another."""
         return (
-            math.log(self.density / other.density),
-            math.log(self.bending / other.bending),
-            math.log(self.damping / other.damping),
+            math.log(self.density / origin.density),
+            math.log(self.bending / origin.bending),
+            math.log(self.damping / origin.damping),
         )
 
     @property
@@ -62,7 +62,7 @@ DAMPING = [name for name, *_ in THETA].index("damping")
 
 
 def prior(density_uncertainty: float) -> NDArray[np.float64]:
-    """Standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`.
+    """Returns standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`.
 
     Bending is known within a factor of e (the spread of one kind of cloth: Wang et al. 2011). Damping is hardly ever
     measured: within a factor of 4.5 about 2.5 ms, so that 0.25 to 30 ms are within 1.7 standard deviations.

@@ -37,33 +37,33 @@ class Model:
         return tuple(column.at(_admissible(column, coefficient)) for column, coefficient in self.effects)
 
     def system(self, forecaster: Forecaster, segments: Segments) -> tuple[System, State]:
-        """The batch of segments by this model."""
+        """Makes the batch of segments by this model."""
         return apply(self.acting, *forecaster.system(segments, [self.calibration] * len(segments)))
 
     def moved(self, steps: tuple[float, ...]) -> Model:
-        """After steps along the calibrated parameters, then along each effect's strength."""
-        own = len(steps) - len(self.effects)
+        """Moves the model by steps along the calibrated parameters, then along each effect's strength."""
+        calibrated = len(steps) - len(self.effects)
         effects = tuple(
             (column, _admissible(column, value + step))
-            for (column, value), step in zip(self.effects, steps[own:], strict=True)
+            for (column, value), step in zip(self.effects, steps[calibrated:], strict=True)
         )
-        return replace(self, calibration=self.calibration.moved(steps[:own]), effects=effects)
+        return replace(self, calibration=self.calibration.moved(steps[:calibrated]), effects=effects)
 
-    def steps_from(self, other: Model) -> tuple[float, ...]:
-        """Steps of `moved` that lead here from another model of the same effects."""
-        strengths = (b - a for (_, a), (_, b) in zip(other.effects, self.effects, strict=True))
-        return (*self.calibration.steps_from(other.calibration), *strengths)
+    def steps_from(self, origin: Model) -> tuple[float, ...]:
+        """Computes the steps of `moved` that lead here from another model of the same effects."""
+        strengths = (b - a for (_, a), (_, b) in zip(origin.effects, self.effects, strict=True))
+        return (*self.calibration.steps_from(origin.calibration), *strengths)
 
-    def stepped(self, place: int, size: float) -> tuple[Model, float]:
-        """After a step along one parameter, with the step: back, where bounds cut the one ahead shorter."""
+    def stepped(self, parameter: int, size: float) -> tuple[Model, float]:
+        """Takes a step along one parameter, and returns the step: back, where bounds cut the one ahead shorter."""
         count = len(THETA) + len(self.effects)
-        ways = [self.moved(tuple(way if k == place else 0.0 for k in range(count))) for way in (size, -size)]
-        taken = [moved.steps_from(self)[place] for moved in ways]
+        ways = [self.moved(tuple(way if k == parameter else 0.0 for k in range(count))) for way in (size, -size)]
+        taken = [moved.steps_from(self)[parameter] for moved in ways]
         longer = int(abs(taken[1]) > abs(taken[0]) + 1e-9 * size)
         return ways[longer], taken[longer]
 
     def halved(self) -> Model:
-        """Halfway from here to the nominal base model."""
+        """Returns the model halfway from here to the nominal base model."""
         nominal = Calibration()
         density, bending, damping = (step / 2 for step in self.calibration.steps_from(nominal))
         return Model(
@@ -77,30 +77,32 @@ _SHARE = 0.1
 
 
 def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segments) -> list[Tensor]:
-    """What each model of the same effects leaves of segments: (frame, marker, 3, segment) errors [m].
+    """Computes the prediction errors (frame, marker, 3, segment) [m] of each model of the same effects on segments.
 
     They are members of one batch: small batches cost nearly as much as larger ones.
     """
-    count, found = len(segments), []
+    count, errors = len(segments), []
     for chosen in np.array_split(np.arange(len(models)), math.ceil(len(models) * count / WIDEST)):
-        own = [models[place] for place in chosen]
-        copies = segments.select(list(range(count)) * len(own))
-        batch = forecaster.system(copies, [model.calibration for model in own for _ in range(count)])
-        strengths = torch.tensor([[value for _, value in model.effects] for model in own], dtype=torch.float64)
+        members = [models[index] for index in chosen]
+        copies = segments.select(list(range(count)) * len(members))
+        batch = forecaster.system(copies, [model.calibration for model in members for _ in range(count)])
+        strengths = torch.tensor([[value for _, value in model.effects] for model in members], dtype=torch.float64)
         acting = [
-            column.at(strengths[:, place].repeat_interleave(count)) for place, (column, _) in enumerate(own[0].effects)
+            column.at(strengths[:, index].repeat_interleave(count))
+            for index, (column, _) in enumerate(members[0].effects)
         ]
-        found += forecaster.errors(*apply(acting, *batch), segments).split(count, dim=-1)
-    return found
+        errors += forecaster.errors(*apply(acting, *batch), segments).split(count, dim=-1)
+    return errors
 
 
 def linearised(model: Model, forecaster: Forecaster, segments: Segments) -> tuple[Tensor, list[Tensor]]:
-    """The errors of a model (frame, marker, 3, segment) [m] and, per unit, what each of its parameters takes away."""
+    """Computes the errors of a model (frame, marker, 3, segment) [m] and, per unit, what each of its parameters takes
+    away."""
     strengths = (max(column.step, _SHARE * abs(value)) for column, value in model.effects)
     sizes = [*(step for _, _, step in THETA), *strengths]
-    steps = [model.stepped(place, size) for place, size in enumerate(sizes)]
+    steps = [model.stepped(index, size) for index, size in enumerate(sizes)]
     base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)
-    return base, [(base - own) / taken for own, (_, taken) in zip(errors, steps, strict=True)]
+    return base, [(base - changed) / taken for changed, (_, taken) in zip(errors, steps, strict=True)]
 
 
 def _admissible(column: EffectColumn, coefficient: float) -> float:

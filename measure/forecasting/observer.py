@@ -69,8 +69,8 @@ class Forecaster:
     workers: int = 1
 
     @cached_property
-    def _seen(self) -> Tensor:
-        """(marker, vertex): vertices onto markers."""
+    def _onto_markers(self) -> Tensor:
+        """Computes the matrix (marker, vertex) of vertices onto markers."""
         return self._real(onto(self.specimen.mesh.rest, self.markers))
 
     @cached_property
@@ -87,7 +87,7 @@ class Forecaster:
         return torch.tensor(values, dtype=self.dtype, device=self.device)
 
     def system(self, segments: Segments, calibrations: Sequence[Calibration]) -> tuple[System, State]:
-        """The base model of every segment, each with its own calibration, and a start at rest."""
+        """Makes the base model of every segment, each with its own calibration, and a start at rest."""
         specimen = self.specimen
         start = np.zeros((specimen.mesh.vertex_count, 3))
         start[:, 0] = specimen.mesh.rest[:, 0] - specimen.mesh.rest[list(specimen.held), 0].min()
@@ -102,9 +102,11 @@ class Forecaster:
                 handles=handles,
                 gravity=specimen.gravity,
                 air=specimen.air,
-                position=_held(start, specimen.held, specimen.anchors if own.anchors is None else own.anchors),
+                position=_tied_to_anchors(
+                    start, specimen.held, specimen.anchors if segment.anchors is None else segment.anchors
+                ),
             )
-            for own, c in zip(segments.items, calibrations, strict=True)
+            for segment, c in zip(segments.items, calibrations, strict=True)
         ]
         system, state = assemble(scenes, dtype=self.dtype, device=self.device)
         return replace(system, wind=self._wind(segments), motion=self._motion(segments)), state
@@ -118,16 +120,17 @@ class Forecaster:
         return SampledWind(times=times, samples=self._real(samples), beyond=Beyond.HOLD)
 
     def _motion(self, segments: Segments) -> AnchorTracks | None:
-        """Motion of every segment's attachments, from their places in its first frame; None where they stand still."""
+        """Tracks the motion of every segment's attachments, from their positions in its first frame; None where they
+        stand still."""
         tracks = [item.attachments for item in segments.items if item.attachments is not None]
         if not tracks:
             return None
-        moved = np.stack([own - own[0] for own in tracks], axis=-1)
+        moved = np.stack([track - track[0] for track in tracks], axis=-1)
         return AnchorTracks(start=0.0, period=segments.period, samples=self._real(moved))
 
     def errors(self, system: System, state: State, segments: Segments) -> Tensor:
-        """Prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted, 0 where a marker
-        was not tracked in the frame or in one of the two before.
+        """Computes prediction errors (frame, marker, 3, batch) [m] after the warm-up: observed less predicted, 0 where
+        a marker was not tracked in the frame or in one of the two before.
 
         Args:
             system, state: a member for each of the segments, once or several times over.
@@ -144,24 +147,24 @@ class Forecaster:
     def _run(
         self, advance: Callable[[State], State], state: State, segments: Segments
     ) -> tuple[list[Tensor], list[Tensor]]:
-        """The same of what advances a state by a period, frame by frame."""
+        """Predicts frame by frame, by what advances a state by a period: errors and predictions."""
         period, copies = segments.period, state.position.shape[-1] // len(segments)
-        seen = self._real(segments.positions)
-        mask, kept = self._shares(segments.seen, copies), self._shares(segments.counted, copies)
-        x = torch.einsum("vm,mcb->vcb", self._lifted, seen[1]).repeat(1, 1, copies)
-        v = torch.einsum("vm,mcb->vcb", self._lifted, seen[2] - seen[0]).repeat(1, 1, copies) / (2 * period)
+        observed = self._real(segments.positions)
+        mask, counted = self._shares(segments.seen, copies), self._shares(segments.counted, copies)
+        x = torch.einsum("vm,mcb->vcb", self._lifted, observed[1]).repeat(1, 1, copies)
+        v = torch.einsum("vm,mcb->vcb", self._lifted, observed[2] - observed[0]).repeat(1, 1, copies) / (2 * period)
         state = replace(state, position=x, velocity=v, time=period)
         errors: list[Tensor] = []
         predictions: list[Tensor] = []
         with torch.no_grad():
-            for k in range(2, len(seen)):
+            for k in range(2, len(observed)):
                 state = advance(state)
-                predicted = torch.einsum("mv,vcb->mcb", self._seen, state.position)
-                error = (seen[k][:, :, None] - predicted.unflatten(-1, (copies, -1))).flatten(2)
+                predicted = torch.einsum("mv,vcb->mcb", self._onto_markers, state.position)
+                error = (observed[k][:, :, None] - predicted.unflatten(-1, (copies, -1))).flatten(2)
                 if mask is not None:
                     error = error * mask[k][:, None]
                 if k >= segments.first:
-                    errors.append(error if kept is None else error * kept[k - segments.first][:, None])
+                    errors.append(error if counted is None else error * counted[k - segments.first][:, None])
                     predictions.append(predicted)
                 lifted = torch.einsum("vm,mcb->vcb", self._lifted, error)
                 state = replace(
@@ -170,19 +173,21 @@ class Forecaster:
         return errors, predictions
 
     def _shares(self, mask: NDArray[np.bool_] | None, copies: int) -> Tensor | None:
-        """(frame, marker, batch) 1 where a mask (frame, marker, segment) is set, else 0; None where there is none."""
+        """Converts a mask (frame, marker, segment) to (frame, marker, batch), 1 where it is set, else 0; None where
+        there is none."""
         return None if mask is None else self._real(mask.astype(np.float64)).repeat(1, 1, copies)
 
     def sensitivity(
         self, column: Column, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
     ) -> Tensor:
-        """Change of the predictions with a column, (frame, marker, 3, batch) [m per unit], given the base's errors."""
+        """Computes the change of the predictions with a column, (frame, marker, 3, batch) [m per unit], from the base's
+        errors."""
         return self._changes([column], segments, calibrations, base)[0]
 
     def sensitivities(
         self, columns: Sequence[Column], segments: Segments, calibrations: Sequence[Calibration], base: Tensor
     ) -> list[Tensor]:
-        """The same of each parameter of `THETA`, then of each column."""
+        """Computes the sensitivities to each parameter of `THETA`, then to each column."""
         return self._changes([*range(len(THETA)), *columns], segments, calibrations, base)
 
     def _changes(
@@ -192,19 +197,19 @@ class Forecaster:
         calibrations: Sequence[Calibration],
         base: Tensor,
     ) -> list[Tensor]:
-        """The same of columns and of places in `THETA`: steps in one joint batch, those of `DOUBLE` in one of their own
-        in double precision."""
-        steps = [place for place, one in enumerate(wanted) if not isinstance(one, WrittenColumn)]
-        exact = [place for place in steps if self.dtype != torch.float64 and _name(wanted[place]) in DOUBLE]
-        plain = [place for place in steps if place not in exact]
-        found = dict(zip(plain, self._stepped([wanted[p] for p in plain], segments, calibrations, base), strict=True))
+        """Computes the sensitivities to columns and to parameters of `THETA` by their index: steps in one joint batch,
+        those of `DOUBLE` in one of their own in double precision."""
+        steps = [index for index, parameter in enumerate(wanted) if not isinstance(parameter, WrittenColumn)]
+        exact = [index for index in steps if self.dtype != torch.float64 and _name(wanted[index]) in DOUBLE]
+        plain = [index for index in steps if index not in exact]
+        changes = dict(zip(plain, self._stepped([wanted[p] for p in plain], segments, calibrations, base), strict=True))
         if exact:
-            found |= zip(
+            changes |= zip(
                 exact, self.double._stepped([wanted[p] for p in exact], segments, calibrations, None), strict=True
             )
         return [
-            self._written(one, segments) if isinstance(one, WrittenColumn) else found[place].to(base)
-            for place, one in enumerate(wanted)
+            self._written(parameter, segments) if isinstance(parameter, WrittenColumn) else changes[index].to(base)
+            for index, parameter in enumerate(wanted)
         ]
 
     def _stepped(
@@ -214,69 +219,69 @@ class Forecaster:
         calibrations: Sequence[Calibration],
         base: Tensor | None,
     ) -> list[Tensor]:
-        """The same of steps; the base's errors are found beside theirs where they are not given. Nothing changes with
-        an effect that the cloth cannot have as it is held."""
+        """Computes the sensitivities by steps; the base's errors are computed beside theirs where they are not given.
+        Nothing changes with an effect that the cloth cannot have as it is held."""
         nominal = self.system(segments, calibrations)
         sizes: list[float] = []
         inapplicable: list[int] = []
         batches: list[tuple[System, State]] = [] if base is not None else [nominal]
-        for one in wanted:
-            if isinstance(one, int):
-                sizes.append(THETA[one][2])
-                batches.append(self.system(segments, _moved(calibrations, one, sizes[-1])))
-            elif isinstance(one, StepColumn):
+        for parameter in wanted:
+            if isinstance(parameter, int):
+                sizes.append(THETA[parameter][2])
+                batches.append(self.system(segments, _moved(calibrations, parameter, sizes[-1])))
+            elif isinstance(parameter, StepColumn):
                 try:
-                    batches.append(one.system(*nominal))
+                    batches.append(parameter.system(*nominal))
                 except InapplicableError:
                     inapplicable.append(len(sizes) + len(inapplicable))
                     continue
-                sizes.append(one.step)
+                sizes.append(parameter.step)
             else:
-                raise UsageError(f"{one.name} has no sensitivity", where="columns", fix="give a StepColumn")
+                raise UsageError(f"{parameter.name} has no sensitivity", where="columns", fix="give a StepColumn")
         errors = self.errors_jointly(batches, segments)
         start = errors.pop(0) if base is None else base
-        found = [(start - own) / size for own, size in zip(errors, sizes, strict=True)]
-        for place in inapplicable:
-            found.insert(place, torch.zeros_like(start))
-        return found
+        changes = [(start - stepped) / size for stepped, size in zip(errors, sizes, strict=True)]
+        for index in inapplicable:
+            changes.insert(index, torch.zeros_like(start))
+        return changes
 
     def _written(self, column: WrittenColumn, segments: Segments) -> Tensor:
-        seen, rest = self._real(segments.positions), self.specimen.mesh.rest
-        moved = column.sensitivity(self.markers, rest, seen, segments.period)[segments.first - 2 :]
+        observed, rest = self._real(segments.positions), self.specimen.mesh.rest
+        moved = column.sensitivity(self.markers, rest, observed, segments.period)[segments.first - 2 :]
         if segments.counted is None:
             return moved
         return moved * self._real(segments.counted.astype(np.float64))[:, :, None]
 
     def errors_jointly(self, batches: Sequence[tuple[System, State]], segments: Segments) -> list[Tensor]:
-        """`errors` of each of some batches of the same segments.
+        """Computes `errors` of each of some batches of the same segments.
 
         They run in joint batches of up to `_JOINT` members: small batches cost nearly as much as larger ones. Products
         of matrices round differently with the number of columns, so that their number decides, not that of workers.
         """
 
         def run(chosen: NDArray[np.int64]) -> Sequence[Tensor]:
-            joint, start = JointBatch.of([batches[place] for place in chosen])
+            joint, start = JointBatch.of([batches[index] for index in chosen])
             errors, _ = self._run(
                 partial(self.integrator.advance_jointly, joint, duration=segments.period), start, segments
             )
             return torch.stack(errors).split(len(segments), dim=-1)
 
         together = min(math.ceil(len(batches) * len(segments) / _JOINT), len(batches))
-        shares = [np.arange(len(batches))[place::together] for place in range(together)]
+        shares = [np.arange(len(batches))[index::together] for index in range(together)]
         with ThreadPoolExecutor(self.workers, initializer=torch.set_num_threads, initargs=(1,)) as pool:
             done = list(pool.map(run, shares))
-        return [done[place % together][place // together] for place in range(len(batches))]
+        return [done[index % together][index // together] for index in range(len(batches))]
 
 
-def _name(one: Column | int) -> str:
-    return THETA[one][0] if isinstance(one, int) else one.name
+def _name(parameter: Column | int) -> str:
+    return THETA[parameter][0] if isinstance(parameter, int) else parameter.name
 
 
-def _held(start: Floats, vertices: Sequence[int], anchors: Floats) -> Floats:
+def _tied_to_anchors(start: Floats, vertices: Sequence[int], anchors: Floats) -> Floats:
     position = start.copy()
     position[list(vertices)] = anchors
     return position
 
 
-def _moved(calibrations: Sequence[Calibration], place: int, size: float) -> list[Calibration]:
-    return [c.moved([size if k == place else 0.0 for k in range(len(THETA))]) for c in calibrations]
+def _moved(calibrations: Sequence[Calibration], parameter: int, size: float) -> list[Calibration]:
+    return [c.moved([size if k == parameter else 0.0 for k in range(len(THETA))]) for c in calibrations]

@@ -53,7 +53,7 @@ class StepColumn(Column):
 
     @abstractmethod
     def system(self, system: System, state: State) -> tuple[System, State]:
-        """The batch with this step taken, and its start."""
+        """Takes this step on the batch, and returns it with its start."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,11 +92,11 @@ class EffectColumn(StepColumn):
         return self.strengthened(self.step, system, state)
 
     def strengthened(self, coefficient: float, system: System, state: State) -> tuple[System, State]:
-        """The batch with the effect at a strength `coefficient` beyond its null value."""
+        """Applies the effect to the batch at a strength `coefficient` beyond its null value."""
         return apply([self.at(coefficient)], system, state)
 
     def at(self, coefficient: float | Tensor) -> Effect:
-        """The effect at a strength `coefficient` beyond its null value, or one for each member (batch,)."""
+        """Makes the effect at a strength `coefficient` beyond its null value, or one for each member (batch,)."""
         return EFFECTS[self.effect](**dict(self.shapes), **{self.parameter: self.described.null + coefficient})
 
 
@@ -136,10 +136,10 @@ class FieldColumn(StepColumn):
         return "m/s²"
 
     def acceleration(self, rest: Floats) -> Tensor:
-        """(vertex, 3, 1) of a step, at rest coordinates (vertex, 2) [m/s²]."""
-        made = torch.zeros((len(rest), 3, 1), dtype=torch.float64)
-        made[:, self.axis, 0] = self.step * torch.as_tensor(cosine(self.mode, rest, rest))
-        return made
+        """Computes the acceleration (vertex, 3, 1) of a step, at rest coordinates (vertex, 2) [m/s²]."""
+        field = torch.zeros((len(rest), 3, 1), dtype=torch.float64)
+        field[:, self.axis, 0] = self.step * torch.as_tensor(cosine(self.mode, rest, rest))
+        return field
 
     def system(self, system: System, state: State) -> tuple[System, State]:
         return SteadyField(acceleration=self.acceleration(system.cloth.mesh.rest)).apply(system, state)
@@ -174,7 +174,7 @@ class WindColumn(StepColumn):
 
 
 def blown(shares: Tensor, system: System, state: State) -> tuple[System, State]:
-    """The batch in a wind that is stronger, turned and rising by (part, batch) or (part, 1) shares of its mean."""
+    """Makes the batch's wind stronger, turned and rising by (part, batch) or (part, 1) shares of its mean."""
     samples = shares[None].expand(2, -1, -1)
     return apply([Gusts(intensity=1.0, lateral=1.0, vertical=1.0, samples=samples)], system, state)
 
@@ -192,20 +192,21 @@ class WrittenColumn(Column):
 
     mode: tuple[int, int]
 
-    def sensitivity(self, markers: Floats, rest: Floats, seen: Tensor, period: float) -> Tensor:
-        """(frame − 2, marker, 3, segment) [m per unit] of seen markers (frame, marker, 3, segment), from the third on.
+    def sensitivity(self, markers: Floats, rest: Floats, observed: Tensor, period: float) -> Tensor:
+        """Computes the sensitivity (frame − 2, marker, 3, segment) [m per unit] of observed markers (frame, marker, 3,
+        segment), from the third frame on.
 
         Args:
             markers: (marker, 2) [m].
             rest: (vertex, 2) of the cloth [m].
             period: between the frames [s].
         """
-        shape = torch.as_tensor(cosine(self.mode, markers, rest), dtype=seen.dtype, device=seen.device)
-        return self._moved(seen, period) * shape[None, :, None, None]
+        shape = torch.as_tensor(cosine(self.mode, markers, rest), dtype=observed.dtype, device=observed.device)
+        return self._moved(observed, period) * shape[None, :, None, None]
 
     @abstractmethod
-    def _moved(self, seen: Tensor, period: float) -> Tensor:
-        """(frame − 2, marker, 3, segment) T² f [m per unit]."""
+    def _moved(self, observed: Tensor, period: float) -> Tensor:
+        """Computes (frame − 2, marker, 3, segment) T² f [m per unit]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,8 +228,10 @@ class MotionColumn(WrittenColumn):
     def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         return ("1/s", "1")[self.derivative - 1]
 
-    def _moved(self, seen: Tensor, period: float) -> Tensor:
-        return _travelled(seen) * period if self.derivative == 1 else seen[2:] - 2 * seen[1:-1] + seen[:-2]
+    def _moved(self, observed: Tensor, period: float) -> Tensor:
+        return (
+            _travelled(observed) * period if self.derivative == 1 else observed[2:] - 2 * observed[1:-1] + observed[:-2]
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,17 +252,18 @@ class AcrossColumn(WrittenColumn):
     def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         return "1/s"
 
-    def _moved(self, seen: Tensor, period: float) -> Tensor:
-        return left_of(_travelled(seen), axis=2) * period
+    def _moved(self, observed: Tensor, period: float) -> Tensor:
+        return left_of(_travelled(observed), axis=2) * period
 
 
-def _travelled(seen: Tensor) -> Tensor:
-    """(frame − 2, …) what the velocity makes of a period between frames, by central differences of (frame, …) [m]."""
-    return (seen[2:] - seen[:-2]) / 2
+def _travelled(observed: Tensor) -> Tensor:
+    """Computes what the velocity makes of a period between frames, (frame − 2, …), by central differences of (frame, …)
+    [m]."""
+    return (observed[2:] - observed[:-2]) / 2
 
 
 def cosine(mode: tuple[int, int], places: Floats, rest: Floats) -> Floats:
-    """(place,) cos(π i u/W) cos(π j v/H) at rest coordinates (place, 2) of a cloth (vertex, 2) [m]."""
+    """Computes cos(π i u/W) cos(π j v/H) at rest coordinates (place, 2) of a cloth (vertex, 2) [m], (place,)."""
     low = rest.min(axis=0)
     share = (places - low) / (rest.max(axis=0) - low)
     return np.cos(np.pi * mode[0] * share[:, 0]) * np.cos(np.pi * mode[1] * share[:, 1])
@@ -304,7 +308,7 @@ _MOTIONS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (0, 2))
 
 
 def library() -> tuple[EffectColumn, ...]:
-    """The strengths that are weighed.
+    """Lists the strengths that are weighed.
 
     Raises:
         UsageError: an entry that the registry of effects does not have.
@@ -322,12 +326,12 @@ def library() -> tuple[EffectColumn, ...]:
 
 
 def fields() -> tuple[FieldColumn, ...]:
-    """The corrective field's modes: steady forces."""
+    """Lists the corrective field's modes: steady forces."""
     return tuple(FieldColumn(axis=axis, mode=mode) for axis in range(3) for mode in _MODES)
 
 
 def winds() -> tuple[WindColumn, ...]:
-    """The components of the wind, by which its course is estimated."""
+    """Lists the components of the wind, by which its course is estimated."""
     return tuple(WindColumn(part=part) for part in range(3))
 
 
@@ -338,7 +342,7 @@ def motions() -> tuple[WrittenColumn, ...]:
 
 
 def columns() -> tuple[Column, ...]:
-    """What is weighed beside the calibrated parameters: the library's strengths, then forces along and across the
+    """Lists what is weighed beside the calibrated parameters: the library's strengths, then forces along and across the
     motion."""
     return (*library(), *motions())
 

@@ -43,8 +43,8 @@ class Cut:
 
     @classmethod
     def of(cls, rate: float, frames: int) -> Cut:
-        """How recordings of so many frames or more are cut: frames about a horizon apart, segments of 2 s, or half of
-        what there is.
+        """Chooses how recordings of so many frames or more are cut: frames about a horizon apart, segments of 2 s, or
+        half of what there is.
 
         Args:
             rate: [Hz].
@@ -61,11 +61,11 @@ class Cut:
         return self.length * self.period >= _SHORTEST
 
     def segments(self, frames: int) -> int:
-        """How many a recording holds; a remainder is left out."""
+        """Counts the segments that a recording holds; a remainder is left out."""
         return (math.ceil(frames / self.stride) - self.warm - 2) // self.length
 
     def lasting(self, segments: int) -> float:
-        """How long a recording is that holds so many [s]."""
+        """Computes how long a recording is that holds so many segments [s]."""
         return (segments * self.length + self.warm + 3) * self.period
 
 
@@ -110,7 +110,8 @@ class Segments:
 
     @classmethod
     def of(cls, recordings: Sequence[Trajectory]) -> Segments:
-        """Cut recordings; frames beyond a horizon of about 40 ms are used every so many, a remainder is left out.
+        """Cuts recordings into segments; frames beyond a horizon of about 40 ms are used every so many, a remainder is
+        left out.
 
         Segments last 2 s, or half of what the shortest recording allows.
 
@@ -135,8 +136,8 @@ class Segments:
                     fix="fill its gaps (measure.observe.fill)",
                 )
             frames = recording.positions[:: cut.stride]
-            seen = None if recording.seen is None else recording.seen[:: cut.stride]
-            held = None if recording.attachments is None else recording.attachments[:: cut.stride]
+            tracked = None if recording.seen is None else recording.seen[:: cut.stride]
+            attachments = None if recording.attachments is None else recording.attachments[:: cut.stride]
             if not cut.enough:
                 needed = 2 * _SHORTEST + (cut.warm + 2) * period
                 raise InputError(
@@ -144,8 +145,8 @@ class Segments:
                     where=f"recording {recording.name!r}",
                     fix="record for 10 s or more",
                 )
-            for place in range(cut.segments(len(recording.positions))):
-                begin = place * cut.length
+            for number in range(cut.segments(len(recording.positions))):
+                begin = number * cut.length
                 items.append(
                     Segment(
                         recording=index,
@@ -153,15 +154,15 @@ class Segments:
                         wind=recording.wind,
                         noise=recording.noise,
                         positions=frames[begin : begin + span],
-                        seen=None if seen is None else seen[begin : begin + span],
-                        attachments=None if held is None else held[begin : begin + span],
-                        anchors=None if held is None else held[begin],
+                        seen=None if tracked is None else tracked[begin : begin + span],
+                        attachments=None if attachments is None else attachments[begin : begin + span],
+                        anchors=None if attachments is None else attachments[begin],
                     )
                 )
         return cls(items=tuple(items), markers=first.markers, cut=cut)
 
     def tied(self, anchors: Sequence[Floats]) -> Segments:
-        """With cloths tied where each recording's (held, 3) are [m]; but those that are carried."""
+        """Ties the segments' cloths where each recording's (held, 3) are [m]; but those that are carried."""
         return replace(
             self,
             items=tuple(
@@ -171,7 +172,7 @@ class Segments:
         )
 
     def select(self, indices: Iterable[int]) -> Segments:
-        """Some of them."""
+        """Selects some of the segments."""
         return replace(self, items=tuple(self.items[i] for i in indices))
 
     @cached_property
@@ -191,11 +192,12 @@ class Segments:
 
     @cached_property
     def seen(self) -> NDArray[np.bool_] | None:
-        """(frame, marker, segment) whether each position was tracked, warm-up included; None where all were."""
+        """Returns whether each position was tracked, warm-up included, (frame, marker, segment); None where all
+        were."""
         if all(item.seen is None for item in self.items):
             return None
-        whole = np.ones(self.items[0].positions.shape[:2], dtype=bool)
-        return np.stack([whole if item.seen is None else item.seen for item in self.items], axis=-1)
+        all_tracked = np.ones(self.items[0].positions.shape[:2], dtype=bool)
+        return np.stack([all_tracked if item.seen is None else item.seen for item in self.items], axis=-1)
 
     @cached_property
     def counted(self) -> NDArray[np.bool_] | None:

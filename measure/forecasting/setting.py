@@ -52,7 +52,7 @@ class Setting:
 
     @classmethod
     def of(cls, experiment: Experiment, *, workers: int = 1) -> Setting:
-        """With a model that uses so many threads.
+        """Makes the setting, with a model that uses so many threads.
 
         Raises:
             InputError: recordings that cannot be used together, or are too short.
@@ -85,7 +85,7 @@ class Setting:
         )
 
     def moved(self, lags: Sequence[float]) -> Setting:
-        """With each recording's log moved by what it lags [s]."""
+        """Moves each recording's log by what it lags [s]."""
         recordings = tuple(
             replace(recording, wind=recording.wind.later(lag))
             for recording, lag in zip(self.experiment.recordings, lags, strict=True)

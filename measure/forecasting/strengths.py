@@ -76,16 +76,16 @@ class Strengths:
         return (self.low**2 + self.high**2) / (2 * (self.high - self.low))
 
 
-def every() -> tuple[Strengths, ...]:
-    """Of all effects that have any."""
+def all_strengths() -> tuple[Strengths, ...]:
+    """Lists the strengths of all effects that have any."""
     columns = {column.name: column for column in (*library(), _SLACK)}
     return tuple(Strengths(column=columns[name], low=low, high=high) for name, (low, high) in _RANGES.items())
 
 
 def on_markers() -> tuple[Strengths, ...]:
-    """Of the effects that verdicts on markers weigh."""
-    weighed = {column.name for column in library()}
-    return tuple(one for one in every() if one.name in weighed)
+    """Lists the strengths of the effects that verdicts on markers weigh."""
+    names = {column.name for column in library()}
+    return tuple(strengths for strengths in all_strengths() if strengths.name in names)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,11 +103,11 @@ class Suspicion:
     words: str
 
     @classmethod
-    def parse(cls, text: str, weighed: Sequence[Strengths]) -> Suspicion:
-        """From `lift`, `vertical-wind-` or `tilted-pole.lean+`.
+    def parse(cls, text: str, candidates: Sequence[Strengths]) -> Suspicion:
+        """Parses a suspicion such as `lift`, `vertical-wind-` or `tilted-pole.lean+`.
 
         Args:
-            weighed: the effects that may be suspected.
+            candidates: the effects that may be suspected.
 
         Raises:
             UnknownNameError: none of them.
@@ -115,21 +115,23 @@ class Suspicion:
         """
         sign = {"+": 1, "-": -1}.get(text[-1:], 0)
         wanted = text[:-1] if sign else text
-        found = [own for own in weighed if wanted in (own.name, own.column.effect)]
-        if not found:
-            effects = dict.fromkeys(own.column.effect for own in weighed)
-            raise UnknownNameError.of("effect", wanted, [*effects, *(own.name for own in weighed)], where=WHERE)
-        if len(found) > 1:
-            each = " or ".join(one.name for one in found)
-            raise UsageError(f"{wanted} has several strengths", where=WHERE, fix=f"suspect one of them: {each}")
-        (one,) = found
-        if one.low > 0 and sign < 0:
+        matching = [strengths for strengths in candidates if wanted in (strengths.name, strengths.column.effect)]
+        if not matching:
+            effects = dict.fromkeys(strengths.column.effect for strengths in candidates)
+            raise UnknownNameError.of(
+                "effect", wanted, [*effects, *(strengths.name for strengths in candidates)], where=WHERE
+            )
+        if len(matching) > 1:
+            names = " or ".join(strengths.name for strengths in matching)
+            raise UsageError(f"{wanted} has several strengths", where=WHERE, fix=f"suspect one of them: {names}")
+        (strengths,) = matching
+        if strengths.low > 0 and sign < 0:
             raise UsageError(f"{wanted} cannot be less than none", where=WHERE, fix=f"give {wanted} without the sign")
-        if one.low < 0 and not sign:
+        if strengths.low < 0 and not sign:
             raise UsageError(
-                f"{wanted} may be above or below {one.column.described.null:g}",
+                f"{wanted} may be above or below {strengths.column.described.null:g}",
                 where=WHERE,
                 fix=f"give the sign that is suspected, {wanted}+ or {wanted}-",
             )
         sign = sign or 1
-        return cls(name=one.name, sign=sign, words=f"{wanted}{'+' if sign > 0 else '-'}")
+        return cls(name=strengths.name, sign=sign, words=f"{wanted}{'+' if sign > 0 else '-'}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.inference.evidence import Evidence, Fit, best_gain, gains
+    from measure.inference.evidence import CoefficientFit, Evidence, best_gain, gains
     from measure.inference.growth import power
     from measure.inference.random_effect import NullModel, Nulls
     from measure.inference.whitened_misfit import WhitenedMisfit

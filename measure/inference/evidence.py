@@ -13,7 +13,7 @@ from flagdata.errors import UsageError
 from measure.forecasting.calibration import PRIOR, THETA
 from measure.inference.random_effect import NullModel
 from measure.probes.course import Course
-from measure.probes.rows import Rows
+from measure.probes.rows import StatisticRows
 from measure.probes.statistics import Statistics
 from measure.probes.wind_log import DIRECTION, NUISANCES, by_recording
 
@@ -25,7 +25,7 @@ _TINY = np.finfo(np.float64).tiny
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Evidence(Rows):
+class Evidence(StatisticRows):
     """Segments beside a null model, as quadratic forms: the misfit of coefficients δ is c − 2 g·δ + δᵀ H δ.
 
     Its columns are the statistics', then the null model's shifts, then what the log of each recording's wind may be off
@@ -60,34 +60,34 @@ class Evidence(Rows):
     prior: Floats = field(default_factory=PRIOR.copy)
 
     @classmethod
-    def of(cls, statistics: Statistics, speeds: Floats, null: NullModel, *, beside: Floats | None = None) -> Evidence:
-        """The evidence of segments with their wind's speed (segment,) [m/s].
+    def of(cls, statistics: Statistics, speeds: Floats, null: NullModel, *, further: Floats | None = None) -> Evidence:
+        """Computes the evidence of segments with their wind's speed (segment,) [m/s].
 
         Args:
-            beside: (segment, column, k) how k coefficients more move r, along which nothing was taken: they become the
+            further: (segment, column, k) how k coefficients more move r, along which nothing was taken: they become the
                 columns after the statistics', and moments are not looked at.
 
         Raises:
             UsageError: moments of the statistics or of the nulls alone.
         """
-        if beside is not None:
-            response = np.concatenate([statistics.response, beside], axis=2)
+        if further is not None:
+            response = np.concatenate([statistics.response, further], axis=2)
             statistics = replace(statistics, response=response)
-        own = cls._of(statistics.r, statistics, speeds, null)
-        if beside is not None or (statistics.turning is None and null.turning is None):
-            return own
+        evidence = cls._of(statistics.r, statistics, speeds, null)
+        if further is not None or (statistics.turning is None and null.turning is None):
+            return evidence
         if statistics.turning is None or null.turning is None:
             raise UsageError(
-                "moments of the nulls or of the data alone",
+                "only the nulls or only the data have moments",
                 where="evidence",
                 fix="look at them in both or in none",
             )
-        return replace(own, turning=cls.of(statistics.turning, speeds, null.turning))
+        return replace(evidence, turning=cls.of(statistics.turning, speeds, null.turning))
 
     @classmethod
     def _of(cls, r: Floats, statistics: Statistics, speeds: Floats, null: NullModel) -> Evidence:
-        left = r - null.mean(speeds)
-        shifts = np.broadcast_to(null.shifts.T, (len(left), *null.shifts.T.shape))
+        residuals = r - null.mean(speeds)
+        shifts = np.broadcast_to(null.shifts.T, (len(residuals), *null.shifts.T.shape))
         response = np.concatenate([statistics.response, shifts], axis=2)
         plain = response.shape[2]
         if statistics.log is not None:
@@ -97,8 +97,8 @@ class Evidence(Rows):
         return cls(
             recording=statistics.recording,
             curvature=weighted @ response,
-            score=np.einsum("saj,sj->sa", weighted, left),
-            energy=np.einsum("si,ij,sj->s", left, precision, left),
+            score=np.einsum("saj,sj->sa", weighted, residuals),
+            energy=np.einsum("si,ij,sj->s", residuals, precision, residuals),
             columns=statistics.response.shape[2],
             logged=response.shape[2] - plain,
             lines=statistics.lines,
@@ -133,8 +133,8 @@ class Evidence(Rows):
         curvature[self.nuisance, self.nuisance] += prior
         return curvature, self.score.sum(axis=0), float(self.energy.sum())
 
-    def fit(self, chosen: Chosen, *, centre: Sequence[float] | Floats = _HERE) -> Fit:
-        """Generalised least squares of the nuisance columns, under their priors, and the chosen ones.
+    def fit(self, chosen: Chosen, *, centre: Sequence[float] | Floats = _HERE) -> CoefficientFit:
+        """Fits the nuisance columns by generalised least squares, under their priors, and the chosen ones.
 
         Args:
             centre: of the calibrated parameters' prior, in steps from where the statistics were taken.
@@ -146,18 +146,20 @@ class Evidence(Rows):
         energy += float(pull @ np.asarray(centre))
         covariance = np.asarray(np.linalg.inv(curvature[np.ix_(active, active)]), dtype=np.float64)
         value = covariance @ score[active]
-        return Fit(active=tuple(active), value=value, covariance=covariance, left=energy - float(score[active] @ value))
+        return CoefficientFit(
+            active=tuple(active), value=value, covariance=covariance, remainder=energy - float(score[active] @ value)
+        )
 
     def freed(self, column: int) -> Evidence:
-        """With a coefficient of a column that is free in every segment: what is left across it.
+        """Frees a coefficient of a column in every segment: returns what is left across it.
 
         Moments about the pole, the wind's course and what recordings settle at are not looked at: what fluctuates
         within a segment moves them all the same.
         """
-        own = np.maximum(self.curvature[:, column, column], np.finfo(np.float64).tiny)
+        information = np.maximum(self.curvature[:, column, column], np.finfo(np.float64).tiny)
         along, slope = self.curvature[:, column], self.score[:, column]
-        curvature = self.curvature - along[:, :, None] * along[:, None, :] / own[:, None, None]
-        score = self.score - along * (slope / own)[:, None]
+        curvature = self.curvature - along[:, :, None] * along[:, None, :] / information[:, None, None]
+        score = self.score - along * (slope / information)[:, None]
         # Nothing is left of the column itself: it stays as one of which nothing is known.
         curvature[:, column, :] = curvature[:, :, column] = score[:, column] = 0.0
         curvature[:, column, column] = 1.0
@@ -165,7 +167,7 @@ class Evidence(Rows):
             recording=self.recording,
             curvature=curvature,
             score=score,
-            energy=self.energy - slope**2 / own,
+            energy=self.energy - slope**2 / information,
             columns=self.columns,
             logged=self.logged,
             lines=self.lines,
@@ -173,7 +175,7 @@ class Evidence(Rows):
         )
 
     def with_directions(self) -> Evidence:
-        """With the directions of the logs taken as they are logged: nothing is fitted to them."""
+        """Takes the directions of the logs as they are logged: nothing is fitted to them."""
         curvature, score = self.curvature.copy(), self.score.copy()
         places = np.arange(score.shape[1])[score.shape[1] - self.logged :][DIRECTION::NUISANCES]
         curvature[:, places, :] = 0.0
@@ -181,23 +183,25 @@ class Evidence(Rows):
         score[:, places] = 0.0
         return replace(self, curvature=curvature, score=score)
 
-    def drops(self, beside: Chosen = ()) -> Floats:
-        """(column,) how much each column, added to the nuisances and to some more, lowers the squared distance."""
-        return np.square(self.pulls(beside))
+    def drops(self, along: Chosen = ()) -> Floats:
+        """Computes how much each column, added to the nuisances and to some more, lowers the squared distance,
+        (column,)."""
+        return np.square(self.pulls(along))
 
-    def pulls(self, beside: Chosen = ()) -> Floats:
-        """(column,) the roots of `drops`, each with the sign of the column's coefficient."""
-        active = [*self.nuisance, *beside]
+    def pulls(self, along: Chosen = ()) -> Floats:
+        """Computes the roots of `drops`, each with the sign of the column's coefficient, (column,)."""
+        active = [*self.nuisance, *along]
         curvature, score, _ = self._total()
         solved = np.linalg.solve(curvature[np.ix_(active, active)], np.c_[curvature[active], score[active]])
-        own = np.diag(curvature) - np.einsum("ai,ai->i", curvature[active], solved[:, :-1])
+        information = np.diag(curvature) - np.einsum("ai,ai->i", curvature[active], solved[:, :-1])
         slope = score - curvature[active].T @ solved[:, -1]
-        pulls = slope / np.sqrt(np.maximum(own, np.maximum(1e-9 * np.diag(curvature), _TINY)))
+        pulls = slope / np.sqrt(np.maximum(information, np.maximum(1e-9 * np.diag(curvature), _TINY)))
         pulls[active] = 0.0
         return pulls[: self.columns]
 
     def moved(self, column: int, coefficient: float) -> Evidence:
-        """What it would be if a column acted with a coefficient as well: r and moments move by their response."""
+        """Computes what the evidence would be if a column acted with a coefficient as well: r and moments move by their
+        response."""
         along = self.curvature[:, :, column]
         return replace(
             self,
@@ -207,59 +211,60 @@ class Evidence(Rows):
         )
 
     def with_one_more(self, active: Chosen, columns: Chosen) -> tuple[Floats, Floats, Floats]:
-        """How a fit of some columns moves with one more, for each of others: (column,) its coefficients, (all, column)
-        how all coefficients go with it, (all,) those of the fit without."""
+        """Computes how a fit of some columns moves with one more, for each of others: (column,) its coefficients, (all,
+        column) how all coefficients go with it, (all,) those of the fit without."""
         curvature, score, _ = self._total()
-        chosen, others = list(active), list(columns)
-        across = curvature[np.ix_(chosen, others)]
+        chosen, candidates = list(active), list(columns)
+        across = curvature[np.ix_(chosen, candidates)]
         solved = np.linalg.solve(curvature[np.ix_(chosen, chosen)], np.c_[across, score[chosen]])
-        moved, fitted = np.zeros((len(score), len(others))), np.zeros(len(score))
-        moved[chosen], moved[others, range(len(others))], fitted[chosen] = -solved[:, :-1], 1.0, solved[:, -1]
-        whole = np.diag(curvature)[others]
-        own = whole - np.einsum("ai,ai->i", across, solved[:, :-1])
-        step = (score[others] - across.T @ solved[:, -1]) / np.maximum(own, np.maximum(1e-9 * whole, _TINY))
+        moved, fitted = np.zeros((len(score), len(candidates))), np.zeros(len(score))
+        moved[chosen], moved[candidates, range(len(candidates))], fitted[chosen] = -solved[:, :-1], 1.0, solved[:, -1]
+        total = np.diag(curvature)[candidates]
+        information = total - np.einsum("ai,ai->i", across, solved[:, :-1])
+        step = (score[candidates] - across.T @ solved[:, -1]) / np.maximum(information, np.maximum(1e-9 * total, _TINY))
         return step, moved, fitted
 
     def left_out(self, outside: NDArray[np.bool_], chosen: Chosen = ()) -> Floats:
-        """(segment,) half misfits of some segments, when the nuisances and chosen columns are fitted to the others."""
+        """Computes half misfits of some segments, when the nuisances and chosen columns are fitted to the others,
+        (segment,)."""
         fit = self.select(~outside).fit(chosen)
         return self.select(outside).misfit(fit.active, fit.value) / 2
 
     def misfit(self, active: Chosen, value: Floats) -> Floats:
-        """(segment,) what coefficients leave of each segment."""
+        """Computes what coefficients leave of each segment, (segment,)."""
         places = list(active)
         quadratic = np.einsum("a,sab,b->s", value, self.curvature[:, places][:, :, places], value)
         return self.energy - 2 * self.score[:, places] @ value + quadratic
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Fit:
+class CoefficientFit:
     """Coefficients of some columns, with their covariance, and the squared distance they leave, prior included."""
 
     active: tuple[int, ...]
     value: Floats
     covariance: Floats
-    left: float
+    remainder: float
 
     def in_errors(self, columns: Sequence[int]) -> Floats:
-        """(column,) some coefficients in their standard errors."""
+        """Computes some coefficients in their standard errors, (column,)."""
         return np.array([value / error for value, error in map(self.of, columns)])
 
     def of(self, column: int) -> tuple[float, float]:
-        """Coefficient and standard error."""
-        place = self.active.index(column)
-        return float(self.value[place]), float(np.sqrt(self.covariance[place, place]))
+        """Returns coefficient and standard error."""
+        index = self.active.index(column)
+        return float(self.value[index]), float(np.sqrt(self.covariance[index, index]))
 
 
 def left_together(recording: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(segment,) what is left out together: a recording, or each half of a single one."""
+    """Numbers the segments by what is left out together, (segment,): a recording, or each half of a single one."""
     if len(np.unique(recording)) > 1:
         return recording
     return (np.arange(len(recording)) >= len(recording) / 2).astype(np.int64)
 
 
 def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
-    """How much better each choice of columns predicts segments it was not fitted to: (choice, segment).
+    """Computes how much better each choice of columns predicts segments it was not fitted to: (choice, segment).
 
     Each recording is left out in turn (of a single recording, each half), the model is fitted to the others, and the
     left-out segments' half misfits are compared with the base model's, fitted to the same.
@@ -270,19 +275,19 @@ def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
         inside, outside = evidence.select(folds != index), evidence.select(folds == index)
         base = inside.fit(())
         before = outside.misfit(base.active, base.value)
-        for place, chosen in enumerate(choices):
+        for row, chosen in enumerate(choices):
             fit = inside.fit(chosen)
-            result[place, folds == index] = (before - outside.misfit(fit.active, fit.value)) / 2
+            result[row, folds == index] = (before - outside.misfit(fit.active, fit.value)) / 2
     return result
 
 
-def best_gain(evidence: Evidence, beside: Chosen = (), *, without: Chosen = ()) -> float:
-    """The largest held-out gain that one more column brings, over that of some columns alone: see `gains`.
+def best_gain(evidence: Evidence, along: Chosen = (), *, without: Chosen = ()) -> float:
+    """Computes the largest held-out gain that one more column brings, over that of some columns alone: see `gains`.
 
     Args:
         without: columns whose gains do not count.
     """
-    folds, active = left_together(evidence.recording), [*evidence.nuisance, *beside]
+    folds, active = left_together(evidence.recording), [*evidence.nuisance, *along]
     columns = [column for column in range(evidence.columns) if column not in (*active, *without)]
     total = np.zeros(len(columns))
     for index in np.unique(folds):

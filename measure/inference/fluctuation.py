@@ -28,16 +28,16 @@ class Fluctuation:
     likelihood: float
 
 
-def fluctuation(evidence: Evidence, column: int, beside: Chosen = ()) -> Fluctuation:
-    """How much a column's coefficient fluctuates, beside the nuisances and some columns more.
+def fluctuation(evidence: Evidence, column: int, along: Chosen = ()) -> Fluctuation:
+    """Estimates how much a column's coefficient fluctuates, beside the nuisances and some columns more.
 
     Errors are taken to be as large as this set's are across the column.
     """
-    fit = evidence.fit([column, *(other for other in beside if other != column)])
+    fit = evidence.fit([column, *(further for further in along if further != column)])
     active = list(fit.active)
     score = evidence.score[:, column] - evidence.curvature[:, column][:, active] @ fit.value
     curvature = np.maximum(evidence.curvature[:, column, column], np.finfo(np.float64).tiny)
-    across = fit.left - float((score**2 / curvature).sum())
+    across = fit.remainder - float((score**2 / curvature).sum())
     size = across / (len(score) * (evidence.columns - 1))
     score, curvature = score / size, curvature / size
     grid: Floats = np.concatenate([np.zeros(1), np.geomspace(1e-3, 10.0, 200)]) ** 2
@@ -51,8 +51,8 @@ def fluctuation(evidence: Evidence, column: int, beside: Chosen = ()) -> Fluctua
 
 
 def fluctuation_gains(evidence: Evidence, column: int) -> Floats:
-    """(segment,) log likelihood of each left-out recording's segments under the others' constant and fluctuation, over
-    their constant alone."""
+    """Computes the log likelihood of each left-out recording's segments under the others' constant and fluctuation,
+    over their constant alone, (segment,)."""
     folds = left_together(evidence.recording)
     result = np.zeros(len(folds))
     for index in np.unique(folds):
@@ -68,10 +68,11 @@ def fluctuation_gains(evidence: Evidence, column: int) -> Floats:
 
 
 def _restricted(variances: Floats, score: Floats, curvature: Floats) -> Floats:
-    """(variance,) restricted log likelihood of coefficients s/h ± 1/√h that vary by τ² about a constant, over none."""
+    """Computes the restricted log likelihood of coefficients s/h ± 1/√h that vary by τ² about a constant, over none,
+    (variance,)."""
     single = score / curvature
     weight = curvature / (1 + variances[:, None] * curvature)
     mean = weight @ single / weight.sum(axis=1)
     misfit = (weight * (single - mean[:, None]) ** 2).sum(axis=1)
-    found = (np.log(weight).sum(axis=1) - misfit - np.log(weight.sum(axis=1))) / 2
-    return found - found[0]
+    likelihood = (np.log(weight).sum(axis=1) - misfit - np.log(weight.sum(axis=1))) / 2
+    return likelihood - likelihood[0]

@@ -14,9 +14,9 @@ Floats = NDArray[np.float64]
 
 
 def power(sizes: Floats, damping: Floats) -> float:
-    """By which power of the damping sizes grow: least squares of their logarithms, taken back toward 0 by what chance
-    makes of it. It is 0 within two standard errors, so that few experiments of extreme damping lead nowhere, and where
-    the damping does not vary.
+    """Estimates by which power of the damping sizes grow: least squares of their logarithms, taken back toward 0 by
+    what chance makes of it. It is 0 within two standard errors, so that few experiments of extreme damping lead
+    nowhere, and where the damping does not vary.
 
     Args:
         sizes: (experiment,) positive.
@@ -28,6 +28,6 @@ def power(sizes: Floats, damping: Floats) -> float:
         return 0.0
     size = np.log(np.maximum(sizes, np.finfo(np.float64).tiny))
     slope = float(about @ size) / spread
-    left = size - size.mean() - slope * about
-    error = float(left @ left) / (len(sizes) - 2) / spread
+    residuals = size - size.mean() - slope * about
+    error = float(residuals @ residuals) / (len(sizes) - 2) / spread
     return slope * max(0.0, 1 - 2**2 * error / slope**2) if slope else 0.0

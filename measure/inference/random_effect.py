@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from measure.forecasting.calibration import DAMPING, PRIOR, Calibration
 from measure.forecasting.setting import Design
 from measure.inference.growth import power
-from measure.probes.rows import Rows
+from measure.probes.rows import StatisticRows
 from measure.probes.statistics import Statistics
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ class NullModel:
 
     @classmethod
     def fit(cls, nulls: Nulls, design: Design) -> NullModel:
-        """From segments whose calibrations are known, for segments of a design.
+        """Fits the model to segments whose calibrations are known, for segments of a design.
 
         What numerics leave is smoother the more the cloth is damped, so that more of it lies along the columns: all
         of it is taken to be larger by a power of the damping.
@@ -59,13 +59,13 @@ class NullModel:
         clean = nulls.statistics.r * np.exp(-grown * nulls.calibration[:, DAMPING])[:, None]
         features = np.c_[_features(nulls.speeds), nulls.beyond(design)]
         coefficients, *_ = np.linalg.lstsq(features, clean, rcond=None)
-        left = clean - features @ coefficients
+        residuals = clean - features @ coefficients
         experiment = nulls.experiment
-        means = np.stack([left[experiment == index].mean(axis=0) for index in range(experiment.max() + 1)])
-        within = left - means[experiment]
-        covariance = within.T @ within / max(len(left) - len(means) - features.shape[1], 1)
+        means = np.stack([residuals[experiment == index].mean(axis=0) for index in range(experiment.max() + 1)])
+        within = residuals - means[experiment]
+        covariance = within.T @ within / max(len(residuals) - len(means) - features.shape[1], 1)
         covariance += np.diag(np.full(len(covariance), _UNSEEN * np.diag(covariance).mean()))
-        covariance = _shrunk(covariance * _inflation(within, nulls.statistics.recording, covariance), len(left))
+        covariance = _shrunk(covariance * _inflation(within, nulls.statistics.recording, covariance), len(residuals))
         first = np.unique(experiment, return_index=True)[1]
         by_cloth = _by_cloth(means, nulls.numerics[first], nulls.cloth[first], covariance)
         if design.cloth in by_cloth:
@@ -80,16 +80,16 @@ class NullModel:
         )
 
     def under(self, prior: Floats) -> NullModel:
-        """With another prior of the calibrated parameters."""
+        """Replaces the prior of the calibrated parameters."""
         return replace(self, prior=prior, turning=None if self.turning is None else self.turning.under(prior))
 
     def mean(self, speeds: Floats) -> Floats:
-        """(segment, column)."""
+        """Predicts the mean (segment, column)."""
         return _features(speeds) @ self.coefficients
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Nulls(Rows):
+class Nulls(StatisticRows):
     """Segments of null recordings, with what they were made with.
 
     Attributes:
@@ -118,7 +118,8 @@ class Nulls(Rows):
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """One after another, of as many markers as all have; recordings and numerics are those of the parts."""
+        """Joins nulls one after another, of as many markers as all have; recordings and numerics are those of the
+        parts."""
         least = min(part.statistics.marker_error.shape[1] for part in parts)
         return super().joined(
             [
@@ -128,7 +129,8 @@ class Nulls(Rows):
         )
 
     def beyond(self, design: Design) -> Floats:
-        """(segment, k) by how much squared noise [mm²] and period [10 ms] differ from a design's, where they vary."""
+        """Computes by how much squared noise [mm²] and period [10 ms] differ from a design's, where they vary,
+        (segment, k)."""
         beyond = np.stack([1e6 * (self.noise**2 - design.noise**2), 100 * (self.period - design.period)], axis=1)
         return beyond[:, np.ptp(beyond, axis=0) > 0]
 
@@ -147,14 +149,14 @@ _UNSEEN = 1e-9
 
 
 def _power_of_damping(nulls: Nulls) -> float:
-    """By which power of the damping r grows, about the mean of its experiment and in units of all."""
+    """Estimates by which power of the damping r grows, about the mean of its experiment and in units of all."""
     _, first, experiment = np.unique(nulls.experiment, return_index=True, return_inverse=True)
     clean, features = nulls.statistics.r, _features(nulls.speeds)
-    left = clean - features @ np.linalg.lstsq(features, clean, rcond=None)[0]
-    means = np.stack([left[experiment == index].mean(axis=0) for index in range(len(first))])
-    squared = (left - means[experiment]) ** 2
-    whole = np.maximum(squared.mean(axis=0), np.finfo(np.float64).tiny)
-    sizes = np.array([(squared[experiment == index].mean(axis=0) / whole).mean() for index in range(len(first))])
+    residuals = clean - features @ np.linalg.lstsq(features, clean, rcond=None)[0]
+    means = np.stack([residuals[experiment == index].mean(axis=0) for index in range(len(first))])
+    squared = (residuals - means[experiment]) ** 2
+    total = np.maximum(squared.mean(axis=0), np.finfo(np.float64).tiny)
+    sizes = np.array([(squared[experiment == index].mean(axis=0) / total).mean() for index in range(len(first))])
     return power(np.sqrt(sizes), nulls.calibration[first, DAMPING])
 
 
@@ -165,7 +167,7 @@ def _features(speeds: Floats) -> Floats:
 def _by_cloth(
     means: Floats, kinds: NDArray[np.int64], cloths: NDArray[np.str_], covariance: Floats
 ) -> dict[str, Floats]:
-    """Cloth → (column,) what the nulls of one nominal cloth have in common, beyond that of all.
+    """Predicts for each cloth, (column,), what the nulls of one nominal cloth have in common, beyond that of all.
 
     A random effect of the cloth beside one of the numerics, predicted linearly (Henderson, Biometrics 31:423, 1975).
     Their variances are found by moments, in units of the covariance and summed over the columns. Empty where they
@@ -193,25 +195,28 @@ def _by_cloth(
 
 
 def _principal(means: Floats, covariance: Floats) -> Floats:
-    """Directions with most of the variance of the means, in units of the covariance: (shift, column)."""
+    """Computes directions with most of the variance of the means, in units of the covariance: (shift, column)."""
     factor = np.linalg.cholesky(covariance)
     whitened = np.linalg.solve(factor, (means - means.mean(axis=0)).T)
-    left, size, _ = np.linalg.svd(whitened, full_matrices=False)
-    kept = min(_SHIFTS, max(len(means) - 1, 0))
-    scale = size[:kept] / np.sqrt(max(len(means) - 1, 1))
-    return (factor @ (left[:, :kept] * scale)).T
+    directions, size, _ = np.linalg.svd(whitened, full_matrices=False)
+    count = min(_SHIFTS, max(len(means) - 1, 0))
+    scale = size[:count] / np.sqrt(max(len(means) - 1, 1))
+    return (factor @ (directions[:, :count] * scale)).T
 
 
-def _inflation(left: Floats, recording: NDArray[np.int64], covariance: Floats) -> float:
-    """How much more recordings' means vary than those of as many independent segments, at least 1."""
+def _inflation(residuals: Floats, recording: NDArray[np.int64], covariance: Floats) -> float:
+    """Computes how much more recordings' means vary than those of as many independent segments, at least 1."""
     sums = np.stack(
-        [left[recording == index].sum(axis=0) / np.sqrt((recording == index).sum()) for index in np.unique(recording)]
+        [
+            residuals[recording == index].sum(axis=0) / np.sqrt((recording == index).sum())
+            for index in np.unique(recording)
+        ]
     )
     ratio = np.mean(sums**2, axis=0) / np.diag(covariance)
     return float(max(1.0, np.median(ratio)))
 
 
 def _shrunk(covariance: Floats, count: int) -> Floats:
-    """Toward its diagonal, by the share that chance correlations have at this count."""
+    """Shrinks the covariance toward its diagonal, by the share that chance correlations have at this count."""
     share = min(1.0, len(covariance) / count)
     return (1 - share) * covariance + share * np.diag(np.diag(covariance))

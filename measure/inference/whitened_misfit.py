@@ -22,36 +22,36 @@ class WhitenedMisfit:
     what most effects change. By this measure, as in the linear evidence, errors count by what nulls leave.
 
     Attributes:
-        found: statistics of the base model.
+        statistics: of the base model.
         projection: their directions.
         null: the null model.
         speeds: (segment,) of the wind [m/s].
         origin: calibration of the base model that the statistics are taken at.
     """
 
-    found: Statistics
+    statistics: Statistics
     projection: Projection
     null: NullModel
     speeds: Floats
     origin: Calibration = field(default_factory=Calibration)
 
     def of(self, errors: Tensor) -> Evidence:
-        """The evidence of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
+        """Computes the evidence of a model that leaves these errors (frame, marker, 3, segment) of all segments [m]."""
         lines, turned = self.projection.lines(errors), self.projection.turned(errors)
-        known = self.found.turning
-        turning = None if known is None or turned is None else replace(known, r=turned)
-        course, whole = self.projection.course(errors), self.found.course
-        if course is not None and whole is not None:
-            course = replace(course, log=whole.log)
-        found = replace(
-            self.found,
+        turning_before = self.statistics.turning
+        turning = None if turning_before is None or turned is None else replace(turning_before, r=turned)
+        course, course_before = self.projection.course(errors), self.statistics.course
+        if course is not None and course_before is not None:
+            course = replace(course, log=course_before.log)
+        moved = replace(
+            self.statistics,
             r=self.projection.of(errors),
             lines=lines,
             turning=turning,
             course=course,
         )
-        return self.evidence(found)
+        return self.evidence(moved)
 
     def evidence(self, statistics: Statistics) -> Evidence:
-        """The evidence of all segments."""
+        """Computes the evidence of all segments."""
         return Evidence.of(statistics, self.speeds, self.null)

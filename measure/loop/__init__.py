@@ -11,8 +11,8 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.loop.corrective_field import Mode
-    from measure.loop.run import Options, Outcome, solve
-    from measure.loop.selection import GUST_COLUMN, Judgement, estimate, finalists, judge
+    from measure.loop.run import LoopOptions, LoopOutcome, solve
+    from measure.loop.selection import GUST_COLUMN, LibraryJudgement, estimate, finalists, judge
     from measure.loop.set_up import HOIST
     from measure.loop.validation import folds, paired, total_error
 

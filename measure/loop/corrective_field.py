@@ -33,22 +33,24 @@ class Mode:
 
 
 def corrective_field(
-    setting: Setting, whitened: WhitenedMisfit, *, left: Tensor | None = None, beside: Sequence[int] = ()
+    setting: Setting, whitened: WhitenedMisfit, *, errors: Tensor | None = None, along: Sequence[int] = ()
 ) -> tuple[Mode, ...]:
-    """Its modes, fitted together.
+    """Fits the modes of the corrective field together.
 
     Args:
-        left: (frame, marker, 3, segment) errors of a larger model [m]; None for those of the nominal one.
-        beside: columns of that model, whose strengths are fitted with the field.
+        errors: (frame, marker, 3, segment) errors of a larger model [m]; None for those of the nominal one.
+        along: columns of that model, whose strengths are fitted with the field.
     """
     forecaster, segments, modes = setting.forecaster, setting.segments, fields()
     nominal = [setting.calibration] * len(segments)
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
     changes = forecaster.sensitivities(modes, segments, nominal, base)[len(THETA) :]
-    found = whitened.found if left is None else replace(whitened.found, r=whitened.projection.of(left))
+    statistics = (
+        whitened.statistics if errors is None else replace(whitened.statistics, r=whitened.projection.of(errors))
+    )
     response = whitened.projection.response(changes)
-    evidence = Evidence.of(found, whitened.speeds, whitened.null, beside=response)
-    first = found.r.shape[1]
-    fit = evidence.fit([*beside, *range(first, first + len(modes))])
-    fitted = (fit.of(first + place) for place in range(len(modes)))
+    evidence = Evidence.of(statistics, whitened.speeds, whitened.null, further=response)
+    first = statistics.r.shape[1]
+    fit = evidence.fit([*along, *range(first, first + len(modes))])
+    fitted = (fit.of(first + index) for index in range(len(modes)))
     return tuple(Mode(column=c, value=v, error=e) for c, (v, e) in zip(modes, fitted, strict=True))

@@ -66,7 +66,7 @@ class Refined:
     stays: bool
 
     def without(self, outside: NDArray[np.bool_]) -> Model:
-        """The same model fitted to the other segments alone, one step from `origin`."""
+        """Fits the same model to the other segments alone, one step from `origin`."""
         step, _ = _step(self.statistics.select(~outside), self.null, self.speeds[~outside], self.origin, self.anchor)
         return self.origin.moved(cut(step))
 
@@ -77,9 +77,9 @@ def refine(
     whitened: WhitenedMisfit,
     chosen: Sequence[int],
     *,
-    weighed: Sequence[Column],
+    columns: Sequence[Column],
 ) -> Refined:
-    """Fit the calibrated parameters and chosen columns to segments, from the linear fit of the statistics on; one
+    """Fits the calibrated parameters and chosen columns to segments, from the linear fit of the statistics on; one
     effect alone from where across its prior least is left, if that is less.
 
     Every round uses the errors along the fitted columns alone, with their part of the null model. These alone would
@@ -87,18 +87,18 @@ def refine(
     directions before.
 
     Args:
-        weighed: the columns of the statistics, but for the calibrated parameters.
+        columns: the columns of the statistics, but for the calibrated parameters.
 
     Raises:
         DivergedError: the model's cloth does not stay one, at an eighth of the way from the nominal base model neither.
     """
-    fit = whitened.evidence(whitened.found).fit(chosen, centre=Calibration().steps_from(whitened.origin))
-    own = [weighed[c - len(THETA)] for c in chosen]
-    effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
+    fit = whitened.evidence(whitened.statistics).fit(chosen, centre=Calibration().steps_from(whitened.origin))
+    chosen_columns = [columns[c - len(THETA)] for c in chosen]
+    effects = tuple((column, 0.0) for column in chosen_columns if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
     model = Model(calibration=whitened.origin, effects=effects).moved(cut(np.array(values, dtype=np.float64)))
     model = _where_least_is_left(forecaster, segments, whitened, model)
-    prior = np.array([fit.of(place)[1] for place in range(len(THETA))])
+    prior = np.array([fit.of(index)[1] for index in range(len(THETA))])
     part = replace(_part(whitened.null, [*range(len(THETA)), *chosen]), prior=prior)
     anchor = model.calibration
     reached = _round(forecaster, segments, model, part, whitened.speeds, tuple(chosen), anchor=anchor)
@@ -106,23 +106,24 @@ def refine(
         if reached.stays:
             break
         reached = _round(forecaster, segments, reached.model, part, whitened.speeds, tuple(chosen), anchor=anchor)
-    every = np.ones(len(segments), dtype=bool)
-    ((model, errors),) = finished(forecaster, segments, whitened, [reached.model], chosen, [every])
+    all_segments = np.ones(len(segments), dtype=bool)
+    ((model, errors),) = finished(forecaster, segments, whitened, [reached.model], chosen, [all_segments])
     return replace(reached, model=model, errors=errors)
 
 
 def _where_least_is_left(forecaster: Forecaster, segments: Segments, whitened: WhitenedMisfit, model: Model) -> Model:
-    """A model of one effect at the strength that leaves least, of the linear fit's and of some across what is expected:
-    an effect that soon saturates, as springs along the hoist do, is far from what its first small step promises."""
+    """Returns a model of one effect at the strength that leaves least, of the linear fit's and of some across what is
+    expected: an effect that soon saturates, as springs along the hoist do, is far from what its first small step
+    promises."""
     if len(model.effects) != 1:
         return model
     ((column, linear),) = model.effects
     tried = [replace(model, effects=((column, value),)) for value in (linear, *_expected(column))]
-    left: list[float] = []
+    misfits: list[float] = []
     for errors in errors_of(tried, forecaster, segments):
         finite = bool(errors.isfinite().all())
-        left.append(whitened.of(errors).fit(()).left if finite else np.inf)
-    return tried[int(np.argmin(left))] if np.isfinite(left).any() else model
+        misfits.append(whitened.of(errors).fit(()).remainder if finite else np.inf)
+    return tried[int(np.argmin(misfits))] if np.isfinite(misfits).any() else model
 
 
 def _expected(column: EffectColumn) -> list[float]:
@@ -141,20 +142,20 @@ def finished(
     chosen: Sequence[int],
     insides: Sequence[NDArray[np.bool_]],
 ) -> list[tuple[Model, tuple[float, ...]]]:
-    """Models of the same columns after one linear step by all directions of the whitened misfit, each fitted to
-    some segments, with the standard errors of that step.
+    """Moves models of the same columns by one linear step by all directions of the whitened misfit, each fitted to some
+    segments; returns them with the standard errors of that step.
 
     By its own few directions a fit follows effects far from where they are linear, but cannot separate some of them
     from numerical errors; by all directions, it can.
     """
-    every = errors_of(models, forecaster, segments)
-    made: list[tuple[Model, tuple[float, ...]]] = []
-    for model, errors, inside in zip(models, every, insides, strict=True):
+    errors_of_models = errors_of(models, forecaster, segments)
+    stepped: list[tuple[Model, tuple[float, ...]]] = []
+    for model, errors, inside in zip(models, errors_of_models, insides, strict=True):
         fit = whitened.of(errors).select(inside).fit(chosen, centre=Calibration().steps_from(model.calibration))
         step, spread = np.array([fit.of(column) for column in (*range(len(THETA)), *chosen)]).T
         moved = model.moved(cut(step)) if np.isfinite(step).all() else model
-        made.append((moved, tuple(float(error) for error in spread)))
-    return made
+        stepped.append((moved, tuple(float(error) for error in spread)))
+    return stepped
 
 
 def _round(
@@ -168,8 +169,8 @@ def _round(
     anchor: Calibration,
 ) -> Refined:
     for _ in range(_HALVINGS):
-        found = _linearised(forecaster, segments, origin)
-        if np.isfinite(found.r).all() and np.isfinite(found.response).all():
+        measured = _linearised(forecaster, segments, origin)
+        if np.isfinite(measured.r).all() and np.isfinite(measured.response).all():
             break
         origin = origin.halved()
     else:
@@ -178,12 +179,12 @@ def _round(
             where=", ".join(column.name for column, _ in origin.effects) or "base model",
             fix="look at the recordings' residuals: no model of the library is near them",
         )
-    step, errors = _step(found, null, speeds, origin, anchor)
+    step, errors = _step(measured, null, speeds, origin, anchor)
     return Refined(
         model=origin.moved(cut(step)),
         chosen=chosen,
         errors=tuple(float(e) for e in errors),
-        statistics=found,
+        statistics=measured,
         origin=origin,
         anchor=anchor,
         null=null,
@@ -193,7 +194,7 @@ def _round(
 
 
 def cut(step: Floats) -> tuple[float, ...]:
-    """A step along the calibrated parameters and strengths, no further than the linear model reaches."""
+    """Cuts a step along the calibrated parameters and strengths to no further than the linear model reaches."""
     longest = np.concatenate([_LONGEST * PRIOR, np.full(len(step) - len(PRIOR), np.inf)])
     return tuple(float(v) for v in np.clip(step, -longest, longest))
 
@@ -215,11 +216,12 @@ def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Sta
 
 
 def _step(
-    found: Statistics, null: NullModel, speeds: Floats, model: Model, anchor: Calibration
+    statistics: Statistics, null: NullModel, speeds: Floats, model: Model, anchor: Calibration
 ) -> tuple[Floats, Floats]:
-    """One step of generalised least squares from here, under the prior about a calibration; with standard errors."""
-    count = found.r.shape[1]
+    """Takes one step of generalised least squares from here, under the prior about a calibration; with standard
+    errors."""
+    count = statistics.r.shape[1]
     chosen = range(len(THETA), count)
-    fit = Evidence.of(found, speeds, null).fit(chosen, centre=anchor.steps_from(model.calibration))
+    fit = Evidence.of(statistics, speeds, null).fit(chosen, centre=anchor.steps_from(model.calibration))
     value, error = zip(*(fit.of(column) for column in range(count)), strict=True)
     return np.array(value), np.array(error)

@@ -63,8 +63,8 @@ class Profile:
     misfit: Floats
 
     def estimate(self, *, larger: float) -> Estimate | None:
-        """The strength as a bound; None where the profile has two ends, and the fit says more, or where strengths of
-        the other sign lie beyond an end.
+        """Estimates the strength as a bound; None where the profile has two ends, and the fit says more, or where
+        strengths of the other sign lie beyond an end.
 
         What the fit's mesh and a mistold cloth do to an effect is a factor, and widens a bound as it does intervals.
 
@@ -73,76 +73,76 @@ class Profile:
         """
         if not np.isfinite(self.misfit).any():
             return None
-        found = self.span(larger=larger)
+        span = self.span(larger=larger)
         described = self.column.described
-        through = found.bound is Bound.MOST and not one_sided(described)
-        if found.bound is None or found.estimated or through:
+        through = span.bound is Bound.MOST and not one_sided(described)
+        if span.bound is None or span.estimated or through:
             return None
-        whole = math.exp(CRITERIA.reach * CRITERIA.strength_factor)
+        factor = math.exp(CRITERIA.reach * CRITERIA.strength_factor)
         null, unit = described.null, self.column.unit
         best = float(self.sizes[int(np.argmin(self.misfit))])
-        size = {Bound.LEAST: found.low / whole, Bound.MOST: found.high * whole}.get(found.bound, best)
-        ends = (0.0 if found.bound is not Bound.LEAST else size, size if found.bound is Bound.MOST else found.high)
+        size = {Bound.LEAST: span.low / factor, Bound.MOST: span.high * factor}.get(span.bound, best)
+        ends = (0.0 if span.bound is not Bound.LEAST else size, size if span.bound is Bound.MOST else span.high)
         low, high = sorted(null + self.sign * end for end in ends)
         turned = {Bound.LEAST: Bound.MOST, Bound.MOST: Bound.LEAST}
-        bound = found.bound if self.sign > 0 else turned.get(found.bound, found.bound)
+        bound = span.bound if self.sign > 0 else turned.get(span.bound, span.bound)
         return Estimate(
-            value=null + self.sign * size, low=low, high=high, unit=unit, level=found.level, bound=bound.value
+            value=null + self.sign * size, low=low, high=high, unit=unit, level=span.level, bound=bound.value
         )
 
     def span(self, *, larger: float) -> Span:
-        """Of the distance from null, which cannot be less than none; as `estimate`."""
+        """Computes the span of the distance from null, which cannot be less than none; as `estimate`."""
         described = self.column.described
         end = described.admissible[1] if self.sign > 0 else -described.admissible[0]
         farthest = end - self.sign * described.null
         if self.sizes[-1] > _AT_THE_END * farthest:
             farthest = float(self.sizes[-1])
         # In the logarithm, in which strengths are spaced.
-        found = of_profile(
+        logarithmic = of_profile(
             np.log(self.sizes),
             self.misfit,
             level=CRITERIA.interval,
             larger=larger,
             limits=(-math.inf, math.log(farthest)),
         )
-        return replace(found, low=math.exp(found.low), high=float(np.exp(found.high)))
+        return replace(logarithmic, low=math.exp(logarithmic.low), high=float(np.exp(logarithmic.high)))
 
 
 def profiled(
-    forecaster: Forecaster, segments: Segments, whitened: WhitenedMisfit, model: Model, place: int = 0
+    forecaster: Forecaster, segments: Segments, whitened: WhitenedMisfit, model: Model, index: int = 0
 ) -> Profile:
-    """The misfit of a model across the strengths of one of its effects, the others as they are.
+    """Computes the misfit of a model across the strengths of one of its effects, the others as they are.
 
     Args:
-        place: of the effect.
+        index: of the effect.
     """
-    column, coefficient = model.effects[place]
+    column, coefficient = model.effects[index]
     sizes, sign = across(column, coefficient)
-    effects = [(*model.effects[:place], (column, sign * float(size)), *model.effects[place + 1 :]) for size in sizes]
+    effects = [(*model.effects[:index], (column, sign * float(size)), *model.effects[index + 1 :]) for size in sizes]
     centre = Calibration().steps_from(model.calibration)
-    left = []
-    for errors in errors_of([replace(model, effects=own) for own in effects], forecaster, segments):
+    misfits = []
+    for errors in errors_of([replace(model, effects=changed) for changed in effects], forecaster, segments):
         finite = bool(errors.isfinite().all())
-        left.append(whitened.of(errors).fit((), centre=centre).left if finite else math.inf)
-    return Profile(column=column, sizes=sizes, sign=sign, misfit=np.array(left))
+        misfits.append(whitened.of(errors).fit((), centre=centre).remainder if finite else math.inf)
+    return Profile(column=column, sizes=sizes, sign=sign, misfit=np.array(misfits))
 
 
 def one_sided(described: Parameter) -> bool:
-    """Whether all strengths that are expected lie on one side of null."""
+    """Returns whether all strengths that are expected lie on one side of null."""
     low, high = (end - described.null for end in described.prior)
     return low * high >= 0
 
 
 def across(column: EffectColumn, coefficient: float) -> tuple[Floats, int]:
-    """(n,) distances from null, ascending, from well below what is expected and what was fitted to well beyond, as far
-    as the effect may have them, and the sign of the strengths."""
+    """Spaces distances from null, (n,), ascending, from well below what is expected and what was fitted to well beyond,
+    as far as the effect may have them; returns them with the sign of the strengths."""
     described = column.described
     ends, single = [end - described.null for end in described.prior], one_sided(described)
     sign = int(np.sign(sum(ends) if single or not coefficient else coefficient))
     expected = sorted(abs(end) for end in ends if end * sign > 0)
-    known = [*(expected if single else expected[-1:]), *([abs(coefficient)] if coefficient * sign > 0 else [])]
-    farthest = abs(described.nearest(described.null + sign * BEYOND * max(known)) - described.null)
-    return np.geomspace(min(known) / BEYOND, _WITHIN_THE_END * farthest, COUNT), sign
+    sizes = [*(expected if single else expected[-1:]), *([abs(coefficient)] if coefficient * sign > 0 else [])]
+    farthest = abs(described.nearest(described.null + sign * BEYOND * max(sizes)) - described.null)
+    return np.geomspace(min(sizes) / BEYOND, _WITHIN_THE_END * farthest, COUNT), sign
 
 
 Floats = NDArray[np.float64]
@@ -166,27 +166,27 @@ class Fits:
     _errors: dict[tuple[int, ...], Tensor] = field(default_factory=dict)
 
     def of(self, chosen: Sequence[int]) -> Refined | None:
-        """The base model with some columns of the library; None if its cloth diverges."""
+        """Fits the base model with some columns of the library; None if its cloth diverges."""
         key = tuple(chosen)
         if key not in self._made:
             try:
-                self._made[key] = refine(self.forecaster, self.segments, self.whitened, key, weighed=columns())
+                self._made[key] = refine(self.forecaster, self.segments, self.whitened, key, columns=columns())
             except DivergedError:
                 self._made[key] = None
         return self._made[key]
 
     def left_out(self, fitted: Refined, outsides: Sequence[NDArray[np.bool_]]) -> list[LeftOut]:
-        """What one of these models leaves, each time fitted to the other segments alone."""
+        """Computes what one of these models leaves, each time fitted to the other segments alone."""
         keys = [(fitted.chosen, outside.tobytes()) for outside in outsides]
-        new = [place for place, key in enumerate(keys) if key not in self._left]
+        new = [index for index, key in enumerate(keys) if key not in self._left]
         if new:
-            own = [outsides[place] for place in new]
-            made = left_out(self.forecaster, self.segments, fitted, self.whitened, own)
-            self._left.update(zip([keys[place] for place in new], made, strict=True))
+            new_outsides = [outsides[index] for index in new]
+            fitted_anew = left_out(self.forecaster, self.segments, fitted, self.whitened, new_outsides)
+            self._left.update(zip([keys[index] for index in new], fitted_anew, strict=True))
         return [self._left[key] for key in keys]
 
     def errors(self, fitted: Refined) -> Tensor:
-        """(frame, marker, 3, segment) that one of these models leaves [m]."""
+        """Computes the errors (frame, marker, 3, segment) that one of these models leaves [m]."""
         if fitted.chosen not in self._errors:
             self._errors[fitted.chosen], _ = self.forecaster.run(
                 *fitted.model.system(self.forecaster, self.segments), self.segments
@@ -194,21 +194,25 @@ class Fits:
         return self._errors[fitted.chosen]
 
     def evidence(self, fitted: Refined) -> Evidence:
-        """Of what one of these models leaves."""
-        found = self.whitened.of(self.errors(fitted))
-        return found if self.settling is None else replace(found, settled=self.settling(fitted.model))
+        """Computes the evidence of what one of these models leaves."""
+        whitened_evidence = self.whitened.of(self.errors(fitted))
+        return (
+            whitened_evidence
+            if self.settling is None
+            else replace(whitened_evidence, settled=self.settling(fitted.model))
+        )
 
     @property
     def base(self) -> Refined:
-        """Without any.
+        """Fits the base model without any column.
 
         Raises:
             DivergedError: see `refine`.
         """
-        made = self.of(())
-        if made is None:
+        fitted = self.of(())
+        if fitted is None:
             raise DivergedError("the base model's cloth does not stay one", fix="check cloth, pins and wind")
-        return made
+        return fitted
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -231,24 +235,25 @@ class Refit:
 
 
 def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, workers: int = 1) -> dict[int, Refit | None]:
-    """Column → what its model does; None where its cloth diverges, fitted to all recordings or without one.
+    """Refits the model with each column: column → what its model does; None where its cloth diverges, fitted to all
+    recordings or without one.
 
     Args:
         workers: threads; each model is run in one.
     """
-    together = left_together(fits.whitened.found.recording)
+    together = left_together(fits.whitened.statistics.recording)
     parts = [together == index for index in np.unique(together)]
 
-    def left(fitted: Refined) -> list[Floats]:
-        return [left.misfit for left in fits.left_out(fitted, parts)]
+    def misfits_of(fitted: Refined) -> list[Floats]:
+        return [fold.misfit for fold in fits.left_out(fitted, parts)]
 
-    def one(column: int) -> Refit | None:
+    def refit_of(column: int) -> Refit | None:
         fitted = fits.of((column,))
         if fitted is None:
             return None
         evidence = fits.evidence(fitted)
         gains = np.zeros(len(together))
-        for outside, old, new in zip(parts, before, left(fitted), strict=True):
+        for outside, old, new in zip(parts, before, misfits_of(fitted), strict=True):
             gains[outside] = old - new
         if not np.isfinite(gains).all():
             return None
@@ -262,5 +267,5 @@ def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, worker
 
     with ThreadPoolExecutor(max_workers=workers) as pool:
         list(pool.map(fits.of, [(), *((column,) for column in candidates)]))
-        before = left(fits.base)
-        return dict(zip(candidates, pool.map(one, candidates), strict=True))
+        before = misfits_of(fits.base)
+        return dict(zip(candidates, pool.map(refit_of, candidates), strict=True))

@@ -19,29 +19,29 @@ _SHOWN = 50
 def residuals(
     experiment: Experiment, segments: Segments, before: Predictions, after: Predictions | None, *, held_out: bool
 ) -> tuple[Residual, ...]:
-    """One a recording, from predictions of all segments.
+    """Computes the residuals of each recording, from predictions of all segments.
 
     Args:
         held_out: whether each recording's were made by models that were not fitted to it.
     """
     recording = segments.recording
-    made: list[Residual] = []
-    for index, own in enumerate(experiment.recordings):
+    residuals_of: list[Residual] = []
+    for index, trajectory in enumerate(experiment.recordings):
         places = np.flatnonzero(recording == index)
         first, second = _joined(before.errors, places), None if after is None else _joined(after.errors, places)
         counted = np.ones(first.shape[:2], dtype=bool)
         if segments.counted is not None:
-            counted = np.concatenate([segments.counted[..., place] for place in places])
+            counted = np.concatenate([segments.counted[..., segment] for segment in places])
         starts = [segments.items[p].start + segments.first * segments.period for p in places]
         length = before.errors.shape[0]
         times = np.concatenate([start + np.arange(length) * segments.period for start in starts])
         frequencies, spectrum = _spectrum(first, segments.period)
-        shown = slice(0, _SHOWN)
-        predicted = _joined(before.predicted, places)[shown]
-        made.append(
+        first_frames = slice(0, _SHOWN)
+        predicted = _joined(before.predicted, places)[first_frames]
+        residuals_of.append(
             Residual(
-                recording=own.name,
-                speed=own.wind.speed,
+                recording=trajectory.name,
+                speed=trajectory.wind.speed,
                 held_out=held_out,
                 times=_list(times),
                 in_time=_list(_over(first, counted, 1)),
@@ -53,21 +53,22 @@ def residuals(
                 frequencies=_list(frequencies),
                 spectrum=_list(spectrum),
                 spectrum_after=[] if second is None else _list(_spectrum(second, segments.period)[1]),
-                observed=np.where(counted[shown, :, None], predicted + first[shown], np.nan).tolist(),
+                observed=np.where(counted[first_frames, :, None], predicted + first[first_frames], np.nan).tolist(),
                 before=predicted.tolist(),
-                after=[] if after is None else _joined(after.predicted, places)[shown].tolist(),
+                after=[] if after is None else _joined(after.predicted, places)[first_frames].tolist(),
             )
         )
-    return tuple(made)
+    return tuple(residuals_of)
 
 
 def _joined(values: Floats, places: NDArray[np.int64]) -> Floats:
-    """(frame, marker, 3) of one recording's segments, one after another."""
-    return np.concatenate([values[..., place] for place in places])
+    """Joins one recording's segments one after another, (frame, marker, 3)."""
+    return np.concatenate([values[..., segment] for segment in places])
 
 
 def _over(errors: Floats, counted: NDArray[np.bool_], axis: int) -> Floats:
-    """Root mean square distance over frames (0) or markers (1) [m], of what was tracked; NaN where nothing was."""
+    """Computes the root mean square distance over frames (0) or markers (1) [m], of what was tracked; NaN where nothing
+    was."""
     count = counted.sum(axis=axis)
     total = (errors**2).sum(axis=2).sum(axis=axis)
     return np.sqrt(np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0))

@@ -31,7 +31,7 @@ from measure.forecasting.model import Model
 from measure.forecasting.regressors import EffectColumn, columns, names
 from measure.forecasting.setting import Setting, Stage
 from measure.forecasting.strengths import WHERE, Suspicion
-from measure.inference.evidence import Evidence, Fit
+from measure.inference.evidence import CoefficientFit, Evidence
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.corrective_field import Mode, corrective_field
 from measure.loop.gauss_newton import Refined, cut
@@ -39,7 +39,7 @@ from measure.loop.refit import Fits, Refit, refit
 from measure.loop.residuals import residuals
 from measure.loop.selection import (
     GUST_COLUMN,
-    Judgement,
+    LibraryJudgement,
     Weighed,
     equivalent,
     finalists,
@@ -58,7 +58,7 @@ from measure.nulls.simulation import NullBatch
 from measure.observe.checks.attachment import hoist_stands_still
 from measure.observe.trajectory import Experiment
 from measure.probes.course import Variation
-from measure.probes.lines import Line
+from measure.probes.lines import SpectralLine
 from measure.probes.statistics import Projection, Statistics, projected
 from measure.probes.wind_log import lags
 from measure.verdict.criteria import CRITERIA
@@ -67,57 +67,59 @@ from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, 
 
 
 def parameters(
-    base: Refined, larger: Refined | None, reach: NDArray[np.float64], *, weighed: float
+    base: Refined, larger: Refined | None, reach: NDArray[np.float64], *, density_uncertainty: float
 ) -> tuple[Parameter, ...]:
-    """Density, bending and damping, which are estimated by their logarithms, of the base and of a larger model.
+    """Estimates density, bending and damping, by their logarithms, of the base and of a larger model.
 
     Args:
         reach: (theta,) standard errors to either side within which this code's nulls lie.
-        weighed: relative standard uncertainty of the density before anything was fitted.
+        density_uncertainty: relative standard uncertainty of the density before anything was fitted.
     """
-    made: list[Parameter] = []
-    for place, (name, _, _) in enumerate(THETA):
-        half = float(reach[place]) * base.errors[place]
-        before = _estimate(name, base.model.calibration, half, weighed)
+    estimated: list[Parameter] = []
+    for index, (name, _, _) in enumerate(THETA):
+        half = float(reach[index]) * base.errors[index]
+        before = _estimate(name, base.model.calibration, half, density_uncertainty)
         within = half / CRITERIA.reach
         if larger is None:
-            made.append(Parameter(name=name, before=before, after=None, shift=None, within=within))
+            estimated.append(Parameter(name=name, before=before, after=None, shift=None, within=within))
             continue
         steps = larger.model.calibration.steps_from(base.model.calibration)
-        after = _estimate(name, larger.model.calibration, float(reach[place]) * larger.errors[place], weighed)
-        shift = steps[place] / base.errors[place]
-        made.append(Parameter(name=name, before=before, after=after, shift=shift, within=within))
-    return tuple(made)
+        after = _estimate(
+            name, larger.model.calibration, float(reach[index]) * larger.errors[index], density_uncertainty
+        )
+        shift = steps[index] / base.errors[index]
+        estimated.append(Parameter(name=name, before=before, after=after, shift=shift, within=within))
+    return tuple(estimated)
 
 
-def _estimate(name: str, calibration: Calibration, half: float, weighed: float) -> Estimate:
-    """A parameter with its interval, of half the width `half` in its logarithm by this code alone.
+def _estimate(name: str, calibration: Calibration, half: float, density_uncertainty: float) -> Estimate:
+    """Estimates a parameter with its interval, of half the width `half` in its logarithm by this code alone.
 
     What codes differ by does not make that of the density wider than what was known before.
     """
     if name == "damping":
         return _damping(calibration.damping, half)
-    value, between, known = {
-        "density": (calibration.density, CRITERIA.density_between, weighed),
+    value, between, prior_uncertainty = {
+        "density": (calibration.density, CRITERIA.density_between, density_uncertainty),
         "bending": (calibration.bending, CRITERIA.bending_between, math.inf),
     }[name]
-    whole = min(math.hypot(half, CRITERIA.reach * between), max(half, CRITERIA.reach * known))
+    half_width = min(math.hypot(half, CRITERIA.reach * between), max(half, CRITERIA.reach * prior_uncertainty))
     return Estimate(
         value=value,
-        low=value * math.exp(-whole),
-        high=value * math.exp(whole),
+        low=value * math.exp(-half_width),
+        high=value * math.exp(half_width),
         unit="of nominal",
         level=CRITERIA.interval,
     )
 
 
 def _damping(value: float, half: float) -> Estimate:
-    """Damping [s]: what codes differ by is like so much more or less of it, and where a fit ends is a factor beside;
-    none lies below 0."""
+    """Estimates damping [s]: what codes differ by is like so much more or less of it, and where a fit ends is a factor
+    beside; none lies below 0."""
     between = CRITERIA.reach * CRITERIA.damping_between
-    whole = math.hypot(half, CRITERIA.reach * CRITERIA.damping_factor)
-    low = value - math.hypot(value - value * math.exp(-whole), between)
-    high = value + math.hypot(value * math.exp(whole) - value, between)
+    half_width = math.hypot(half, CRITERIA.reach * CRITERIA.damping_factor)
+    low = value - math.hypot(value - value * math.exp(-half_width), between)
+    high = value + math.hypot(value * math.exp(half_width) - value, between)
     return Estimate(value=value, low=max(0.0, low), high=high, unit="s", level=CRITERIA.interval)
 
 
@@ -128,7 +130,7 @@ _LOOKS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(plan.NullOptions):
+class LoopOptions(plan.NullOptions):
     """How to close the loop: by which nulls, at which level of the global test.
 
     Attributes:
@@ -155,7 +157,7 @@ class Options(plan.NullOptions):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Outcome:
+class LoopOutcome:
     """The numerical result of an experiment, without sentences.
 
     Attributes:
@@ -175,12 +177,12 @@ class Outcome:
     at_bounds: tuple[str, ...]
     field: tuple[Mode, ...] = ()
     whole: bool = True
-    line: Line | None = None
+    line: SpectralLine | None = None
     course: Variation | None = None
 
 
-def solve(experiment: Experiment, options: Options, *, stage: Stage | None = None) -> Outcome:
-    """What an experiment came to.
+def solve(experiment: Experiment, options: LoopOptions, *, stage: Stage | None = None) -> LoopOutcome:
+    """Solves an experiment: tests, fits, validates.
 
     Args:
         stage: called with progress.
@@ -190,16 +192,16 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
     """
     began = time.perf_counter()
     torch.set_num_threads(1)
-    report = stage or (lambda what, done, total: None)
+    report = stage or (lambda stage_name, done, total: None)
     setting = Setting.of(experiment, workers=options.workers)
     report("sensitivities", 0, 1)
-    found, projection = _looked_at(setting)
-    late = (0.0,) * len(setting.speeds) if found.course is None else lags(found.course, setting.segments)
+    measured, projection = _looked_at(setting)
+    late = (0.0,) * len(setting.speeds) if measured.course is None else lags(measured.course, setting.segments)
     if any(late):
         setting = setting.moved(late)
-        found, projection = _looked_at(setting)
+        measured, projection = _looked_at(setting)
     report("sensitivities", 1, 1)
-    nominal, suspected = setting, _suspected(found, options.suspected)
+    nominal, suspected = setting, _suspected(measured, options.suspected)
 
     def tested(nulls: int) -> tuple[Setting, Fits, NullBank, Reference]:
         bank = plan.bank_for(nominal, options, nulls=nulls, stage=report)
@@ -207,7 +209,7 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
             len(nominal.segments), noise=nominal.design.noise, seed=options.seed, prior=nominal.prior
         )
         report("base model", 0, 1)
-        fitted, fits = _calibrated(nominal, _fits(nominal, found, projection, bank), bank)
+        fitted, fits = _calibrated(nominal, _fits(nominal, measured, projection, bank), bank)
         fits = _settling(fitted, fits, options.seed)
         report("base model", 1, 1)
         reference = reference.at(fitted.calibration)
@@ -215,10 +217,10 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
 
     nulls = plan.first_round(options)
     setting, fits, bank, reference = tested(nulls)
-    evidence = fits.whitened.evidence(fits.whitened.found)
-    while (more := _more(options, nulls, reference, evidence)) is not None:
-        setting, fits, bank, reference = tested(nulls := more)
-        evidence = fits.whitened.evidence(fits.whitened.found)
+    evidence = fits.whitened.evidence(fits.whitened.statistics)
+    while (wanted := _nulls_wanted(options, nulls, reference, evidence)) is not None:
+        setting, fits, bank, reference = tested(nulls := wanted)
+        evidence = fits.whitened.evidence(fits.whitened.statistics)
     set_up = SetUp(tolerance=setting.tolerance, attached=hoist_stands_still(setting.experiment))
     judgement, refits = judge(evidence, reference, level=options.level, set_up=set_up), dict[int, Refit | None]()
     if judgement.conclusion not in NOT_REJECTED:
@@ -234,30 +236,30 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
     return _outcome(solved, bank, trial, options, began, late)
 
 
-def _more(options: Options, nulls: int, reference: Reference, evidence: Evidence) -> int | None:
-    """How many nulls to go on with after so many; None where those decide, or are given as a bank."""
+def _nulls_wanted(options: LoopOptions, nulls: int, reference: Reference, evidence: Evidence) -> int | None:
+    """Returns how many nulls to go on with after so many; None where those decide, or are given as a bank."""
     if options.bank is not None:
         return None
     statistic = reference.tested(evidence, names())
     return plan.more_nulls(nulls, options.nulls, options.most_nulls, reference.test, statistic, level=options.level)
 
 
-def _suspected(found: Statistics, suspected: Suspicion | None) -> tuple[int, int] | None:
-    """Column and sign of an effect that is suspected; None where none is.
+def _suspected(measured: Statistics, suspected: Suspicion | None) -> tuple[int, int] | None:
+    """Returns column and sign of an effect that is suspected; None where none is.
 
     Raises:
         InputError: the cloth cannot have it as it is held, or in its wind.
     """
     if suspected is None:
         return None
-    place = names().index(suspected.name)
-    if not found.response[:, place, place].any():
+    column = names().index(suspected.name)
+    if not measured.response[:, column, column].any():
         raise InputError(
             f"{suspected.name} moves nothing of this cloth as it is held and in its wind",
             where=WHERE,
             fix="suspect another effect, or leave it out",
         )
-    return place, suspected.sign
+    return column, suspected.sign
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -267,12 +269,12 @@ class Solved:
     setting: Setting
     fits: Fits
     reference: Reference
-    judgement: Judgement
+    judgement: LibraryJudgement
 
     @cached_property
     def evidence(self) -> Evidence:
         """The evidence against the base model."""
-        return self.fits.whitened.evidence(self.fits.whitened.found)
+        return self.fits.whitened.evidence(self.fits.whitened.statistics)
 
     @property
     def base(self) -> Refined:
@@ -281,23 +283,25 @@ class Solved:
 
     @property
     def larger(self) -> Refined | None:
-        """With the effects that act; None where none does, its course is unknown (gusts), or its cloth diverges."""
-        named = self.acting
-        return None if not named or GUST_COLUMN in named else self.fits.of(named)
+        """Returns the model with the effects that act; None where none does, its course is unknown (gusts), or its
+        cloth diverges."""
+        columns_acting = self.acting
+        return None if not columns_acting or GUST_COLUMN in columns_acting else self.fits.of(columns_acting)
 
     @property
     def acting(self) -> tuple[int, ...]:
-        """Columns of the larger model: all effects named as acting, or the first of those that may be; none where its
-        cloth diverges."""
-        named = self.judgement.named
-        return named if self.judgement.conclusion is Conclusion.EFFECT else named[:1]
+        """Lists columns of the larger model: all effects named as acting, or the first of those that may be; none where
+        its cloth diverges."""
+        columns_named = self.judgement.named
+        return columns_named if self.judgement.conclusion is Conclusion.EFFECT else columns_named[:1]
 
-    def strength(self, weighed: Weighed, larger: Refined) -> Estimate:
-        """The strength of an acting effect beyond the linear: its error exceeds what Σ says as where it is linear."""
-        place = self.acting.index(weighed.column)
-        column, coefficient = larger.model.effects[place]
-        linear = self.evidence.fit([weighed.column]).of(weighed.column)[1]
-        error = larger.errors[len(THETA) + place] * weighed.error / linear
+    def strength(self, ranked: Weighed, larger: Refined) -> Estimate:
+        """Estimates the strength of an acting effect beyond the linear: its error exceeds what Σ says as where it is
+        linear."""
+        index = self.acting.index(ranked.column)
+        column, coefficient = larger.model.effects[index]
+        linear = self.evidence.fit([ranked.column]).of(ranked.column)[1]
+        error = larger.errors[len(THETA) + index] * ranked.error / linear
         return strength(column.described.null, coefficient, error, column.unit)
 
     @cached_property
@@ -318,10 +322,10 @@ def _looked_at(setting: Setting) -> tuple[Statistics, Projection]:
     return projected(setting.forecaster, setting.segments, starts, columns())
 
 
-def _fits(setting: Setting, found: Statistics, projection: Projection, bank: NullBank) -> Fits:
-    """Models of the experiment, which begin at the one that statistics were taken at."""
+def _fits(setting: Setting, statistics: Statistics, projection: Projection, bank: NullBank) -> Fits:
+    """Prepares models of the experiment, which begin at the one that statistics were taken at."""
     whitened = WhitenedMisfit(
-        found=found,
+        statistics=statistics,
         projection=projection,
         null=bank.model(setting.design).under(setting.prior),
         speeds=setting.speeds[setting.recording],
@@ -331,23 +335,23 @@ def _fits(setting: Setting, found: Statistics, projection: Projection, bank: Nul
 
 
 def _calibrated(setting: Setting, fits: Fits, bank: NullBank) -> tuple[Setting, Fits]:
-    """Statistics at the base model that all directions lead to, taken anew until a step is within its errors, or leaves
+    """Takes statistics at the base model that all directions lead to, anew until a step is within its errors, or leaves
     more than there was before it: beyond that, directions follow what numerics do."""
     for _ in range(_LOOKS):
         fit = _base_fit(setting, fits)
-        step, errors = np.array([fit.of(place) for place in range(len(THETA))]).T
+        step, errors = np.array([fit.of(index) for index in range(len(THETA))]).T
         if (np.abs(step) < errors).all():
             break
         moved = replace(setting, calibration=setting.calibration.moved(cut(step)))
-        there = _fits(moved, *_looked_at(moved), bank)
-        if _base_fit(moved, there).left > fit.left:
+        moved_fits = _fits(moved, *_looked_at(moved), bank)
+        if _base_fit(moved, moved_fits).remainder > fit.remainder:
             break
-        setting, fits = moved, there
+        setting, fits = moved, moved_fits
     return setting, fits
 
 
 def _settling(setting: Setting, fits: Fits, seed: int) -> Fits:
-    """With what the recordings settle at beside the models, run freely in the same winds."""
+    """Adds what the recordings settle at beside the models, run freely in the same winds."""
     recordings = setting.experiment.recordings
     plain = NullBatch(
         specimen=setting.experiment.specimen,
@@ -365,27 +369,27 @@ def _settling(setting: Setting, fits: Fits, seed: int) -> Fits:
         batch = replace(plain, calibrations=(model.calibration,) * len(recordings), effects=model.acting)
         return settled_off(recordings, batch)[setting.recording]
 
-    found = replace(fits.whitened.found, settled=settling(Model(calibration=setting.calibration)))
-    return replace(fits, whitened=replace(fits.whitened, found=found), settling=settling)
+    with_settled = replace(fits.whitened.statistics, settled=settling(Model(calibration=setting.calibration)))
+    return replace(fits, whitened=replace(fits.whitened, statistics=with_settled), settling=settling)
 
 
-def _base_fit(setting: Setting, fits: Fits) -> Fit:
-    """The base model, linear where statistics were taken."""
-    evidence = fits.whitened.evidence(fits.whitened.found)
+def _base_fit(setting: Setting, fits: Fits) -> CoefficientFit:
+    """Fits the base model, linear where statistics were taken."""
+    evidence = fits.whitened.evidence(fits.whitened.statistics)
     return evidence.fit((), centre=Calibration().steps_from(setting.calibration))
 
 
-def _trial(solved: Solved, options: Options) -> Trial:
-    """Before and after on what was left out, where an effect is named."""
+def _trial(solved: Solved, options: LoopOptions) -> Trial:
+    """Compares before and after on what was left out, where an effect is named."""
     setting, larger = solved.setting, solved.larger
     if larger is None:
         return Trial()
     control = solved.control
     fitted = [solved.base, larger, *([] if control is None else [control[1]])]
-    every = folds(setting.segments, [float(u) for u in setting.speeds])
+    all_folds = folds(setting.segments, [float(u) for u in setting.speeds])
 
-    def left(model: Refined) -> list[LeftOut]:
-        return solved.fits.left_out(model, [fold.outside for fold in every])
+    def left_out_by(model: Refined) -> list[LeftOut]:
+        return solved.fits.left_out(model, [fold.outside for fold in all_folds])
 
     with ThreadPoolExecutor(max_workers=options.workers) as pool:
         simulated = pool.submit(
@@ -396,16 +400,16 @@ def _trial(solved: Solved, options: Options) -> Trial:
             copies=_FLOOR_COPIES,
             seed=options.seed,
         )
-        tried = list(pool.map(left, fitted))
+        tried = list(pool.map(left_out_by, fitted))
         of_recording, floor = simulated.result()
-    made: list[Comparison] = []
-    apart: list[Floats] = []
+    comparisons: list[Comparison] = []
+    differences: list[Floats] = []
     places: list[NDArray[np.int64]] = []
     squared = 0.0
     frames = len(setting.segments.items[0].positions) - setting.segments.first
-    for place, (fold, (before, after, *wrong)) in enumerate(zip(every, zip(*tried, strict=True), strict=True)):
-        near = np.isin(of_recording, np.unique(setting.recording[fold.outside]))
-        made.append(
+    for number, (fold, (before, after, *wrong)) in enumerate(zip(all_folds, zip(*tried, strict=True), strict=True)):
+        same_recording = np.isin(of_recording, np.unique(setting.recording[fold.outside]))
+        comparisons.append(
             compare(
                 fold,
                 recording=setting.recording[fold.outside],
@@ -413,35 +417,35 @@ def _trial(solved: Solved, options: Options) -> Trial:
                 before=before,
                 after=after,
                 control=wrong[0] if wrong else None,
-                floor=floor[near],
+                floor=floor[same_recording],
                 control_name="" if control is None else control[0].candidate.effect,
             )
         )
-        if len(every) == 1 or place < len(setting.speeds):  # the late parts are in the recordings as well
+        if len(all_folds) == 1 or number < len(setting.speeds):  # the late parts are in the recordings as well
             squared += after.squared.sum() - before.squared.sum()
-            places.append(np.full(len(after.misfit), place))
-            apart += [own.misfit - after.misfit for own in wrong]
+            places.append(np.full(len(after.misfit), number))
+            differences += [fitted_wrong.misfit - after.misfit for fitted_wrong in wrong]
     return Trial(
-        comparisons=tuple(made),
-        apart=np.concatenate(apart) if apart else None,
+        comparisons=tuple(comparisons),
+        apart=np.concatenate(differences) if differences else None,
         recording=np.concatenate(places),
         rises=bool(squared > 0),
     )
 
 
 def _outcome(
-    solved: Solved, bank: NullBank, trial: Trial, options: Options, began: float, late: tuple[float, ...]
-) -> Outcome:
+    solved: Solved, bank: NullBank, trial: Trial, options: LoopOptions, began: float, late: tuple[float, ...]
+) -> LoopOutcome:
     setting, larger, judgement = solved.setting, solved.larger, solved.judgement
     before = _unseen(setting, solved.base)
     after = None if larger is None else _unseen(setting, larger)
     verdict = Verdict(
         conclusion=judgement.conclusion,
-        named=_named(judgement),
+        named=_effects_named(judgement),
         words="",
         test=_test(solved, bank, options),
         parameters=(
-            *parameters(solved.base, larger, solved.reference.reach, weighed=float(setting.prior[0])),
+            *parameters(solved.base, larger, solved.reference.reach, density_uncertainty=float(setting.prior[0])),
             *_direction(judgement),
         ),
         ranking=_ranking(solved, larger),
@@ -460,7 +464,7 @@ def _outcome(
     beyond = judgement.conclusion in (Conclusion.OUTSIDE, Conclusion.PARTLY)
     field = _field(solved) if beyond else ()
     fitted = solved.base if larger is None else larger
-    return Outcome(
+    return LoopOutcome(
         verdict=replace(verdict, seconds=time.perf_counter() - began),
         experiment=setting.experiment,
         lags=late,
@@ -472,24 +476,28 @@ def _outcome(
     )
 
 
-def _direction(judgement: Judgement) -> tuple[Parameter, ...]:
-    """By how much the wind is turned from its logs, in degrees."""
-    found = judgement.direction
-    if found is None:
+def _direction(judgement: LibraryJudgement) -> tuple[Parameter, ...]:
+    """Reports by how much the wind is turned from its logs, in degrees."""
+    angle = judgement.direction
+    if angle is None:
         return ()
-    value, low, high = (math.degrees(v) for v in (found.value, found.low, found.high))
-    shown = Estimate(value=value, low=low, high=high, unit="°", level=found.level)
+    value, low, high = (math.degrees(v) for v in (angle.value, angle.low, angle.high))
+    in_degrees = Estimate(value=value, low=low, high=high, unit="°", level=angle.level)
     return (
-        Parameter(name="direction of the wind from its log, counter-clockwise", before=shown, after=None, shift=None),
+        Parameter(
+            name="direction of the wind from its log, counter-clockwise", before=in_degrees, after=None, shift=None
+        ),
     )
 
 
-def _test(solved: Solved, bank: NullBank, options: Options) -> NullTest:
-    """The global test of the base model, and whether other nulls could decide it otherwise."""
+def _test(solved: Solved, bank: NullBank, options: LoopOptions) -> NullTest:
+    """Reports the global test of the base model, and whether other nulls could decide it otherwise."""
     conformal, judgement = solved.reference.test, solved.judgement
     low, high = conformal.interval(judgement.statistic, level=CRITERIA.interval)
     undecided = low <= options.level <= high and conformal.tests(options.level)
-    more = conformal.settling(judgement.statistic, at=options.level, level=CRITERIA.interval) if undecided else None
+    kinds_settling = (
+        conformal.settling(judgement.statistic, at=options.level, level=CRITERIA.interval) if undecided else None
+    )
     return NullTest(
         statistic=judgement.statistic,
         null=[float(v) for v in conformal.null],
@@ -499,43 +507,45 @@ def _test(solved: Solved, bank: NullBank, options: Options) -> NullTest:
         critical=conformal.critical(options.level),
         nulls=bank.words,
         open=undecided,
-        settling=more,
+        settling=kinds_settling,
         suspected="" if options.suspected is None else options.suspected.words,
     )
 
 
-def _power(judgement: Judgement) -> tuple[Power, ...]:
-    """Of each effect that was tested for, the surest first."""
-    known = {column.name: column for column in columns() if isinstance(column, EffectColumn)}
+def _power(judgement: LibraryJudgement) -> tuple[Power, ...]:
+    """Reports the power of each effect that was tested for, the surest first."""
+    by_name = {column.name: column for column in columns() if isinstance(column, EffectColumn)}
     return tuple(
         Power(
-            effect=known[move.name].effect,
-            parameter=known[move.name].parameter,
+            effect=by_name[move.name].effect,
+            parameter=by_name[move.name].parameter,
             strength=move.strength,
-            unit=known[move.name].unit,
+            unit=by_name[move.name].unit,
             share=share,
         )
-        for move, share in sorted(judgement.power, key=lambda own: -own[1])
+        for move, share in sorted(judgement.power, key=lambda entry: -entry[1])
     )
 
 
 def _field(solved: Solved) -> tuple[Mode, ...]:
-    """The corrective field, of what the larger model leaves where there is one."""
+    """Fits the corrective field, of what the larger model leaves where there is one."""
     larger = solved.larger
-    left = None if larger is None else solved.fits.errors(larger)
+    errors = None if larger is None else solved.fits.errors(larger)
     return corrective_field(
-        solved.setting, solved.fits.whitened, left=left, beside=() if larger is None else larger.chosen
+        solved.setting, solved.fits.whitened, errors=errors, along=() if larger is None else larger.chosen
     )
 
 
 def _unseen(setting: Setting, refined: Refined) -> Predictions:
-    """Predictions of all segments by the model fitted to the other recordings; of a single recording by its own."""
+    """Predicts all segments by the model fitted to the other recordings; of a single recording by its own."""
     if len(setting.speeds) < 2:
         return predict(setting.forecaster, setting.segments, refined.model)
     parts: list[Predictions] = []
     for index in range(len(setting.speeds)):
-        own = setting.recording == index
-        parts.append(predict(setting.forecaster, setting.segments.select(np.flatnonzero(own)), refined.without(own)))
+        outside = setting.recording == index
+        parts.append(
+            predict(setting.forecaster, setting.segments.select(np.flatnonzero(outside)), refined.without(outside))
+        )
     # Segments are in the order of their recordings.
     return Predictions(
         errors=np.concatenate([p.errors for p in parts], axis=-1),
@@ -544,21 +554,21 @@ def _unseen(setting: Setting, refined: Refined) -> Predictions:
 
 
 def _ranking(solved: Solved, larger: Refined | None) -> tuple[Candidate, ...]:
-    """The candidates; those of the larger model with their strengths beyond the linear."""
-    made: list[Candidate] = []
-    for weighed in solved.judgement.ranking:
-        candidate = weighed.candidate
-        alone = candidate.strength.bound is None and weighed.measured is None
-        if larger is not None and weighed.column in solved.acting and alone:
-            candidate = replace(candidate, strength=solved.strength(weighed, larger))
-        made.append(candidate)
-    return tuple(made)
+    """Lists the candidates; those of the larger model with their strengths beyond the linear."""
+    candidates: list[Candidate] = []
+    for ranked in solved.judgement.ranking:
+        candidate = ranked.candidate
+        alone = candidate.strength.bound is None and ranked.measured is None
+        if larger is not None and ranked.column in solved.acting and alone:
+            candidate = replace(candidate, strength=solved.strength(ranked, larger))
+        candidates.append(candidate)
+    return tuple(candidates)
 
 
-def _named(judgement: Judgement) -> tuple[str, ...]:
+def _effects_named(judgement: LibraryJudgement) -> tuple[str, ...]:
     names: list[str] = []
-    for weighed in judgement.ranking:
-        if weighed.column in judgement.named:
-            candidate = weighed.candidate
+    for ranked in judgement.ranking:
+        if ranked.column in judgement.named:
+            candidate = ranked.candidate
             names += [candidate.effect, *equivalent(candidate.effect, candidate.strength)]
     return tuple(dict.fromkeys(names))

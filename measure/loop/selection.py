@@ -26,7 +26,7 @@ from measure.loop.validation import total_error
 from measure.nulls.directions import Move
 from measure.nulls.reference import GUSTS, Reference
 from measure.probes.course import ALONG, Variation
-from measure.probes.lines import Line
+from measure.probes.lines import SpectralLine
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import undecided
 from measure.verdict.quantity import number
@@ -73,13 +73,13 @@ class Weighed:
     measured: Estimate | None = None
 
     def passes(self, level: float) -> bool:
-        """Whether the model passes its predictive test: what it leaves is what nulls leave, and its strength is the
-        same in all recordings."""
+        """Returns whether the model passes its predictive test: what it leaves is what nulls leave, and its strength is
+        the same in all recordings."""
         return self.candidate.leftover > level and not heterogeneous(self.candidate, level)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Judgement:
+class LibraryJudgement:
     """What was decided.
 
     Attributes:
@@ -105,7 +105,7 @@ class Judgement:
     confident: tuple[int, ...]
     statistic: float
     p_value: float
-    line: Line | None = None
+    line: SpectralLine | None = None
     course: Variation | None = None
     direction: Estimate | None = None
     departed: tuple[int, ...] = ()
@@ -120,8 +120,8 @@ def judge(
     level: float,
     refits: Mapping[int, Refit | None] | None = None,
     set_up: SetUp | None = None,
-) -> Judgement:
-    """Weigh the library against the evidence of all recordings.
+) -> LibraryJudgement:
+    """Weighs the library against the evidence of all recordings.
 
     Args:
         level: of the global test.
@@ -129,7 +129,7 @@ def judge(
             that diverged.
         set_up: what recordings may show of it; what they show leads the verdict, whatever the test says.
     """
-    known = refits or {}
+    refitted = refits or {}
     statistics = reference.statistics(evidence, names())
     statistic = reference.tested(evidence, names())
     p_value, power = reference.test.p(statistic), reference.power(level)
@@ -137,41 +137,52 @@ def judge(
     # Nothing is known along an effect that the cloth cannot have as it is held.
     effects = [(i, c) for i, c in effects if evidence.curvature[:, i, i].sum() > 0]
     held_out = gains(evidence, [[i] for i, _ in effects])
-    weighed = [
+    candidates = [
         _weigh(
-            evidence, reference, column, effect, own, statistics, known.get(column), lost=known.get(column, 0) is None
+            evidence,
+            reference,
+            column,
+            effect,
+            linear,
+            statistics,
+            refitted.get(column),
+            lost=refitted.get(column, 0) is None,
         )
-        for (column, effect), own in zip(effects, held_out, strict=True)
+        for (column, effect), linear in zip(effects, held_out, strict=True)
     ]
     direction, declared = turned(evidence, reference), set_up or SetUp()
     beyond = beyond_tolerance(direction, declared.tolerance)
     if direction is not None:
-        place = names().index(TURNED)
-        weighed = [_within(w, direction, declared.tolerance) if w.column == place else w for w in weighed]
-    ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[len(names())]))])
-    departing = {names().index(name) for name, shown in ((TURNED, beyond), (HOIST, declared.attached)) if shown}
+        turned_column = names().index(TURNED)
+        candidates = [_within(w, direction, declared.tolerance) if w.column == turned_column else w for w in candidates]
+    ranking = _ranked([*candidates, _gusts(evidence, reference, float(statistics[len(names())]))])
+    departing = {
+        names().index(name)
+        for name, declared_otherwise in ((TURNED, beyond), (HOIST, declared.attached))
+        if declared_otherwise
+    }
     departed = [w for w in ranking if w.column in departing]
     confident = _confidence_set(ranking, evidence)
-    first = known.get((departed or ranking)[0].column)
-    left = evidence if first is None else first.evidence
+    first = refitted.get((departed or ranking)[0].column)
+    remaining = evidence if first is None else first.evidence
 
     def judgement(
-        conclusion: Conclusion, named: Sequence[Weighed], why: str = "", reasons: tuple[str, ...] = ()
-    ) -> Judgement:
-        taken = {w.column for w in named}
+        conclusion: Conclusion, accepted: Sequence[Weighed], why: str = "", reasons: tuple[str, ...] = ()
+    ) -> LibraryJudgement:
+        taken = {w.column for w in accepted}
         reasoned = [
             replace(w, candidate=replace(w.candidate, why_not=_reason(ranking[0], w, why) * (w.column not in taken)))
             for w in ranking
         ]
-        return Judgement(
+        return LibraryJudgement(
             conclusion=conclusion,
-            named=tuple(w.column for w in named),
+            named=tuple(w.column for w in accepted),
             ranking=tuple(reasoned),
             confident=tuple(w.column for w in confident),
             statistic=statistic,
             p_value=p_value,
-            line=_swinging(left, reference, level),
-            course=_blown(left, reference, level),
+            line=_swinging(remaining, reference, level),
+            course=_blown(remaining, reference, level),
             direction=direction,
             departed=tuple(w.column for w in departed),
             power=power,
@@ -186,10 +197,10 @@ def judge(
         if len(departed) == 1 and first is not None:
             explained = first.leftover > level
         else:
-            explained = reference.p_left_by(left, names(), columns_shown) > level
+            explained = reference.p_left_by(remaining, names(), columns_shown) > level
         if explained:
             return judgement(Conclusion.EFFECT, departed, rest)
-        second = _second(left, reference, departed[0], ranking, level) if len(departed) == 1 else None
+        second = _second(remaining, reference, departed[0], ranking, level) if len(departed) == 1 else None
         if second is not None:
             return judgement(Conclusion.EFFECT, (*departed, second))
         return judgement(Conclusion.PARTLY, departed)
@@ -202,10 +213,10 @@ def judge(
     passing = [w for w in confident if w.passes(level)]
     if passing:
         return judgement(Conclusion.EFFECT if len(passing) == 1 else Conclusion.ONE_OF, passing)
-    second = _second(left, reference, confident[0], ranking, level) if confident else None
+    second = _second(remaining, reference, confident[0], ranking, level) if confident else None
     if second is not None:
         return judgement(Conclusion.EFFECT, (confident[0], second))
-    pulsating = _pulsating(left, reference, ranking, level)
+    pulsating = _pulsating(remaining, reference, ranking, level)
     if pulsating is not None and (pulsating.candidate.leftover > level or not confident):
         ranking = [pulsating if w.column == GUST_COLUMN else w for w in ranking]
         return judgement(Conclusion.EFFECT if pulsating.candidate.leftover > level else Conclusion.PARTLY, [pulsating])
@@ -213,28 +224,29 @@ def judge(
 
 
 def _departure(evidence: Evidence, reference: Reference) -> float:
-    """Root mean square departure of what recordings settle at from the base model run freely, in nulls' scatters; 0
-    where it is not looked at."""
+    """Computes the root mean square departure of what recordings settle at from the base model run freely, in nulls'
+    scatters; 0 where it is not looked at."""
     settles = reference.settles(evidence)
     return 0.0 if settles is None else float(np.sqrt(np.square(settles).mean()))
 
 
-def _within(weighed: Weighed, direction: Estimate, tolerance: float) -> Weighed:
-    """The turned wind as it was measured; no effect where the log's tolerance allows for it."""
+def _within(turned_wind: Weighed, direction: Estimate, tolerance: float) -> Weighed:
+    """Describes the turned wind as it was measured; no effect where the log's tolerance allows for it."""
     inside = tolerance > 0 and not beyond_tolerance(direction, tolerance)
     low, high, allowed = (number(math.degrees(v), digits=2) for v in (direction.low, direction.high, tolerance))
     unlike = f"the wind is turned by {low}° to {high}° from its log, which {allowed}° of tolerance allow for"
     return replace(
-        weighed,
+        turned_wind,
         measured=direction,
-        admissible=weighed.admissible and not inside,
+        admissible=turned_wind.admissible and not inside,
         unlike=unlike if inside else "",
-        candidate=replace(weighed.candidate, strength=direction),
+        candidate=replace(turned_wind.candidate, strength=direction),
     )
 
 
-def withdrawn(judgement: Judgement) -> Judgement:
-    """Without an effect named: with those that were, errors on unseen recordings are larger than without."""
+def withdrawn(judgement: LibraryJudgement) -> LibraryJudgement:
+    """Withdraws the effects that were named: with those that were, errors on unseen recordings are larger than
+    without."""
     why = "with it, errors on unseen recordings are larger than without"
     ranking = tuple(
         replace(w, candidate=replace(w.candidate, why_not=why)) if w.column in judgement.named else w
@@ -244,64 +256,69 @@ def withdrawn(judgement: Judgement) -> Judgement:
 
 
 def _confidence_set(ranking: Sequence[Weighed], evidence: Evidence) -> list[Weighed]:
-    """Models of the library whose held-out scores do not differ significantly from the best, best first; none where the
-    base model, which gains nothing, is among them, or where a force that is none of the library leads them all."""
+    """Selects models of the library whose held-out scores do not differ significantly from the best, best first; none
+    where the base model, which gains nothing, is among them, or where a force that is none of the library leads them
+    all."""
     able = [w for w in ranking if w.admissible]
     forces = gains(evidence, [[i + _FIRST] for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)])
     scores = [*(w.gains for w in able), *forces]
-    best = max(scores, key=lambda own: own.sum())
+    best = max(scores, key=lambda scores_of_model: scores_of_model.sum())
     if not _leads(best, np.zeros_like(best), evidence.recording):
         return []
     return [w for w in able if not _leads(best, w.gains, evidence.recording) and _leads(w.gains, 0 * best, w.recording)]
 
 
-def _leads(one: Floats, other: Floats, recording: NDArray[np.int64]) -> bool:
-    """Whether held-out scores (segment,) are better by more than `Criteria.lead` standard errors of the difference."""
-    return bool((one - other).sum() > CRITERIA.lead * total_error(one - other, recording))
+def _leads(first: Floats, second: Floats, recording: NDArray[np.int64]) -> bool:
+    """Returns whether held-out scores (segment,) are better by more than `Criteria.lead` standard errors of the
+    difference."""
+    return bool((first - second).sum() > CRITERIA.lead * total_error(first - second, recording))
 
 
-def _swinging(left: Evidence, reference: Reference, level: float) -> Line | None:
-    """The line of the spectra of what is left, where it alone would reject a model."""
-    line = reference.line(left)
+def _swinging(evidence: Evidence, reference: Reference, level: float) -> SpectralLine | None:
+    """Finds the line of the spectra of what is left, where it alone would reject a model."""
+    line = reference.line(evidence)
     return line if line is not None and reference.conformal.p(line.far) <= level else None
 
 
 def _varying(evidence: Evidence) -> Variation | None:
-    """How the wind varies, estimated from the errors; None where its course is not asked for."""
+    """Estimates from the errors how the wind varies. None where its course is not asked for."""
     return None if evidence.course is None else evidence.course.variation(evidence.recording)
 
 
-def _blown(left: Evidence, reference: Reference, level: float) -> Variation | None:
-    """How the wind varies by the remaining errors, where that alone would reject a model and is not turbulence."""
-    swing, variation = reference.swing(left), _varying(left)
+def _blown(evidence: Evidence, reference: Reference, level: float) -> Variation | None:
+    """Estimates how the wind varies by the remaining errors, where that alone would reject a model and is not
+    turbulence."""
+    swing, variation = reference.swing(evidence), _varying(evidence)
     if swing is None or variation is None or variation.turbulent:
         return None
     return variation if reference.conformal.p(swing) <= level else None
 
 
-def _pulsating(left: Evidence, reference: Reference, ranking: Sequence[Weighed], level: float) -> Weighed | None:
-    """Gusts by the course of a wind that varies along itself alone, where that alone would reject a model: what varies
-    within segments is not found by how the pressure differs between them. None where the wind does not vary so."""
-    variation = _blown(left, reference, level)
+def _pulsating(evidence: Evidence, reference: Reference, ranking: Sequence[Weighed], level: float) -> Weighed | None:
+    """Finds gusts by the course of a wind that varies along itself alone, where that alone would reject a model:
+    what varies within segments is not found by how the pressure differs between them. None where the wind does not
+    vary so."""
+    variation = _blown(evidence, reference, level)
     if variation is None or not variation.alone:
         return None
     (gusts,) = (w for w in ranking if w.column == GUST_COLUMN)
-    each = [_intensity(left.select(left.recording == index)) for index in np.unique(left.recording)]
-    error = float(np.std(each, ddof=1) / math.sqrt(len(each))) if len(each) > 1 else 0.0
-    found = estimate(_intensity(left), error, gusts.candidate.strength.unit)
+    intensities = [_intensity(evidence.select(evidence.recording == index)) for index in np.unique(evidence.recording)]
+    error = float(np.std(intensities, ddof=1) / math.sqrt(len(intensities))) if len(intensities) > 1 else 0.0
+    intensity = estimate(_intensity(evidence), error, gusts.candidate.strength.unit)
     return replace(
-        gusts, admissible=True, unlike="", measured=found, candidate=replace(gusts.candidate, strength=found)
+        gusts, admissible=True, unlike="", measured=intensity, candidate=replace(gusts.candidate, strength=intensity)
     )
 
 
 def _intensity(evidence: Evidence) -> float:
-    """Standard deviation of the wind along itself, as a share of its mean, by its course."""
+    """Computes the standard deviation of the wind along itself, as a share of its mean, by its course."""
     variation = _varying(evidence)
-    return 0.0 if variation is None else math.sqrt(max(float(variation.whole[ALONG]), 0.0))
+    return 0.0 if variation is None else math.sqrt(max(float(variation.total[ALONG]), 0.0))
 
 
 def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
-    """p-value of one strength in all recordings, by Cochran's Q (Biometrics 10:101, 1954); None of fewer than two.
+    """Computes the p-value of one strength in all recordings, by Cochran's Q (Biometrics 10:101, 1954); None of fewer
+    than two.
 
     A strength is that of a law in the wind: a wind that rises by so many metres a second, fitted as one that rises by
     an angle, has a larger angle in lighter winds.
@@ -319,11 +336,11 @@ def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
 
 
 def heterogeneous(candidate: Candidate, level: float) -> bool:
-    """Whether its strength is another in every recording: another law in the wind would be a better one."""
+    """Returns whether its strength is another in every recording: another law in the wind would be a better one."""
     return candidate.heterogeneity is not None and candidate.heterogeneity <= level
 
 
-def finalists(judgement: Judgement) -> tuple[int, ...]:
+def finalists(judgement: LibraryJudgement) -> tuple[int, ...]:
     """Columns that are refitted: the confidence set, the first by held-out gains, and the largest statistics."""
     able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
     strongest = sorted(able, key=lambda w: -abs(w.candidate.z))
@@ -335,62 +352,64 @@ def finalists(judgement: Judgement) -> tuple[int, ...]:
 def _second(
     evidence: Evidence, reference: Reference, first: Weighed, ranking: Sequence[Weighed], level: float
 ) -> Weighed | None:
-    """An effect with which the first passes its predictive test, and predicts better than alone. Beside gusts, the
-    pressure is free in every segment.
+    """Finds an effect with which the first passes its predictive test, and predicts better than alone. Beside gusts,
+    the pressure is free in every segment.
 
     Args:
         evidence: of what the first leaves, if it was refitted.
     """
     pressure = names().index(GUSTS)
-    known = [first.column]
+    fitted = [first.column]
     if first.column == GUST_COLUMN:
-        evidence, reference, known = evidence.freed(pressure), reference.beside(), []
-    skipped = {GUST_COLUMN, first.column, *([] if known else [pressure])}
-    others = [w for w in ranking if w.column not in skipped]
-    pairs = gains(evidence, [known, *([*known, w.column] for w in others)])
-    for place in np.argsort(-pairs[1:].sum(axis=1)):
-        second, both = others[place], [*known, others[place].column]
-        if not _leads(pairs[1 + place], pairs[0], evidence.recording):
+        evidence, reference, fitted = evidence.freed(pressure), reference.beside(), []
+    skipped = {GUST_COLUMN, first.column, *([] if fitted else [pressure])}
+    candidates = [w for w in ranking if w.column not in skipped]
+    pairs = gains(evidence, [fitted, *([*fitted, w.column] for w in candidates)])
+    for index in np.argsort(-pairs[1:].sum(axis=1)):
+        second, pair = candidates[index], [*fitted, candidates[index].column]
+        if not _leads(pairs[1 + index], pairs[0], evidence.recording):
             return None
-        value, _ = evidence.fit(both).of(second.column)
+        value, _ = evidence.fit(pair).of(second.column)
         described = EFFECTS[second.candidate.effect].parameters()[second.candidate.parameter]
-        constant = all(_homogeneous_beside(evidence, both, w, level) for w in (first, second) if w.column in both)
+        constant = all(_homogeneous_beside(evidence, pair, w, level) for w in (first, second) if w.column in pair)
         if (
             described.admits(described.null + value)
             and constant
-            and reference.p_left_by(evidence, names(), both) > level
+            and reference.p_left_by(evidence, names(), pair) > level
         ):
             return second
     return None
 
 
-def _homogeneous_beside(evidence: Evidence, chosen: Sequence[int], weighed: Weighed, level: float) -> bool:
-    """Whether a strength is the same in all recordings, where some columns are fitted to each."""
-    found = heterogeneity(
-        _each(evidence, chosen, weighed.column, about=0.0, larger=_larger(evidence, weighed), unit="1")
+def _homogeneous_beside(evidence: Evidence, chosen: Sequence[int], candidate: Weighed, level: float) -> bool:
+    """Returns whether a strength is the same in all recordings, where some columns are fitted to each."""
+    p = heterogeneity(
+        _strengths_by_recording(
+            evidence, chosen, candidate.column, about=0.0, larger=_larger(evidence, candidate), unit="1"
+        )
     )
-    return found is None or found > level
+    return p is None or p > level
 
 
-def _larger(evidence: Evidence, weighed: Weighed) -> float:
-    """By how much a strength's standard error is larger than Σ says when it is fitted alone."""
-    return weighed.error / evidence.fit([weighed.column]).of(weighed.column)[1]
+def _larger(evidence: Evidence, candidate: Weighed) -> float:
+    """Computes by how much a strength's standard error is larger than Σ says when it is fitted alone."""
+    return candidate.error / evidence.fit([candidate.column]).of(candidate.column)[1]
 
 
-def _each(
+def _strengths_by_recording(
     evidence: Evidence, chosen: Sequence[int], column: int, *, about: float, larger: float, unit: str
 ) -> tuple[Estimate, ...]:
-    """The strength of a column in each recording alone, where some columns are fitted to it.
+    """Estimates the strength of a column in each recording alone, where some columns are fitted to it.
 
     Args:
         about: the strength in the model that the evidence is of.
         larger: by how much its standard errors are larger than Σ says.
     """
-    made: list[Estimate] = []
+    strengths: list[Estimate] = []
     for index in np.unique(evidence.recording):
         value, claimed = evidence.select(evidence.recording == index).fit(chosen).of(column)
-        made.append(estimate(about + value, larger * claimed, unit))
-    return tuple(made)
+        strengths.append(estimate(about + value, larger * claimed, unit))
+    return tuple(strengths)
 
 
 def _weigh(
@@ -411,15 +430,17 @@ def _weigh(
     error = abs(value) / math.sqrt(max(statistic, 1e-12))
     z = value / error if error > 0 else 0.0
     gained, leftover = linear, refitted.leftover if refitted else reference.p_left_by(evidence, names(), [column])
-    left, null = evidence, effect.described.null
+    remaining, null = evidence, effect.described.null
     if refitted is not None:
-        gained, value, left = refitted.gains, refitted.coefficient, refitted.evidence
+        gained, value, remaining = refitted.gains, refitted.coefficient, refitted.evidence
     about = null + (value if refitted else 0.0)
     larger = error / fit.of(column)[1]
     bounded = None if refitted is None or refitted.profile is None else refitted.profile.estimate(larger=larger)
     # Where all strengths beyond a bound do the same, slopes at one of them say nothing of those of single recordings.
     by_recording = (
-        () if bounded is not None else _each(left, [column], column, about=about, larger=larger, unit=effect.unit)
+        ()
+        if bounded is not None
+        else _strengths_by_recording(remaining, [column], column, about=about, larger=larger, unit=effect.unit)
     )
     return Weighed(
         column=column,
@@ -446,56 +467,57 @@ def _weigh(
 
 
 def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighed:
-    """Gusts, whose course is unknown: a pressure that fluctuates from segment to segment, by twice their intensity."""
-    place = names().index(GUSTS)
-    found, gained = fluctuation(evidence, place), fluctuation_gains(evidence, place)
+    """Weighs gusts, whose course is unknown: a pressure that fluctuates from segment to segment, by twice their
+    intensity."""
+    pressure = names().index(GUSTS)
+    gusts, gained = fluctuation(evidence, pressure), fluctuation_gains(evidence, pressure)
     described = EFFECTS["gusts"].parameters()["intensity"]
     variation = _varying(evidence)
     unlike = "" if variation is None or variation.turbulent or variation.alone else variation.words
     by_recording = []
     for index in np.unique(evidence.recording):
-        own = fluctuation(evidence.select(evidence.recording == index), place)
-        by_recording.append(estimate(own.deviation / 2, own.error / 2, described.unit))
+        in_recording = fluctuation(evidence.select(evidence.recording == index), pressure)
+        by_recording.append(estimate(in_recording.deviation / 2, in_recording.error / 2, described.unit))
     return Weighed(
         column=GUST_COLUMN,
         gains=gained,
         recording=evidence.recording,
-        error=found.error / 2,
-        admissible=bool(found.deviation > CRITERIA.reach * found.error) and not unlike,
+        error=gusts.error / 2,
+        admissible=bool(gusts.deviation > CRITERIA.reach * gusts.error) and not unlike,
         unlike=unlike,
         candidate=Candidate(
             effect="gusts",
             parameter="intensity",
             null=described.null,
-            strength=strength(described.null, found.deviation / 2, found.error / 2, described.unit),
+            strength=strength(described.null, gusts.deviation / 2, gusts.error / 2, described.unit),
             z=math.sqrt(statistic),
             p_value=reference.p_alone(statistic, len(names())),
             p_family=reference.p_family(statistic, len(names())),
             gain=float(gained.sum()),
             gain_error=total_error(gained, evidence.recording),
             behind=0.0,
-            leftover=reference.beside().p_left_by(evidence.freed(place), names(), ()),
+            leftover=reference.beside().p_left_by(evidence.freed(pressure), names(), ()),
             by_recording=tuple(by_recording),
         ),
     )
 
 
 def strength(null: float, coefficient: float, error: float, unit: str) -> Estimate:
-    """The strength of an effect, by its coefficient beyond null and the standard error that nulls leave.
+    """Estimates the strength of an effect, by its coefficient beyond null and the standard error that nulls leave.
 
     What the fit's mesh and a mistold cloth do to an effect is a factor, so that more of the interval lies beyond the
     strength than between it and the null.
     """
-    whole, reach = CRITERIA.reach * CRITERIA.strength_factor, CRITERIA.reach * error
-    inward = math.hypot(coefficient * (1 - math.exp(-whole)), reach)
-    outward = math.hypot(coefficient * (math.exp(whole) - 1), reach)
+    factor, reach = CRITERIA.reach * CRITERIA.strength_factor, CRITERIA.reach * error
+    inward = math.hypot(coefficient * (1 - math.exp(-factor)), reach)
+    outward = math.hypot(coefficient * (math.exp(factor) - 1), reach)
     low, high = (outward, inward) if coefficient < 0 else (inward, outward)
     value = null + coefficient
     return Estimate(value=value, low=value - low, high=value + high, unit=unit, level=CRITERIA.interval)
 
 
 def estimate(value: float, error: float, unit: str) -> Estimate:
-    """A normal interval at the level of all intervals."""
+    """Computes a normal interval at the level of all intervals."""
     return Estimate(
         value=value,
         low=value - CRITERIA.reach * error,
@@ -505,34 +527,34 @@ def estimate(value: float, error: float, unit: str) -> Estimate:
     )
 
 
-def _ranked(weighed: Sequence[Weighed]) -> list[Weighed]:
-    """By held-out gain, those first that are admissible."""
-    ordered = sorted(weighed, key=lambda w: (-w.admissible, -w.gains.sum()))
+def _ranked(candidates: Sequence[Weighed]) -> list[Weighed]:
+    """Ranks candidates by held-out gain, those first that are admissible."""
+    ordered = sorted(candidates, key=lambda w: (-w.admissible, -w.gains.sum()))
     return [replace(w, candidate=replace(w.candidate, behind=_behind(ordered[0], w))) for w in ordered]
 
 
-def _behind(best: Weighed, other: Weighed) -> float:
-    """Standard errors of the paired difference."""
-    if other is best:
+def _behind(best: Weighed, compared: Weighed) -> float:
+    """Computes standard errors of the paired difference."""
+    if compared is best:
         return 0.0
-    difference = best.gains - other.gains
+    difference = best.gains - compared.gains
     error = total_error(difference, best.recording)
     return float(difference.sum() / error) if error > 0 else 0.0
 
 
-def _reason(best: Weighed, other: Weighed, why: str) -> str:
+def _reason(best: Weighed, candidate: Weighed, why: str) -> str:
     if why:
         return why
-    if not other.admissible and other.unlike:
-        return other.unlike
-    if not other.admissible and other.column == GUST_COLUMN:
+    if not candidate.admissible and candidate.unlike:
+        return candidate.unlike
+    if not candidate.admissible and candidate.column == GUST_COLUMN:
         return "their intensity is not significantly above zero"
-    if not other.admissible:
-        strength = other.candidate.strength
+    if not candidate.admissible:
+        strength = candidate.candidate.strength
         unit = "" if strength.unit == "1" else f" {strength.unit}"
         return f"the fitted value is unphysical: {number(strength.value)}{unit}"
-    if not _leads(other.gains, 0 * other.gains, other.recording):
+    if not _leads(candidate.gains, 0 * candidate.gains, candidate.recording):
         return "it predicts unseen recordings no better than the base model"
-    if _leads(best.gains, other.gains, other.recording):
-        return f"{_behind(best, other):.1f} standard errors behind {best.candidate.effect} on unseen recordings"
+    if _leads(best.gains, candidate.gains, candidate.recording):
+        return f"{_behind(best, candidate):.1f} standard errors behind {best.candidate.effect} on unseen recordings"
     return "the errors that remain are larger than those of nulls, or a force outside the library predicts better"

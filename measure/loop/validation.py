@@ -65,7 +65,7 @@ class Trial:
 
 
 def total_error(values: Floats, recording: NDArray[np.int64]) -> float:
-    """Standard error of a sum over segments (segment,) that are drawn within recordings.
+    """Computes the standard error of a sum over segments (segment,) that are drawn within recordings.
 
     Recordings are strata: that an effect helps more in strong wind than in light wind is no chance. Where one has a
     single segment, segments are taken to be drawn from all.
@@ -76,8 +76,8 @@ def total_error(values: Floats, recording: NDArray[np.int64]) -> float:
 
 
 def _strata(values: Floats, recording: NDArray[np.int64]) -> list[Floats]:
-    own = [values[recording == index] for index in np.unique(recording)]
-    return own if min(len(part) for part in own) > 1 else [values]
+    strata = [values[recording == index] for index in np.unique(recording)]
+    return strata if min(len(part) for part in strata) > 1 else [values]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,8 +94,8 @@ class Predictions:
 
 
 def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
-    """Each recording left out in turn, where there are two or more, and the last part of every recording: a third, but
-    two segments of four or more, so that chance within a recording shows."""
+    """Leaves each recording out in turn, where there are two or more, and the last part of every recording: a third,
+    but two segments of four or more, so that chance within a recording shows."""
     recording = segments.recording
     result: list[Fold] = []
     if len(np.unique(recording)) > 1:
@@ -105,8 +105,8 @@ def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
         ]
     late = np.zeros(len(recording), dtype=bool)
     for index in np.unique(recording):
-        own = np.flatnonzero(recording == index)
-        late[own[-max(2 if len(own) > _ENOUGH else 1, len(own) // 3) :]] = True
+        in_recording = np.flatnonzero(recording == index)
+        late[in_recording[-max(2 if len(in_recording) > _ENOUGH else 1, len(in_recording) // 3) :]] = True
     if not late.all():
         result.append(Fold(words="last part of each recording, unseen", outside=late))
     return tuple(result)
@@ -141,7 +141,7 @@ def left_out(
     whitened: WhitenedMisfit,
     outsides: Sequence[NDArray[np.bool_]],
 ) -> list[LeftOut]:
-    """What a model leaves, each time fitted to the other segments alone."""
+    """Computes what a model leaves, each time fitted to the other segments alone."""
     begun = [fitted.without(outside) for outside in outsides]
     ended = finished(forecaster, segments, whitened, begun, fitted.chosen, [~outside for outside in outsides])
     models = [model for model, _ in ended]
@@ -156,20 +156,20 @@ def measured(
     outsides: Sequence[NDArray[np.bool_]],
     chosen: Sequence[int] = (),
 ) -> list[LeftOut]:
-    """What models leave as they are; what each leaves along the nuisances and chosen columns is fitted to the other
-    segments."""
-    every = errors_of(models, forecaster, segments)
+    """Computes what models leave as they are; what each leaves along the nuisances and chosen columns is fitted to the
+    other segments."""
+    errors_of_models = errors_of(models, forecaster, segments)
     return [
         LeftOut(
             squared=_squared(_array(errors))[outside] / segments.tracked[outside],
             misfit=whitened.of(errors).left_out(outside, chosen),
         )
-        for errors, outside in zip(every, outsides, strict=True)
+        for errors, outside in zip(errors_of_models, outsides, strict=True)
     ]
 
 
 def _squared(errors: Floats) -> Floats:
-    """(segment,) mean squared distance [m²]."""
+    """Computes the mean squared distance, (segment,) [m²]."""
     return (errors**2).sum(axis=2).mean(axis=(0, 1))
 
 
@@ -207,7 +207,8 @@ def compare(
 
 
 def share_removed(before: Floats, after: Floats, floor: Floats) -> float | None:
-    """Share of the mean square above the floor that is gone after; None where there is hardly anything above it.
+    """Computes the share of the mean square above the floor that is gone after; None where there is hardly anything
+    above it.
 
     Args:
         before, after, floor: (segment,) mean squared distances [m²].
@@ -218,7 +219,7 @@ def share_removed(before: Floats, after: Floats, floor: Floats) -> float | None:
 
 
 def a_segment(values: Floats, recording: NDArray[np.int64]) -> Estimate:
-    """Mean of misfits over segments, drawn within recordings, with Student's interval [nat]."""
+    """Averages misfits over segments, drawn within recordings, with Student's interval [nat]."""
     value, reach = float(values.mean()), math.inf
     if len(values) > 1:
         free = len(values) - len(_strata(values, recording))
@@ -228,7 +229,7 @@ def a_segment(values: Floats, recording: NDArray[np.int64]) -> Estimate:
 
 
 def root(squared: Floats) -> Estimate:
-    """Root of the mean over segments, with Student's interval of the mean, through the root [m]."""
+    """Computes the root of the mean over segments, with Student's interval of the mean, through the root [m]."""
     mean = float(squared.mean())
     reach = _reach(squared)
     return Estimate(
@@ -241,7 +242,8 @@ def root(squared: Floats) -> Estimate:
 
 
 def paired(before: Floats, after: Floats) -> Estimate:
-    """Difference of roots of means, paired by segment: linear in the squares, for which Student's interval is valid."""
+    """Computes the difference of roots of means, paired by segment: linear in the squares, for which Student's interval
+    is valid."""
     slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))
     value, reach = slope * float((before - after).mean()), slope * _reach(before - after)
     return Estimate(value=value, low=value - reach, high=value + reach, unit="m", level=CRITERIA.interval)
@@ -257,7 +259,7 @@ def _reach(values: Floats) -> float:
 def numerical_floor(
     setting: Setting, recordings: NDArray[np.int64], model: Model, *, copies: int, seed: int
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Errors of segments simulated from a model by other numerics and predicted by it.
+    """Computes errors of segments simulated from a model by other numerics and predicted by it.
 
     Args:
         recordings: of the experiment, in whose winds and by whose ways is simulated.
@@ -269,7 +271,7 @@ def numerical_floor(
     first = setting.experiment.recordings[0]
     simulated = np.tile(recordings, copies)
     speeds = tuple(float(u) for u in setting.speeds[simulated])
-    own = child_seed(seed, "floor")
+    floor_seed = child_seed(seed, "floor")
     recorded, specimen = setting.experiment.recordings, setting.experiment.specimen
     batch = NullBatch(
         specimen=specimen,
@@ -279,13 +281,13 @@ def numerical_floor(
         noise=first.noise,
         calibrations=(model.calibration,) * len(simulated),
         speeds=speeds,
-        winds=winds.like(recorded, speeds, duration=_DURATION, seed=own),
-        tracks=tracks.like(recorded, specimen.seats, len(speeds), duration=_DURATION, seed=own),
-        seed=own,
+        winds=winds.like(recorded, speeds, duration=_DURATION, seed=floor_seed),
+        tracks=tracks.like(recorded, specimen.seats, len(speeds), duration=_DURATION, seed=floor_seed),
+        seed=floor_seed,
         effects=model.acting,
     )
-    made = batch.simulate()
-    segments = Segments.of(made)
-    forecaster = replace(setting.forecaster, specimen=as_seen(batch.specimen, made))
+    trajectories = batch.simulate()
+    segments = Segments.of(trajectories)
+    forecaster = replace(setting.forecaster, specimen=as_seen(batch.specimen, trajectories))
     squared = predict(forecaster, segments, model).squared
     return simulated[segments.recording], squared

@@ -71,13 +71,13 @@ _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.2, 5.0), (0.25e-3, 40e-3)
 Progress = Callable[[int], object]
 
 
-def each(segments: int) -> int:
-    """Segments of each recording of a null experiment, for data of so many in all."""
+def segments_of_each(segments: int) -> int:
+    """Counts the segments of each recording of a null experiment, for data of so many in all."""
     return max(2, math.ceil(segments / WINDS))
 
 
 def around(slowest: float, fastest: float) -> tuple[float, float]:
-    """The winds of nulls for data of such winds [m/s]: somewhat beyond them."""
+    """Computes the winds of nulls for data of such winds [m/s]: somewhat beyond them."""
     return 0.9 * slowest, 1.1 * fastest
 
 
@@ -91,7 +91,7 @@ def prior_batch(
     speeds: tuple[float, float],
     seed: int,
 ) -> NullBatch:
-    """A null experiment over the priors: one cloth in four winds, one from each quarter of `speeds`.
+    """Draws a null experiment over the priors: one cloth in four winds, one from each quarter of `speeds`.
 
     Density and bending are log-uniform about the nominal ones, damping log-uniform, the other stiffness as
     `stiffness.drawn` has it.
@@ -116,39 +116,40 @@ def _log(rng: np.random.Generator, span: tuple[float, float]) -> float:
     return float(np.exp(rng.uniform(math.log(span[0]), math.log(span[1]))))
 
 
-def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tuple[Nulls, float]:
-    """Simulate a batch and take its statistics along columns, each recording's at the calibration that it was simulated
-    with, as those of data are taken at the fitted one; with the duration of a segment [s]."""
+def evaluate(batch: NullBatch, numerics: int, along: Sequence[Column]) -> tuple[Nulls, float]:
+    """Simulates a batch and takes its statistics along columns, each recording's at the calibration that it was
+    simulated with, as those of data are taken at the fitted one; with the duration of a segment [s]."""
     recordings = batch.simulate()
     segments = Segments.of(recordings).tied(_anchors(batch, recordings))
     forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
-    own = [batch.calibrations[recording] for recording in segments.recording]
-    found = statistics(forecaster, segments, own, weighed)
-    found = replace(found, settled=settled_off(recordings, mistaken(batch))[found.recording])
+    calibrations = [batch.calibrations[recording] for recording in segments.recording]
+    measured = statistics(forecaster, segments, calibrations, along)
+    measured = replace(measured, settled=settled_off(recordings, mistaken(batch))[measured.recording])
     cloths = np.array([c.steps_from(Calibration()) for c in batch.calibrations])
     nulls = Nulls(
-        statistics=found,
-        speeds=np.array(batch.speeds)[found.recording],
-        calibration=cloths[found.recording],
-        numerics=np.full(len(found.recording), numerics),
-        noise=np.full(len(found.recording), batch.noise),
-        period=np.full(len(found.recording), segments.period),
-        cloth=np.full(len(found.recording), batch.specimen.material.fingerprint),
+        statistics=measured,
+        speeds=np.array(batch.speeds)[measured.recording],
+        calibration=cloths[measured.recording],
+        numerics=np.full(len(measured.recording), numerics),
+        noise=np.full(len(measured.recording), batch.noise),
+        period=np.full(len(measured.recording), segments.period),
+        cloth=np.full(len(measured.recording), batch.specimen.material.fingerprint),
     )
     return nulls, segments.duration
 
 
 def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]:
-    """(held, 3) for each recording [m]; where they are not given, taken from all recordings of its cloth."""
+    """Computes anchors (held, 3) for each recording [m]; where they are not given, taken from all recordings of its
+    cloth."""
     cloths: dict[Calibration, list[Trajectory]] = {}
     for cloth, recording in zip(batch.calibrations, recordings, strict=True):
         cloths.setdefault(cloth, []).append(recording)
-    known = {cloth: as_seen(batch.specimen, own).anchors for cloth, own in cloths.items()}
-    return [known[cloth] for cloth in batch.calibrations]
+    anchors = {cloth: as_seen(batch.specimen, of_cloth).anchors for cloth, of_cloth in cloths.items()}
+    return [anchors[cloth] for cloth in batch.calibrations]
 
 
 def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:
-    """Evaluate the batches that the folder lacks, each into a file of its own; long ones first, so that no worker is
+    """Evaluates the batches that the folder lacks, each into a file of its own; long ones first, so that no worker is
     left alone with one.
 
     Args:
@@ -172,22 +173,24 @@ def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progr
 
 def _cache(folder: Path, batch: NullBatch, index: int) -> None:
     nulls, duration = evaluate(batch, index, columns())
-    own = nulls.statistics
-    if own.lines is None or own.turning is None or own.course is None or own.settled is None:
+    measured = nulls.statistics
+    if measured.lines is None or measured.turning is None or measured.course is None or measured.settled is None:
         raise UsageError(
-            "no spectra, moments, courses or settled quantities", where="null bank", fix="take statistics by `evaluate`"
+            "the batch has no spectra, moments, courses or settled quantities",
+            where="null bank",
+            fix="take statistics by `evaluate`",
         )
     buffer = BytesIO()
     np.savez(
         buffer,
         version=np.array(_VERSION),
         columns=np.array(names()),
-        recording=own.recording,
-        r=own.r,
-        response=own.response,
-        error=own.error,
-        marker_error=own.marker_error,
-        lines=own.lines,
+        recording=measured.recording,
+        r=measured.r,
+        response=measured.response,
+        error=measured.error,
+        marker_error=measured.marker_error,
+        lines=measured.lines,
         speeds=nulls.speeds,
         calibration=nulls.calibration,
         noise=nulls.noise,
@@ -196,12 +199,12 @@ def _cache(folder: Path, batch: NullBatch, index: int) -> None:
         duration=np.array(duration),
         anchors_told=np.array(batch.specimen.anchors_given),
         carried=np.array(bool(batch.tracks)),
-        turned=own.turning.r,
-        turning=own.turning.response,
-        moment=own.turning.error,
-        course=own.course.score,
-        course_curvature=own.course.curvature,
-        settled=own.settled,
+        turned=measured.turning.r,
+        turning=measured.turning.response,
+        moment=measured.turning.error,
+        course=measured.course.score,
+        course_curvature=measured.course.curvature,
+        settled=measured.settled,
     )
     put_if_absent(_file(folder, index), buffer.getvalue())
 
@@ -211,7 +214,7 @@ def _file(folder: Path, index: int) -> Path:
 
 
 def _content(path: Path) -> Mapping[str, np.ndarray]:
-    """The contents of a file of a bank, each of the batch's segments in all its arrays."""
+    """Reads the contents of a file of a bank, each of the batch's segments in all its arrays."""
     rebuild = "delete it and build the bank again"
     content = read_arrays(path, what="a batch of nulls", fix=rebuild)
     if not set(content) >= {*_SEGMENTS, *_SINGLE, "version", "columns"}:
@@ -240,22 +243,22 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
 def _number(path: Path) -> int:
     number = path.stem.partition("-")[2]
     if not number.isdecimal():
-        raise CorruptError("not a file of a bank", where=str(path), fix="move it out of the folder")
+        raise CorruptError("it is not a file of a bank", where=str(path), fix="move it out of the folder")
     return int(number)
 
 
 def files(folder: Path) -> list[Path]:
-    """The batches of a folder."""
+    """Lists the batches of a folder."""
     return sorted(folder.glob("nulls-*.npz"))
 
 
 def version_of_content() -> dict[str, Any]:
-    """What the arrays of a batch are, beside its design: nulls of another version are none of these."""
+    """Identifies what the arrays of a batch are, beside its design: nulls of another version are none of these."""
     return {"version": _VERSION, "columns": list(names()), "code": code_version()}
 
 
 def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
-    """The bank of a folder.
+    """Loads the bank of a folder.
 
     Args:
         kinds: how many of its kinds, the first; None for all.
@@ -267,15 +270,15 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
     """
     paths = files(folder)[:kinds]
     if not paths:
-        raise NotFoundError("no null recordings", where=str(folder), fix="build the bank first")
+        raise NotFoundError("the folder holds no null recordings", where=str(folder), fix="build the bank first")
     parts: list[Nulls] = []
     durations: set[float] = set()
-    given: set[bool] = set()
+    anchors_given: set[bool] = set()
     carried: set[bool] = set()
     count = 0
     for path in paths:
         content = _content(path)
-        own = Statistics(
+        measured = Statistics(
             recording=content["recording"] + count,
             r=content["r"],
             response=content["response"],
@@ -292,10 +295,10 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
             course=Course(score=content["course"], curvature=content["course_curvature"]),
             settled=content["settled"],
         )
-        numerics = np.full(len(own.r), _number(path))
+        numerics = np.full(len(measured.r), _number(path))
         parts.append(
             Nulls(
-                statistics=own,
+                statistics=measured,
                 speeds=content["speeds"],
                 calibration=content["calibration"],
                 numerics=numerics,
@@ -305,13 +308,14 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
             )
         )
         durations.add(round(float(content["duration"]), 1))
-        given.add(bool(content["anchors_told"]))
+        anchors_given.add(bool(content["anchors_told"]))
         carried.add(bool(content["carried"]))
-        count = int(own.recording.max()) + 1
-    if len(durations) > 1 or len(given) > 1 or len(carried) > 1:
+        count = int(measured.recording.max()) + 1
+    if len(durations) > 1 or len(anchors_given) > 1 or len(carried) > 1:
         lengths = ", ".join(f"{d:g} s" for d in sorted(durations))
         raise CorruptError(
-            f"segments of {lengths}, anchors {' and '.join('given' if g else 'taken from recordings' for g in given)}, "
+            f"the bank has segments of {lengths}, "
+            f"anchors {' and '.join('given' if g else 'taken from recordings' for g in anchors_given)}, "
             f"cloths {' and '.join('carried' if c else 'held still' for c in carried)}",
             where=str(folder),
             fix="build a bank of one design into a folder of its own",
@@ -321,6 +325,6 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
         columns=names(),
         duration=durations.pop(),
         words=words,
-        anchors_given=given.pop(),
+        anchors_given=anchors_given.pop(),
         carried=carried.pop(),
     )

@@ -51,18 +51,18 @@ class ClusteredNulls:
 
     @cached_property
     def correlation(self) -> float:
-        """ρ of normal scores, from 0 to 1; 1 of a single kind, which shows nothing of it."""
+        """Estimates ρ of normal scores, from 0 to 1; 1 of a single kind, which shows nothing of it."""
         if self.count < 2:
             return 1.0
         if self.count == len(self.null):
             return 0.0
         scores = ndtri((rankdata(self.null) - 0.5) / len(self.null))
-        _, place, sizes = np.unique(self.kinds, return_inverse=True, return_counts=True)
-        means = np.bincount(place, scores) / sizes
+        _, kind, sizes = np.unique(self.kinds, return_inverse=True, return_counts=True)
+        means = np.bincount(kind, scores) / sizes
         between = float((sizes * np.square(means - scores.mean())).sum()) / (self.count - 1)
-        within = float(np.square(scores - means[place]).sum()) / (len(scores) - self.count)
-        whole = between + (self._each - 1) * within
-        return min(max((between - within) / whole, 0.0), 1.0) if whole > 0 else 0.0
+        within = float(np.square(scores - means[kind]).sum()) / (len(scores) - self.count)
+        total = between + (self._flags_a_kind - 1) * within
+        return min(max((between - within) / total, 0.0), 1.0) if total > 0 else 0.0
 
     @cached_property
     def effective(self) -> float:
@@ -75,41 +75,41 @@ class ClusteredNulls:
         return 1 / (1 + self.effective)
 
     def tests(self, level: float) -> bool:
-        """Whether any statistic can be rejected at a level."""
+        """Returns whether any statistic can be rejected at a level."""
         return self.count >= self.kinds_needed(level)
 
     def kinds_needed(self, level: float) -> int:
-        """The fewest kinds, as large and as alike as these, by which a level can be tested."""
+        """Computes the fewest kinds, as large and as alike as these, by which a level can be tested."""
         return math.ceil((1 / level - 1) * self.count / self.effective - 1e-9)
 
     def p(self, value: float) -> float:
-        """p of a statistic, the data themselves counted as a flag that is as far."""
+        """Computes p of a statistic, the data themselves counted as a flag that is as far."""
         return (1 + self.effective * self._share(value)) / (1 + self.effective)
 
     def tail(self, value: float) -> float:
-        """Beside it the share of Student's t that is as far, by the flags' mean and standard deviation."""
+        """Computes, beside p, the share of Student's t that is as far, by the flags' mean and standard deviation."""
         freedom = self.effective - 1
         spread = float(self.null.std(ddof=1)) * math.sqrt(1 + 1 / self.effective)
         return float(t.sf((value - float(self.null.mean())) / spread, freedom))
 
     def critical(self, level: float) -> float | None:
-        """The statistic beyond which p is at most `level`; None where the level cannot be tested."""
+        """Computes the statistic beyond which p is at most `level`; None where the level cannot be tested."""
         if not self.tests(level):
             return None
         return max(float(value) for value in np.unique(self.null) if self.p(float(value)) > level)
 
     def interval(self, value: float, *, level: float) -> tuple[float, float]:
-        """Interval of the share of all flags, simulated or not, that are at least as far, by which happen to be among
-        the nulls (Clopper and Pearson's interval of n' flags)."""
+        """Computes the interval of the share of all flags, simulated or not, that are at least as far, by which happen
+        to be among the nulls (Clopper and Pearson's interval of n' flags)."""
         return clopper_pearson(self._share(value) * self.effective, self.effective, level=level)
 
     def settling(self, value: float, *, at: float, level: float) -> int | None:
-        """The fewest kinds, no fewer than there are, whose `interval` would not hold a share `at`, if the same share of
-        their flags is as far; None beyond `MOST_KINDS`."""
-        share, each = self._share(value), self.effective / self.count
+        """Computes the fewest kinds, no fewer than there are, whose `interval` would not hold a share `at`, if the same
+        share of their flags is as far; None beyond `MOST_KINDS`."""
+        share, flags_a_kind = self._share(value), self.effective / self.count
 
         def holds(count: int) -> bool:
-            low, high = clopper_pearson(share * count * each, count * each, level=level)
+            low, high = clopper_pearson(share * count * flags_a_kind, count * flags_a_kind, level=level)
             return low <= at <= high
 
         if holds(MOST_KINDS):
@@ -120,7 +120,7 @@ class ClusteredNulls:
         return float((self.null >= value).mean())
 
     @property
-    def _each(self) -> float:
-        """Flags of a kind, as the analysis of variance of kinds of several sizes counts them."""
+    def _flags_a_kind(self) -> float:
+        """Counts flags of a kind, as the analysis of variance of kinds of several sizes counts them."""
         _, sizes = np.unique(self.kinds, return_counts=True)
         return (len(self.null) - float(np.square(sizes).sum()) / len(self.null)) / (self.count - 1)

@@ -31,7 +31,7 @@ MOST_KINDS = 1000
 
 
 def kinds_needed(level: float) -> int:
-    """The fewest kinds of numerics by which a level can be tested: K + 1 ≥ 1/level."""
+    """Computes the fewest kinds of numerics by which a level can be tested: K + 1 ≥ 1/level."""
     return math.ceil(1 / level - 1e-9) - 1
 
 
@@ -58,27 +58,27 @@ class GroupedConformal:
         return 1 / (1 + self.count)
 
     def tests(self, level: float) -> bool:
-        """Whether any statistic can be rejected at a level."""
+        """Returns whether any statistic can be rejected at a level."""
         return self.count >= kinds_needed(level)
 
     def p(self, value: float) -> float:
-        """p of a statistic, the data themselves counted as a kind that is as far."""
+        """Computes p of a statistic, the data themselves counted as a kind that is as far."""
         return (1 + self._as_far(value)) / (1 + self.count)
 
     def critical(self, level: float) -> float | None:
-        """The statistic beyond which p is at most `level`; None where the level cannot be tested."""
+        """Computes the statistic beyond which p is at most `level`; None where the level cannot be tested."""
         if not self.tests(level):
             return None
         return max(float(value) for value in np.unique(self.null) if self.p(float(value)) > level)
 
     def interval(self, value: float, *, level: float) -> tuple[float, float]:
-        """Interval of the share of all kinds, simulated or not, that are at least as far, by how many kinds happen to
-        be among the nulls (Clopper and Pearson's interval, with sums of shares in place of counts)."""
+        """Computes the interval of the share of all kinds, simulated or not, that are at least as far, by how many
+        kinds happen to be among the nulls (Clopper and Pearson's interval, with sums of shares in place of counts)."""
         return clopper_pearson(self._as_far(value), self.count, level=level)
 
     def settling(self, value: float, *, at: float, level: float) -> int | None:
-        """The fewest kinds, no fewer than there are, whose `interval` would not hold a share `at`, if the same share of
-        them is as far; None beyond `MOST_KINDS`."""
+        """Computes the fewest kinds, no fewer than there are, whose `interval` would not hold a share `at`, if the same
+        share of them is as far; None beyond `MOST_KINDS`."""
         share = self._as_far(value) / self.count
 
         def holds(count: int) -> bool:
@@ -91,19 +91,19 @@ class GroupedConformal:
         return next((count for count in range(self.count, MOST_KINDS) if not holds(count)), MOST_KINDS)
 
     def quantile(self, share: float) -> float:
-        """The value that one more kind does not exceed with a chance of `share` or more; infinite where there are too
-        few kinds for it."""
+        """Computes the value that one more kind does not exceed with a chance of `share` or more; infinite where there
+        are too few kinds for it."""
         order = np.argsort(self.null)
         below = np.cumsum(self._weight[order])
-        place = int(np.searchsorted(below, share * (1 + self.count) - 1e-9))
-        return float(self.null[order][place]) if place < len(order) else math.inf
+        rank = int(np.searchsorted(below, share * (1 + self.count) - 1e-9))
+        return float(self.null[order][rank]) if rank < len(order) else math.inf
 
     def _as_far(self, value: float) -> float:
-        """Sum over the kinds of the share of each one's groups."""
+        """Sums, over the kinds, the share of each one's groups that are at least as far."""
         return float(self._weight[self.null >= value].sum())
 
     @cached_property
     def _weight(self) -> Floats:
-        """(group,) one over how many groups its kind has."""
-        _, place, counts = np.unique(self.kinds, return_inverse=True, return_counts=True)
-        return 1 / counts[place]
+        """Weighs each group by one over how many groups its kind has, (group,)."""
+        _, kind, counts = np.unique(self.kinds, return_inverse=True, return_counts=True)
+        return 1 / counts[kind]

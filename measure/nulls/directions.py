@@ -47,34 +47,35 @@ class Move:
 
 
 def moves(columns: tuple[str, ...]) -> list[Move]:
-    """Of all effects that are weighed, at their expected strengths of each sign that they may have."""
+    """Lists the moves of all effects that are weighed, at their expected strengths of each sign that they may have."""
     return [
-        Move(column=columns.index(one.name), name=one.name, strength=sign * one.expected)
-        for one in on_markers()
-        for sign in one.signs
-        if one.name in columns
+        Move(column=columns.index(strengths.name), name=strengths.name, strength=sign * strengths.expected)
+        for strengths in on_markers()
+        for sign in strengths.signs
+        if strengths.name in columns
     ]
 
 
 def pulled(evidence: Evidence) -> Floats:
-    """(column, part) root of each column's drop over what is left with it, with the sign of its coefficient; parts are
-    the errors', and their moments' about the pole where these are looked at."""
+    """Computes the root of each column's drop over what is left with it, with the sign of its coefficient, (column,
+    part); parts are the errors', and their moments' about the pole where these are looked at."""
     parts = [evidence] if evidence.turning is None else [evidence, evidence.turning]
-    found = [(own.pulls(), own.fit(()).left) for own in parts]
-    return np.stack([np.sign(pulls) * np.sqrt(shares_of(pulls**2, left)) for pulls, left in found], axis=1)
+    fits = [(part.pulls(), part.fit(()).remainder) for part in parts]
+    return np.stack([np.sign(pulls) * np.sqrt(shares_of(pulls**2, remainder)) for pulls, remainder in fits], axis=1)
 
 
 def standardised(pulls: Floats, centre: Floats, width: Floats) -> Floats:
-    """(…, column, part) pulls less what is usual, over how much they vary; −∞ where nothing is seen."""
+    """Standardises (…, column, part) pulls: less what is usual, over how much they vary; −∞ where nothing is seen."""
     return np.where(width > np.cbrt(NOTHING), (pulls - centre) / np.maximum(width, np.cbrt(NOTHING)), -np.inf)
 
 
 def directed(pulls: Floats, column: int, sign: int) -> Floats:
-    """(group,) how far standardised pulls (group, column, part) go the way of one effect, by the farther part."""
-    own = pulls[:, column]
-    return np.where(np.isfinite(own), sign * own, -np.inf).max(axis=1)
+    """Computes how far standardised pulls (group, column, part) go the way of one effect, by the farther part,
+    (group,)."""
+    of_column = pulls[:, column]
+    return np.where(np.isfinite(of_column), sign * of_column, -np.inf).max(axis=1)
 
 
-def shares_of(drops: Floats, left: float) -> Floats:
-    """Drops over what is left with each."""
-    return drops / np.maximum(left - drops, 1e-9)
+def shares_of(drops: Floats, misfit: float) -> Floats:
+    """Divides drops by what is left with each."""
+    return drops / np.maximum(misfit - drops, 1e-9)

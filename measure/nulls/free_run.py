@@ -19,8 +19,8 @@ _COPIES = 2
 
 
 def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> Floats:
-    """(recording, quantity) what recordings settle at less what a model does in the same winds, held where they show it
-    to be held.
+    """Computes what recordings settle at less what a model does in the same winds, held where they show it to be held,
+    (recording, quantity).
 
     Args:
         batch: the model's cloth, calibrations, winds and effects, one a recording.
@@ -36,15 +36,17 @@ def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> Floats:
         seed=child_seed(batch.seed, "free"),
     )
     runs, period = copies.as_fitted(), 1 / batch.rate
-    modelled = np.stack([settled(batch.markers, runs[..., place], period=period) for place in range(runs.shape[-1])])
+    modelled = np.stack([settled(batch.markers, runs[..., run], period=period) for run in range(runs.shape[-1])])
     observed = [settled(r.markers, r.positions, period=1 / r.rate, noise=r.noise) for r in recordings]
     return np.stack(observed) - modelled.reshape(_COPIES, count, -1).mean(axis=0)
 
 
 def mistaken(batch: NullBatch) -> NullBatch:
-    """The batch with calibrations that are off by as much as those of data are: one draw for its cloth."""
+    """Moves the batch's calibrations by as much as those of data are off: one draw for its cloth."""
     rng = stream(batch.seed, "null", "mistaken")
     spread = (CRITERIA.density_between, CRITERIA.bending_between, CRITERIA.damping_factor)
     steps = tuple(float(step) for step in spread * rng.standard_normal(3))
-    moved: dict[Calibration, Calibration] = {own: own.moved(steps) for own in batch.calibrations}
-    return replace(batch, calibrations=tuple(moved[own] for own in batch.calibrations))
+    moved: dict[Calibration, Calibration] = {
+        calibration: calibration.moved(steps) for calibration in batch.calibrations
+    }
+    return replace(batch, calibrations=tuple(moved[calibration] for calibration in batch.calibrations))

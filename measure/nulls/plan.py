@@ -49,17 +49,17 @@ class NullOptions:
 
     def __post_init__(self) -> None:
         if not 0 < self.level < 1:
-            raise UsageError(f"a level of {self.level!r}", where="nulls", fix="give one between 0 and 1")
+            raise UsageError(f"the level is {self.level!r}", where="nulls", fix="give one between 0 and 1")
         if self.nulls < FEWEST_NULLS or self.workers < 1:
             raise UsageError(
-                f"{self.nulls} nulls by {self.workers} workers",
+                f"{self.nulls} nulls cannot be made by {self.workers} workers",
                 where="nulls",
                 fix=f"give {FEWEST_NULLS} or more, and 1 or more",
             )
 
 
 def bank_for(setting: Setting, options: NullOptions, *, nulls: int | None = None, stage: Stage) -> NullBank:
-    """The bank of a folder where one is named; else nulls that are simulated for an experiment.
+    """Returns the bank of a folder where one is named; else nulls that are simulated for an experiment.
 
     Args:
         nulls: how many are simulated; None for as many as the options have.
@@ -86,7 +86,7 @@ def first_round(options: NullOptions) -> int:
 def more_nulls(
     nulls: int, wanted: int, most: int, conformal: GroupedConformal, statistic: float, *, level: float
 ) -> int | None:
-    """Twice as many nulls where so many leave open what the test decides; None where they decide it.
+    """Returns twice as many nulls where so many leave open what the test decides; None where they decide it.
 
     Below `wanted` that is where the interval of p is not wholly above the level: the base model is only ever rejected
     by that many or more, and p of so many is valid whether fewer would have ended the test or not. Beyond, up to
@@ -95,12 +95,12 @@ def more_nulls(
     p, (low, high) = conformal.p(statistic), conformal.interval(statistic, level=CRITERIA.interval)
     if nulls < wanted:
         return min(2 * nulls, wanted) if low <= level else None
-    near = level / CRITERIA.near <= p <= CRITERIA.near * level and low <= level <= high
-    return min(2 * nulls, most) if near and nulls < most else None
+    borderline = level / CRITERIA.near <= p <= CRITERIA.near * level and low <= level <= high
+    return min(2 * nulls, most) if borderline and nulls < most else None
 
 
 def load_bank(folder: Path, setting: Setting) -> NullBank:
-    """The bank of a folder, made as `measure.nulls.bank` does.
+    """Loads the bank of a folder, made as `measure.nulls.bank` does.
 
     Raises:
         InputError: its segments or anchors are not like the recordings'.
@@ -112,7 +112,7 @@ def load_bank(folder: Path, setting: Setting) -> NullBank:
 
 
 def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None:
-    """Refuse nulls that do not fit the recordings.
+    """Refuses nulls that do not fit the recordings.
 
     Raises:
         InputError: segments of another length, anchors known in another way, or cloths held in another way.
@@ -141,17 +141,18 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
 
 
 def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
-    """Nulls over the priors of the cloth, of the winds of an experiment and carried as it is: a batch for each kind of
-    numerics. Those of one cloth hold as many segments as the data, and are as noisy as the noisiest of its recordings.
+    """Draws nulls over the priors of the cloth, of the winds of an experiment and carried as it is: a batch for each
+    kind of numerics. Those of one cloth hold as many segments as the data, and are as noisy as the noisiest of its
+    recordings.
     """
     segments, recordings = setting.segments, setting.experiment.recordings
-    made = [
+    drawn = [
         banks.prior_batch(
             setting.experiment.specimen,
             markers=segments.markers,
             rate=1 / segments.period,
             noise=setting.design.noise,
-            duration=segments.cut.lasting(banks.each(len(segments))),
+            duration=segments.cut.lasting(banks.segments_of_each(len(segments))),
             speeds=banks.around(float(setting.speeds.min()), float(setting.speeds.max())),
             seed=child_seed(seed, "null", index),
         )
@@ -169,19 +170,19 @@ def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
                 seed=batch.seed,
             ),
         )
-        for batch in made
+        for batch in drawn
     ]
 
 
 def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
-    """A bank of `batches`, kept in the user's cache folder by the hash of its design: what is there already is not
-    simulated anew, and a build that was stopped goes on."""
+    """Simulates a bank of `batches`, kept in the user's cache folder by the hash of its design: what is there already
+    is not simulated anew, and a build that was stopped goes on."""
     wanted = batches(setting, kinds=math.ceil(nulls / banks.WINDS), seed=seed)
     done = 0
 
-    def count(more: int) -> None:
+    def count(finished: int) -> None:
         nonlocal done
-        done += more
+        done += finished
         stage(f"nulls of {len(wanted)} kinds", done, len(wanted))
 
     folder = kept_in(setting, seed=seed)
@@ -193,13 +194,14 @@ def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: S
 
 
 def kept_in(setting: Setting, *, seed: int) -> Path:
-    """The folder of the nulls of an experiment's design, by a seed and by this version of the code."""
-    made = {"design": design_hash(setting), "seed": seed, **banks.version_of_content()}
-    return user_cache() / "nulls" / recipe_hash(made)[:32]
+    """Returns the folder of the nulls of an experiment's design, by a seed and by this version of the code."""
+    identity = {"design": design_hash(setting), "seed": seed, **banks.version_of_content()}
+    return user_cache() / "nulls" / recipe_hash(identity)[:32]
 
 
 def design_hash(setting: Setting) -> str:
-    """SHA-256 of all of an experiment that shapes its nulls: cloth, markers, rate, noise, lengths, winds and ways."""
+    """Hashes all of an experiment that shapes its nulls, SHA-256: cloth, markers, rate, noise, lengths, winds and
+    ways."""
     segments, recordings = setting.segments, setting.experiment.recordings
     content, arrays = described(setting.experiment.specimen)
     del content["density-uncertainty"]  # nulls are judged under it, not made by it

@@ -22,8 +22,8 @@ from measure.inference.random_effect import NullModel, Nulls
 from measure.nulls.conformal import GroupedConformal, kinds_needed
 from measure.nulls.directions import APPEARS, NOTHING, Move, directed, moves, pulled, shares_of, standardised
 from measure.nulls.tails import as_normal, freedom
-from measure.probes.lines import Line, Lines, strongest
-from measure.probes.rows import Rows
+from measure.probes.lines import Lines, SpectralLine, strongest
+from measure.probes.rows import StatisticRows
 from measure.verdict.criteria import CRITERIA
 
 Floats = NDArray[np.float64]
@@ -48,7 +48,7 @@ class LeftOut:
 
 
 def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> Iterator[LeftOut]:
-    """Groups like data, of each experiment in turn: so many segments of its recordings.
+    """Draws groups like data, of each experiment in turn: so many segments of its recordings.
 
     Args:
         nulls: what the null models learn from.
@@ -58,23 +58,23 @@ def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> I
         InputError: an experiment has fewer segments.
     """
     rng = stream(seed, "null", "groups")
-    each = math.ceil(_GROUPS / len(np.unique(pool.experiment)))
+    groups_of_each = math.ceil(_GROUPS / len(np.unique(pool.experiment)))
     for index in range(pool.experiment.max() + 1):
         outside = pool.select(pool.experiment == index)
         recording = outside.statistics.recording
         places = [np.flatnonzero(recording == r) for r in np.unique(recording)]
         groups: list[NDArray[np.int64]] = []
-        for _ in range(each):
+        for _ in range(groups_of_each):
             chosen = np.concatenate([places[k] for k in rng.permutation(len(places))])[:segments]
             if len(chosen) < segments:
                 raise InputError(
-                    f"{segments} segments of data against {len(chosen)} nulls of one cloth",
+                    f"the data have {segments} segments, the nulls of one cloth {len(chosen)}",
                     where="null bank",
                     fix="simulate longer nulls, or give shorter recordings",
                 )
             groups.append(chosen)
-        others = nulls.select(nulls.numerics != outside.numerics[0])
-        yield LeftOut(model=NullModel.fit(others, outside.design), outside=outside, groups=tuple(groups))
+        other_kinds = nulls.select(nulls.numerics != outside.numerics[0])
+        yield LeftOut(model=NullModel.fit(other_kinds, outside.design), outside=outside, groups=tuple(groups))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,25 +104,25 @@ class NullBank:
         kinds = len(np.unique(self.nulls.numerics))
         if kinds < CRITERIA.fewest_kinds:
             raise InputError(
-                f"nulls of {kinds} kinds of numerics",
+                f"the nulls are of {kinds} kinds of numerics",
                 where="null bank",
                 fix=f"simulate at least {CRITERIA.fewest_kinds}, and {kinds_needed(CRITERIA.level)} to test at a level "
                 f"of {CRITERIA.level:g}",
             )
 
     def model(self, design: Design) -> NullModel:
-        """Learnt from all, for data of a design."""
+        """Fits the null model to all nulls, for data of a design."""
         return NullModel.fit(self.nulls, design)
 
     def plain(self) -> NullBank:
-        """For those who look at the errors alone: without moments about the pole, the wind's course and settled
-        quantities."""
-        own = replace(self.nulls.statistics, turning=None, course=None, settled=None)
-        return replace(self, nulls=replace(self.nulls, statistics=own))
+        """Removes moments about the pole, the wind's course and settled quantities, for those who look at the errors
+        alone."""
+        errors_alone = replace(self.nulls.statistics, turning=None, course=None, settled=None)
+        return replace(self, nulls=replace(self.nulls, statistics=errors_alone))
 
     def reference(self, segments: int, *, noise: float, seed: int, prior: Floats = PRIOR) -> Reference:
-        """Statistics of groups like the data: so many segments of recordings of one null experiment, by a null model
-        that has seen none of its numerics.
+        """Computes statistics of groups like the data: so many segments of recordings of one null experiment, by a null
+        model that has seen none of its numerics.
 
         Args:
             noise: of the data's markers [m].
@@ -132,19 +132,23 @@ class NullBank:
         Raises:
             InputError: no experiment has that many segments, or too few kinds have such noise.
         """
-        plain: list[_Found] = []
-        beside_gusts: list[_Found] = []
+        plain: list[_GroupStatistics] = []
+        beside_gusts: list[_GroupStatistics] = []
         groups: list[_Group] = []
-        for kept in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
-            evidence = Evidence.of(kept.outside.statistics, kept.outside.speeds, kept.model.under(prior))
-            for chosen in {tuple(sorted(group.tolist())): group for group in kept.groups}.values():
-                picked, own = evidence.select(chosen), kept.outside.select(chosen[:1])
-                plain.append(_Found.of(picked, self.columns, own))
-                beside_gusts.append(_Found.of(picked.freed(self.columns.index(GUSTS)), self.columns, own))
-            first = kept.groups[0]
-            groups.append(_Group(evidence=evidence.select(first), own=kept.outside.select(first[:1])))
-        beside = Reference.of(_Found.joined(beside_gusts), noise)
-        return Reference.of(_Found.joined(plain), noise, beside_gusts=beside, columns=self.columns, groups=groups)
+        for left_out in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
+            evidence = Evidence.of(left_out.outside.statistics, left_out.outside.speeds, left_out.model.under(prior))
+            for chosen in {tuple(sorted(group.tolist())): group for group in left_out.groups}.values():
+                picked, first_segment = evidence.select(chosen), left_out.outside.select(chosen[:1])
+                plain.append(_GroupStatistics.of(picked, self.columns, first_segment))
+                beside_gusts.append(
+                    _GroupStatistics.of(picked.freed(self.columns.index(GUSTS)), self.columns, first_segment)
+                )
+            first = left_out.groups[0]
+            groups.append(_Group(evidence=evidence.select(first), own=left_out.outside.select(first[:1])))
+        with_gusts = Reference.of(_GroupStatistics.joined(beside_gusts), noise)
+        return Reference.of(
+            _GroupStatistics.joined(plain), noise, beside_gusts=with_gusts, columns=self.columns, groups=groups
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,7 +160,7 @@ class _Group:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Found(Rows):
+class _GroupStatistics(StatisticRows):
     """Statistics of null groups.
 
     Attributes:
@@ -186,8 +190,8 @@ class _Found(Rows):
     damping: Floats
 
     @classmethod
-    def of(cls, evidence: Evidence, columns: tuple[str, ...], own: Nulls) -> _Found:
-        """Of one group, whose statistics are at its true calibration.
+    def of(cls, evidence: Evidence, columns: tuple[str, ...], segment: Nulls) -> _GroupStatistics:
+        """Computes the statistics of one group, taken at its true calibration.
 
         A null's cloth is as far from the nominal one as cloths known to `PRIOR` are. Where the data's is known better,
         that of a null lies nearer to its nominal one by as much.
@@ -195,20 +199,20 @@ class _Found(Rows):
         Args:
             own: one segment of it.
         """
-        nominal = -own.calibration[0] * np.minimum(evidence.prior / PRIOR, 1.0)
-        swing, settles = (np.zeros(0) if own is None else own for own in (evidence.swing, evidence.settles))
+        nominal = -segment.calibration[0] * np.minimum(evidence.prior / PRIOR, 1.0)
+        swing, settles = (np.zeros(0) if values is None else values for values in (evidence.swing, evidence.settles))
         return cls(
             shares=unscaled(evidence, columns)[None],
             pulls=pulled(evidence)[None],
-            left=np.array([evidence.fit(()).left]),
+            left=np.array([evidence.fit(()).remainder]),
             gained=np.array([best_gain(evidence, without=_uncounted(columns))]),
             swings=swing[None],
             settled=settles[None],
             lines=None if evidence.lines is None else strongest(evidence.lines)[None],
             deviations=evidence.fit((), centre=nominal).in_errors(range(len(THETA)))[None],
-            noise=own.noise,
-            kinds=own.numerics,
-            damping=own.calibration[:, DAMPING],
+            noise=segment.noise,
+            kinds=segment.numerics,
+            damping=segment.calibration[:, DAMPING],
         )
 
 
@@ -226,38 +230,40 @@ class _Usual:
     pull_width: Floats
 
     @classmethod
-    def of(cls, found: _Found) -> _Usual:
-        lines = None if found.lines is None else Lines.of(found.lines)
-        powers = np.array([power(np.abs(own), found.damping) for own in found.swings.T])
-        roots = _roots(found, lines, powers)
+    def of(cls, groups: _GroupStatistics) -> _Usual:
+        lines = None if groups.lines is None else Lines.of(groups.lines)
+        powers = np.array([power(np.abs(swings), groups.damping) for swings in groups.swings.T])
+        roots = _roots(groups, lines, powers)
         return cls(
             powers=powers,
-            spread=np.maximum(found.shares.mean(axis=0), NOTHING),
+            spread=np.maximum(groups.shares.mean(axis=0), NOTHING),
             centre=roots.mean(axis=0),
             width=np.maximum(roots.std(axis=0), np.cbrt(NOTHING)),
             lines=lines,
             degrees=freedom(roots),
-            pull=found.pulls.mean(axis=0),
-            pull_width=found.pulls.std(axis=0),
+            pull=groups.pulls.mean(axis=0),
+            pull_width=groups.pulls.std(axis=0),
         )
 
     def pulled(self, pulls: Floats) -> Floats:
-        """(group, column, part) how far each column pulls more than it does in nulls, in their standard deviations."""
+        """Computes how far each column pulls more than it does in nulls, in their standard deviations, (group, column,
+        part)."""
         return standardised(pulls, self.pull, self.pull_width)
 
-    def far(self, found: _Found) -> Floats:
-        """(group, column + 2 to 11) how far groups are from their mean, in deviations by each one's own tail."""
-        far = as_normal((_roots(found, self.lines, self.powers) - self.centre) / self.width, self.degrees)
-        begin = found.shares.shape[1] + 2
-        either = slice(begin, begin + found.swings.shape[1] + found.settled.shape[1])
-        far[:, either] = np.abs(far[:, either])
-        return far
+    def far(self, groups: _GroupStatistics) -> Floats:
+        """Computes how far groups are from their mean, in deviations by each one's own tail, (group, column + 2 to
+        11)."""
+        distances = as_normal((_roots(groups, self.lines, self.powers) - self.centre) / self.width, self.degrees)
+        begin = groups.shares.shape[1] + 2
+        either = slice(begin, begin + groups.swings.shape[1] + groups.settled.shape[1])
+        distances[:, either] = np.abs(distances[:, either])
+        return distances
 
 
-def _roots(found: _Found, lines: Lines | None, powers: Floats) -> Floats:
-    swings = found.swings * np.exp(-np.outer(found.damping, powers))
-    roots = np.c_[np.cbrt(np.c_[found.shares, found.left, found.gained]), swings, found.settled]
-    return roots if lines is None or found.lines is None else np.c_[roots, lines.standing_out(found.lines)]
+def _roots(groups: _GroupStatistics, lines: Lines | None, powers: Floats) -> Floats:
+    swings = groups.swings * np.exp(-np.outer(groups.damping, powers))
+    roots = np.c_[np.cbrt(np.c_[groups.shares, groups.left, groups.gained]), swings, groups.settled]
+    return roots if lines is None or groups.lines is None else np.c_[roots, lines.standing_out(groups.lines)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -331,14 +337,14 @@ class Reference:
     @classmethod
     def of(
         cls,
-        found: _Found,
+        statistics: _GroupStatistics,
         noise: float,
         *,
         beside_gusts: Reference | None = None,
         columns: tuple[str, ...] = (),
         groups: Sequence[_Group] = (),
     ) -> Reference:
-        """For data of some noise [m].
+        """Makes the null distributions for data of some noise [m].
 
         Args:
             groups: one of each kind.
@@ -346,33 +352,38 @@ class Reference:
         Raises:
             InputError: no nulls of such noise.
         """
-        kinds = found.kinds
-        similar = np.abs(found.noise - noise) <= CRITERIA.alike_noise
+        kinds = statistics.kinds
+        similar = np.abs(statistics.noise - noise) <= CRITERIA.alike_noise
         count, needed = len(np.unique(kinds[similar])), kinds_needed(1 - CRITERIA.interval)
         if count < needed:
             raise InputError(
-                f"{count} kinds of numerics with markers as noisy as {1e3 * noise:.2g} mm",
+                f"the nulls are of {count} kinds of numerics with markers as noisy as {1e3 * noise:.2g} mm",
                 where="null bank",
                 fix=f"build a bank of {needed} or more with such noise, or leave it out",
             )
-        usual = _Usual.of(found.select(similar))
-        scaled, far = np.empty_like(found.shares), np.empty((len(kinds), len(usual.centre)))
-        pulls, apart = np.empty_like(found.pulls), dict[int, _Usual]()
+        usual = _Usual.of(statistics.select(similar))
+        scaled, distances = np.empty_like(statistics.shares), np.empty((len(kinds), len(usual.centre)))
+        pulls, usual_of_kind = np.empty_like(statistics.pulls), dict[int, _Usual]()
         for kind in np.unique(kinds):
-            own = kinds == kind
-            near = np.abs(found.noise - found.noise[own][0]) <= CRITERIA.alike_noise
-            if len(np.unique(kinds[near & ~own])) >= CRITERIA.fewest_kinds:  # else no others have such noise
-                near &= ~own
-            others = replace(_Usual.of(found.select(near)), degrees=usual.degrees)
-            scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
-            pulls[own] = others.pulled(found.pulls[own])
-            apart[int(kind)] = others
+            of_kind = kinds == kind
+            similar_noise = np.abs(statistics.noise - statistics.noise[of_kind][0]) <= CRITERIA.alike_noise
+            if (
+                len(np.unique(kinds[similar_noise & ~of_kind])) >= CRITERIA.fewest_kinds
+            ):  # else no others have such noise
+                similar_noise &= ~of_kind
+            usual_of_others = replace(_Usual.of(statistics.select(similar_noise)), degrees=usual.degrees)
+            scaled[of_kind], distances[of_kind] = (
+                statistics.shares[of_kind] / usual_of_others.spread,
+                usual_of_others.far(statistics.select(of_kind)),
+            )
+            pulls[of_kind] = usual_of_others.pulled(statistics.pulls[of_kind])
+            usual_of_kind[int(kind)] = usual_of_others
         return cls(
             scaled=scaled,
             spread=usual.spread,
-            far=far,
+            far=distances,
             kinds=kinds,
-            deviations=found.deviations,
+            deviations=statistics.deviations,
             centre=usual.centre,
             width=usual.width,
             degrees=usual.degrees,
@@ -384,15 +395,15 @@ class Reference:
             beside_gusts=beside_gusts,
             columns=columns,
             groups=tuple(groups),
-            usual=apart,
+            usual=usual_of_kind,
         )
 
     def at(self, calibration: Calibration) -> Reference:
-        """For data whose statistics are taken at a calibration."""
+        """Returns the null distributions for data whose statistics are taken at a calibration."""
         return replace(self, damping=calibration.steps_from(Calibration())[DAMPING])
 
     def beside(self) -> Reference:
-        """That of evidence with a pressure that is free in every segment.
+        """Returns the null distributions of evidence with a pressure that is free in every segment.
 
         Raises:
             UsageError: this is it.
@@ -408,18 +419,18 @@ class Reference:
 
     @cached_property
     def reach(self) -> Floats:
-        """(theta,) standard errors, as Σ has them, to either side of an interval of the calibrated parameters: as many
+        """Computes standard errors, as Σ has them, to either side of an interval of the calibrated parameters: as many
         as hold the true ones in a share of the kinds of numerics, themselves and one more counted, that is the
-        intervals' level."""
+        intervals' level, (theta,)."""
         return np.array(
             [
-                GroupedConformal(null=np.abs(own), kinds=self.kinds).quantile(CRITERIA.interval)
-                for own in self.deviations.T
+                GroupedConformal(null=np.abs(deviations), kinds=self.kinds).quantile(CRITERIA.interval)
+                for deviations in self.deviations.T
             ]
         )
 
     def along(self, column: int, sign: int) -> Reference:
-        """That tests along one effect alone, which was suspected beforehand."""
+        """Returns the null distributions that test along one effect alone, which was suspected beforehand."""
         return replace(self, suspected=(column, sign))
 
     @cached_property
@@ -430,106 +441,122 @@ class Reference:
         return GroupedConformal(null=directed(self.pulled, *self.suspected), kinds=self.kinds)
 
     def tested(self, evidence: Evidence, columns: tuple[str, ...]) -> float:
-        """The statistic of data that the base model is tested by."""
+        """Computes the statistic of data that the base model is tested by."""
         if self.suspected is None:
             return self.farthest(evidence, columns)
         return float(directed(standardised(pulled(evidence), self.pull, self.pull_width)[None], *self.suspected)[0])
 
     def power(self, level: float) -> tuple[tuple[Move, float], ...]:
-        """Effects that are tested for, each with the share of nulls beyond the critical value once it acts on them at
-        its expected strength: on average of both signs, where it may have either, but of the suspected one alone."""
+        """Lists effects that are tested for, each with the share of nulls beyond the critical value once it acts on
+        them at its expected strength: on average of both signs, where it may have either, but of the suspected one
+        alone."""
         critical = self.test.critical(level)
         if critical is None:
             return ()
-        shares = {move: float((found > critical).mean()) for move, found in self._acting.items()}
-        each: dict[int, list[Move]] = {}
+        shares = {move: float((statistics_of > critical).mean()) for move, statistics_of in self._acting.items()}
+        by_column: dict[int, list[Move]] = {}
         for move in shares:
-            each.setdefault(move.column, []).append(move)
-        return tuple((own[0], float(np.mean([shares[move] for move in own]))) for own in each.values())
+            by_column.setdefault(move.column, []).append(move)
+        return tuple(
+            (moves_of[0], float(np.mean([shares[move] for move in moves_of]))) for moves_of in by_column.values()
+        )
 
     @cached_property
     def _acting(self) -> dict[Move, Floats]:
-        """Effects that are tested for → (group,) the statistic of nulls on which each acts, as far as appears."""
-        found: dict[Move, Floats] = {}
+        """Computes the statistic of nulls on which each effect that is tested for acts, as far as appears, (group,)."""
+        statistics_of: dict[Move, Floats] = {}
         for move in moves(self.columns):
             if self.suspected is None or (move.column, move.sign) == self.suspected:
-                acted = [own.evidence.moved(move.column, APPEARS * move.strength) for own in self.groups]
-                found[move] = np.array([self._found(one, own.own) for one, own in zip(acted, self.groups, strict=True)])
-        return found
+                acted = [group.evidence.moved(move.column, APPEARS * move.strength) for group in self.groups]
+                statistics_of[move] = np.array(
+                    [
+                        self._statistic_of_group(evidence, group.own)
+                        for evidence, group in zip(acted, self.groups, strict=True)
+                    ]
+                )
+        return statistics_of
 
-    def _found(self, evidence: Evidence, own: Nulls) -> float:
-        """The test's statistic of a null group."""
-        usual = self.usual[int(own.numerics[0])]
+    def _statistic_of_group(self, evidence: Evidence, segment: Nulls) -> float:
+        """Computes the test's statistic of a null group."""
+        usual = self.usual[int(segment.numerics[0])]
         if self.suspected is None:
-            return float(usual.far(_Found.of(evidence, self.columns, own)).max())
+            return float(usual.far(_GroupStatistics.of(evidence, self.columns, segment)).max())
         return float(directed(usual.pulled(pulled(evidence)[None]), *self.suspected)[0])
 
-    def statistics(self, evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
-        """(column,) of data, as `scaled` has them, where some columns are fitted already."""
-        shares = unscaled(evidence, columns, beside)
+    def statistics(self, evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> Floats:
+        """Computes (column,) statistics of data, as `scaled` has them, where some columns are fitted already."""
+        shares = unscaled(evidence, columns, along)
         return shares / self.spread[: len(shares)]
 
     def p_family(self, statistic: float, column: int) -> float:
-        """Chance that in nulls any is as far as this column."""
-        return self.conformal.p(float(self._far(statistic * self.spread[column], column)))
+        """Computes the chance that in nulls any column is as far as this one."""
+        return self.conformal.p(float(self._distance(statistic * self.spread[column], column)))
 
     def p_alone(self, statistic: float, column: int) -> float:
-        """The same for the column alone."""
+        """Computes the chance that in nulls this column alone is as far."""
         return GroupedConformal(null=self.scaled[:, column], kinds=self.kinds).p(statistic)
 
     def reach_of(self, column: int) -> float:
-        """How many standard errors, those that make nulls' mean squared z 1, reach to either side of an interval."""
+        """Computes how many standard errors, those that make nulls' mean squared z 1, reach to either side of an
+        interval."""
         null = GroupedConformal(null=self.scaled[:, column], kinds=self.kinds)
         return math.sqrt(null.quantile(CRITERIA.interval))
 
     def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
-        """p of the global test on what some columns leave, fitted to the data."""
+        """Computes p of the global test on what some columns leave, fitted to the data."""
         return self.conformal.p(self.farthest(evidence, columns, chosen))
 
     def farthest(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = ()) -> float:
-        """How far the farthest of data is, where some columns are fitted already: the statistic of the global test."""
-        shares, left = unscaled(evidence, columns, chosen), evidence.fit(chosen).left
-        far = max(float(self._far(shares, slice(len(shares))).max()), float(self._far(left, len(self.spread))))
+        """Computes how far the farthest of data is, where some columns are fitted already: the statistic of the global
+        test."""
+        shares, remainder = unscaled(evidence, columns, chosen), evidence.fit(chosen).remainder
+        distance = max(
+            float(self._distance(shares, slice(len(shares))).max()), float(self._distance(remainder, len(self.spread)))
+        )
         best = best_gain(evidence, chosen, without=_uncounted(columns))
-        gained = float(self._far(best, len(self.spread) + 1))
+        gained = float(self._distance(best, len(self.spread) + 1))
         swing, line, settles = self.swing(evidence), self.line(evidence), self.settles(evidence)
-        beside = [swing, None if line is None else line.far, None if settles is None else float(settles.max())]
-        return max(far, gained, *(own for own in beside if own is not None))
+        further = [swing, None if line is None else line.far, None if settles is None else float(settles.max())]
+        return max(distance, gained, *(value for value in further if value is not None))
 
     def swing(self, evidence: Evidence) -> float | None:
-        """How far the wind's course of data swings, by the part that does most; None where it is not looked at.
+        """Computes how far the wind's course of data swings, by the part that does most; None where it is not looked
+        at.
 
         Raises:
             UsageError: it is of the data, and was not of the nulls.
         """
-        found = evidence.swing
-        if found is None:
+        observed = evidence.swing
+        if observed is None:
             return None
-        own = slice(len(self.spread) + 2, len(self.spread) + 2 + len(self.powers))
-        if len(self.centre[own]) != len(found):
-            raise UsageError("courses of the data alone", where="reference", fix="look at them in the nulls as well")
-        damped = found * np.exp(-self.damping * self.powers)
-        return float(np.abs(self._by_tail(damped, own)).max())
+        columns = slice(len(self.spread) + 2, len(self.spread) + 2 + len(self.powers))
+        if len(self.centre[columns]) != len(observed):
+            raise UsageError(
+                "only the data have courses of the wind", where="reference", fix="look at them in the nulls as well"
+            )
+        damped = observed * np.exp(-self.damping * self.powers)
+        return float(np.abs(self._by_tail(damped, columns)).max())
 
     def settles(self, evidence: Evidence) -> Floats | None:
-        """(quantity,) how far each of data lies that recordings settle at; None where they are not looked at.
+        """Computes how far each quantity of data lies that recordings settle at, (quantity,); None where they are not
+        looked at.
 
         Raises:
             UsageError: they are of the data, and were not of the nulls.
         """
-        found = evidence.settles
-        if found is None:
+        settled = evidence.settles
+        if settled is None:
             return None
         begin = len(self.spread) + 2 + len(self.powers)
-        own = slice(begin, len(self.centre) - (self.lines is not None))
-        if len(self.centre[own]) != len(found):
+        columns = slice(begin, len(self.centre) - (self.lines is not None))
+        if len(self.centre[columns]) != len(settled):
             raise UsageError(
-                "settled quantities of the data alone", where="reference", fix="look at them in the nulls as well"
+                "only the data have settled quantities", where="reference", fix="look at them in the nulls as well"
             )
-        return np.abs(self._by_tail(found, own))
+        return np.abs(self._by_tail(settled, columns))
 
-    def line(self, evidence: Evidence) -> Line | None:
-        """The most prominent one of data; None where spectra are not looked at.
+    def line(self, evidence: Evidence) -> SpectralLine | None:
+        """Finds the most prominent line of data; None where spectra are not looked at.
 
         Raises:
             UsageError: they are, of the data or of the nulls alone.
@@ -538,17 +565,19 @@ class Reference:
             return None
         if self.lines is None or evidence.lines is None:
             raise UsageError(
-                "spectra of the nulls or of the data alone", where="reference", fix="look at lines in both or in none"
+                "only the nulls or only the data have spectra",
+                where="reference",
+                fix="look at lines in both or in none",
             )
         line = self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
         return replace(line, far=float(as_normal(np.array(line.far), self.degrees[-1])))
 
-    def _far(self, values: Floats | float, columns: int | slice) -> Floats:
-        """How far shares, what is left or the best gain lie, as `far` has it."""
+    def _distance(self, values: Floats | float, columns: int | slice) -> Floats:
+        """Computes how far shares, what is left or the best gain lie, as `far` has it."""
         return self._by_tail(np.cbrt(values), columns)
 
     def _by_tail(self, values: Floats | float, columns: int | slice) -> Floats:
-        """The same of roots as they are."""
+        """Computes how far roots lie, as they are."""
         return as_normal((values - self.centre[columns]) / self.width[columns], self.degrees[columns])
 
 
@@ -558,17 +587,17 @@ def _uncounted(columns: tuple[str, ...]) -> list[int]:
     return [columns.index(TURNED)] if TURNED in columns else []
 
 
-def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:
-    """Each column's drop over what is left with it in some segments, and the likelihood ratio of gusts; where moments
-    about the pole are looked at, then the same drops of these, and what they leave.
+def unscaled(evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> Floats:
+    """Computes each column's drop over what is left with it in some segments, and the likelihood ratio of gusts; where
+    moments about the pole are looked at, then the same drops of these, and what they leave.
 
     Args:
-        beside: columns that are fitted already.
+        along: columns that are fitted already.
     """
-    drops, left = evidence.drops(beside), evidence.fit(beside).left
-    gusts = fluctuation(evidence, columns.index(GUSTS), beside).likelihood
-    found = np.append(shares_of(drops, left), max(gusts, 0.0))
+    drops, remainder = evidence.drops(along), evidence.fit(along).remainder
+    gusts = fluctuation(evidence, columns.index(GUSTS), along).likelihood
+    values = np.append(shares_of(drops, remainder), max(gusts, 0.0))
     if evidence.turning is None:
-        return found
-    drops, left = evidence.turning.drops(beside), evidence.turning.fit(beside).left
-    return np.concatenate([found, shares_of(drops, left), [left]])
+        return values
+    drops, remainder = evidence.turning.drops(along), evidence.turning.fit(along).remainder
+    return np.concatenate([values, shares_of(drops, remainder), [remainder]])

@@ -82,22 +82,22 @@ class NullBatch:
     effects: tuple[Effect, ...] = ()
 
     def simulate(self) -> list[Trajectory]:
-        """One recording a calibration."""
-        flat, held = self._mesh()
-        seen = np.einsum("mv,fvcb->fmcb", onto(flat.rest, self.markers), self._frames(flat, held))
-        jitter = self.noise * stream(self.seed, "null", "markers").standard_normal(seen.shape)
-        made = [
+        """Simulates one recording a calibration."""
+        flat, attached = self._mesh()
+        tracked = np.einsum("mv,fvcb->fmcb", onto(flat.rest, self.markers), self._frames(flat, attached))
+        jitter = self.noise * stream(self.seed, "null", "markers").standard_normal(tracked.shape)
+        trajectories = [
             Trajectory(
-                name=f"null {self.seed}-{place}",
+                name=f"null {self.seed}-{number}",
                 markers=self.markers,
-                positions=seen[..., place] + jitter[..., place],
+                positions=tracked[..., number] + jitter[..., number],
                 rate=self.rate,
                 wind=wind,
                 noise=self.noise,
             )
-            for place, wind in enumerate(self.winds or [WindTrack.constant((u, 0.0, 0.0)) for u in self.speeds])
+            for number, wind in enumerate(self.winds or [WindTrack.constant((u, 0.0, 0.0)) for u in self.speeds])
         ]
-        return [carried(recording, self.specimen.seats) for recording in made] if self.tracks else made
+        return [carried(recording, self.specimen.seats) for recording in trajectories] if self.tracks else trajectories
 
     @property
     def effort(self) -> float:
@@ -106,8 +106,8 @@ class NullBatch:
         return self._mesh()[0].vertex_count * (2.0 if isinstance(integrator, Symplectic) else 1.0)
 
     def _mesh(self) -> tuple[Mesh, tuple[int, ...]]:
-        """A finer mesh in the fit's frame, and its vertices nearest to the attachments: a grid, or in half of the draws
-        one whose inner vertices are moved and joined anew (Delaunay), as other codes' meshes are."""
+        """Makes a finer mesh in the fit's frame, and finds its vertices nearest to the attachments: a grid, or in half
+        of the draws one whose inner vertices are moved and joined anew (Delaunay), as other codes' meshes are."""
         rng = stream(self.seed, "null", "mesh")
         rest = self.specimen.mesh.rest
         low, size = rest.min(axis=0), np.ptp(rest, axis=0)
@@ -118,11 +118,11 @@ class NullBatch:
         if rng.random() < 0.5:
             flat = irregular(flat, spacing, rng)
         flat = replace(flat, rest=flat.rest + low)
-        held = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
-        return flat, tuple(held)
+        nearest = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
+        return flat, tuple(nearest)
 
-    def _frames(self, flat: Mesh, held: tuple[int, ...]) -> Floats:
-        """(frame, vertex, 3, recording) [m], after the start has been forgotten.
+    def _frames(self, flat: Mesh, attached: tuple[int, ...]) -> Floats:
+        """Computes positions (frame, vertex, 3, recording) [m], after the start has been forgotten.
 
         Cloth that is stretched beyond what a stable step is estimated for diverges; it is run anew in smaller steps.
 
@@ -131,7 +131,7 @@ class NullBatch:
         """
         for halvings in range(1 + _HALVINGS):
             with suppress(DivergedError):
-                return self._run(flat, held, *self._method(halvings))
+                return self._run(flat, attached, *self._method(halvings))
         raise FlagdataError(
             f"a simulation of nulls diverges, even in steps {2**_HALVINGS} times smaller than usual",
             where=f"{self.calibrations[0]}, stretching × {self.stiffness.stretching:.3g}, winds "
@@ -140,24 +140,24 @@ class NullBatch:
         )
 
     def as_fitted(self) -> Floats:
-        """(frame, marker, 3, recording) of the same by the mesh and the steps of the fit, without noise [m].
+        """Computes the same by the mesh and the steps of the fit, without noise, (frame, marker, 3, recording) [m].
 
         Raises:
             FlagdataError: it diverges.
         """
         specimen = self.specimen
         try:
-            found = self._run(specimen.mesh, specimen.held, SplitEuler(), 0.0)
+            frames = self._run(specimen.mesh, specimen.held, SplitEuler(), 0.0)
         except DivergedError:
             raise FlagdataError(
                 "a free run of the model diverges",
                 where=f"{self.calibrations[0]}",
                 fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
             ) from None
-        return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), found)
+        return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), frames)
 
-    def _run(self, flat: Mesh, held: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
-        """The same by a method that damps by itself so much [s].
+    def _run(self, flat: Mesh, attached: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
+        """Runs the flags by a method that damps by itself so much [s].
 
         Raises:
             DivergedError: a position is not finite.
@@ -169,7 +169,7 @@ class NullBatch:
         scenes = []
         for calibration, rough, speed, anchors in zip(self.calibrations, roughness, self.speeds, begun, strict=True):
             position = _hung(flat.rest, specimen.seats, anchors) + rough
-            position[list(held)] = anchors
+            position[list(attached)] = anchors
             material = calibration.material(self.stiffness.of(specimen.material))
             scenes.append(
                 Scene(
@@ -179,7 +179,7 @@ class NullBatch:
                     air=specimen.air,
                     wind=(speed, 0.0, 0.0),
                     material=replace(material, damping=max(material.damping - damped, 0.0)),
-                    handles=Handles(vertices=held, stiffness=specimen.stiffness),
+                    handles=Handles(vertices=attached, stiffness=specimen.stiffness),
                 )
             )
         system, state = assemble(scenes)
@@ -203,11 +203,11 @@ class NullBatch:
         return after(SETTLE, self.duration, self.rate).start / self.rate
 
     def _times(self, period: float) -> Floats:
-        """(n,) of a run, so far apart, since the recording's first frame [s]."""
+        """Lists times (n,) of a run, so far apart, since the recording's first frame [s]."""
         return np.arange(math.ceil((SETTLE + self.duration) / period) + 2, dtype=np.float64) * period - self._begins
 
     def _blowing(self, system: System) -> SampledWind:
-        """The winds since the start of the run."""
+        """Samples the winds since the start of the run."""
         times = self._times(_SAMPLED)
         samples = np.stack([wind.at(times) for wind in self.winds], axis=-1)
         blown = torch.as_tensor(samples, dtype=system.cloth.dtype, device=system.cloth.device)
@@ -215,13 +215,14 @@ class NullBatch:
         return SampledWind(times=even, samples=blown, beyond=Beyond.HOLD)
 
     def _carrying(self, system: System) -> AnchorTracks:
-        """The ways of the attachments since the start of the run."""
+        """Samples the paths of the attachments since the start of the run."""
         places = np.stack([track.at(self._times(CARRIED)) for track in self.tracks], axis=-1)
         moved = torch.as_tensor(places - places[0], dtype=system.cloth.dtype, device=system.cloth.device)
         return AnchorTracks(start=0.0, period=CARRIED, samples=moved)
 
     def _method(self, halvings: int = 0) -> tuple[Integrator, float]:
-        """A method for these dampings with steps that were halved so often, and the damping it adds by itself [s]."""
+        """Chooses a method for these dampings with steps that were halved so often, and the damping it adds by itself
+        [s]."""
         if max(c.damping for c in self.calibrations) <= _GENTLE and not self.effects:
             return Symplectic(safety=SAFETY / 2**halvings), 0.0
         step = _STEPS[stream(self.seed, "null", "method").integers(len(_STEPS))] / 2**halvings
@@ -230,8 +231,8 @@ class NullBatch:
 
 
 def _hung(rest: Floats, seats: Floats, anchors: Floats) -> Floats:
-    """(vertex, 3) of a plane upright cloth below or beside its anchors (held, 3) [m], turned about the vertical as they
-    are; one that is held along a vertical stands along +x.
+    """Hangs a plane upright cloth below or beside its anchors (held, 3) [m], turned about the vertical as they are,
+    (vertex, 3); one that is held along a vertical stands along +x.
 
     Args:
         rest, seats: (vertex, 2) of the cloth, (held, 2) of its attachments [m].
@@ -246,7 +247,8 @@ def _hung(rest: Floats, seats: Floats, anchors: Floats) -> Floats:
 
 
 def irregular(flat: Mesh, spacing: float, rng: np.random.Generator) -> Mesh:
-    """A grid's vertices, those inside moved by up to `_UNEVEN` of the spacing [m] along each axis, joined anew."""
+    """Moves a grid's vertices, those inside by up to `_UNEVEN` of the spacing [m] along each axis, and joins them
+    anew."""
     low, high = flat.rest.min(axis=0), flat.rest.max(axis=0)
     inside = ((flat.rest > low + spacing / 2) & (flat.rest < high - spacing / 2)).all(axis=1)
     rest = flat.rest + np.where(inside[:, None], rng.uniform(-_UNEVEN, _UNEVEN, flat.rest.shape) * spacing, 0.0)

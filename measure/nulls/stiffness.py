@@ -37,7 +37,7 @@ class StiffnessFactors:
     bending: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
     def of(self, material: Material) -> Material:
-        """The material with its tables multiplied; the coupling of warp and weft by their geometric mean."""
+        """Multiplies the material's tables; the coupling of warp and weft by their geometric mean."""
         along = np.array([self.warp, math.sqrt(self.warp * self.weft), self.weft, self.shear])
         return replace(
             material,
@@ -47,9 +47,10 @@ class StiffnessFactors:
 
 
 def drawn(rng: np.random.Generator) -> StiffnessFactors:
-    """A fabric over the prior: all factors log-uniform, those of bending about a mean of 1, which is calibrated."""
+    """Draws a fabric over the prior: all factors log-uniform, those of bending about a mean of 1, which is
+    calibrated."""
     stretching = float(np.exp(rng.uniform(*np.log(_STRETCHING))))
-    apart = rng.uniform(-math.log(_APART), math.log(_APART), 6)
-    apart[3:] -= apart[3:].mean()
-    warp, weft, shear, *bending = (float(factor) for factor in np.exp(apart))
+    logs = rng.uniform(-math.log(_APART), math.log(_APART), 6)
+    logs[3:] -= logs[3:].mean()
+    warp, weft, shear, *bending = (float(factor) for factor in np.exp(logs))
     return StiffnessFactors(stretching=stretching, warp=warp, weft=weft, shear=shear, bending=tuple(bending))  # type: ignore[arg-type]

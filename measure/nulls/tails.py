@@ -23,7 +23,7 @@ _TINY = float(np.finfo(np.float64).tiny)
 
 
 def freedom(values: Floats) -> Floats:
-    """(statistic,) degrees of freedom by the kurtosis of nulls (group, statistic), from 4 on."""
+    """Estimates degrees of freedom by the kurtosis of nulls (group, statistic), from 4 on, (statistic,)."""
     about = values - values.mean(axis=0)
     kurtosis = (about**4).mean(axis=0) / np.maximum((about**2).mean(axis=0) ** 2, _TINY) - 3
     return np.minimum(4 + 6 / np.maximum(kurtosis, 6 / _NORMAL), _NORMAL)

@@ -29,7 +29,7 @@ _HALVINGS = 40
 def like(
     recordings: Sequence[Trajectory], seats: Floats, count: int, *, duration: float, seed: int
 ) -> tuple[AttachmentTrack, ...]:
-    """So many ways of attachments; none where those of the recordings are held still.
+    """Draws so many ways of attachments; none where those of the recordings are held still.
 
     Args:
         recordings: of the data, in the frame of the fit.
@@ -44,18 +44,18 @@ def like(
     half = round(_TURN / 2 / CARRIED)
     times = np.arange(round((SETTLE + duration) / CARRIED) + 2, dtype=np.float64) * CARRIED
     around = np.arange(-half, len(times) + half, dtype=np.float64) * CARRIED
-    made: list[AttachmentTrack] = []
+    drawn: list[AttachmentTrack] = []
     for _ in range(count):
         way = ways[int(rng.integers(len(ways)))]
         length = float(way.x[-1])
-        there = np.abs((around + rng.uniform(0, 2 * length)) % (2 * length) - length)
-        instants = np.convolve(there, np.full(2 * half + 1, 1 / (2 * half + 1)), mode="valid")
-        made.append(AttachmentTrack(times=times - SETTLE, places=way(instants)))
-    return tuple(made)
+        folded = np.abs((around + rng.uniform(0, 2 * length)) % (2 * length) - length)
+        instants = np.convolve(folded, np.full(2 * half + 1, 1 / (2 * half + 1)), mode="valid")
+        drawn.append(AttachmentTrack(times=times - SETTLE, places=way(instants)))
+    return tuple(drawn)
 
 
 def smoothed(recording: Trajectory, seats: Floats) -> CubicSpline:
-    """The way of a recording's attachments (held, 3) [m] over its time [s], without the noise of the markers.
+    """Smooths the way of a recording's attachments (held, 3) [m] over its time [s], free of the noise of the markers.
 
     It is the smoothest, by its third differences, that lies as far from the tracked one as the noise does (Whittaker,
     Proc. Edinb. Math. Soc. 41:63, 1923; Morozov's discrepancy principle).
@@ -80,22 +80,22 @@ def smoothed(recording: Trajectory, seats: Floats) -> CubicSpline:
 
 
 def _roughness(count: int) -> Floats:
-    """(4, count) bands of the sum of squared third differences of so many values, the diagonal last."""
+    """Computes the bands (4, count) of the sum of squared third differences of so many values, the diagonal last."""
     factors = np.array([-1.0, 3.0, -3.0, 1.0])
     bands = np.zeros((4, count))
-    for place in range(4):  # off the diagonal: products of factors that far apart, summed over the differences
-        for one in range(4 - place):
-            begin = one + place
-            bands[3 - place, begin : begin + count - 3] += factors[one] * factors[one + place]
+    for lag in range(4):  # off the diagonal: products of factors that far apart, summed over the differences
+        for term in range(4 - lag):
+            begin = term + lag
+            bands[3 - lag, begin : begin + count - 3] += factors[term] * factors[term + lag]
     return bands
 
 
 def _smooth(values: Floats, weight: float, bands: Floats) -> Floats:
-    """(frame, coordinate) what minimises squared distances from values, and a weight times their roughness.
+    """Minimises squared distances from values, and a weight times their roughness, (frame, coordinate).
 
     Args:
         bands: (4, frame) of the roughness, the diagonal last, as `solveh_banded` has them.
     """
-    whole = weight * bands
-    whole[-1] += 1.0
-    return np.asarray(solveh_banded(whole, values), dtype=np.float64)
+    matrix = weight * bands
+    matrix[-1] += 1.0
+    return np.asarray(solveh_banded(matrix, values), dtype=np.float64)

@@ -23,7 +23,7 @@ _EVERY = 0.05
 def like(
     recordings: Sequence[Trajectory], speeds: Sequence[float], *, duration: float, seed: int
 ) -> tuple[WindTrack, ...]:
-    """A wind for each of `speeds` [m/s]; none where the logs of all recordings are steady.
+    """Draws a wind for each of `speeds` [m/s]; none where the logs of all recordings are steady.
 
     Each is the log of a recording drawn at random, from an instant drawn at random, forwards and backwards in turns so
     that it goes on, and multiplied to its speed.
@@ -33,20 +33,20 @@ def like(
         duration: of a null recording behind the time in which it settles [s].
         seed: of the draws.
     """
-    changing = [one for one in recordings if _fluctuates(one)]
+    changing = [recording for recording in recordings if _fluctuates(recording)]
     if not changing:
         return ()
     rng = stream(seed, "null", "winds")
     times = np.arange(round((SETTLE + duration) / _EVERY) + 2, dtype=np.float64) * _EVERY
-    made: list[WindTrack] = []
+    drawn: list[WindTrack] = []
     for speed in speeds:
-        one = recordings[int(rng.integers(len(recordings)))]
-        length = float(one.times[-1])
-        there = np.abs((times + rng.uniform(0, 2 * length)) % (2 * length) - length)
-        velocity = one.wind.at(there)
-        mean = float(np.linalg.norm(one.wind.at(np.arange(0.0, length, _EVERY)), axis=1).mean())
-        made.append(WindTrack(times=times - SETTLE, velocity=velocity * (speed / mean)))
-    return tuple(made)
+        recording = recordings[int(rng.integers(len(recordings)))]
+        length = float(recording.times[-1])
+        folded = np.abs((times + rng.uniform(0, 2 * length)) % (2 * length) - length)
+        velocity = recording.wind.at(folded)
+        mean = float(np.linalg.norm(recording.wind.at(np.arange(0.0, length, _EVERY)), axis=1).mean())
+        drawn.append(WindTrack(times=times - SETTLE, velocity=velocity * (speed / mean)))
+    return tuple(drawn)
 
 
 def _fluctuates(recording: Trajectory) -> bool:

@@ -19,7 +19,7 @@ _JUDGED = 2.0
 
 
 def of_batches(batches: Sequence[NullBatch], *, workers: int) -> str:
-    """What is simulated for a bank, and for about how long."""
+    """Announces what is simulated for a bank, and for about how long."""
     seconds = [len(batch.speeds) * (SETTLE + batch.duration) for batch in batches]
     work = sum(lasting * batch.specimen.mesh.vertex_count for lasting, batch in zip(seconds, batches, strict=True))
     return _simulated(sum(seconds), work, workers=workers)
@@ -28,7 +28,8 @@ def of_batches(batches: Sequence[NullBatch], *, workers: int) -> str:
 def of_recordings(
     recordings: Sequence[Trajectory], vertices: int, options: NullOptions, *, sets: int = 1, workers: int
 ) -> str:
-    """What is simulated for verdicts where no bank is given, and for about how long; with one, what is judged.
+    """Announces what is simulated for verdicts where no bank is given, and for about how long; with one, what is
+    judged.
 
     Args:
         vertices: of the mesh that is fitted.
@@ -36,12 +37,12 @@ def of_recordings(
         workers: processes that share the work.
     """
     if options.bank is not None:
-        judging = sets * _JUDGED * sum(len(one.positions) / one.rate for one in recordings)
+        judging = sets * _JUDGED * sum(len(recording.positions) / recording.rate for recording in recordings)
         return announced(
             "judging the recordings" if sets == 1 else f"judging {sets} sets of recordings", judging, workers=workers
         )
-    cuts = [(Cut.of(one.rate, len(one.positions)), len(one.positions)) for one in recordings]
-    lasting = cuts[0][0].lasting(banks.each(sum(cut.segments(frames) for cut, frames in cuts)))
+    cuts = [(Cut.of(recording.rate, len(recording.positions)), len(recording.positions)) for recording in recordings]
+    lasting = cuts[0][0].lasting(banks.segments_of_each(sum(cut.segments(frames) for cut, frames in cuts)))
     seconds = sets * options.nulls * (SETTLE + lasting)
     return _simulated(seconds, seconds * vertices, workers=workers)
 

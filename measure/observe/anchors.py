@@ -16,7 +16,7 @@ from measure.observe.trajectory import Floats, Specimen, Trajectory
 
 
 def anchors_of(recordings: Sequence[Trajectory], seats: Floats) -> Floats:
-    """(held, 3) where points (held, 2) of the cloth are on the average [m], recordings counting alike.
+    """Locates points (held, 2) of the cloth on the average, (held, 3) [m], recordings counting alike.
 
     Each marker counts by the frames in which it was tracked.
     """
@@ -25,13 +25,13 @@ def anchors_of(recordings: Sequence[Trajectory], seats: Floats) -> Floats:
 
 
 def carried(recording: Trajectory, seats: Floats) -> Trajectory:
-    """The recording with its attachments where its markers say that points (held, 2) of the cloth go."""
-    held = np.einsum("sm,fmi->fsi", onto(recording.markers, seats), recording.positions)
-    return replace(recording, attachments=held)
+    """Moves the recording's attachments where its markers say that points (held, 2) of the cloth go."""
+    attachments = np.einsum("sm,fmi->fsi", onto(recording.markers, seats), recording.positions)
+    return replace(recording, attachments=attachments)
 
 
 def _tracked_mean(recording: Trajectory) -> Floats:
-    """(marker, 3) mean over the frames in which each was tracked [m]; over all frames where none was."""
+    """Averages each marker over the frames in which it was tracked, (marker, 3) [m]; over all frames where none was."""
     if recording.seen is None:
         return recording.positions.mean(axis=0)
     weight = np.where(recording.seen.any(axis=0), recording.seen, 1.0)
@@ -39,7 +39,7 @@ def _tracked_mean(recording: Trajectory) -> Floats:
 
 
 def as_seen(specimen: Specimen, recordings: Sequence[Trajectory]) -> Specimen:
-    """The cloth with its anchors taken from these recordings; itself where its anchors are given."""
+    """Takes the cloth's anchors from these recordings; itself where its anchors are given."""
     if specimen.anchors_given:
         return specimen
     return replace(specimen, anchors=anchors_of(recordings, specimen.mesh.rest[list(specimen.held)]))

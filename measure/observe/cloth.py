@@ -23,13 +23,13 @@ Points = NDArray[np.float64]
 
 
 def rectangle(width: float, height: float, *, vertices: int = VERTICES) -> Mesh:
-    """A grid of nearly square cells from (0, 0) to (width, height), of about so many vertices.
+    """Makes a grid of nearly square cells from (0, 0) to (width, height), of about so many vertices.
 
     Raises:
         InputError: a size that is not positive.
     """
     if not (width > 0 and height > 0):
-        raise InputError(f"a cloth of {width} m × {height} m", where="cloth", fix="give positive sizes")
+        raise InputError(f"the cloth measures {width} m × {height} m", where="cloth", fix="give positive sizes")
     # (w/s + 1) (h/s + 1) = n, solved for the cell s.
     n, total = max(vertices, 4) - 1, width + height
     cell = (total + math.sqrt(total**2 + 4 * n * width * height)) / (2 * n)
@@ -37,7 +37,7 @@ def rectangle(width: float, height: float, *, vertices: int = VERTICES) -> Mesh:
 
 
 def hull(points: Points, *, where: str) -> Points:
-    """(corner, 2) the convex hull of points on the cloth, counter-clockwise.
+    """Computes the convex hull of points on the cloth, (corner, 2), counter-clockwise.
 
     Raises:
         InputError: they are on a line.
@@ -53,7 +53,7 @@ def hull(points: Points, *, where: str) -> Points:
 
 
 def outline(rest: Points, faces: NDArray[np.int64], *, where: str) -> Points:
-    """(corner, 2) the outer edge of a triangulated cloth.
+    """Finds the outer edge of a triangulated cloth, (corner, 2).
 
     Raises:
         InputError: it has no edge, several pieces or a hole.
@@ -64,16 +64,16 @@ def outline(rest: Points, faces: NDArray[np.int64], *, where: str) -> Points:
     if not follows:
         raise InputError("the rest shape has no edge", where=where, fix="is the surface closed, or its rest unwrapped?")
     first = min(follows)
-    loop, here = [first], follows.pop(first)
-    while here != first:
-        if here not in follows:
+    loop, vertex = [first], follows.pop(first)
+    while vertex != first:
+        if vertex not in follows:
             raise InputError(
                 "the outline of the cloth is broken",
-                where=f"{where}, vertex {here}",
+                where=f"{where}, vertex {vertex}",
                 fix="join vertices that are doubled, and orient all faces alike",
             )
-        loop.append(here)
-        here = follows.pop(here)
+        loop.append(vertex)
+        vertex = follows.pop(vertex)
     if follows:
         raise InputError(
             "the cloth has holes or several pieces",
@@ -84,18 +84,18 @@ def outline(rest: Points, faces: NDArray[np.int64], *, where: str) -> Points:
 
 
 def is_rectangle(corners: Points) -> bool:
-    """Whether an outline fills its box."""
+    """Returns whether an outline fills its box."""
     return abs(area(corners)) >= _SQUARE * float(np.prod(np.ptp(corners, axis=0)))
 
 
 def area(corners: Points) -> float:
-    """Signed area of a polygon [m²], positive where it is counter-clockwise (shoelace formula)."""
+    """Computes the signed area of a polygon [m²], positive where it is counter-clockwise (shoelace formula)."""
     following = np.roll(corners, -1, axis=0)
     return float((corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]).sum() / 2)
 
 
 def model_mesh(corners: Points, *, vertices: int = VERTICES) -> Mesh:
-    """A mesh of about so many vertices within an outline, in the outline's own coordinates.
+    """Meshes an outline by about so many vertices, in the outline's own coordinates.
 
     Raises:
         InputError: an outline that has no area, or is too narrow somewhere to be meshed at that spacing.
@@ -104,13 +104,13 @@ def model_mesh(corners: Points, *, vertices: int = VERTICES) -> Mesh:
     if is_rectangle(corners):
         flat = rectangle(*np.ptp(corners, axis=0).tolist(), vertices=vertices)
         return Mesh(rest=flat.rest + low, faces=flat.faces)
-    whole = abs(area(corners))
-    if whole <= 1e-9 * float(np.ptp(corners, axis=0).max()) ** 2:
+    size = abs(area(corners))
+    if size <= 1e-9 * float(np.ptp(corners, axis=0).max()) ** 2:
         raise InputError("the outline of the cloth has no area", where="cloth", fix="check its rest coordinates")
     # Equilateral triangles of side s have √3/2 s² a vertex, and half the outer edge's are beyond the cloth.
     perimeter = float(np.hypot(*np.diff(np.vstack([corners, corners[:1]]), axis=0).T).sum())
     cell, unit = perimeter / 2, math.sqrt(3) / 2
-    spacing = (cell + math.sqrt(cell**2 + 4 * vertices * unit * whole)) / (2 * vertices * unit)
+    spacing = (cell + math.sqrt(cell**2 + 4 * vertices * unit * size)) / (2 * vertices * unit)
     edge = _along(corners, spacing)
     inner = _lattice(corners, spacing)
     inner = inner[inside(corners, inner)]
@@ -124,9 +124,9 @@ def model_mesh(corners: Points, *, vertices: int = VERTICES) -> Mesh:
     faces = np.where(doubled[:, None] < 0, faces[:, ::-1], faces)[keep]
     used, compact = np.unique(faces, return_inverse=True)
     covered = float(np.abs(doubled[keep]).sum() / 2)
-    if len(used) < len(edge) or abs(covered - whole) > 0.02 * whole:
+    if len(used) < len(edge) or abs(covered - size) > 0.02 * size:
         raise InputError(
-            f"an outline that {len(points)} vertices do not fill: {covered:.4g} of {whole:.4g} m²",
+            f"{len(points)} vertices do not fill the outline: {covered:.4g} of {size:.4g} m²",
             where="cloth",
             fix="ask for more vertices, or name the width and height of a plain sheet",
         )
@@ -141,7 +141,7 @@ def sharp_corners(corners: Points) -> NDArray[np.int64]:
 
 
 def distance_to(corners: Points, point: Points) -> float:
-    """Distance of a point (2,) from the edge of a polygon [m]."""
+    """Computes the distance of a point (2,) from the edge of a polygon [m]."""
     along = np.roll(corners, -1, axis=0) - corners
     offset = point - corners
     share = np.clip((offset * along).sum(axis=1) / (along * along).sum(axis=1), 0, 1)
@@ -149,7 +149,8 @@ def distance_to(corners: Points, point: Points) -> float:
 
 
 def inside(corners: Points, points: Points) -> NDArray[np.bool_]:
-    """(point,) whether points are within a polygon: a ray from each crosses its edges an odd number of times."""
+    """Returns whether points are within a polygon, (point,): a ray from each crosses its edges an odd number of
+    times."""
     x, y = points[:, 0:1], points[:, 1:2]
     x0, y0 = corners.T
     x1, y1 = np.roll(corners, -1, axis=0).T
@@ -160,7 +161,7 @@ def inside(corners: Points, points: Points) -> NDArray[np.bool_]:
 
 
 def _along(corners: Points, spacing: float) -> Points:
-    """Sharp corners of the outline, and points evenly spaced along it between them."""
+    """Selects sharp corners of the outline, and points evenly spaced along it between them."""
     sharp = sharp_corners(corners)
     loop = np.roll(corners, -int(sharp[0]) if len(sharp) else 0, axis=0)
     loop = np.concatenate([loop, loop[:1]])

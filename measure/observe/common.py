@@ -30,53 +30,57 @@ _NEAR = 0.75
 
 
 def at_same_rate(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]]:
-    """The recordings as they are if their rates are the same; else each at the lowest of their rates.
+    """Resamples the recordings to the lowest of their rates; returns them as they are if their rates are the same.
 
     Positions in between are those of cubic splines in time, tracked where both neighbouring frames were.
     """
-    rate = min(own.rate for own in recordings)
+    rate = min(recording.rate for recording in recordings)
     moved: list[Trajectory] = []
-    found: list[Finding] = []
-    for own in recordings:
-        if own.rate == rate:
-            moved.append(own)
+    findings: list[Finding] = []
+    for recording in recordings:
+        if recording.rate == rate:
+            moved.append(recording)
             continue
-        times = np.arange(int((len(own.positions) - 1) / own.rate * rate + 1e-9) + 1) / rate
-        place = times * own.rate
-        before = np.minimum(np.floor(place + 1e-9).astype(np.int64), len(own.positions) - 2)
-        seen = None if own.seen is None else own.seen[before] & own.seen[before + 1]
-        moved.append(replace(own, rate=rate, positions=CubicSpline(own.times, own.positions)(times), seen=seen))
-        found.append(
+        times = np.arange(int((len(recording.positions) - 1) / recording.rate * rate + 1e-9) + 1) / rate
+        frames = times * recording.rate
+        before = np.minimum(np.floor(frames + 1e-9).astype(np.int64), len(recording.positions) - 2)
+        tracked = None if recording.seen is None else recording.seen[before] & recording.seen[before + 1]
+        moved.append(
+            replace(
+                recording, rate=rate, positions=CubicSpline(recording.times, recording.positions)(times), seen=tracked
+            )
+        )
+        findings.append(
             Finding.of(
                 "recording-resampled",
-                f"its {own.rate:.4g} frames a second are not those of the other recordings: it is followed at "
+                f"its {recording.rate:.4g} frames a second are not those of the other recordings: it is followed at "
                 f"{rate:.4g} Hz",
-                where=f"recording {own.name!r}",
+                where=f"recording {recording.name!r}",
                 value=rate,
             )
         )
-    return tuple(moved), tuple(found)
+    return tuple(moved), tuple(findings)
 
 
 def at_same_points(
     recordings: Sequence[Trajectory], points: Floats
 ) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]]:
-    """The recordings as they are if their markers are the same; else each at these points (point, 2) [m].
+    """Resamples the recordings to these points (point, 2) [m]; returns them as they are if their markers are the same.
 
     Raises:
         InputError: a recording with markers too few to show the cloth at other points.
     """
     first = recordings[0]
-    if all(_alike(own.markers, first.markers) for own in recordings):
-        return tuple(replace(own, markers=first.markers) for own in recordings), ()
+    if all(_same_markers(recording.markers, first.markers) for recording in recordings):
+        return tuple(replace(recording, markers=first.markers) for recording in recordings), ()
     if (shared := _shared(recordings)) is not None:
         return shared
     moved: list[Trajectory] = []
-    found: list[Finding] = []
-    for own in recordings:
-        where, count = f"recording {own.name!r}", len(own.markers)
-        if _alike(own.markers, points):
-            moved.append(replace(own, markers=points))
+    findings: list[Finding] = []
+    for recording in recordings:
+        where, count = f"recording {recording.name!r}", len(recording.markers)
+        if _same_markers(recording.markers, points):
+            moved.append(replace(recording, markers=points))
             continue
         if count < _DENSER * len(points):
             raise InputError(
@@ -85,12 +89,18 @@ def at_same_points(
                 where=where,
                 fix="track the same points in all recordings, or close the loop on them one by one",
             )
-        weights = onto(own.markers, points)
+        weights = onto(recording.markers, points)
         grown = float(np.sqrt((weights**2).sum(axis=1).mean()))
-        positions = np.einsum("pm,fmc->fpc", weights, own.positions)
-        seen = None if own.seen is None else own.seen @ np.abs(weights).T >= _NEAR * np.abs(weights).sum(axis=1)
-        moved.append(replace(own, markers=points, positions=positions, noise=own.noise * grown, seen=seen))
-        found.append(
+        positions = np.einsum("pm,fmc->fpc", weights, recording.positions)
+        tracked = (
+            None
+            if recording.seen is None
+            else recording.seen @ np.abs(weights).T >= _NEAR * np.abs(weights).sum(axis=1)
+        )
+        moved.append(
+            replace(recording, markers=points, positions=positions, noise=recording.noise * grown, seen=tracked)
+        )
+        findings.append(
             Finding.of(
                 "markers-resampled",
                 f"its {count} markers are not those of the other recordings: all are followed at {len(points)} "
@@ -99,39 +109,39 @@ def at_same_points(
                 count=len(points),
             )
         )
-    return tuple(moved), tuple(found)
+    return tuple(moved), tuple(findings)
 
 
 def _shared(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]] | None:
-    """The recordings with the markers that all of them have; None where these are too few to speak of one layout."""
-    most = max(recordings, key=lambda own: len(own.markers))
+    """Selects the markers that all recordings have; None where these are too few to speak of one layout."""
+    most = max(recordings, key=lambda recording: len(recording.markers))
     size = _SAME * float(np.ptp(most.markers, axis=0).max())
     places: list[NDArray[np.int64]] = []
-    there = np.ones(len(most.markers), dtype=bool)
-    for own in recordings:
-        distance, place = KDTree(own.markers).query(most.markers)
-        there &= np.asarray(distance) <= size
-        places.append(np.asarray(place, dtype=np.int64))
-    if there.sum() < _SHARED * len(there):
+    shared = np.ones(len(most.markers), dtype=bool)
+    for recording in recordings:
+        distance, nearest = KDTree(recording.markers).query(most.markers)
+        shared &= np.asarray(distance) <= size
+        places.append(np.asarray(nearest, dtype=np.int64))
+    if shared.sum() < _SHARED * len(shared):
         return None
-    made = [
+    selected = [
         replace(
-            own,
-            markers=most.markers[there],
-            positions=own.positions[:, place[there]],
-            seen=None if own.seen is None else own.seen[:, place[there]],
+            recording,
+            markers=most.markers[shared],
+            positions=recording.positions[:, nearest[shared]],
+            seen=None if recording.seen is None else recording.seen[:, nearest[shared]],
         )
-        for own, place in zip(recordings, places, strict=True)
+        for recording, nearest in zip(recordings, places, strict=True)
     ]
-    found = Finding.of(
+    finding = Finding.of(
         "markers-shared",
-        f"the {int(there.sum())} of {len(there)} markers that are in all recordings are followed",
+        f"the {int(shared.sum())} of {len(shared)} markers that are in all recordings are followed",
         where="experiment",
-        count=int(there.sum()),
+        count=int(shared.sum()),
         fix="track them again, if they matter",
     )
-    return tuple(made), (found,)
+    return tuple(selected), (finding,)
 
 
-def _alike(one: Floats, other: Floats) -> bool:
-    return one.shape == other.shape and bool(np.abs(one - other).max() <= _SAME * np.ptp(one, axis=0).max())
+def _same_markers(first: Floats, second: Floats) -> bool:
+    return first.shape == second.shape and bool(np.abs(first - second).max() <= _SAME * np.ptp(first, axis=0).max())

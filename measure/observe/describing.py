@@ -24,7 +24,7 @@ from sim.material import BENDING_SHAPE, MATERIALS, STRETCHING_SHAPE, Material, n
 
 
 def of_arcsim(scene: Mapping[str, Any], rest: Floats, *, where: str) -> tuple[Known, tuple[Finding, ...]]:
-    """What an ArcSim scene says, and what it ran with that no model here has.
+    """Reads what an ArcSim scene says, and what it ran with that no model here has.
 
     The material is looked up in the catalog under its file's name: output folders name the file, but do not hold it.
     Its damping stays the catalog's, since ArcSim's own 0 says nothing about what its steps damp.
@@ -38,7 +38,7 @@ def of_arcsim(scene: Mapping[str, Any], rest: Floats, *, where: str) -> tuple[Kn
     entry = _table(_first(_first(scene, "cloths", where), "materials", where), where)
     wind, magic = _table(scene.get("wind", {}), where), _table(scene.get("magic", {}), where)
     velocity = scene_wind(scene)
-    known = Known(
+    description = Known(
         material=_arcsim_material(entry, where),
         pins=_arcsim_pins(scene, rest, where),
         stiffness=_number(magic, "handle_stiffness", ARCSIM_STIFFNESS, where),
@@ -48,11 +48,11 @@ def of_arcsim(scene: Mapping[str, Any], rest: Floats, *, where: str) -> tuple[Kn
         if velocity is None
         else WindTrack.constant((velocity["wind_x"], velocity["wind_y"], velocity["wind_z"])),
     )
-    return known, _arcsim_findings(scene, entry, where)
+    return description, _arcsim_findings(scene, entry, where)
 
 
 def of_simulation(artifact: Artifact, rest: Floats) -> Known:
-    """What the row of a mesh sequence says that was simulated here; silent for any other.
+    """Reads what the row of a mesh sequence says that was simulated here; silent for any other.
 
     Its effects are left aside: the search for missing effects must not know them.
 
@@ -94,14 +94,14 @@ def of_simulation(artifact: Artifact, rest: Floats) -> Known:
 
 
 def _simulated_pins(scene: Mapping[str, Any], rest: Floats) -> Floats | None:
-    """The pins of the recipe's shape; None for an ArcSim scene, whose handles are not in the row."""
+    """Locates the pins of the recipe's shape; None for an ArcSim scene, whose handles are not in the row."""
     if scene["shape"] == "flag":
-        held = handles.full_hoist(rest) if scene["attachment"] == "hoist" else handles.corners(rest)
+        vertices = handles.full_hoist(rest) if scene["attachment"] == "hoist" else handles.corners(rest)
     elif scene["shape"] == "hanging-cloth":
-        held = handles.top_corners(rest)
+        vertices = handles.top_corners(rest)
     else:
         return None
-    return rest[list(held)]
+    return rest[list(vertices)]
 
 
 def _force(spec: Mapping[str, Any]) -> AirForce:
@@ -127,7 +127,9 @@ def _arcsim_pins(scene: Mapping[str, Any], rest: Floats, where: str) -> Floats |
         listed = _table(handle, where).get("nodes", [])
         if not isinstance(listed, list) or not all(isinstance(n, int) and 0 <= n < len(rest) for n in listed):
             raise InputError(
-                f"handles {listed!r} of a mesh with {len(rest)} vertices", where=where, fix="name the pins yourself"
+                f"the handles {listed!r} are not vertices of a mesh of {len(rest)}",
+                where=where,
+                fix="name the pins yourself",
             )
         nodes += listed
     return rest[nodes] if nodes else None
@@ -140,10 +142,10 @@ def _arcsim_findings(scene: Mapping[str, Any], entry: Mapping[str, Any], where: 
         if key not in entry and stage in acting:
             acting.remove(stage)
     steps, frame = scene.get("frame_steps"), scene.get("frame_time")
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if isinstance(steps, int) and steps > 0 and isinstance(frame, int | float):
         step = float(frame) / steps
-        found.append(
+        findings.append(
             Finding.of(
                 "simulated-with-numerical-damping",
                 f"ArcSim ran with implicit steps of {1e3 * step:.3g} ms, which damp the cloth by {5e2 * step:.3g} "
@@ -153,7 +155,7 @@ def _arcsim_findings(scene: Mapping[str, Any], entry: Mapping[str, Any], where: 
             )
         )
     if acting:
-        found.append(
+        findings.append(
             Finding.of(
                 "simulated-with-other-stages",
                 f"ArcSim ran with {', '.join(acting)}, which the base model is without",
@@ -161,14 +163,14 @@ def _arcsim_findings(scene: Mapping[str, Any], entry: Mapping[str, Any], where: 
                 count=len(acting),
             )
         )
-    return tuple(found)
+    return tuple(findings)
 
 
 def _first(content: Any, key: str, where: str) -> Any:
     entries = _table(content, where).get(key)
     if not isinstance(entries, list) or len(entries) != 1:
         count = len(entries) if isinstance(entries, list) else "no"
-        raise InputError(f"{count} {key}", where=where, fix="one is supported")
+        raise InputError(f"the scene has {count} {key}", where=where, fix="one is supported")
     return entries[0]
 
 

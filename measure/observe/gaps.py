@@ -51,7 +51,7 @@ def frames_of(gap: float, period: float) -> int:
 
 
 def fill(trajectory: Trajectory) -> tuple[Trajectory, tuple[Finding, ...]]:
-    """A recording without NaN, whose mask says which positions were tracked, and what was done to get there.
+    """Fills a recording's NaN, and returns it with a mask of the positions that were tracked, and what was done.
 
     Raises:
         InputError: more than half of its markers are lost.
@@ -70,7 +70,7 @@ def fill(trajectory: Trajectory) -> tuple[Trajectory, tuple[Finding, ...]]:
 
 
 def fill_positions(positions: Floats, markers: Floats, *, period: float, where: str) -> Filled:
-    """Positions (frame, marker, 3) without their NaN.
+    """Fills the NaN of positions (frame, marker, 3).
 
     The recording is cut to begin and end with frames in which about as many markers were tracked as usually. A marker
     that was tracked in fewer than half of the frames is left out. A gap of up to `LONGEST`, or one with frames in which
@@ -90,10 +90,10 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
     if not tracked.any():
         raise InputError("no marker was tracked in any frame", where=where, fix="check the columns and their units")
     frames = _stretch(tracked)
-    found: list[Finding] = []
+    findings: list[Finding] = []
     cut = len(tracked) - (frames.stop - frames.start)
     if cut:
-        found.append(
+        findings.append(
             Finding.of(
                 "recording-cut",
                 f"{cut} frames at its ends are left out, in which clearly fewer markers were tracked than usually",
@@ -102,132 +102,136 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
             )
         )
     tracked = tracked[frames]
-    kept = tracked.mean(axis=0) >= _LEAST
-    lost = int((~kept).sum())
-    if lost > _LOST * len(kept):
-        marker = int(np.flatnonzero(~kept)[0])
+    markers_used = tracked.mean(axis=0) >= _LEAST
+    lost = int((~markers_used).sum())
+    if lost > _LOST * len(markers_used):
+        marker = int(np.flatnonzero(~markers_used)[0])
         raise InputError(
-            f"{lost} of {len(kept)} markers were tracked in fewer than half of the frames",
+            f"{lost} of {len(markers_used)} markers were tracked in fewer than half of the frames",
             where=f"{where}, marker {marker}",
             fix="track them again, or cut the recording to where they are tracked",
         )
     if lost:
-        found.append(
+        findings.append(
             Finding.of(
                 "markers-left-out",
-                f"{lost} of {len(kept)} markers were tracked in fewer than half of the frames: left out",
-                where=f"{where}, marker {int(np.argmin(kept))}",
+                f"{lost} of {len(markers_used)} markers were tracked in fewer than half of the frames: left out",
+                where=f"{where}, marker {int(np.argmin(markers_used))}",
                 count=lost,
                 fix="track them again, if they matter",
             )
         )
-    there = tracked[:, kept]
-    missing = int((~there).sum())
+    tracked_used = tracked[:, markers_used]
+    missing = int((~tracked_used).sum())
     if not missing:
         return Filled(
             frames=frames,
-            markers=kept,
-            positions=np.array(positions[frames][:, kept]),
+            markers=markers_used,
+            positions=np.array(positions[frames][:, markers_used]),
             seen=None,
-            findings=tuple(found),
+            findings=tuple(findings),
         )
-    found.append(
+    findings.append(
         Finding.of(
             "markers-missing",
-            f"{missing} positions ({100 * missing / there.size:.2g} %) were not tracked; predictions are not "
+            f"{missing} positions ({100 * missing / tracked_used.size:.2g} %) were not tracked; predictions are not "
             "compared with them",
-            where=f"{where}, frame {frames.start + _first(~there)}",
+            where=f"{where}, frame {frames.start + _first(~tracked_used)}",
             count=missing,
-            value=missing / there.size,
+            value=missing / tracked_used.size,
         )
     )
-    whole = _filled(positions[frames][:, kept], there, markers[kept], frames_of(LONGEST, period))
-    return Filled(frames=frames, markers=kept, positions=whole, seen=there, findings=tuple(found))
+    complete = _filled(
+        positions[frames][:, markers_used], tracked_used, markers[markers_used], frames_of(LONGEST, period)
+    )
+    return Filled(frames=frames, markers=markers_used, positions=complete, seen=tracked_used, findings=tuple(findings))
 
 
-def _filled(positions: Floats, there: NDArray[np.bool_], markers: Floats, longest: int) -> Floats:
-    """(frame, marker, 3) without NaN."""
-    whole = np.array(positions)
-    index = np.arange(len(whole))
-    near = np.argsort(((markers[:, None] - markers[None]) ** 2).sum(axis=2), axis=1)[:, 1:]
-    for marker in np.flatnonzero(~there.all(axis=0)).tolist():
-        seen = there[:, marker]
-        spline = CubicSpline(index[seen], positions[seen, marker])
+def _filled(positions: Floats, tracked: NDArray[np.bool_], markers: Floats, longest: int) -> Floats:
+    """Fills (frame, marker, 3)."""
+    complete = np.array(positions)
+    index = np.arange(len(complete))
+    neighbours = np.argsort(((markers[:, None] - markers[None]) ** 2).sum(axis=2), axis=1)[:, 1:]
+    for marker in np.flatnonzero(~tracked.all(axis=0)).tolist():
+        of_marker = tracked[:, marker]
+        spline = CubicSpline(index[of_marker], positions[of_marker, marker])
         carried: Floats | None = None
-        for begin, end in _gaps(seen):
-            inner = begin > 0 and end < len(seen)
-            if (inner and end - begin <= longest) or there[begin:end].sum(axis=1).min() < _NEIGHBOURS:
-                whole[begin:end, marker] = spline(index[begin:end])
+        for begin, end in _gaps(of_marker):
+            inner = begin > 0 and end < len(of_marker)
+            if (inner and end - begin <= longest) or tracked[begin:end].sum(axis=1).min() < _NEIGHBOURS:
+                complete[begin:end, marker] = spline(index[begin:end])
                 continue
             if carried is None:
-                carried = _carried(positions, there, markers, near[marker], marker)
-            whole[begin:end, marker] = _long_gap(positions[:, marker], carried, index[begin:end])
-    return whole
+                carried = _carried(positions, tracked, markers, neighbours[marker], marker)
+            complete[begin:end, marker] = _long_gap(positions[:, marker], carried, index[begin:end])
+    return complete
 
 
-def _long_gap(own: Floats, carried: Floats, gap: NDArray[np.int64]) -> Floats:
-    """(gap, 3) of a marker (frame, 3), by its own places at the gap's ends or by where its neighbours take it."""
-    off, half = own - carried, max(1, (len(gap) + 1) // 2)
+def _long_gap(track: Floats, carried: Floats, gap: NDArray[np.int64]) -> Floats:
+    """Fills a gap (gap, 3) of a marker (frame, 3), by its own positions at the gap's ends or by where its neighbours
+    take it."""
+    off, half = track - carried, max(1, (len(gap) + 1) // 2)
     moved = _across(off, gap) + carried[gap]
-    return moved if _swing(off, half) < _swing(own, half) and np.isfinite(moved).all() else _across(own, gap)
+    return moved if _swing(off, half) < _swing(track, half) and np.isfinite(moved).all() else _across(track, gap)
 
 
 def _across(series: Floats, gap: NDArray[np.int64]) -> Floats:
-    """(gap, 3) of a series (frame, 3) in a gap: it changes evenly between its ends, and stays beyond a single one."""
+    """Interpolates a series (frame, 3) in a gap, (gap, 3): it changes evenly between its ends, and stays beyond a
+    single one."""
     ends = [frame for frame in (gap[0] - 1, gap[-1] + 1) if 0 <= frame < len(series)]
     return np.stack([np.interp(gap, ends, series[ends, axis]) for axis in range(3)], axis=-1)
 
 
 def _swing(series: Floats, half: int) -> float:
-    """Mean square by which a series (frame, 3) is off the mean of itself so many frames before and after.
+    """Computes the mean square by which a series (frame, 3) is off the mean of itself so many frames before and after.
 
     It is what filling a gap of twice as many frames from its ends costs where the series is known; infinite where it
     is known nowhere.
     """
     off = series[half:-half] - (series[: -2 * half] + series[2 * half :]) / 2
-    known = off[np.isfinite(off).all(axis=1)]
-    return float((known**2).sum(axis=1).mean()) if len(known) else np.inf
+    finite = off[np.isfinite(off).all(axis=1)]
+    return float((finite**2).sum(axis=1).mean()) if len(finite) else np.inf
 
 
 def _carried(
-    positions: Floats, there: NDArray[np.bool_], markers: Floats, near: NDArray[np.int64], marker: int
+    positions: Floats, tracked: NDArray[np.bool_], markers: Floats, neighbours: NDArray[np.int64], marker: int
 ) -> Floats:
-    """(frame, 3) where the quadratic map of its nearest tracked neighbours takes a marker [m].
+    """Maps a marker by the quadratic map of its nearest tracked neighbours, (frame, 3) [m].
 
     It is not finite in frames in which hardly a marker was tracked.
 
     Args:
-        near: the other markers, the nearest first.
+        neighbours: the other markers, the nearest first.
     """
-    found = np.full((len(positions), 3), np.nan)
-    nearest = [near[seen[near]][:_NEIGHBOURS] for seen in there]
-    fillable = np.flatnonzero([len(own) == _NEIGHBOURS for own in nearest])
+    positions_by_neighbours = np.full((len(positions), 3), np.nan)
+    nearest = [neighbours[in_frame[neighbours]][:_NEIGHBOURS] for in_frame in tracked]
+    fillable = np.flatnonzero([len(neighbours_used) == _NEIGHBOURS for neighbours_used in nearest])
     if not len(fillable):
-        return found
+        return positions_by_neighbours
     kinds, kind = np.unique(np.stack([nearest[frame] for frame in fillable]), axis=0, return_inverse=True)
-    for place, own in enumerate(kinds):
-        frames = fillable[kind.ravel() == place]
-        weights = _weights(markers[own] - markers[marker])
-        found[frames] = np.einsum("n,fnc->fc", weights, positions[np.ix_(frames, own)])
-    return found
+    for index, chosen in enumerate(kinds):
+        frames = fillable[kind.ravel() == index]
+        weights = _weights(markers[chosen] - markers[marker])
+        positions_by_neighbours[frames] = np.einsum("n,fnc->fc", weights, positions[np.ix_(frames, chosen)])
+    return positions_by_neighbours
 
 
 def _weights(arms: Floats) -> Floats:
-    """(neighbour,) by which places add up to that of a marker, arms (neighbour, 2) from it [m]."""
+    """Computes weights (neighbour,) by which places add up to that of a marker, arms (neighbour, 2) from it [m]."""
     u, v = (arms / np.abs(arms).max()).T
     basis = np.stack([np.ones(len(u)), u, v, u * u, u * v, v * v], axis=1)
     return np.linalg.pinv(basis, rcond=1e-3)[0]
 
 
-def _gaps(seen: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """First frame of each gap, and the frame after it."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], seen, [True]]).astype(np.int8)))
+def _gaps(tracked: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Yields the first frame of each gap, and the frame after it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], tracked, [True]]).astype(np.int8)))
     yield from ((int(begin), int(end)) for begin, end in zip(edges[::2], edges[1::2], strict=True))
 
 
 def _stretch(tracked: NDArray[np.bool_]) -> slice:
-    """From the first to the last frame in which nearly as many markers were tracked as usually, of those that are
-    tracked half the time; all frames where there are none such."""
+    """Cuts to the frames from the first to the last in which nearly as many markers were tracked as usually, of those
+    that are tracked half the time; all frames where there are none such."""
     often = tracked.mean(axis=0) >= _LEAST
     if not often.any():
         return slice(0, len(tracked))

@@ -15,7 +15,7 @@ _COINCIDENT = 1e-6
 
 
 def onto(source_rest: NDArray[np.float64], target_rest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The matrix that takes values at source points to values at target points: thin-plate splines in (u, v).
+    """Computes the matrix that takes values at source points to values at target points: thin-plate splines in (u, v).
 
     Of all fields through the source's values it gives the one of least ∫ f_uu² + 2 f_uv² + f_vv² (Duchon, 1977), and
     so reproduces fields that are linear in (u, v). Where a target point is a source point its row is exactly that of
@@ -35,7 +35,7 @@ def onto(source_rest: NDArray[np.float64], target_rest: NDArray[np.float64]) -> 
     for name, rest in (("source", source), ("target", target)):
         if rest.ndim != 2 or rest.shape[1] != 2 or not np.isfinite(rest).all():
             raise InputError(
-                f"{name} points of shape {rest.shape}, or not finite",
+                f"the {name} points have the shape {rest.shape}, or are not finite",
                 where="interpolation",
                 fix="give (point, 2) finite metres",
             )
@@ -62,17 +62,19 @@ def _matrix(source_bytes: bytes, target_bytes: bytes) -> NDArray[np.float64]:
 
 
 def _frame(source: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Where the points are and how large their box is, once they are known to define a spline."""
+    """Computes the points' centre and the size of their box, once they are known to define a spline."""
     if len(source) < 3:
-        raise InputError(f"{len(source)} source points", where="interpolation", fix="give at least three")
+        raise InputError(f"there are {len(source)} source points", where="interpolation", fix="give at least three")
     low, high = source.min(axis=0), source.max(axis=0)
     size = float((high - low).max())
-    apart = _distances(source, source)
-    np.fill_diagonal(apart, np.inf)
-    if apart.min() <= _COINCIDENT * size:
-        first, second = np.unravel_index(int(apart.argmin()), apart.shape)
+    distances = _distances(source, source)
+    np.fill_diagonal(distances, np.inf)
+    if distances.min() <= _COINCIDENT * size:
+        first, second = np.unravel_index(int(distances.argmin()), distances.shape)
         raise InputError(
-            "two source points in one place", where=f"points {int(first)} and {int(second)}", fix="keep one of them"
+            "two source points are at the same point",
+            where=f"points {int(first)} and {int(second)}",
+            fix="keep one of them",
         )
     return (low + high) / 2, size
 

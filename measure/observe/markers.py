@@ -16,7 +16,7 @@ from measure.observe.observation import Observation
 
 
 def from_table(path: Path, options: MarkerOptions | None = None) -> tuple[Observation, ...]:
-    """The recordings of a marker table; one that holds a single, unnamed recording calls it after the file.
+    """Reads the recordings of a marker table; one that holds a single, unnamed recording calls it after the file.
 
     Raises:
         FlagdataError: as `read_table`.
@@ -25,7 +25,7 @@ def from_table(path: Path, options: MarkerOptions | None = None) -> tuple[Observ
 
 
 def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None) -> Observation:
-    """A marker artifact of a lake.
+    """Reads a marker artifact of a lake.
 
     Raises:
         InputError: an artifact of another kind, or without an object.
@@ -33,7 +33,7 @@ def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None) ->
     """
     if artifact.kind is not Kind.MARKERS or artifact.object is None:
         raise InputError(
-            f"a {artifact.kind.value}, not markers",
+            f"the artifact is a {artifact.kind.value}, not markers",
             where=f"artifact {artifact.id}",
             fix="name a marker artifact; flagdata ls lists them",
         )

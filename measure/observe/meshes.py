@@ -42,12 +42,12 @@ class Location:
     weights: NDArray[np.float64]
 
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(point, …) of values (vertex, …), linear in each face."""
+        """Interpolates values (vertex, …) at the points, (point, …), linear in each face."""
         return np.einsum("pc,pc...->p...", self.weights, values[self.corners])
 
 
 def locate(rest: NDArray[np.float64], faces: NDArray[np.int64], points: NDArray[np.float64], *, where: str) -> Location:
-    """The faces in which points of the flat cloth lie, and where in them.
+    """Finds the faces in which points of the flat cloth lie, and where in them.
 
     Args:
         rest: (vertex, 2) [m].
@@ -59,20 +59,20 @@ def locate(rest: NDArray[np.float64], faces: NDArray[np.int64], points: NDArray[
     """
     a, b, c = (rest[faces[:, i]] for i in range(3))
     doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    whole = np.abs(doubled) > 1e-9 * np.abs(doubled).max(initial=0.0)
-    if not whole.any():
+    has_area = np.abs(doubled) > 1e-9 * np.abs(doubled).max(initial=0.0)
+    if not has_area.any():
         raise InputError("no face has an area in the rest shape", where=where, fix="export texture coordinates anew")
-    a, b, c, faces, doubled = a[whole], b[whole], c[whole], faces[whole], doubled[whole]
-    found = np.empty(len(points), dtype=np.int64)
+    a, b, c, faces, doubled = a[has_area], b[has_area], c[has_area], faces[has_area], doubled[has_area]
+    containing = np.empty(len(points), dtype=np.int64)
     weights = np.empty((len(points), 3))
     step = max(1, _PAIRS // len(faces))
     for first in range(0, len(points), step):
-        some = points[first : first + step]
-        second = _cross(some[:, None] - a, c - a) / doubled
-        third = _cross(b - a, some[:, None] - a) / doubled
+        subset = points[first : first + step]
+        second = _cross(subset[:, None] - a, c - a) / doubled
+        third = _cross(b - a, subset[:, None] - a) / doubled
         inside = np.minimum(np.minimum(second, third), 1 - second - third)
         best = inside.argmax(axis=1)
-        rows = np.arange(len(some))
+        rows = np.arange(len(subset))
         worst = float(inside[rows, best].min())
         if worst < -_SLACK:
             lost = first + int(inside[rows, best].argmin())
@@ -82,28 +82,29 @@ def locate(rest: NDArray[np.float64], faces: NDArray[np.int64], points: NDArray[
                 where=where,
                 fix="give points within the rest shape, in its own coordinates",
             )
-        found[first : first + step] = best
+        containing[first : first + step] = best
         second, third = second[rows, best], third[rows, best]
         weights[first : first + step] = np.stack([1 - second - third, second, third], axis=1)
-    return Location(corners=faces[found], weights=weights)
+    return Location(corners=faces[containing], weights=weights)
 
 
 def sample(sequence: MeshSequence | RaggedMeshSequence, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(frame, point, 3) where points of the flat cloth (point, 2) are in each frame [m], linear in each face.
+    """Interpolates where points of the flat cloth (point, 2) are in each frame, (frame, point, 3) [m], linear in each
+    face.
 
     Raises:
         InputError: a point that is not on the cloth in every frame.
     """
     positions = np.empty((len(sequence), len(points), 3))
-    known: tuple[NDArray[np.float32], NDArray[np.int32]] | None = None
+    last: tuple[NDArray[np.float32], NDArray[np.int32]] | None = None
     location: Location | None = None
     for index in range(len(sequence)):
         mesh = sequence.frame(index)
-        same = known is not None and np.array_equal(known[0], mesh.rest) and np.array_equal(known[1], mesh.faces)
+        same = last is not None and np.array_equal(last[0], mesh.rest) and np.array_equal(last[1], mesh.faces)
         if location is None or not same:
             rest, faces = mesh.rest.astype(np.float64), mesh.faces.astype(np.int64)
             location = locate(rest, faces, points, where=f"frame {index}")
-            known = (mesh.rest, mesh.faces)
+            last = (mesh.rest, mesh.faces)
         positions[index] = location.of(mesh.positions.astype(np.float64))
     return positions
 
@@ -120,7 +121,7 @@ _SAME_RATE = 1e-3
 def from_folder(
     path: Path, *, name: str | None = None, rate: float | None = None, unit: str = "m", markers: int = VERTICES
 ) -> Observation:
-    """An ArcSim output folder, or any folder of OBJ meshes with texture coordinates in metres.
+    """Reads an ArcSim output folder, or any folder of OBJ meshes with texture coordinates in metres.
 
     Args:
         name: what reports call it; the folder's if None.
@@ -132,23 +133,23 @@ def from_folder(
         FlagdataError: as `read_folder` and `from_sequence`.
     """
     sequence = read_folder(path, rate=rate, metre=float(length_unit(unit, where=str(path)).to_si(1.0)))
-    seen = from_sequence(sequence, name=name or path.name, markers=markers)
+    observation = from_sequence(sequence, name=name or path.name, markers=markers)
     scene = sequence.attributes.get("scene")
-    stated = scene.get("frame_time") if isinstance(scene, Mapping) else None
-    if rate is None or not isinstance(stated, int | float) or abs(rate * stated - 1) < _SAME_RATE:
-        return seen
-    found = Finding.of(
+    frame_time = scene.get("frame_time") if isinstance(scene, Mapping) else None
+    if rate is None or not isinstance(frame_time, int | float) or abs(rate * frame_time - 1) < _SAME_RATE:
+        return observation
+    finding = Finding.of(
         "rate-not-as-described",
-        f"frames are taken at {rate:.6g} Hz, conf.json says {1 / stated:.6g} Hz",
-        where=f"recording {seen.name!r}",
-        value=1 / stated,
+        f"frames are taken at {rate:.6g} Hz, conf.json says {1 / frame_time:.6g} Hz",
+        where=f"recording {observation.name!r}",
+        value=1 / frame_time,
         fix="leave the rate out, if conf.json is right",
     )
-    return replace(seen, findings=(*seen.findings, found))
+    return replace(observation, findings=(*observation.findings, finding))
 
 
 def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None, markers: int = VERTICES) -> Observation:
-    """A mesh sequence of a lake.
+    """Reads a mesh sequence of a lake.
 
     Raises:
         InputError: an artifact of another kind, or without an object.
@@ -156,19 +157,20 @@ def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None, ma
     """
     if artifact.kind is not Kind.MESHES or artifact.object is None:
         raise InputError(
-            f"a {artifact.kind.value}, not a mesh sequence",
+            f"the artifact is a {artifact.kind.value}, not a mesh sequence",
             where=f"artifact {artifact.id}",
             fix="name a mesh sequence; flagdata ls lists them",
         )
     sequence = read_meshes(lake.whole_object(artifact.object))  # damage must not be measured
-    seen = from_sequence(sequence, name=name or artifact.name, markers=markers)
+    observation = from_sequence(sequence, name=name or artifact.name, markers=markers)
     first = sequence.frame(0).rest.astype(np.float64)
-    known = seen.known if seen.known.pins is not None else of_simulation(artifact, first)
-    return replace(seen, source=artifact.id, known=known)
+    description = observation.known if observation.known.pins is not None else of_simulation(artifact, first)
+    return replace(observation, source=artifact.id, known=description)
 
 
 def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, markers: int = VERTICES) -> Observation:
-    """A moving mesh; one that is remeshed, or has more than `MARKERS` vertices, at fixed points of the cloth.
+    """Makes an observation of a moving mesh; one that is remeshed, or has more than `MARKERS` vertices, is followed at
+    fixed points of the cloth.
 
     The points are those of a model mesh over the first frame's outline, found in each frame through the rest
     coordinates and linear within its faces.
@@ -180,7 +182,7 @@ def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, mar
     first = sequence.frame(0)
     rest, faces = first.rest.astype(np.float64), first.faces.astype(np.int64)
     corners = outline(rest, faces, where=where)
-    known, found = _described(sequence.attributes, rest, where)
+    description, findings = _described(sequence.attributes, rest, where)
     fixed = isinstance(sequence, MeshSequence)
     if isinstance(sequence, MeshSequence) and len(rest) <= MARKERS:
         used = np.unique(faces)  # vertices that no face uses are no part of the cloth
@@ -188,15 +190,15 @@ def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, mar
     else:
         mesh = model_mesh(corners, vertices=markers)
         seats, positions = mesh.rest, sample(sequence, mesh.rest)
-        found = (*found, _resampled(len(seats), remeshed=not fixed, where=where))
+        findings = (*findings, _resampled(len(seats), remeshed=not fixed, where=where))
     return Observation(
         name=name,
         markers=seats,
         positions=positions,
         times=(sequence.time - sequence.time[0]) / NANOSECONDS,
         outline=corners,
-        known=known,
-        findings=found,
+        known=description,
+        findings=findings,
     )
 
 

@@ -98,7 +98,7 @@ class Observation:
         markers, frames = np.shape(self.markers), np.shape(self.times)
         if len(markers) != 2 or markers[1] != 2 or np.shape(self.positions) != (*frames, markers[0], 3):
             raise InputError(
-                f"{frames} times and markers of shape {markers} with positions of shape {np.shape(self.positions)}",
+                f"{frames} times and markers {markers} do not fit positions of shape {np.shape(self.positions)}",
                 where=where,
                 fix="give (frame,), (marker, 2) and (frame, marker, 3)",
             )
@@ -106,18 +106,18 @@ class Observation:
             raise InputError("its times do not increase", where=where, fix="sort the frames by time, each once")
 
     def turned(self, up: Up) -> Observation:
-        """This recording, whose `up` axis pointed up, with z up; its wind and gravity are turned along."""
+        """Turns this recording, whose `up` axis pointed up, to z up; its wind and gravity are turned along."""
         if up is Up.Z:
             return self
         turn = np.array(_TURNS[up], dtype=np.float64)
         gravity, wind = self.known.gravity, self.known.wind
-        known = replace(
+        description = replace(
             self.known,
             gravity=None if gravity is None else tuple((turn @ np.array(gravity)).tolist()),
             wind=None if wind is None else replace(wind, velocity=wind.velocity @ turn.T),
         )
-        own = None if self.wind is None else replace(self.wind, velocity=self.wind.velocity @ turn.T)
-        return replace(self, positions=self.positions @ turn.T, known=known, wind=own)
+        turned_wind = None if self.wind is None else replace(self.wind, velocity=self.wind.velocity @ turn.T)
+        return replace(self, positions=self.positions @ turn.T, known=description, wind=turned_wind)
 
 
 def from_arrays(
@@ -131,7 +131,7 @@ def from_arrays(
     noise: float | None = None,
     known: Known | None = None,
 ) -> Observation:
-    """A recording from arrays: positions (frame, marker, 3) [m] at `rate` [Hz], rest (marker, 2) [m], z up.
+    """Makes a recording from arrays: positions (frame, marker, 3) [m] at `rate` [Hz], rest (marker, 2) [m], z up.
 
     Args:
         faces: (face, 3) of a mesh whose vertices the markers are; its edge is the cloth's.
@@ -140,7 +140,7 @@ def from_arrays(
         InputError: shapes that disagree, or a rate that is not positive.
     """
     if not (np.isfinite(rate) and rate > 0):
-        raise InputError(f"a rate of {rate!r} frames a second", where=f"recording {name!r}", fix="give Hz")
+        raise InputError(f"the rate is {rate!r} frames a second", where=f"recording {name!r}", fix="give Hz")
     positions, rest = np.asarray(positions, dtype=np.float64), np.asarray(rest, dtype=np.float64)
     corners = None
     if faces is not None:

@@ -76,9 +76,9 @@ class WindSource:
     clock: float | None = None
 
     def certain(self, track: WindTrack) -> WindTrack:
-        """The track with its stated uncertainty."""
-        said = {"gain": self.gain, "direction": self.direction, "clock": self.clock}
-        return replace(track, **{name: value for name, value in said.items() if value is not None})
+        """Adds the stated uncertainty to the track."""
+        uncertainties = {"gain": self.gain, "direction": self.direction, "clock": self.clock}
+        return replace(track, **{name: value for name, value in uncertainties.items() if value is not None})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +129,7 @@ class ExperimentRecipe:
 
 
 def load(path: Path) -> ExperimentRecipe:
-    """The recipe in a file, of a whole experiment.
+    """Loads the recipe in a file, of a whole experiment.
 
     Raises:
         InputError: it names no recording.
@@ -142,7 +142,7 @@ def load(path: Path) -> ExperimentRecipe:
 
 
 def parse(path: Path) -> ExperimentRecipe:
-    """The recipe in a file, which may leave the recordings out.
+    """Parses the recipe in a file, which may leave the recordings out.
 
     Raises:
         NotFoundError: no such file, or one that it names.
@@ -249,7 +249,7 @@ _WINDS: Mapping[str, type[_Wind]] = {"velocity": _Velocity, "speed": _Speed, "lo
 
 
 def read(recipe: ExperimentRecipe, lake: Lake | None = None) -> Observed:
-    """The experiment of a recipe, checked.
+    """Reads and checks the experiment of a recipe.
 
     Args:
         lake: that artifacts are looked up in.
@@ -263,8 +263,8 @@ def read(recipe: ExperimentRecipe, lake: Lake | None = None) -> Observed:
 
 def _setup(form: _Form, folder: Path, *, where: str) -> Setup:
     cloth, pins, inside = form.cloth, form.pins, f"{where} [material]"
-    named = "name" in form.material or "file" in form.material
-    material = tables.entries(_MATERIAL | (_CHANGES if named else {}), form.material, where=inside)
+    from_catalog = "name" in form.material or "file" in form.material
+    material = tables.entries(_MATERIAL | (_CHANGES if from_catalog else {}), form.material, where=inside)
     air = tables.entries(_AIR, form.air, where=f"{where} [air]")
     gravity = air.pop("gravity", None)
     if material.get("mass-unknown") and "density-uncertainty" in material:
@@ -311,20 +311,20 @@ def _stiffness(pins: _Pins, *, where: str) -> float | None:
     return math.inf if pins.rigid else pins.stiffness
 
 
-def _material(given: Mapping[str, Any], folder: Path, *, where: str) -> Material | None:
-    name, file = given.get("name"), given.get("file")
+def _material(form: Mapping[str, Any], folder: Path, *, where: str) -> Material | None:
+    name, file = form.get("name"), form.get("file")
     if name is None and file is None:
         return None
     if name is not None and file is not None:
         raise UsageError("both name and file are given", where=where, fix="keep one of them")
     base = named(name, where=where) if name is not None else material_file(folder / local_path(file))
-    thicken = given.get("thicken", 1.0)
-    made = base.scaled(
+    thicken = form.get("thicken", 1.0)
+    material = base.scaled(
         density=thicken,
-        stretching=thicken * given.get("stretching-factor", 1.0),
-        bending=thicken * given.get("bending-factor", 1.0),
+        stretching=thicken * form.get("stretching-factor", 1.0),
+        bending=thicken * form.get("bending-factor", 1.0),
     )
-    return replace(made, **{key: given[key] for key in ("density", "damping") if key in given})
+    return replace(material, **{key: form[key] for key in ("density", "damping") if key in form})
 
 
 def _recording(content: Mapping[str, Any], folder: Path, *, where: str) -> RecordingSource:
@@ -337,58 +337,58 @@ def _wind(content: Any, folder: Path, *, where: str) -> WindSource:
     kinds = [key for key in _WINDS if content.get(key) not in (None, "", [])]
     if len(kinds) != 1:
         raise UsageError(f"{len(kinds)} winds are given", where=where, fix="give one of velocity, speed and log")
-    given = tables.read(_WINDS[kinds[0]], content, where=where)
-    if given.direction_sigma is not None and given.direction_sigma < 0:
-        raise InputError(
-            f"direction-sigma is {given.direction_sigma:g}", where=where, fix="give a number of at least 0"
-        )
-    source = WindSource(gain=given.gain_sigma, direction=given.direction_sigma, clock=given.clock_sigma)
-    if isinstance(given, _Log):
-        start = given.start
+    form = tables.read(_WINDS[kinds[0]], content, where=where)
+    if form.direction_sigma is not None and form.direction_sigma < 0:
+        raise InputError(f"direction-sigma is {form.direction_sigma:g}", where=where, fix="give a number of at least 0")
+    source = WindSource(gain=form.gain_sigma, direction=form.direction_sigma, clock=form.clock_sigma)
+    if isinstance(form, _Log):
+        start = form.start
         placement = LogPlacement(
-            axis=given.axis,
-            north=given.north,
-            offset=given.offset,
+            axis=form.axis,
+            north=form.north,
+            offset=form.offset,
             start=timebase.parse(start, where=f"{where} start") if start is not None else None,
         )
-        sensor = given.sensor
+        sensor = form.sensor
         if sensor is not None and (folder / local_path(sensor)).is_file():
             sensor = str(folder / sensor)
-        options, confirm = WindOptions(recipe=sensor, zone=given.zone), Accepting(given.accept)
-        return replace(source, log=given.log, placement=placement, options=options, confirm=confirm)
-    if isinstance(given, _Speed):
-        x, y = given.speed * math.cos(given.toward), given.speed * math.sin(given.toward)
+        options, confirm = WindOptions(recipe=sensor, zone=form.zone), Accepting(form.accept)
+        return replace(source, log=form.log, placement=placement, options=options, confirm=confirm)
+    if isinstance(form, _Speed):
+        x, y = form.speed * math.cos(form.toward), form.speed * math.sin(form.toward)
         return replace(source, velocity=(x, y, 0.0))
-    return replace(source, velocity=cast("_Velocity", given).velocity)
+    return replace(source, velocity=cast("_Velocity", form).velocity)
 
 
 def _observation(source: RecordingSource, recipe: ExperimentRecipe, lake: Lake | None) -> Observation:
-    seen = _take(opened(source, recipe.folder, lake), source)
-    return blown(replace(seen.turned(recipe.up), name=source.name or seen.name), source.wind, recipe.folder, lake)
+    observation = _take(opened(source, recipe.folder, lake), source)
+    return blown(
+        replace(observation.turned(recipe.up), name=source.name or observation.name), source.wind, recipe.folder, lake
+    )
 
 
-def blown(seen: Observation, source: WindSource | None, folder: Path, lake: Lake | None) -> Observation:
-    """A recording with its wind, if there is a source of it, and what was found on reading that.
+def blown(observation: Observation, source: WindSource | None, folder: Path, lake: Lake | None) -> Observation:
+    """Adds the wind to a recording, if there is a source of it, and what was found on reading that.
 
     Raises:
         NotFoundError: a log that is neither a path nor an artifact.
         FlagdataError: as its reader.
     """
     if source is None:
-        return seen
-    track, found = _track(source, folder, lake)
-    return replace(seen, wind=source.certain(track), findings=(*seen.findings, *found))
+        return observation
+    track, findings = _track(source, folder, lake)
+    return replace(observation, wind=source.certain(track), findings=(*observation.findings, *findings))
 
 
 def opened(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Observation, ...]:
-    """All recordings of a source, as they are: neither turned, nor with the wind beside them.
+    """Opens all recordings of a source, as they are: neither turned, nor with the wind beside them.
 
     Raises:
         NotFoundError: neither a path nor an artifact.
         UsageError: options that say nothing of such a source.
         FlagdataError: as its reader.
     """
-    return tuple(replace(seen, noise=source.noise) for seen in _read(source, folder, lake))
+    return tuple(replace(observation, noise=source.noise) for observation in _read(source, folder, lake))
 
 
 def _read(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Observation, ...]:
@@ -400,7 +400,9 @@ def _read(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Obs
         options = MarkerOptions(rate=source.rate, unit=source.unit, rest_unit=source.rest_unit)
         return markers.from_table(path, options)
     if lake is None:
-        raise NotFoundError("no such file or folder", where=source.source, fix="check the path, or open a lake for ids")
+        raise NotFoundError(
+            "the file or folder does not exist", where=source.source, fix="check the path, or open a lake for ids"
+        )
     _refuse(source, ("take", "rate", "rest_unit"), "an artifact")
     if source.unit != "m":
         raise UsageError("an artifact is in metres", where=source.source, fix="leave the unit out")
@@ -410,25 +412,29 @@ def _read(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Obs
     return (meshes.from_artifact(lake, artifact),)
 
 
-def _refuse(source: RecordingSource, keys: tuple[str, ...], what: str) -> None:
-    given = {"take": bool(source.take), "rate": source.rate is not None, "rest_unit": source.rest_unit is not None}
+def _refuse(source: RecordingSource, keys: tuple[str, ...], kind_of_source: str) -> None:
+    options = {"take": bool(source.take), "rate": source.rate is not None, "rest_unit": source.rest_unit is not None}
     for key in keys:
-        if given[key]:
+        if options[key]:
             fix = f"leave {key.replace('_', '-')} out"
-            raise UsageError(f"{key.replace('_', '-')} means nothing for {what}", where=source.source, fix=fix)
+            raise UsageError(
+                f"{key.replace('_', '-')} means nothing for {kind_of_source}", where=source.source, fix=fix
+            )
 
 
-def _take(found: tuple[Observation, ...], source: RecordingSource) -> Observation:
-    if not source.take and len(found) > 1:
+def _take(observations: tuple[Observation, ...], source: RecordingSource) -> Observation:
+    if not source.take and len(observations) > 1:
         raise UsageError(
-            f"the table holds {len(found)} recordings",
+            f"the table holds {len(observations)} recordings",
             where=source.source,
-            fix=f"add take, one of {', '.join(seen.name for seen in found)}",
+            fix=f"add take, one of {', '.join(observation.name for observation in observations)}",
         )
-    for seen in found:
-        if seen.name == source.take or not source.take:
-            return seen
-    raise UnknownNameError.of("recording", source.take, [seen.name for seen in found], where=source.source)
+    for observation in observations:
+        if observation.name == source.take or not source.take:
+            return observation
+    raise UnknownNameError.of(
+        "recording", source.take, [observation.name for observation in observations], where=source.source
+    )
 
 
 def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTrack, tuple[Finding, ...]]:
@@ -443,5 +449,5 @@ def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTra
             "an artifact's wind was read before", where=source.log, fix="leave the sensor and the zone out"
         )
     if lake is None:
-        raise NotFoundError("no such log", where=source.log, fix="check the path, or open a lake for ids")
+        raise NotFoundError("the log does not exist", where=source.log, fix="check the path, or open a lake for ids")
     return wind.from_artifact(lake, lake.artifact(source.log, kinds=(Kind.WIND,)), placement)

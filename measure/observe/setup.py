@@ -62,35 +62,37 @@ class Setup:
 
     def __post_init__(self) -> None:
         if self.outline is not None and (np.ndim(self.outline) != 2 or np.shape(self.outline)[1:] != (2,)):
-            raise self._wrong(f"an outline of shape {np.shape(self.outline)}", "give (corner, 2) in metres")
+            raise self._wrong(f"the outline has the shape {np.shape(self.outline)}", "give (corner, 2) in metres")
         if self.outline is not None and (len(self.outline) < 3 or not np.isfinite(self.outline).all()):
-            raise self._wrong("an outline of fewer than three finite corners", "list its corners in order")
+            raise self._wrong("the outline has fewer than three finite corners", "list its corners in order")
         if isinstance(self.pins, tuple) and not (self.pins and np.isfinite(self.pins).all()):
-            raise self._wrong(f"pins {self.pins!r}", "give a name, or finite (u, v) in metres")
+            raise self._wrong(f"the pins are {self.pins!r}", "give a name, or finite (u, v) in metres")
         if self.stiffness is not None and not self.stiffness > 0:
-            raise self._wrong(f"a stiffness of {self.stiffness!r}", "give N/m, or infinity for rigid pins")
+            raise self._wrong(f"the stiffness is {self.stiffness!r}", "give N/m, or infinity for rigid pins")
         if self.carried and self.stiffness not in (None, math.inf):
             raise self._wrong("a stiffness of pins that are carried", "leave it out: they hold rigidly")
         if not 0 < self.density_uncertainty <= 1:
             raise self._wrong(
-                f"a density uncertainty of {self.density_uncertainty!r}",
+                f"the density uncertainty is {self.density_uncertainty!r}",
                 "give the relative standard uncertainty, such as 0.02 for 2 %",
             )
         if self.gravity is not None and not (math.isfinite(self.gravity) and self.gravity >= 0):
-            raise self._wrong(f"a gravity of {self.gravity!r}", "give m/s², downward")
+            raise self._wrong(f"the gravity is {self.gravity!r}", "give m/s², downward")
         if self.vertices < 16:
-            raise self._wrong(f"a model mesh of {self.vertices} vertices", "ask for at least 16")
+            raise self._wrong(f"the model mesh has {self.vertices} vertices", "ask for at least 16")
 
-    def _wrong(self, what: str, fix: str) -> InputError:
-        return InputError(what, where="setup", fix=fix)
+    def _wrong(self, message: str, fix: str) -> InputError:
+        return InputError(message, where="setup", fix=fix)
 
 
 def sheet(width: float, height: float) -> NDArray[np.float64]:
-    """The outline of a rectangle from (0, 0) to (width, height) [m].
+    """Outlines a rectangle from (0, 0) to (width, height) [m].
 
     Raises:
         InputError: a size that is not positive.
     """
     if not (0 < width < math.inf and 0 < height < math.inf):
-        raise InputError(f"a cloth of {width} m × {height} m", where="setup", fix="give positive sizes in metres")
+        raise InputError(
+            f"the cloth measures {width} m × {height} m", where="setup", fix="give positive sizes in metres"
+        )
     return np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])

@@ -53,26 +53,28 @@ class WindTrack:
         times, velocity = _frozen(self.times), _frozen(self.velocity)
         if times.ndim != 1 or velocity.shape != (len(times), 3) or not len(times):
             raise InputError(
-                f"{times.shape} times with velocities of shape {velocity.shape}",
+                f"the times have the shape {times.shape}, the velocities {velocity.shape}",
                 where="wind",
                 fix="give (n,) seconds and (n, 3) m/s",
             )
         if not (np.isfinite(times).all() and np.isfinite(velocity).all()) or (np.diff(times) <= 0).any():
             raise InputError(
-                "times that do not increase, or a value that is not finite",
+                "the times do not increase, or a value is not finite",
                 where="wind",
                 fix="sort the log and leave its gaps out",
             )
         if not all(0 <= deviation < math.inf for deviation in self.uncertainty):
             raise InputError(
-                f"standard deviations of {self.uncertainty}", where="wind", fix="give gain, direction and clock, or 0"
+                f"the standard deviations are {self.uncertainty}",
+                where="wind",
+                fix="give gain, direction and clock, or 0",
             )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "velocity", velocity)
 
     @classmethod
     def constant(cls, velocity: tuple[float, float, float]) -> WindTrack:
-        """The same wind (x, y, z) [m/s] all the time."""
+        """Makes a track of the same wind (x, y, z) [m/s] all the time."""
         return cls(times=np.zeros(1), velocity=np.array([velocity], dtype=np.float64))
 
     @property
@@ -91,11 +93,11 @@ class WindTrack:
         return float(np.linalg.norm(self.velocity, axis=1).mean())
 
     def later(self, seconds: float) -> WindTrack:
-        """The same wind, with its times since an instant that many seconds later."""
+        """Shifts the wind's times to an instant that many seconds later."""
         return replace(self, times=self.times - seconds)
 
     def at(self, times: Floats) -> Floats:
-        """(k, 3) [m/s] at times (k,) [s]; outside the log its first and last sample."""
+        """Interpolates velocities (k, 3) [m/s] at times (k,) [s]; outside the log its first and last sample."""
         return np.stack([np.interp(times, self.times, self.velocity[:, axis]) for axis in range(3)], axis=-1)
 
 
@@ -118,13 +120,13 @@ class AttachmentTrack:
         times, places = _frozen(self.times), _frozen(self.places)
         if times.ndim != 1 or not len(times) or places.ndim != 3 or places.shape[::2] != (len(times), 3):
             raise InputError(
-                f"{times.shape} times with places of shape {places.shape}",
+                f"the times have the shape {times.shape}, the places {places.shape}",
                 where="attachments",
                 fix="give (n,) seconds and (n, held, 3) metres",
             )
         if not (np.isfinite(times).all() and np.isfinite(places).all()) or (np.diff(times) <= 0).any():
             raise InputError(
-                "times that do not increase, or a value that is not finite",
+                "the times do not increase, or a value is not finite",
                 where="attachments",
                 fix="sort the track and fill its gaps",
             )
@@ -132,10 +134,10 @@ class AttachmentTrack:
         object.__setattr__(self, "places", places)
 
     def at(self, times: Floats) -> Floats:
-        """(k, held, 3) [m] at times (k,) [s]."""
+        """Interpolates (k, held, 3) [m] at times (k,) [s]."""
         flat = self.places.reshape(len(self.times), -1)
-        found = np.stack([np.interp(times, self.times, values) for values in flat.T], axis=-1)
-        return found.reshape(len(times), *self.places.shape[1:])
+        interpolated = np.stack([np.interp(times, self.times, values) for values in flat.T], axis=-1)
+        return interpolated.reshape(len(times), *self.places.shape[1:])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -173,31 +175,36 @@ class Trajectory:
         where = f"recording {self.name!r}"
         if markers.ndim != 2 or markers.shape[1] != 2 or positions.shape[1:] != (len(markers), 3):
             raise InputError(
-                f"markers of shape {markers.shape} with positions of shape {positions.shape}",
+                f"the markers have the shape {markers.shape}, the positions have {positions.shape}",
                 where=where,
                 fix="give (marker, 2) and (frame, marker, 3), in metres",
             )
         if not np.isfinite(markers).all() or np.isinf(positions).any():
             raise InputError("a coordinate is not finite", where=where, fix="mark points that were lost by NaN")
         if not (np.isfinite(self.rate) and self.rate > 0):
-            raise InputError(f"a rate of {self.rate!r} frames a second", where=where, fix="give Hz")
+            raise InputError(f"the rate is {self.rate!r} frames a second", where=where, fix="give Hz")
         if not (np.isfinite(self.noise) and self.noise >= 0):
-            raise InputError(f"a noise of {self.noise!r} m", where=where, fix="give at least 0 metres")
+            raise InputError(f"the noise is {self.noise!r} m", where=where, fix="give at least 0 metres")
         if self.seen is not None and self.seen.shape != positions.shape[:2]:
             raise InputError(
-                f"a mask of shape {self.seen.shape} with positions of shape {positions.shape}",
+                f"the mask has the shape {self.seen.shape}, the positions have {positions.shape}",
                 where=where,
                 fix="give (frame, marker)",
             )
         if self.attachments is not None:
-            held = _frozen(self.attachments)
-            if held.ndim != 3 or held.shape[::2] != (len(positions), 3) or not np.isfinite(held).all():
+            attachments = _frozen(self.attachments)
+            if (
+                attachments.ndim != 3
+                or attachments.shape[::2] != (len(positions), 3)
+                or not np.isfinite(attachments).all()
+            ):
                 raise InputError(
-                    f"attachments of shape {held.shape}, or not finite, with positions of shape {positions.shape}",
+                    f"the attachments have the shape {attachments.shape}, or are not finite; the positions have "
+                    f"{positions.shape}",
                     where=where,
                     fix="give (frame, held, 3), in metres, without gaps",
                 )
-            object.__setattr__(self, "attachments", held)
+            object.__setattr__(self, "attachments", attachments)
         object.__setattr__(self, "markers", markers)
         object.__setattr__(self, "positions", positions)
 
@@ -247,7 +254,7 @@ class Specimen:
         anchors = _frozen(self.anchors)
         if not self.held or anchors.shape != (len(self.held), 3) or not np.isfinite(anchors).all():
             raise InputError(
-                f"{len(self.held)} attachments with anchors of shape {anchors.shape}",
+                f"{len(self.held)} attachments have anchors of shape {anchors.shape}",
                 where="specimen",
                 fix="give one finite (x, y, z) for each attached vertex",
             )
@@ -278,13 +285,15 @@ class Experiment:
     def __post_init__(self) -> None:
         names = [r.name for r in self.recordings]
         if not names or len(set(names)) != len(names):
-            raise InputError(f"recordings {names!r}", where="experiment", fix="give one or more, each its own name")
+            raise InputError(
+                f"the recordings' names are {names!r}", where="experiment", fix="give one or more, each its own name"
+            )
         rest = self.specimen.mesh.rest
         slack = 1e-3 * float(np.ptp(rest, axis=0).max())
-        held = {None if r.attachments is None else r.attachments.shape[1] for r in self.recordings}
-        if held not in ({None}, {len(self.specimen.held)}):
+        counts = {None if r.attachments is None else r.attachments.shape[1] for r in self.recordings}
+        if counts not in ({None}, {len(self.specimen.held)}):
             raise InputError(
-                "recordings with and without attachments that move, or with others than the cloth's",
+                "some recordings have attachments that move and some not, or not the cloth's",
                 where="experiment",
                 fix="give the tracks of all attachments in all recordings, or none",
             )
@@ -306,7 +315,7 @@ def _frozen(values: Floats) -> Floats:
 
 
 def described(specimen: Specimen) -> tuple[dict[str, Any], list[NDArray[Any]]]:
-    """Plain values and arrays that say all of a cloth and its uncertainties, to be hashed; no names and files."""
+    """Lists plain values and arrays that say all of a cloth and its uncertainties, to be hashed; no names and files."""
     material = specimen.material
     content: dict[str, Any] = {
         "held": list(specimen.held),

@@ -57,12 +57,12 @@ class LogPlacement:
             raise UsageError("both an offset and a start are given", where="wind", fix="keep one of them")
 
     def first_frame(self, series: WindSeries) -> int:
-        """Instant of the first frame on the log's clock [UTC ns]; by default the log's first sample."""
+        """Returns the instant of the first frame on the log's clock [UTC ns]; by default the log's first sample."""
         return self.start if self.start is not None else int(series.time[0]) + round((self.offset or 0.0) * NANOSECONDS)
 
 
 def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[WindTrack, tuple[Finding, ...]]:
-    """The wind that a log holds, without its unusable samples, and its metadata.
+    """Reads the wind that a log holds, without its unusable samples, and its metadata.
 
     Raises:
         InputError: no usable samples, or nothing that gives a direction.
@@ -71,12 +71,12 @@ def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[W
     velocity = _velocity(series, placement, where=where)
     good = np.isfinite(velocity).all(axis=1) & ((series.flags & UNUSABLE) == 0)
     if not good.any():
-        raise InputError("no usable sample of the wind", where=where, fix="see what flagdata ingest says of the log")
+        raise InputError("the wind has no usable sample", where=where, fix="see what flagdata ingest says of the log")
     begin = placement.first_frame(series)
     times = (series.time[good] - begin) / NANOSECONDS
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if placement.offset is None and placement.start is None:
-        found.append(
+        findings.append(
             Finding.of(
                 "clock-of-wind-assumed",
                 f"the first frame is taken to be at the log's first sample, {iso(begin)}",
@@ -84,33 +84,33 @@ def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[W
                 fix="give the first frame's instant on the log's clock",
             )
         )
-    left = int((~good).sum())
-    if left:
-        found.append(
+    unusable = int((~good).sum())
+    if unusable:
+        findings.append(
             Finding.of(
-                "wind-samples-left-out",
-                f"{left} of {len(good)} samples of the wind are unusable and left out",
+                "wind-samples-unusable-out",
+                f"{unusable} of {len(good)} samples of the wind are unusable and left out",
                 where=where,
-                count=left,
+                count=unusable,
             )
         )
     gap = float(np.diff(times).max(initial=0.0))
     if gap > _LONG_GAP:
-        found.append(
+        findings.append(
             Finding.of(
                 "wind-gap",
-                f"no usable sample of the wind for {gap:.3g} s; it is taken to change evenly",
+                f"the wind has no usable sample for {gap:.3g} s; it is taken to change evenly",
                 value=gap,
                 where=f"{where}, {times[int(np.diff(times).argmax())]:.4g} s after the first frame",
             )
         )
-    return WindTrack(times=times, velocity=velocity[good]), tuple(found)
+    return WindTrack(times=times, velocity=velocity[good]), tuple(findings)
 
 
 def from_log(
     path: Path, placement: LogPlacement, options: WindOptions | None = None, *, confirm: Confirm = UNASKED
 ) -> tuple[WindTrack, tuple[Finding, ...]]:
-    """The wind of an anemometer's file, of any format that can be ingested.
+    """Reads the wind of an anemometer's file, of any format that can be ingested.
 
     Args:
         confirm: asks what the file leaves open, and whether a drafted reading is right; without it a draft is refused.
@@ -125,22 +125,22 @@ def from_log(
         completed = replace(options or WindOptions(), **dict(answers))  # type: ignore[arg-type]
         log = read_log(path, completed)
         confirmed(path, file_hash(path), [(log, completed)], confirm)
-        wind, found = track(log.series, placement, where=f"wind log {path.name}")
-        return wind, (*_typed(answers), *log.findings, *found)
+        wind, findings = track(log.series, placement, where=f"wind log {path.name}")
+        return wind, (*_typed(answers), *log.findings, *findings)
 
     return confirm.answered(read)
 
 
 def _typed(answers: Answers) -> tuple[Finding, ...]:
-    """What was answered at a terminal about a file, so that the result states it."""
+    """Reports what was answered at a terminal about a file, so that the result states it."""
     if not answers:
         return ()
-    texts = (f"{name} {', '.join(given) if isinstance(given, tuple) else given}" for name, given in answers.items())
+    texts = (f"{name} {', '.join(answer) if isinstance(answer, tuple) else answer}" for name, answer in answers.items())
     return (Finding.of("answers-given", f"given at the terminal: {'; '.join(texts)}"),)
 
 
 def from_artifact(lake: Lake, artifact: Artifact, placement: LogPlacement) -> tuple[WindTrack, tuple[Finding, ...]]:
-    """The wind of a wind or recording artifact, on its common clock.
+    """Reads the wind of a wind or recording artifact, on its common clock.
 
     Raises:
         InputError: an artifact of another kind, or one without wind.
@@ -156,7 +156,7 @@ def from_artifact(lake: Lake, artifact: Artifact, placement: LogPlacement) -> tu
 
 
 def _velocity(series: WindSeries, placement: LogPlacement, *, where: str) -> Floats:
-    """(n, 3) [m/s] where the air goes to; NaN where a channel has no value."""
+    """Computes where the air goes to, (n, 3) [m/s]; NaN where a channel has no value."""
     channels = series.channels
     if placement.axis is not None:
         along = np.array(placement.axis) / float(np.linalg.norm(placement.axis))
@@ -190,7 +190,7 @@ def _velocity(series: WindSeries, placement: LogPlacement, *, where: str) -> Flo
 
 
 def _speed(series: WindSeries, where: str) -> Floats:
-    """(n,) horizontal speed [m/s]."""
+    """Computes the horizontal speed, (n,) [m/s]."""
     channels = series.channels
     if "wind_speed" in channels:
         return channels["wind_speed"]

@@ -11,8 +11,8 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.probes.course import ALONG, LEFT, Course, Variation
-    from measure.probes.lines import REDUCED, Line, Lines, strongest
-    from measure.probes.rows import Rows
+    from measure.probes.lines import REDUCED, Lines, SpectralLine, strongest
+    from measure.probes.rows import StatisticRows
     from measure.probes.statistics import Projection, Statistics, error_scale, projected, reduced
     from measure.probes.wind_log import by_recording, lags
 

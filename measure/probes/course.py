@@ -24,7 +24,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from measure.probes.rows import Rows
+from measure.probes.rows import StatisticRows
 from measure.verdict.criteria import CRITERIA
 
 Floats = NDArray[np.float64]
@@ -35,7 +35,7 @@ _WINDOW = 0.2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Course(Rows):
+class Course(StatisticRows):
     """The wind's course in segments.
 
     Attributes:
@@ -50,7 +50,7 @@ class Course(Rows):
     log: Floats | None = None
 
     def swing(self, recording: NDArray[np.int64]) -> Floats:
-        """(part,) Σ √(h h') c c' over neighbouring windows, c about its recording's mean, a segment.
+        """Computes Σ √(h h') c c' over neighbouring windows, c about its recording's mean, a segment, (part,).
 
         In units of the errors' scale, so that errors that are larger all over leave no larger ones.
 
@@ -61,50 +61,54 @@ class Course(Rows):
         return (weight * value[:, :-1] * value[:, 1:]).sum(axis=(0, 1)) / len(recording)
 
     def variation(self, recording: NDArray[np.int64]) -> Variation:
-        """How the wind varies, as shares of its mean."""
+        """Computes how the wind varies, as shares of its mean."""
         value, weight = self._about(recording), self._together
         within = value - self._mean(value)
-        whole, fast = (
+        total, fast = (
             (weight * c[:, :-1] * c[:, 1:]).sum(axis=(0, 1)) / weight.sum(axis=(0, 1)) for c in (value, within)
         )
         # The error of a ratio of sums over segments, of which each may be another.
-        each = (weight * (value[:, :-1] * value[:, 1:] - whole)).sum(axis=1)
-        error = np.sqrt((each**2).sum(axis=0)) / weight.sum(axis=(0, 1))
-        return Variation(whole=whole, fast=fast, error=error)
+        residuals = (weight * (value[:, :-1] * value[:, 1:] - total)).sum(axis=1)
+        error = np.sqrt((residuals**2).sum(axis=0)) / weight.sum(axis=(0, 1))
+        return Variation(total=total, fast=fast, error=error)
 
     @property
     def _together(self) -> Floats:
         """(segment, window − 1, part) weights of products of neighbours."""
-        return np.sqrt(self._own[:, :-1]) * np.sqrt(self._own[:, 1:])  # a product of two that are tiny is none
+        return np.sqrt(self._diagonal[:, :-1]) * np.sqrt(
+            self._diagonal[:, 1:]
+        )  # a product of two that are tiny is none
 
     @property
-    def _own(self) -> Floats:
-        """(segment, window, part) h."""
+    def _diagonal(self) -> Floats:
+        """Returns h, (segment, window, part)."""
         return np.maximum(np.einsum("swpp->swp", self.curvature), np.finfo(np.float64).tiny)
 
     def _mean(self, value: Floats) -> Floats:
-        """(segment, 1, part) over the windows."""
-        return (self._own * value).sum(axis=1, keepdims=True) / self._own.sum(axis=1, keepdims=True)
+        """Averages over the windows, (segment, 1, part)."""
+        return (self._diagonal * value).sum(axis=1, keepdims=True) / self._diagonal.sum(axis=1, keepdims=True)
 
     def _about(self, recording: NDArray[np.int64]) -> Floats:
-        """(segment, window, part) c less its recording's mean, and less what its log may be off by."""
+        """Computes c less its recording's mean, and less what its log may be off by, (segment, window, part)."""
         value = self._centred(self.score, recording)
         if self.log is None:
             return value
         off = np.stack([self._centred(self.log[..., k], recording) for k in range(self.log.shape[-1])], axis=-1)
         for index in np.unique(recording):
-            own = recording == index
-            weighed = self._own[own][..., None] * off[own]
-            curvature = np.einsum("swpj,swpk->jk", weighed, off[own]) + np.eye(off.shape[-1])
-            value[own] -= off[own] @ np.linalg.solve(curvature, np.einsum("swpk,swp->k", weighed, value[own]))
+            in_recording = recording == index
+            weighted = self._diagonal[in_recording][..., None] * off[in_recording]
+            curvature = np.einsum("swpj,swpk->jk", weighted, off[in_recording]) + np.eye(off.shape[-1])
+            value[in_recording] -= off[in_recording] @ np.linalg.solve(
+                curvature, np.einsum("swpk,swp->k", weighted, value[in_recording])
+            )
         return value
 
     def _centred(self, score: Floats, recording: NDArray[np.int64]) -> Floats:
-        """(segment, window, part) of scores over h, less their recording's mean."""
-        value = score / self._own
+        """Computes scores over h, less their recording's mean, (segment, window, part)."""
+        value = score / self._diagonal
         for index in np.unique(recording):
-            own = recording == index
-            value[own] -= score[own].sum(axis=(0, 1)) / self._own[own].sum(axis=(0, 1))
+            in_recording = recording == index
+            value[in_recording] -= score[in_recording].sum(axis=(0, 1)) / self._diagonal[in_recording].sum(axis=(0, 1))
         return value
 
 
@@ -113,22 +117,22 @@ class Variation:
     """Variances of the wind's parts over its squared mean, by neighbouring windows: negative where numerics rule.
 
     Attributes:
-        whole: (part,) about the mean of the recording.
+        total: (part,) about the mean of the recording.
         fast: (part,) about the mean of the segment.
-        error: (part,) standard errors of `whole`, by how segments differ; none where they are not known.
+        error: (part,) standard errors of `total`, by how segments differ; none where they are not known.
     """
 
-    whole: Floats
+    total: Floats
     fast: Floats
     error: Floats = field(default_factory=lambda: np.zeros(3))
 
     @property
     def turbulent(self) -> bool:
         """Whether it may be that of turbulence: along the wind, across it as well, and slow."""
-        slow = self.whole[ALONG] - self.fast[ALONG]
+        slow = self.total[ALONG] - self.fast[ALONG]
         return bool(
-            self.whole[ALONG] > 0
-            and self.whole[LEFT] >= CRITERIA.least_turned**2 * self.whole[ALONG]
+            self.total[ALONG] > 0
+            and self.total[LEFT] >= CRITERIA.least_turned**2 * self.total[ALONG]
             and self.fast[ALONG] <= CRITERIA.most_within * slow
         )
 
@@ -136,15 +140,15 @@ class Variation:
     def alone(self) -> bool:
         """Whether the wind varies along itself alone, however fast, and beyond what chance may hide: neither turbulence
         nor an obstacle does so."""
-        across = max(float(self.whole[LEFT]), 0.0) + CRITERIA.reach * float(self.error[LEFT])
-        return bool(self.whole[ALONG] > 0 and across < CRITERIA.least_obstructed**2 * self.whole[ALONG])
+        across = max(float(self.total[LEFT]), 0.0) + CRITERIA.reach * float(self.error[LEFT])
+        return bool(self.total[ALONG] > 0 and across < CRITERIA.least_obstructed**2 * self.total[ALONG])
 
     @property
     def words(self) -> str:
         """How it differs from turbulence's."""
-        if self.whole[ALONG] <= 0:
+        if self.total[ALONG] <= 0:
             return "the wind does not vary along its mean as it does in turbulence"
-        turned = math.sqrt(max(self.whole[LEFT], 0.0) / self.whole[ALONG])
+        turned = math.sqrt(max(self.total[LEFT], 0.0) / self.total[ALONG])
         if turned < CRITERIA.least_turned:
             return f"the wind varies across its mean by {turned:.2g} of what it does along it, in turbulence 0.6 to 1"
         return (
@@ -166,7 +170,7 @@ class Gauge:
 
     @classmethod
     def of(cls, changes: Sequence[Tensor], scale: Tensor, *, period: float) -> Gauge:
-        """Along the sensitivities of `winds`.
+        """Makes a gauge along the sensitivities of `winds`.
 
         Args:
             changes: (frame, marker, 3, segment) each [m per unit].
@@ -178,18 +182,19 @@ class Gauge:
         return cls(moved=moved.permute(4, 0, 1, 2, 3).flatten(3), window=window)
 
     def course(self, errors: Tensor) -> Course:
-        """The course by errors (segment, frame, marker · 3) over their scale."""
+        """Computes the course by errors (segment, frame, marker · 3) over their scale."""
         score = torch.einsum("spfk,sfk->sfp", self.moved, errors.to(self.moved))
         curvature = torch.einsum("spfk,sqfk->sfpq", self.moved, self.moved)
         return Course(score=self._windows(score), curvature=self._windows(curvature))
 
     def _windows(self, values: Tensor) -> Floats:
-        """(segment, window, …) sums of (segment, frame, …); frames beyond the last whole window are left out."""
+        """Sums (segment, frame, …) over windows, (segment, window, …); frames beyond the last whole window are left
+        out."""
         count = values.shape[1] // self.window
-        kept = values[:, : count * self.window].unflatten(1, (count, self.window))
-        return kept.sum(2).double().cpu().numpy()
+        windows = values[:, : count * self.window].unflatten(1, (count, self.window))
+        return windows.sum(2).double().cpu().numpy()
 
     @classmethod
     def joined(cls, parts: Sequence[Gauge]) -> Gauge:
-        """The segments of several, one after another."""
+        """Joins the segments of several gauges, one after another."""
         return cls(moved=torch.cat([p.moved for p in parts]), window=parts[0].window)

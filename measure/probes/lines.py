@@ -50,19 +50,19 @@ class Spectrum:
 
     @classmethod
     def of(cls, markers: Floats, rest: Floats, speeds: Floats, period: float) -> Spectrum:
-        """For markers (marker, 2) on a cloth (vertex, 2) [m]."""
+        """Makes the shapes of markers (marker, 2) on a cloth (vertex, 2) [m]."""
         shapes = np.stack([cosine(mode, markers, rest) for mode in SHAPES]) / len(markers)
         return cls(shapes=shapes, speeds=speeds, period=period)
 
     def prominence(self, errors: Tensor) -> Floats:
-        """(segment, reduced frequency, shape · axis) of errors (frame, marker, 3, segment) [m]; NaN where the frames
-        are too few a second."""
+        """Computes the prominence (segment, reduced frequency, shape · axis) of errors (frame, marker, 3, segment) [m];
+        NaN where the frames are too few a second."""
         power, frequency = self._power(errors), self._frequency
         around = np.stack([np.median(power[np.abs(frequency - f) <= _NEAR], axis=0) for f in frequency])
         return self._with_the_wind(power / np.maximum(around, np.finfo(np.float64).tiny))
 
     def _power(self, errors: Tensor) -> Floats:
-        """(frequency, segment, shape · axis) [m²]."""
+        """Computes the power (frequency, segment, shape · axis) [m²]."""
         frames, segments = errors.shape[0], errors.shape[3]
         shapes = torch.as_tensor(self.shapes, dtype=errors.dtype, device=errors.device)
         course = torch.einsum("km,fmcs->fskc", shapes, errors).reshape(frames, segments, -1).double().cpu().numpy()
@@ -76,19 +76,19 @@ class Spectrum:
         return np.asarray(np.fft.rfftfreq(_POINTS, self.period), dtype=np.float64)
 
     def _with_the_wind(self, values: Floats) -> Floats:
-        """(segment, reduced frequency, shape · axis) of (frequency, segment, shape · axis); NaN where the frames are
-        too few a second, or where there is no wind that anything could be shed in."""
+        """Selects (segment, reduced frequency, shape · axis) of (frequency, segment, shape · axis); NaN where the
+        frames are too few a second, or where there is no wind that anything could be shed in."""
         frequency = self._frequency
-        found = np.full((values.shape[1], len(REDUCED), values.shape[2]), np.nan)
-        for place, speed in enumerate(self.speeds):
+        at_reduced = np.full((values.shape[1], len(REDUCED), values.shape[2]), np.nan)
+        for segment, speed in enumerate(self.speeds):
             sought = REDUCED * speed
-            seen = (sought > 0) & (sought < frequency[-1] - _EDGE)
-            found[place, seen] = values[np.rint(sought[seen] / frequency[1]).astype(int), place]
-        return found
+            resolved = (sought > 0) & (sought < frequency[-1] - _EDGE)
+            at_reduced[segment, resolved] = values[np.rint(sought[resolved] / frequency[1]).astype(int), segment]
+        return at_reduced
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class SpectralLine:
     """The most prominent one.
 
     Attributes:
@@ -120,15 +120,16 @@ class Lines:
 
     @classmethod
     def of(cls, groups: Floats) -> Lines:
-        """The lines of null groups (group, shape · axis): see `strongest`."""
+        """Describes the lines of null groups (group, shape · axis): see `strongest`."""
         return cls(mean=groups.mean(axis=0), deviation=np.maximum(groups.std(axis=0), 1e-6))
 
     def standing_out(self, groups: Floats) -> Floats:
-        """(group,) of the shape and axis where it is farthest from nulls' mean, in their standard deviations."""
+        """Computes how far each group is from nulls' mean, in their standard deviations, at the shape and axis where it
+        is farthest, (group,)."""
         return ((groups - self.mean) / self.deviation).max(axis=1)
 
-    def line(self, prominence: Floats, *, centre: float, width: float) -> Line:
-        """The line in some segments (segment, reduced frequency, shape · axis).
+    def line(self, prominence: Floats, *, centre: float, width: float) -> SpectralLine:
+        """Finds the line in some segments (segment, reduced frequency, shape · axis).
 
         Args:
             centre, width: mean and standard deviation of nulls' `standing_out`.
@@ -136,19 +137,21 @@ class Lines:
         values, places = _strongest(prominence)
         across = (values - self.mean) / self.deviation
         best = int(np.argmax(across))
-        return Line(far=float((across[best] - centre) / width), reduced=float(REDUCED[places[best]]), direction=best)
+        return SpectralLine(
+            far=float((across[best] - centre) / width), reduced=float(REDUCED[places[best]]), direction=best
+        )
 
 
 def strongest(prominence: Floats) -> Floats:
-    """(shape · axis,) logarithm of the most prominent line's power, its mean over segments (segment, reduced frequency,
-    shape · axis); only frequencies that at least half of them can show."""
+    """Computes the logarithm of the most prominent line's power, (shape · axis,), its mean over segments (segment,
+    reduced frequency, shape · axis); only frequencies that at least half of them can show."""
     return _strongest(prominence)[0]
 
 
 def _strongest(prominence: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    shown = np.flatnonzero(np.isfinite(prominence[:, :, 0]).mean(axis=0) >= 0.5)
-    if not len(shown):  # too few frames a second for any: as prominent as its neighbourhood
+    resolved = np.flatnonzero(np.isfinite(prominence[:, :, 0]).mean(axis=0) >= 0.5)
+    if not len(resolved):  # too few frames a second for any: as prominent as its neighbourhood
         return np.zeros(prominence.shape[2]), np.zeros(prominence.shape[2], dtype=np.int64)
-    mean = np.nanmean(np.log(np.maximum(prominence[:, shown], np.finfo(np.float64).tiny)), axis=0)
+    mean = np.nanmean(np.log(np.maximum(prominence[:, resolved], np.finfo(np.float64).tiny)), axis=0)
     places = mean.argmax(axis=0)
-    return mean.max(axis=0), shown[places]
+    return mean.max(axis=0), resolved[places]

@@ -13,25 +13,25 @@ from flagdata.errors import UsageError
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rows:
+class StatisticRows:
     """Every field is an array with a row for each segment or group, another such record, or None where it is not looked
     at; but for those named in `_WHOLE`, which are of the record as a whole."""
 
     _WHOLE: ClassVar[frozenset[str]] = frozenset()
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Self:
-        """Some of the rows; indices may repeat."""
-        return replace(self, **{name: _some(getattr(self, name), chosen) for name in self._by_row()})
+        """Selects some of the rows; indices may repeat."""
+        return replace(self, **{name: _select_rows(getattr(self, name), chosen) for name in self._by_row()})
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """One after another; what is of the record as a whole is the first's.
+        """Joins rows one after another; what is of the record as a whole is the first's.
 
         Raises:
             UsageError: none, or what is looked at in some of them alone.
         """
         if not parts:
-            raise UsageError("nothing to join", where=cls.__name__, fix="give at least one part")
+            raise UsageError("there is nothing to join", where=cls.__name__, fix="give at least one part")
         return replace(
             parts[0], **{name: _together(name, [getattr(part, name) for part in parts]) for name in cls._by_row()}
         )
@@ -41,16 +41,16 @@ class Rows:
         return [field.name for field in fields(cls) if field.name not in cls._WHOLE]
 
 
-def _some(value: Any, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Any:
+def _select_rows(value: Any, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Any:
     if value is None:
         return None
-    return value.select(chosen) if isinstance(value, Rows) else value[chosen]
+    return value.select(chosen) if isinstance(value, StatisticRows) else value[chosen]
 
 
 def _together(name: str, values: Sequence[Any]) -> Any:
-    known = [value for value in values if value is not None]
-    if known and len(known) < len(values):
-        raise UsageError(f"{name} of some parts alone", where="joined", fix="look at it in all parts or in none")
-    if not known:
+    present = [value for value in values if value is not None]
+    if present and len(present) < len(values):
+        raise UsageError(f"only some parts have {name}", where="joined", fix="look at it in all parts or in none")
+    if not present:
         return None
-    return known[0].joined(known) if isinstance(known[0], Rows) else np.concatenate(known)
+    return present[0].joined(present) if isinstance(present[0], StatisticRows) else np.concatenate(present)

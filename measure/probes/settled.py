@@ -25,7 +25,7 @@ _LEAST = 1e-4
 
 
 def settled(markers: Floats, positions: Floats, *, period: float, noise: float = 0.0) -> Floats:
-    """(quantity,) as `NAMES` has them.
+    """Computes what the markers settle at, (quantity,) as `NAMES` has them.
 
     Args:
         markers: (marker, 2) places on the flat cloth, u from the hoist to the fly [m].

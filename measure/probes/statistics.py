@@ -38,7 +38,7 @@ from measure.observe.interpolation import onto
 from measure.observe.trajectory import Floats, Specimen
 from measure.probes.course import Course, Gauge
 from measure.probes.lines import Spectrum
-from measure.probes.rows import Rows
+from measure.probes.rows import StatisticRows
 from measure.probes.wind_log import sensitivities
 
 
@@ -56,31 +56,32 @@ class PoleMoment:
 
     @classmethod
     def of(cls, errors: Tensor, segments: Segments, specimen: Specimen) -> PoleMoment:
-        """About the vertical through the middle of the attachments, of errors (frame, marker, 3, segment) [m]."""
+        """Computes moments about the vertical through the middle of the attachments, of errors (frame, marker, 3,
+        segment) [m]."""
         anchors = [specimen.anchors if item.anchors is None else item.anchors for item in segments.items]
-        axis = np.stack([own.mean(axis=0) for own in anchors], axis=-1)[None, None, :2]
-        seen = segments.positions[segments.first :, :, :2] - axis
+        axis = np.stack([points.mean(axis=0) for points in anchors], axis=-1)[None, None, :2]
+        positions = segments.positions[segments.first :, :, :2] - axis
         share = shares(specimen, segments.markers)[None, :, None, None] / segments.period**2
-        arms = torch.as_tensor(share * np.stack([-seen[:, :, 1], seen[:, :, 0]], axis=2)).to(errors)
+        arms = torch.as_tensor(share * np.stack([-positions[:, :, 1], positions[:, :, 0]], axis=2)).to(errors)
         moment = (arms * errors[:, :, :2]).sum((1, 2))
         scale = torch.empty(len(segments)).to(errors)
         for index in np.unique(segments.recording):
-            own = torch.as_tensor(np.flatnonzero(segments.recording == index), device=errors.device)
-            scale[own] = (moment[:, own] ** 2).mean().sqrt()
+            in_recording = torch.as_tensor(np.flatnonzero(segments.recording == index), device=errors.device)
+            scale[in_recording] = (moment[:, in_recording] ** 2).mean().sqrt()
         return cls(arms=arms, scale=scale)
 
     def moment(self, changes: Tensor) -> Tensor:
-        """(change, frame, segment) over its scale, of (change, frame, marker, 3, segment) [m]."""
+        """Computes the moment (change, frame, segment) over its scale, of (change, frame, marker, 3, segment) [m]."""
         return torch.einsum("fmxs,cfmxs->cfs", self.arms, changes[:, :, :, :2]) / self.scale
 
     @classmethod
     def joined(cls, parts: list[PoleMoment]) -> PoleMoment:
-        """The segments of several, one after another."""
+        """Joins the segments of several, one after another."""
         return cls(arms=torch.cat([p.arms for p in parts], dim=-1), scale=torch.cat([p.scale for p in parts]))
 
 
 def shares(specimen: Specimen, markers: Floats) -> Floats:
-    """(marker,) of a cloth's area [m²], that of the vertices brought onto markers (marker, 2) [m]."""
+    """Shares the cloth's area [m²] among markers (marker, 2) [m], that of the vertices brought onto them, (marker,)."""
     return specimen.mesh.vertex_areas @ onto(markers, specimen.mesh.rest)
 
 
@@ -99,7 +100,7 @@ as for a point that moves evenly."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Statistics(Rows):
+class Statistics(StatisticRows):
     """Sums over the frames and markers of segments.
 
     Attributes:
@@ -152,33 +153,36 @@ class Projection:
 
     @classmethod
     def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
-        """Along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some scale (marker, segment)."""
+        """Projects along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some scale (marker,
+        segment)."""
         moved = torch.stack([_plain(change, scale).flatten(1) for change in changes], dim=1)
         moved /= moved.norm(dim=2, keepdim=True).clamp(min=torch.finfo(moved.dtype).tiny)
         return cls(directions=moved, scale=scale)
 
     def of(self, errors: Tensor) -> Floats:
-        """(segment, column) r of errors (frame, marker, 3, segment) [m]."""
+        """Computes r of errors (frame, marker, 3, segment) [m], (segment, column)."""
         clipped = _clipped(errors, self.scale).flatten(1).to(self.directions)
         return torch.einsum("sck,sk->sc", self.directions, clipped).double().cpu().numpy()
 
     def turned(self, errors: Tensor) -> Floats | None:
-        """(segment, column) r of the moment of errors (frame, marker, 3, segment) [m]; None where not looked at."""
+        """Computes r of the moment of errors (frame, marker, 3, segment) [m], (segment, column); None where not looked
+        at."""
         if self.pole_moment is None or self.turning is None:
             return None
         moment = self.pole_moment.moment(errors[None])[0].to(self.turning)
         return torch.einsum("scf,fs->sc", self.turning, moment).double().cpu().numpy()
 
     def course(self, errors: Tensor) -> Course | None:
-        """The wind's course by the errors (frame, marker, 3, segment) [m]; None where not asked for."""
+        """Computes the wind's course by the errors (frame, marker, 3, segment) [m]; None where not asked for."""
         return None if self.gauge is None else self.gauge.course(_clipped(errors, self.scale))
 
     def lines(self, errors: Tensor) -> Floats | None:
-        """(segment, reduced frequency, direction) of their spectra: see `lines`; None where not looked at."""
+        """Computes the prominence of the errors' spectra, (segment, reduced frequency, direction): see `lines`; None
+        where not looked at."""
         return None if self.spectrum is None else self.spectrum.prominence(errors)
 
     def response(self, changes: Sequence[Tensor]) -> Floats:
-        """(segment, column, k) how r moves with k sensitivities (frame, marker, 3, segment) [m per unit]."""
+        """Computes how r moves with k sensitivities (frame, marker, 3, segment) [m per unit], (segment, column, k)."""
         moved = torch.stack([_plain(change, self.scale).flatten(1) for change in changes], dim=2)
         return (self.directions @ moved).double().cpu().numpy()
 
@@ -186,35 +190,35 @@ class Projection:
 def statistics(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
 ) -> Statistics:
-    """Run the base model, its parameters and every column along segments, each with its calibration.
+    """Runs the base model, its parameters and every column along segments, each with its calibration.
 
     The columns of the result are `THETA`'s, then those given.
     """
-    return Statistics.joined([piece.found for piece in _pieces(forecaster, segments, calibrations, columns)])
+    return Statistics.joined([piece.statistics for piece in _pieces(forecaster, segments, calibrations, columns)])
 
 
 def projected(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
 ) -> tuple[Statistics, Projection]:
-    """The same, with how they move with what the wind's log may be off by, and with the directions, 4 MB a segment of
-    50 frames, 190 markers and 36 columns."""
+    """Computes the same statistics, with how they move with what the wind's log may be off by, and with the directions,
+    4 MB a segment of 50 frames, 190 markers and 36 columns."""
     parts: list[Statistics] = []
     along: list[Projection] = []
     pieces = list(_pieces(forecaster, segments, calibrations, columns))
     for piece in pieces:
-        own = Projection.along(piece.changes, piece.scale)
+        projection = Projection.along(piece.changes, piece.scale)
         off = sensitivities(forecaster, piece.segments, piece.calibrations, piece.base)
-        parts.append(_with_log(piece, own, off))
-        along.append(own)
-    whole = Projection(
-        directions=torch.cat([own.directions for own in along]),
+        parts.append(_with_log(piece, projection, off))
+        along.append(projection)
+    joined = Projection(
+        directions=torch.cat([projection.directions for projection in along]),
         scale=torch.cat([piece.scale for piece in pieces], dim=1),
         spectrum=_spectrum(forecaster, segments),
         pole_moment=PoleMoment.joined([piece.pole_moment for piece in pieces]),
         turning=torch.cat([piece.turning for piece in pieces]),
         gauge=Gauge.joined([piece.gauge for piece in pieces]),
     )
-    return Statistics.joined(parts), whole
+    return Statistics.joined(parts), joined
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -230,32 +234,32 @@ class _Piece:
     pole_moment: PoleMoment
     turning: Tensor
     gauge: Gauge
-    found: Statistics
+    statistics: Statistics
 
 
 def _pieces(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
 ) -> Iterator[_Piece]:
-    """Some segments at a time."""
+    """Yields some segments at a time."""
     # Segments of one recording share weights, and so stay in one chunk.
     for chosen in _chunks(segments.recording):
-        own, recording = segments.select(chosen), segments.recording[chosen]
+        chosen_segments, recording = segments.select(chosen), segments.recording[chosen]
         starts = [calibrations[i] for i in chosen]
-        base = forecaster.errors(*forecaster.system(own, starts), own)
-        changes = forecaster.sensitivities((*columns, *winds()), own, starts, base)
+        base = forecaster.errors(*forecaster.system(chosen_segments, starts), chosen_segments)
+        changes = forecaster.sensitivities((*columns, *winds()), chosen_segments, starts, base)
         changes, blown = changes[: -len(winds())], changes[-len(winds()) :]
-        pole_moment = PoleMoment.of(base, own, forecaster.specimen)
-        scale = error_scale(base, recording, own.noise, own.counted)
-        gauge = Gauge.of(blown, scale, period=own.period)
+        pole_moment = PoleMoment.of(base, chosen_segments, forecaster.specimen)
+        scale = error_scale(base, recording, chosen_segments.noise, chosen_segments.counted)
+        gauge = Gauge.of(blown, scale, period=chosen_segments.period)
         turned, turning = _turned(pole_moment, base, changes, recording)
-        found = replace(
-            reduced(base, changes, recording, own.noise, own.counted),
-            lines=_spectrum(forecaster, own).prominence(base),
+        piece_statistics = replace(
+            reduced(base, changes, recording, chosen_segments.noise, chosen_segments.counted),
+            lines=_spectrum(forecaster, chosen_segments).prominence(base),
             turning=turned,
             course=gauge.course(_clipped(base, scale)),
         )
         yield _Piece(
-            segments=own,
+            segments=chosen_segments,
             calibrations=starts,
             base=base,
             changes=changes,
@@ -263,25 +267,25 @@ def _pieces(
             pole_moment=pole_moment,
             turning=turning,
             gauge=gauge,
-            found=found,
+            statistics=piece_statistics,
         )
 
 
 def _with_log(piece: _Piece, along: Projection, off: Sequence[Tensor]) -> Statistics:
-    """Statistics with how they move with what the wind's log may be off by.
+    """Adds to statistics how they move with what the wind's log may be off by.
 
     Args:
         along: the sensitivities that the statistics are along.
         off: (frame, marker, 3, segment) [m] of each nuisance.
     """
-    turning, course = piece.found.turning, piece.found.course
+    turning, course = piece.statistics.turning, piece.statistics.course
     if turning is not None:
         moved = piece.pole_moment.moment(torch.stack(list(off))).double().permute(2, 0, 1)
         turning = replace(turning, log=(piece.turning @ moved.transpose(1, 2)).cpu().numpy())
     if course is not None:
-        scores = [piece.gauge.course(_plain(own, piece.scale)).score for own in off]
+        scores = [piece.gauge.course(_plain(nuisance, piece.scale)).score for nuisance in off]
         course = replace(course, log=np.stack(scores, axis=-1))
-    return replace(piece.found, log=along.response(off), turning=turning, course=course)
+    return replace(piece.statistics, log=along.response(off), turning=turning, course=course)
 
 
 def _turned(
@@ -310,17 +314,18 @@ def _spectrum(forecaster: Forecaster, segments: Segments) -> Spectrum:
 def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     chunks: list[list[int]] = [[]]
     for index in np.unique(recording):
-        own = np.flatnonzero(recording == index).tolist()
-        if chunks[-1] and len(chunks[-1]) + len(own) > _CHUNK:
+        in_recording = np.flatnonzero(recording == index).tolist()
+        if chunks[-1] and len(chunks[-1]) + len(in_recording) > _CHUNK:
             chunks.append([])
-        chunks[-1] += own
+        chunks[-1] += in_recording
     return [np.array(chunk) for chunk in chunks if chunk]
 
 
 def error_scale(
     base: Tensor, recording: NDArray[np.int64], noise: Floats, counted: NDArray[np.bool_] | None = None
 ) -> Tensor:
-    """(marker, segment) root mean square errors of a marker in the recording, beyond what its noise explains [m].
+    """Computes root mean square errors of a marker in the recording, beyond what its noise explains, (marker, segment)
+    [m].
 
     Args:
         counted: (frame, marker, segment) whether each position was tracked; None where all were.
@@ -328,23 +333,23 @@ def error_scale(
     mean = (base**2).mean((0, 2))
     scale = torch.empty_like(mean)
     for index in np.unique(recording):
-        own = torch.as_tensor(np.flatnonzero(recording == index), device=base.device)
-        squared = mean[:, own].mean(1)
+        in_recording = torch.as_tensor(np.flatnonzero(recording == index), device=base.device)
+        squared = mean[:, in_recording].mean(1)
         noisy = _NOISE * float(noise[recording == index][0]) ** 2
         if counted is not None:
             share = torch.as_tensor(counted[:, :, recording == index].mean(axis=(0, 2))).to(base)
             noisy, squared = noisy * share, torch.maximum(squared, _NEVER * squared.max())
-        scale[:, own] = torch.maximum(squared - noisy, squared / 4).sqrt()[:, None]
+        scale[:, in_recording] = torch.maximum(squared - noisy, squared / 4).sqrt()[:, None]
     return scale
 
 
 def _plain(changes: Tensor, scale: Tensor) -> Tensor:
-    """(segment, frame, marker · 3) of changes (frame, marker, 3, segment) over (marker, segment)."""
+    """Divides changes (frame, marker, 3, segment) by (marker, segment): (segment, frame, marker · 3)."""
     return (changes / scale[None, :, None]).permute(3, 0, 1, 2).flatten(2)
 
 
 def _clipped(errors: Tensor, scale: Tensor) -> Tensor:
-    """The same of errors, long ones clipped."""
+    """Divides errors as `_plain` does changes, long ones clipped."""
     errors = errors / scale[None, :, None]
     size = errors.norm(dim=2, keepdim=True) / 3**0.5
     return (errors * (_CLIP / size.clamp(min=_CLIP))).permute(3, 0, 1, 2).flatten(2)
@@ -357,7 +362,8 @@ def reduced(
     noise: Floats,
     counted: NDArray[np.bool_] | None = None,
 ) -> Statistics:
-    """Statistics of segments: errors, sensitivities (frame, marker, 3, segment) and the noise of their markers [m].
+    """Computes statistics of segments: errors, sensitivities (frame, marker, 3, segment) and the noise of their markers
+    [m].
 
     Args:
         counted: (frame, marker, segment) whether each position was tracked; None where all were.
@@ -368,13 +374,13 @@ def reduced(
     stacked = torch.stack(list(changes))
     scale = error_scale(base, recording, noise, counted)
     errors = _clipped(base, scale)
-    for place in range(len(recording)):
-        error = errors[place].flatten().double()
-        moved = (stacked[..., place] / scale[None, None, :, place, None]).reshape(len(changes), -1).double()
+    for segment in range(len(recording)):
+        error = errors[segment].flatten().double()
+        moved = (stacked[..., segment] / scale[None, None, :, segment, None]).reshape(len(changes), -1).double()
         inner = (moved @ moved.T).cpu().numpy()
         length = np.sqrt(np.maximum(np.diag(inner), np.finfo(np.float64).tiny))
-        r[place] = (moved @ error).cpu().numpy() / length
-        response[place] = inner / length[:, None]
+        r[segment] = (moved @ error).cpu().numpy() / length
+        response[segment] = inner / length[:, None]
     return Statistics(
         recording=recording,
         r=r,

@@ -41,7 +41,7 @@ _CALM = 0.3
 
 
 def misread(wind: WindTrack, *, gain: float = 0.0, direction: float = 0.0, clock: float = 0.0) -> WindTrack:
-    """The wind at the flag where the log is off.
+    """Computes the wind at the flag where the log is off.
 
     Args:
         gain: share by which the wind is stronger than logged.
@@ -56,14 +56,15 @@ def misread(wind: WindTrack, *, gain: float = 0.0, direction: float = 0.0, clock
 def sensitivities(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], base: Tensor
 ) -> list[Tensor]:
-    """Change of the predictions (frame, marker, 3, segment) [m] by a prior standard deviation of each nuisance.
+    """Computes the change of the predictions (frame, marker, 3, segment) [m] by a prior standard deviation of each
+    nuisance.
 
     Args:
         base: errors of the base model [m].
     """
     batches = []
-    for place, step in enumerate(_STEPS):
-        off = [step if k == place else 0.0 for k in range(NUISANCES)]
+    for nuisance, step in enumerate(_STEPS):
+        off = [step if k == nuisance else 0.0 for k in range(NUISANCES)]
         items = tuple(
             replace(item, wind=misread(item.wind, gain=off[0], direction=off[1], clock=off[2]))
             for item in segments.items
@@ -72,13 +73,13 @@ def sensitivities(
     errors = forecaster.errors_jointly(batches, segments)
     widths = np.array([item.wind.uncertainty for item in segments.items])  # (segment, nuisance)
     return [
-        (base - own) / step * base.new_tensor(widths[:, place])
-        for place, (own, step) in enumerate(zip(errors, _STEPS, strict=True))
+        (base - stepped) / step * base.new_tensor(widths[:, nuisance])
+        for nuisance, (stepped, step) in enumerate(zip(errors, _STEPS, strict=True))
     ]
 
 
 def lags(course: Course, segments: Segments) -> tuple[float, ...]:
-    """(recording,) by how much each log lags, most probably, by the course of the wind along itself [s].
+    """Estimates by how much each log lags, most probably, by the course of the wind along itself, (recording,) [s].
 
     Least squares of the windows about their mean, as large as they are, under the prior of the clock; 0 where the wind
     is steady or the clock is known.
@@ -87,36 +88,37 @@ def lags(course: Course, segments: Segments) -> tuple[float, ...]:
     window = segments.cut.length // count
     weight = np.einsum("swpp->swp", course.curvature)[..., ALONG]
     value = course.score[..., ALONG] / np.maximum(weight, np.finfo(np.float64).tiny)
-    own = (segments.first + np.arange(count * window)) * segments.period
-    found: list[float] = []
+    times_in_segment = (segments.first + np.arange(count * window)) * segments.period
+    lags_found: list[float] = []
     for index in np.unique(segments.recording):
         places = np.flatnonzero(segments.recording == index)
         wind = segments.items[places[0]].wind
         if wind.steady or not wind.clock:
-            found.append(0.0)
+            lags_found.append(0.0)
             continue
-        times = np.stack([segments.items[place].start + own for place in places])
+        times = np.stack([segments.items[index].start + times_in_segment for index in places])
         tried = np.linspace(-_REACH, _REACH, _LAGS) * wind.clock
-        left = np.array([_left(value[places], weight[places], _late(wind, times, lag, count)) for lag in tried])
-        size = max(float(left.min()) / value[places].size, np.finfo(np.float64).tiny)
-        found.append(float(tried[np.argmin(left / size + (tried / wind.clock) ** 2)]))
-    return tuple(found)
+        misfits = np.array([_misfit(value[places], weight[places], _late(wind, times, lag, count)) for lag in tried])
+        size = max(float(misfits.min()) / value[places].size, np.finfo(np.float64).tiny)
+        lags_found.append(float(tried[np.argmin(misfits / size + (tried / wind.clock) ** 2)]))
+    return tuple(lags_found)
 
 
 def _late(wind: WindTrack, times: Floats, lag: float, count: int) -> Floats:
-    """(segment, window) share by which the wind is stronger than a log that lags, at times (segment, frame) [s]."""
+    """Computes the share by which the wind is stronger than a log that lags, at times (segment, frame) [s], (segment,
+    window)."""
     logged, true = (wind.at((times + shift).ravel())[:, 0].reshape(times.shape) for shift in (0.0, lag))
     share = true / np.where(np.abs(logged) > _CALM, logged, np.inf) - 1
     return share.reshape(len(times), count, -1).mean(axis=2)
 
 
-def _left(value: Floats, weight: Floats, expected: Floats) -> float:
+def _misfit(value: Floats, weight: Floats, expected: Floats) -> float:
     off = value - expected
     return float((weight * (off - (weight * off).sum() / weight.sum()) ** 2).sum())
 
 
 def by_recording(moved: Floats, recording: NDArray[np.int64]) -> Floats:
-    """(segment, row, nuisance · recording) of (segment, row, nuisance): each moves its own recording alone."""
+    """Spreads (segment, row, nuisance) to (segment, row, nuisance · recording): each moves its own recording alone."""
     numbers = np.unique(recording)
-    own = (recording[:, None] == numbers).astype(np.float64)
-    return np.einsum("srk,sn->srnk", moved, own).reshape(*moved.shape[:2], -1)
+    of_recording = (recording[:, None] == numbers).astype(np.float64)
+    return np.einsum("srk,sn->srnk", moved, of_recording).reshape(*moved.shape[:2], -1)

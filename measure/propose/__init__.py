@@ -8,7 +8,7 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.propose.effect_file import write
-    from measure.propose.outcome import Decision, Outcome
+    from measure.propose.outcome import Decision, ProposalOutcome
     from measure.propose.propose import made_ready
     from measure.propose.terms import Term, columns_of, dictionary
 

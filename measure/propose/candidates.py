@@ -33,7 +33,7 @@ class FileColumn(EffectColumn):
 
 
 def from_file(spec: str) -> tuple[FileColumn, ...]:
-    """The strengths of the effect that `FILE.py:Class` names, with steps of half their expected range.
+    """Lists the strengths of the effect that `FILE.py:Class` names, with steps of half their expected range.
 
     Raises:
         FlagdataError: as `sim.effects.files.load`.
@@ -51,13 +51,13 @@ def from_file(spec: str) -> tuple[FileColumn, ...]:
     )
 
 
-def weighed(name: str) -> EffectColumn:
-    """The column of a strength of the library, by "effect.parameter".
+def library_column(name: str) -> EffectColumn:
+    """Finds the column of a strength of the library, by "effect.parameter".
 
     Raises:
         UnknownNameError: none of that name is weighed.
     """
-    known = {column.name: column for column in library()}
-    if name not in known:
-        raise UnknownNameError.of("weighed strength", name, known)
-    return known[name]
+    by_name = {column.name: column for column in library()}
+    if name not in by_name:
+        raise UnknownNameError.of("weighed strength", name, by_name)
+    return by_name[name]

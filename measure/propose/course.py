@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from measure.forecasting.model import Model
 from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.setting import Setting
-from measure.propose.outcome import Course, Line
+from measure.propose.outcome import PeriodogramLine, StrengthCourse
 from measure.verdict.record import Estimate
 from sim.effects import apply
 
@@ -30,19 +30,19 @@ _SLOW = 3
 """Periods in a recording below which a line is no more than a trend."""
 
 
-def course(setting: Setting, model: Model, place: int) -> Course:
-    """The course of the effect at a place of a model, along all recordings."""
-    column, fitted = model.effects[place]
+def course(setting: Setting, model: Model, effect: int) -> StrengthCourse:
+    """Computes the course of the effect at an index of a model, along all recordings."""
+    column, fitted = model.effects[effect]
     amplitudes, period = _amplitudes(setting, model, column, fitted)
     stretch = max(1, round(BIN / period))
     binned: list[Floats] = []
-    lines: list[Line] = []
+    lines: list[PeriodogramLine] = []
     times: list[Floats] = []
     segments = setting.segments
     for index in range(len(setting.speeds)):
-        own = np.flatnonzero(setting.recording == index)
+        of_recording = np.flatnonzero(setting.recording == index)
         parts, places, frames = [], [], []
-        for segment in own:
+        for segment in of_recording:
             top, bottom = amplitudes[0][:, segment], amplitudes[1][:, segment]
             frames.append(top / bottom)
             count = len(top) // stretch
@@ -57,7 +57,7 @@ def course(setting: Setting, model: Model, place: int) -> Course:
     spread = float(np.sqrt(np.mean([np.var(values, ddof=1) for values in binned])))
     speeds = [float(u) for u in setting.speeds]
     height = float(np.ptp(setting.experiment.specimen.mesh.rest[:, 1]))
-    return Course(
+    return StrengthCourse(
         bin=stretch * period,
         times=[t.tolist() for t in times],
         amplitudes=[a.tolist() for a in binned],
@@ -72,11 +72,11 @@ def course(setting: Setting, model: Model, place: int) -> Course:
 def _amplitudes(
     setting: Setting, model: Model, column: EffectColumn, fitted: float
 ) -> tuple[tuple[Floats, Floats], float]:
-    """(frame, segment) Σ e·s and Σ s² over the markers, and the time between frames [s]."""
+    """Computes Σ e·s and Σ s² over the markers, (frame, segment), and the time between frames [s]."""
     forecaster, segments = setting.forecaster, setting.segments
     base = forecaster.errors(*model.system(forecaster, segments), segments)
-    others = tuple(effect for effect in model.effects if effect[0] is not column)
-    rest = Model(calibration=model.calibration, effects=others)
+    other_effects = tuple(effect for effect in model.effects if effect[0] is not column)
+    rest = Model(calibration=model.calibration, effects=other_effects)
     moved = apply([column.at(fitted + column.step)], *rest.system(forecaster, segments))
     change = (base - forecaster.errors(*moved, segments)) / column.step
     top, bottom = (base * change).sum((1, 2)), (change**2).sum((1, 2))
@@ -84,15 +84,15 @@ def _amplitudes(
 
 
 def _mean(values: Floats, unit: str) -> Estimate:
-    """With an interval from blocks of five stretches, which hardly know of one another."""
+    """Averages, with an interval from blocks of five stretches, which hardly know of one another."""
     blocks = values[: len(values) // 5 * 5].reshape(-1, 5).mean(axis=1) if len(values) >= 10 else values
     reach = float(student.ppf(0.5 + _LEVEL / 2, len(blocks) - 1) * blocks.std(ddof=1) / math.sqrt(len(blocks)))
     value = float(values.mean())
     return Estimate(value=value, low=value - reach, high=value + reach, unit=unit, level=_LEVEL)
 
 
-def line(values: Floats, period: float) -> Line:
-    """The largest line of the periodogram, of three periods or more (Fisher, Proc. R. Soc. A 125, 1929).
+def line(values: Floats, period: float) -> PeriodogramLine:
+    """Finds the largest line of the periodogram, of three periods or more (Fisher, Proc. R. Soc. A 125, 1929).
 
     Args:
         values: equally spaced.
@@ -109,10 +109,12 @@ def line(values: Floats, period: float) -> Line:
     # The sum alternates and cancels for small lines, which its first term bounds.
     p_value = min(1.0, terms[0]) if share < 0.05 else min(1.0, max(0.0, sum(terms)))
     frequency = float(np.fft.rfftfreq(len(values), period)[_SLOW + best])
-    return Line(frequency=frequency, share=share, p_value=p_value)
+    return PeriodogramLine(frequency=frequency, share=share, p_value=p_value)
 
 
-def _words(by_recording: list[Estimate], speeds: list[float], spread: float, lines: list[Line], height: float) -> str:
+def _words(
+    by_recording: list[Estimate], speeds: list[float], spread: float, lines: list[PeriodogramLine], height: float
+) -> str:
     unit = "" if by_recording[0].unit == "1" else f" {by_recording[0].unit}"
     means = "; ".join(
         f"{e.value:+.3g} [{e.low:.3g}, {e.high:.3g}]{unit} at {u:.1f} m/s"
@@ -120,8 +122,8 @@ def _words(by_recording: list[Estimate], speeds: list[float], spread: float, lin
     )
     text = f"{means}; in time it varies by {spread:.2g}{unit}, errors included"
     significant = [
-        f"{one.frequency:.2f} Hz ({100 * one.share:.0f} %; f L/U = {one.frequency * height / u:.2g}) at {u:.1f} m/s"
-        for one, u in zip(lines, speeds, strict=True)
-        if one.p_value < _RARE
+        f"{line.frequency:.2f} Hz ({100 * line.share:.0f} %; f L/U = {line.frequency * height / u:.2g}) at {u:.1f} m/s"
+        for line, u in zip(lines, speeds, strict=True)
+        if line.p_value < _RARE
     ]
     return f"{text}, with lines at {', '.join(significant)}; L is the cloth's height" if significant else text

@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from flagdata.errors import ConflictError, UsageError
 from flagdata.outputs import check_files, write_files
-from measure.propose.outcome import Outcome, Strength
+from measure.propose.outcome import ProposalOutcome, TermStrength
 from measure.propose.terms import MASS, Term, TermColumn
 
 _PROJECT = "pyproject.toml"
@@ -37,8 +37,8 @@ class EffectFile:
         return f"{self.path}:{self.class_name}"
 
 
-def write(outcome: Outcome, folder: Path) -> EffectFile:
-    """The effect file, its contract tests and its pyproject.toml, into a folder.
+def write(outcome: ProposalOutcome, folder: Path) -> EffectFile:
+    """Writes the effect file, its contract tests and its pyproject.toml, into a folder.
 
     An earlier proposal from the same data that was changed since is kept; the new one gets the next free name.
 
@@ -85,7 +85,7 @@ def write(outcome: Outcome, folder: Path) -> EffectFile:
 
 
 def check(folder: Path) -> None:
-    """Refuse a folder in which `write` cannot write, before any term is sought; raises as `write`."""
+    """Refuses a folder in which `write` cannot write, before any term is sought; raises as `write`."""
     check_files(folder, _PROJECT, command=_COMMAND)
 
 
@@ -102,8 +102,8 @@ def _is_free(folder: Path, module: str) -> bool:
     return True
 
 
-def _part(strength: Strength) -> dict[str, Any]:
-    """What the template needs of a strength whose name is `field_shape`."""
+def _part(strength: TermStrength) -> dict[str, Any]:
+    """Returns what the template needs of a strength whose name is `field_shape`."""
     term, estimate = Term.named(strength.name), strength.estimate
     reach = abs(estimate.high - estimate.low)
     least, _ = TermColumn.of(term).described.admissible

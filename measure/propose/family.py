@@ -44,24 +44,24 @@ class Family:
     shares: Floats
 
     @classmethod
-    def of(cls, nulls: Nulls, found: Statistics, *, noise: float, seed: int) -> Family:
-        """For the projected errors of data.
+    def of(cls, nulls: Nulls, statistics: Statistics, *, noise: float, seed: int) -> Family:
+        """Makes the family for the projected errors of data.
 
         Args:
-            found: of the data.
+            statistics: of the data.
             noise: of the data's markers [m].
 
         Raises:
             InputError: no null experiment has as many segments.
         """
-        count, columns = found.response.shape[0], found.response.shape[2]
+        count, columns = statistics.response.shape[0], statistics.response.shape[2]
         similar = nulls.select(np.abs(nulls.noise - noise) <= _NOISE_TOLERANCE)
         pool = similar if len(similar.noise) and len(np.unique(similar.experiment)) >= _LEAST else nulls
         shares: list[Floats] = []
-        for kept in left_out_groups(nulls, pool, count, seed=seed):
-            for chosen in kept.groups:
-                placed = replace(found, r=kept.outside.statistics.r[chosen])
-                shares.append(_shares(evidence(placed, kept.outside.speeds[chosen], kept.model), ()))
+        for left_out in left_out_groups(nulls, pool, count, seed=seed):
+            for chosen in left_out.groups:
+                placed = replace(statistics, r=left_out.outside.statistics.r[chosen])
+                shares.append(_shares(evidence(placed, left_out.outside.speeds[chosen], left_out.model), ()))
         result = np.array(shares)
         return cls(shares=result[:, :columns])
 
@@ -73,16 +73,16 @@ class Family:
     def _scaled(self) -> Floats:
         return self.shares[:, len(THETA) :] / self._spread[len(THETA) :]
 
-    def statistics(self, own: Evidence, beside: Sequence[int] = ()) -> Floats:
-        """(column,) of data, where some columns are fitted already."""
-        return _shares(own, beside) / self._spread
+    def statistics(self, evidence_of_data: Evidence, along: Sequence[int] = ()) -> Floats:
+        """Computes (column,) statistics of data, where some columns are fitted already."""
+        return _shares(evidence_of_data, along) / self._spread
 
     def p_value(self, statistic: float, columns: Sequence[int]) -> float:
-        """Share of the groups in which the largest statistic of these columns is at least this one."""
+        """Computes the share of the groups in which the largest statistic of these columns is at least this one."""
         largest = self._scaled[:, [column - len(THETA) for column in columns]].max(axis=1)
         return float((1 + (largest >= statistic).sum()) / (1 + len(largest)))
 
 
-def _shares(own: Evidence, beside: Sequence[int]) -> Floats:
-    drops, left = own.drops(beside), own.fit(beside).left
-    return drops / np.maximum(left - drops, 1e-9)
+def _shares(evidence_of_data: Evidence, along: Sequence[int]) -> Floats:
+    drops, remainder = evidence_of_data.drops(along), evidence_of_data.fit(along).remainder
+    return drops / np.maximum(remainder - drops, 1e-9)

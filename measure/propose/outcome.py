@@ -33,7 +33,7 @@ class Ranked:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class PeriodogramLine:
     """The largest line of the periodogram of an amplitude in one recording.
 
     Attributes:
@@ -48,7 +48,7 @@ class Line:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Course:
+class StrengthCourse:
     """How the amplitude of a term behaves: fitted to each stretch of time, with the rest of the model as it is.
 
     Attributes:
@@ -69,12 +69,12 @@ class Course:
     by_recording: list[Estimate]
     speeds: list[float]
     fluctuation: float
-    lines: list[Line]
+    lines: list[PeriodogramLine]
     words: str
 
 
 @dataclass(frozen=True, kw_only=True)
-class Strength:
+class TermStrength:
     """A strength of the proposal.
 
     Attributes:
@@ -87,7 +87,7 @@ class Strength:
     name: str
     words: str
     estimate: Estimate
-    course: Course
+    course: StrengthCourse
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +140,7 @@ class Retest:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class ProposalOutcome:
     """The whole of it.
 
     Attributes:
@@ -163,7 +163,7 @@ class Outcome:
     steps: tuple[Step, ...]
     tried: int
     ranking: tuple[Ranked, ...]
-    strengths: tuple[Strength, ...]
+    strengths: tuple[TermStrength, ...]
     retest: Retest | None
     level: float
     nulls: str
@@ -173,5 +173,5 @@ class Outcome:
     seed: int
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values: an entry of the proposal log."""
+        """Returns JSON values: an entry of the proposal log."""
         return asdict(self)

@@ -72,30 +72,31 @@ class MassSideBySide(ClothEffect):
 def of_columns(
     forecaster: Forecaster, segments: Segments, base: Tensor, columns: Sequence[Column]
 ) -> dict[str, Tensor]:
-    """Name of each column → change of the predictions with it, (frame, marker, 3, segment) [m per unit].
+    """Computes for each column, by name, the change of the predictions with it, (frame, marker, 3, segment) [m per
+    unit].
 
     Args:
         base: errors of the nominal model.
     """
     nominal = [Calibration()] * len(segments)
-    found: dict[str, Tensor] = {}
+    changes: dict[str, Tensor] = {}
     fields: dict[str, list[TermColumn]] = {}
     for column in columns:
         if isinstance(column, TermColumn):
             fields.setdefault(column.term.field, []).append(column)
         else:
-            found[column.name] = forecaster.sensitivity(column, segments, nominal, base)
-    each = max(1, WIDEST // len(segments))
-    for own in fields.values():
-        for first in range(0, len(own), each):
-            found |= _bundle(forecaster, segments, base, own[first : first + each])
-    return found
+            changes[column.name] = forecaster.sensitivity(column, segments, nominal, base)
+    columns_at_once = max(1, WIDEST // len(segments))
+    for of_field in fields.values():
+        for first in range(0, len(of_field), columns_at_once):
+            changes |= _bundle(forecaster, segments, base, of_field[first : first + columns_at_once])
+    return changes
 
 
 def _bundle(
     forecaster: Forecaster, segments: Segments, base: Tensor, columns: Sequence[TermColumn]
 ) -> dict[str, Tensor]:
-    """Sensitivities to terms of one field."""
+    """Computes sensitivities to terms of one field."""
     count, step = len(segments), columns[0].step
     copies = segments.select(list(range(count)) * len(columns))
     system, state = forecaster.system(copies, [Calibration()] * len(copies))
@@ -105,8 +106,8 @@ def _bundle(
     effect: Effect = MassSideBySide(weights=weights) if field == MASS else SideBySide(field=field, weights=weights)
     errors = forecaster.errors(*effect.apply(system, state), copies)
     return {
-        column.name: (base - errors[..., place * count : (place + 1) * count]) / step
-        for place, column in enumerate(columns)
+        column.name: (base - errors[..., index * count : (index + 1) * count]) / step
+        for index, column in enumerate(columns)
     }
 
 
@@ -133,15 +134,15 @@ class ProjectedSegments:
     directions: tuple[Tensor, ...]
 
     @classmethod
-    def of(cls, forecaster: Forecaster, segments: Segments, weighed: Sequence[Column]) -> ProjectedSegments:
-        """Directions of the calibrated parameters and of the columns that the null bank weighs."""
+    def of(cls, forecaster: Forecaster, segments: Segments, null_columns: Sequence[Column]) -> ProjectedSegments:
+        """Projects on the directions of the calibrated parameters and of the columns that the null bank weighs."""
         nominal = [Calibration()] * len(segments)
         base = forecaster.errors(*forecaster.system(segments, nominal), segments)
-        along = forecaster.sensitivities(weighed, segments, nominal, base)
+        along = forecaster.sensitivities(null_columns, segments, nominal, base)
         return cls(forecaster=forecaster, segments=segments, base=base, directions=tuple(along))
 
     def select(self, chosen: NDArray[np.int64]) -> ProjectedSegments:
-        """The same for some segments only."""
+        """Selects some segments only."""
         return replace(
             self,
             segments=self.segments.select(chosen),
@@ -150,10 +151,11 @@ class ProjectedSegments:
         )
 
     def whitened(self, null: NullModel, of_recordings: Floats) -> WhitenedMisfit:
-        """Misfit of the projected errors, whitened by the null model; `of_recordings` are wind speeds [m/s]."""
+        """Makes the misfit of the projected errors, whitened by the null model; `of_recordings` are wind speeds
+        [m/s]."""
         recording, noise = self.segments.recording, self.segments.noise
         return WhitenedMisfit(
-            found=reduced(self.base, self.directions, recording, noise, self.segments.counted),
+            statistics=reduced(self.base, self.directions, recording, noise, self.segments.counted),
             projection=Projection.along(
                 self.directions, error_scale(self.base, recording, noise, self.segments.counted)
             ),
@@ -167,12 +169,12 @@ class ProjectedSegments:
         return self.projected(self.base, self.directions[: len(THETA)])
 
     def of_columns(self, columns: Sequence[Column]) -> Statistics:
-        """Statistics of the calibrated parameters and some columns, at the nominal model."""
+        """Computes statistics of the calibrated parameters and some columns, at the nominal model."""
         parts = [self.calibrated]
         for first in range(0, len(columns), _TOGETHER):
-            own = columns[first : first + _TOGETHER]
-            found = of_columns(self.forecaster, self.segments, self.base, own)
-            parts.append(self.projected(self.base, [found[column.name] for column in own]))
+            chunk = columns[first : first + _TOGETHER]
+            changes = of_columns(self.forecaster, self.segments, self.base, chunk)
+            parts.append(self.projected(self.base, [changes[column.name] for column in chunk]))
         return replace(parts[0], response=np.concatenate([part.response for part in parts], axis=2))
 
     def at(self, model: Model) -> Statistics:
@@ -181,18 +183,20 @@ class ProjectedSegments:
         return self.projected(base, changes)
 
     def projected(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
-        """Projected errors r (segment, direction) and their response to changes (segment, direction, change)."""
-        found = reduced(
+        """Projects errors, r (segment, direction), and their response to changes (segment, direction, change)."""
+        both_responses = reduced(
             base, [*self.directions, *changes], self.segments.recording, self.segments.noise, self.segments.counted
         )
         count = len(self.directions)
-        return replace(found, r=found.r[:, :count], response=found.response[:, :count, count:])
+        return replace(
+            both_responses, r=both_responses.r[:, :count], response=both_responses.response[:, :count, count:]
+        )
 
     def speeds(self, of_recordings: Floats) -> Floats:
-        """(segment,) of the wind [m/s], of speeds by recording."""
+        """Returns the wind speed of each segment [m/s], (segment,), of speeds by recording."""
         return of_recordings[self.segments.recording]
 
 
-def evidence(found: Statistics, speeds: Floats, null: NullModel) -> Evidence:
-    """The evidence in projected statistics; its columns are those of the response."""
-    return replace(Evidence.of(found, speeds, null), columns=found.response.shape[2])
+def evidence(statistics: Statistics, speeds: Floats, null: NullModel) -> Evidence:
+    """Computes the evidence in projected statistics; its columns are those of the response."""
+    return replace(Evidence.of(statistics, speeds, null), columns=statistics.response.shape[2])

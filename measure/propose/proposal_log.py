@@ -9,14 +9,14 @@ from typing import Any
 from flagdata.documents import read_json
 from flagdata.errors import CorruptError
 from flagdata.outputs import check_rewrite, rewrite
-from measure.propose.outcome import Outcome
+from measure.propose.outcome import ProposalOutcome
 
 SCHEMA = "flagdata.proposals/1"
 _FORMER_SCHEMA = "flagdata.ledger/1"
 
 
 def entries(path: Path) -> list[dict[str, Any]]:
-    """The entries of a log; empty where there is no file.
+    """Reads the entries of a log; empty where there is no file.
 
     Raises:
         CorruptError: the file is not a proposal log.
@@ -25,12 +25,12 @@ def entries(path: Path) -> list[dict[str, Any]]:
         return []
     content = read_json(path, noun="proposal log", fix="move it away")
     if content.get("schema") not in (SCHEMA, _FORMER_SCHEMA) or not isinstance(content.get("entries"), list):
-        raise CorruptError(f"not a proposal log of schema {SCHEMA}", where=str(path), fix="move it away")
+        raise CorruptError(f"it is not a proposal log of schema {SCHEMA}", where=str(path), fix="move it away")
     return content["entries"]
 
 
 def check(path: Path) -> None:
-    """Refuse a path at which no entry can be added, before any term is tried.
+    """Refuses a path at which no entry can be added, before any term is tried.
 
     Raises:
         ConflictError, CorruptError: the file is not a proposal log.
@@ -40,8 +40,8 @@ def check(path: Path) -> None:
     entries(path)
 
 
-def add(path: Path, outcome: Outcome, *, effect: str) -> None:
-    """One more entry, after those that are there. Entries are never changed.
+def add(path: Path, outcome: ProposalOutcome, *, effect: str) -> None:
+    """Adds one more entry, after those that are there. Entries are never changed.
 
     Args:
         effect: name of the effect's file and class; empty where no term was accepted.
@@ -49,6 +49,6 @@ def add(path: Path, outcome: Outcome, *, effect: str) -> None:
     Raises:
         CorruptError: the file is not a proposal log.
     """
-    made = [*entries(path), {"effect": effect, **outcome.as_dict()}]
-    text = json.dumps({"schema": SCHEMA, "entries": made}, indent=1, allow_nan=False, ensure_ascii=False)
+    all_entries = [*entries(path), {"effect": effect, **outcome.as_dict()}]
+    text = json.dumps({"schema": SCHEMA, "entries": all_entries}, indent=1, allow_nan=False, ensure_ascii=False)
     rewrite(path, text + "\n")

@@ -40,7 +40,7 @@ from measure.observe.trajectory import Experiment
 from measure.probes.statistics import Statistics
 from measure.propose.course import course
 from measure.propose.family import Family
-from measure.propose.outcome import Decision, Outcome, Ranked, Retest, Strength
+from measure.propose.outcome import Decision, ProposalOutcome, Ranked, Retest, TermStrength
 from measure.propose.projected import ProjectedSegments, evidence
 from measure.propose.search import Step, search, wrong
 from measure.propose.terms import MASS, TermColumn
@@ -52,7 +52,7 @@ _FLOOR_COPIES = 2
 def retest(
     setting: Setting,
     whitened: WhitenedMisfit,
-    seen: NDArray[np.bool_],
+    used: NDArray[np.bool_],
     before: Model,
     after: Model,
     *,
@@ -61,26 +61,26 @@ def retest(
     words: str,
     seed: int,
 ) -> Retest:
-    """Prediction errors of untouched segments by the models, paired by segment, beside what numerics leave.
+    """Compares prediction errors of untouched segments by the models, paired by segment, beside what numerics leave.
 
     Args:
         whitened: of all segments.
-        seen: (segment,) those that the models were fitted to, and that what is left of the numerics is fitted to.
+        used: (segment,) those that the models were fitted to, and that what is left of the numerics is fitted to.
         control: the same freedom spent on other terms; None where there are none of another direction.
         control_names: which.
         words: which data.
         seed: of the recordings that the floor is of.
     """
 
-    def left(model: Model) -> LeftOut:
-        return measured(setting.forecaster, setting.segments, [model], whitened, [~seen])[0]
+    def misfits_left(model: Model) -> LeftOut:
+        return measured(setting.forecaster, setting.segments, [model], whitened, [~used])[0]
 
-    first, second, recording = left(before), left(after), setting.recording[~seen]
-    wrong = None if control is None else left(control)
+    first, second, recording = misfits_left(before), misfits_left(after), setting.recording[~used]
+    wrong = None if control is None else misfits_left(control)
     _, floor = numerical_floor(setting, np.unique(recording), after, copies=_FLOOR_COPIES, seed=seed)
     return Retest(
         what=words,
-        segments=int((~seen).sum()),
+        segments=int((~used).sum()),
         before=root(first.squared),
         after=root(second.squared),
         reduction=paired(first.squared, second.squared),
@@ -94,7 +94,7 @@ def retest(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fitted:
+class FittedModel:
     """A model with standard errors of its calibrated parameters and strengths, as the null model has them."""
 
     model: Model
@@ -107,8 +107,8 @@ def fit(
     speeds: Floats,
     columns: Sequence[EffectColumn],
     start: Sequence[float],
-) -> Fitted:
-    """Calibrated parameters and strengths, by Gauss and Newton.
+) -> FittedModel:
+    """Fits calibrated parameters and strengths, by Gauss and Newton.
 
     Args:
         speeds: (segment,) of the wind [m/s].
@@ -121,15 +121,17 @@ def fit(
         step, errors = _step(projected, null, speeds, model)
         if np.abs(step / errors).max() < STAYS:
             break
-    return Fitted(model=model.moved(tuple(step)), errors=tuple(float(e) for e in errors))
+    return FittedModel(model=model.moved(tuple(step)), errors=tuple(float(e) for e in errors))
 
 
 def _step(projected: ProjectedSegments, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
-    """One step of generalised least squares from a model, under the prior about the nominal calibration, and its
-    standard errors."""
-    own = evidence(projected.at(model), speeds, null)
-    found = own.fit(range(len(THETA), own.columns), centre=Calibration().steps_from(model.calibration))
-    value, error = np.array([found.of(column) for column in range(own.columns)]).T
+    """Takes one step of generalised least squares from a model, under the prior about the nominal calibration, and
+    returns its standard errors."""
+    projected_evidence = evidence(projected.at(model), speeds, null)
+    fitted = projected_evidence.fit(
+        range(len(THETA), projected_evidence.columns), centre=Calibration().steps_from(model.calibration)
+    )
+    value, error = np.array([fitted.of(column) for column in range(projected_evidence.columns)]).T
     return np.array(cut(value)), error
 
 
@@ -142,16 +144,17 @@ class Split:
     """Segments for choosing and fitting, and segments for the test.
 
     Attributes:
-        seen: (segment,) whether a proposal is made from it; the others are for its test.
+        used: (segment,) whether a proposal is made from it; the others are for its test.
         words: what the test is on.
     """
 
-    seen: NDArray[np.bool_]
+    used: NDArray[np.bool_]
     words: str
 
 
 def split(segments: Segments, speeds: NDArray[np.float64]) -> Split:
-    """The last third of every recording is for the test; of three or more, also the whole one of the middle wind.
+    """Splits off the last third of every recording for the test; of three or more, also the whole one of the middle
+    wind.
 
     Args:
         speeds: (recording,) of the wind [m/s].
@@ -160,26 +163,26 @@ def split(segments: Segments, speeds: NDArray[np.float64]) -> Split:
         InputError: too few segments.
     """
     recording = segments.recording
-    seen = np.ones(len(recording), dtype=bool)
+    used = np.ones(len(recording), dtype=bool)
     words = "the last third of each recording"
     for index in np.unique(recording):
-        own = np.flatnonzero(recording == index)
-        seen[own[-max(1, len(own) // 3) :]] = False
+        of_recording = np.flatnonzero(recording == index)
+        used[of_recording[-max(1, len(of_recording) // 3) :]] = False
     if len(speeds) > 2:
         middle = int(np.argsort(speeds, kind="stable")[len(speeds) // 2])
-        seen[recording == middle] = False
+        used[recording == middle] = False
         words = f"all of the recording at {speeds[middle]:.1f} m/s and the last third of the others"
-    if min(int(seen.sum()), int((~seen).sum())) < _LEAST:
+    if min(int(used.sum()), int((~used).sum())) < _LEAST:
         raise InputError(
-            f"{int(seen.sum())} segments to propose from and {int((~seen).sum())} to test on",
+            f"there are {int(used.sum())} segments to propose from and {int((~used).sum())} to test on",
             where="propose",
             fix=f"record for longer, or more recordings: {_LEAST} of each are needed, of up to 2 s",
         )
-    return Split(seen=seen, words=words)
+    return Split(used=used, words=words)
 
 
 def data_hash(segments: Segments) -> str:
-    """SHA-256 of the markers, positions and wind of segments, hex."""
+    """Hashes the markers, positions and wind of segments, SHA-256, hex."""
     digest = hashlib.sha256(np.ascontiguousarray(segments.markers, dtype="<f8").tobytes())
     for item in segments.items:
         times = np.asarray(item.start + np.arange(len(item.positions)) * segments.period, dtype=np.float64)
@@ -208,8 +211,8 @@ def propose(
     controls: Sequence[EffectColumn] = (),
     options: plan.NullOptions,
     stage: Stage | None = None,
-) -> Outcome:
-    """Seek terms that a model lacks, and keep them if they help on recordings that were not looked at.
+) -> ProposalOutcome:
+    """Seeks terms that a model lacks, and keeps them if they help on recordings that were not looked at.
 
     Args:
         candidates: terms, or strengths of an effect from a file.
@@ -221,14 +224,14 @@ def propose(
         InputError: recordings that cannot be used, are too few, or are of calm air.
     """
     torch.set_num_threads(1)
-    report = stage or (lambda what, done, total: None)
+    report = stage or (lambda stage_name, done, total: None)
     setting = made_ready(experiment)
     bank = plan.bank_for(setting, options, stage=report)
     return weigh(setting, candidates, bank, columns(), known=known, controls=controls, options=options, stage=report)
 
 
 def made_ready(experiment: Experiment) -> Setting:
-    """The recordings in one frame and cut.
+    """Brings the recordings to one frame and cuts them.
 
     Raises:
         InputError: as `propose`.
@@ -248,17 +251,17 @@ def weigh(
     setting: Setting,
     candidates: Sequence[EffectColumn],
     bank: NullBank,
-    weighed: Sequence[Column],
+    along: Sequence[Column],
     *,
     known: Sequence[EffectColumn] = (),
     controls: Sequence[EffectColumn] = (),
     options: plan.NullOptions,
     stage: Stage,
-) -> Outcome:
-    """The outcome for recordings, given nulls.
+) -> ProposalOutcome:
+    """Weighs the candidates on recordings, given nulls.
 
     Args:
-        weighed: the columns that the nulls are known along, the calibrated parameters left out.
+        along: the columns that the nulls are known along, the calibrated parameters left out.
 
     Raises:
         InputError: nulls of segments of another length; too few segments.
@@ -268,75 +271,79 @@ def weigh(
     parts = split(setting.segments, setting.speeds)
     null = bank.model(setting.design).under(setting.prior)
     stage("terms", 0, 1)
-    whole = ProjectedSegments.of(setting.forecaster, setting.segments, weighed)
-    projected = whole.select(np.flatnonzero(parts.seen))
+    all_segments = ProjectedSegments.of(setting.forecaster, setting.segments, along)
+    projected = all_segments.select(np.flatnonzero(parts.used))
     speeds = projected.speeds(setting.speeds)
     tried = _tried(projected, null, speeds, candidates, [*known, *controls])
-    own = evidence(tried.found, speeds, null)
+    projected_evidence = evidence(tried.statistics, speeds, null)
     noise = max(segment.noise for segment in projected.segments.items)
-    family = Family.of(bank.nulls, tried.found, noise=noise, seed=options.seed)
+    family = Family.of(bank.nulls, tried.statistics, noise=noise, seed=options.seed)
     names = tuple(column.name for column in tried.columns)
-    beside = list(range(len(THETA), len(THETA) + len(known)))
-    others = list(range(len(THETA) + len(known), len(THETA) + len(names)))
-    physical = [column for column in others if _admissible(tried.columns[column - len(THETA)], own, column, beside)]
-    pool = [column for column in others[len(controls) :] if column in physical]
+    acting = list(range(len(THETA), len(THETA) + len(known)))
+    proposed = list(range(len(THETA) + len(known), len(THETA) + len(names)))
+    physical = [
+        column
+        for column in proposed
+        if _admissible(tried.columns[column - len(THETA)], projected_evidence, column, acting)
+    ]
+    pool = [column for column in proposed[len(controls) :] if column in physical]
     labels = (*(name for name, _, _ in THETA), *names)
-    steps = search(own, family, labels, pool, beside=beside, level=options.level)
+    steps = search(projected_evidence, family, labels, pool, acting=acting, level=options.level)
     stage("terms", 1, 1)
     taken = [step for step in steps if step.taken]
 
-    def fitted(columns: Sequence[int]) -> Fitted:
-        linear = own.fit(columns)
+    def fitted(columns: Sequence[int]) -> FittedModel:
+        linear = projected_evidence.fit(columns)
         start = [linear.of(column)[0] for column in (*range(len(THETA)), *columns)]
         return fit(projected, null, speeds, [tried.columns[column - len(THETA)] for column in columns], start)
 
-    strengths: tuple[Strength, ...] = ()
+    strengths: tuple[TermStrength, ...] = ()
     tested = None
     decision, reason = Decision.REJECTED, steps[0].reason if steps else "no term was given"
     if taken:
         stage("test on untouched data", 0, 1)
-        before, after = fitted(beside), fitted([*beside, *(step.column for step in taken)])
+        before, after = fitted(acting), fitted([*acting, *(step.column for step in taken)])
         kinds = {_kind(tried.columns[step.column - len(THETA)]) for step in taken}
         unlike = [column for column in physical if _kind(tried.columns[column - len(THETA)]) not in kinds]
-        instead = wrong(own, unlike, [step.column for step in taken], beside)
+        instead = wrong(projected_evidence, unlike, [step.column for step in taken], acting)
         tested = retest(
             setting,
-            whole.whitened(null, setting.speeds),
-            parts.seen,
+            all_segments.whitened(null, setting.speeds),
+            parts.used,
             before.model,
             after.model,
             words=parts.words,
             seed=options.seed,
-            control=fitted([*beside, *instead]).model if instead else None,
+            control=fitted([*acting, *instead]).model if instead else None,
             control_names=[labels[column] for column in instead],
         )
-        strengths = _strengths(setting, own, family, taken, beside, after)
+        strengths = _strengths(setting, projected_evidence, family, taken, acting, after)
         decision, reason = tested.decided
         stage("test on untouched data", 1, 1)
-    return Outcome(
+    return ProposalOutcome(
         decision=decision,
         reason=reason,
         steps=steps,
-        tried=len(others) - len(controls),
-        ranking=_ranking(own, family, labels, pool),
+        tried=len(proposed) - len(controls),
+        ranking=_ranking(projected_evidence, family, labels, pool),
         strengths=strengths,
         retest=tested,
         level=options.level,
         nulls=bank.words,
         proposed_from=data_hash(projected.segments),
-        tested_on=data_hash(setting.segments.select(np.flatnonzero(~parts.seen))),
+        tested_on=data_hash(setting.segments.select(np.flatnonzero(~parts.used))),
         known=tuple(column.name for column in known),
         seed=options.seed,
     )
 
 
-def _admissible(column: EffectColumn, own: Evidence, place: int, beside: Sequence[int]) -> bool:
-    """Whether the strength that fits makes sense."""
-    return column.described.admits(column.described.null + own.fit([*beside, place]).of(place)[0])
+def _admissible(column: EffectColumn, projected_evidence: Evidence, index: int, acting: Sequence[int]) -> bool:
+    """Returns whether the strength that fits makes sense."""
+    return column.described.admits(column.described.null + projected_evidence.fit([*acting, index]).of(index)[0])
 
 
 def _kind(column: EffectColumn) -> str:
-    """The field of a term, the effect of another strength: a control is of another."""
+    """Returns the field of a term, the effect of another strength: a control is of another."""
     return column.term.field if isinstance(column, TermColumn) else column.effect
 
 
@@ -345,7 +352,7 @@ class _Tried:
     """Columns, and their projected statistics after those of the calibrated parameters."""
 
     columns: tuple[EffectColumn, ...]
-    found: Statistics
+    statistics: Statistics
 
 
 def _tried(
@@ -355,71 +362,83 @@ def _tried(
     candidates: Sequence[EffectColumn],
     fixed: Sequence[EffectColumn],
 ) -> _Tried:
-    """Fixed columns, candidates, and the best local candidate at places nearby."""
+    """Adds fixed columns, candidates, and the best local candidate at places nearby."""
     columns = (*fixed, *candidates)
-    tried = _Tried(columns=columns, found=projected.of_columns(columns))
+    tried = _Tried(columns=columns, statistics=projected.of_columns(columns))
     for size in _MOVES:
         first = len(THETA) + len(fixed)
         gained = gains(
-            evidence(tried.found, speeds, null), [[c] for c in range(first, len(THETA) + len(tried.columns))]
+            evidence(tried.statistics, speeds, null), [[c] for c in range(first, len(THETA) + len(tried.columns))]
         )
         moved = _moved(dict(zip(tried.columns[len(fixed) :], gained.sum(axis=1).tolist(), strict=True)), size)
         if not moved:
             break
-        more = projected.of_columns(moved).response[:, :, len(THETA) :]
-        response = np.concatenate([tried.found.response, more], axis=2)
-        tried = _Tried(columns=(*tried.columns, *moved), found=replace(tried.found, response=response))
+        added = projected.of_columns(moved).response[:, :, len(THETA) :]
+        response = np.concatenate([tried.statistics.response, added], axis=2)
+        tried = _Tried(columns=(*tried.columns, *moved), statistics=replace(tried.statistics, response=response))
     return tried
 
 
 def _moved(gained: dict[EffectColumn, float], size: float) -> list[TermColumn]:
-    """The best local term at places nearby, if it is among the best at all."""
+    """Moves the best local term to places nearby, if it is among the best at all."""
     best = max(gained.values(), default=0.0)
-    near = {c: g for c, g in gained.items() if isinstance(c, TermColumn) and c.term.at.place and g >= _CLOSE * best}
-    if not near or best <= 0:
+    leading = {c: g for c, g in gained.items() if isinstance(c, TermColumn) and c.term.at.place and g >= _CLOSE * best}
+    if not leading or best <= 0:
         return []
-    term = max(near, key=lambda column: near[column]).term
+    term = max(leading, key=lambda column: leading[column]).term
     count = len(term.at.place)
     steps = np.array(np.meshgrid(*[(-size, 0.0, size)] * count)).reshape(count, -1).T
-    found = {column.name: column for column in (TermColumn.of(term.moved(*step)) for step in steps.tolist())}
-    known = {column.name for column in gained}
-    return [column for name, column in found.items() if name not in known]
+    by_name = {column.name: column for column in (TermColumn.of(term.moved(*step)) for step in steps.tolist())}
+    tried = {column.name for column in gained}
+    return [column for name, column in by_name.items() if name not in tried]
 
 
-def _ranking(own: Evidence, family: Family, names: tuple[str, ...], pool: Sequence[int]) -> tuple[Ranked, ...]:
-    """All terms, each alone, best first."""
-    statistics, gained = family.statistics(own), gains(own, [[column] for column in pool]).sum(axis=1)
-    made = [
+def _ranking(
+    projected_evidence: Evidence, family: Family, names: tuple[str, ...], pool: Sequence[int]
+) -> tuple[Ranked, ...]:
+    """Ranks all terms, each alone, best first."""
+    statistics, gained = (
+        family.statistics(projected_evidence),
+        gains(projected_evidence, [[column] for column in pool]).sum(axis=1),
+    )
+    ranked_terms = [
         Ranked(name=names[column], statistic=float(statistics[column]), gain=float(gain))
         for column, gain in zip(pool, gained, strict=True)
     ]
-    return tuple(sorted(made, key=lambda ranked: -ranked.gain))
+    return tuple(sorted(ranked_terms, key=lambda ranked: -ranked.gain))
 
 
 def _strengths(
-    setting: Setting, own: Evidence, family: Family, taken: Sequence[Step], beside: Sequence[int], after: Fitted
-) -> tuple[Strength, ...]:
-    """Fitted beyond the linear; errors are scaled by what makes the nulls' mean squared z 1."""
-    chosen = [*beside, *(step.column for step in taken)]
-    linear = own.fit(chosen)
-    made: list[Strength] = []
-    for place, step in enumerate(taken, start=len(beside)):
-        column, value = after.model.effects[place]
+    setting: Setting,
+    projected_evidence: Evidence,
+    family: Family,
+    taken: Sequence[Step],
+    acting: Sequence[int],
+    after: FittedModel,
+) -> tuple[TermStrength, ...]:
+    """Estimates strengths beyond the linear; errors are scaled by what makes the nulls' mean squared z 1."""
+    chosen = [*acting, *(step.column for step in taken)]
+    linear = projected_evidence.fit(chosen)
+    strengths: list[TermStrength] = []
+    for index, step in enumerate(taken, start=len(acting)):
+        column, value = after.model.effects[index]
         first, claimed = linear.of(step.column)
-        others = [c for c in chosen if c != step.column]
-        statistic = float(family.statistics(own, others)[step.column])
+        other_columns = [c for c in chosen if c != step.column]
+        statistic = float(family.statistics(projected_evidence, other_columns)[step.column])
         scale = max(1.0, abs(first) / math.sqrt(max(statistic, 1e-12)) / claimed)
-        error = scale * after.errors[len(THETA) + place]
-        shown = estimate(column.described.null + value, error, column.unit)
+        error = scale * after.errors[len(THETA) + index]
+        strength = estimate(column.described.null + value, error, column.unit)
         words = _words(setting, column, value, after.model.calibration.density)
-        made.append(
-            Strength(name=column.parameter, words=words, estimate=shown, course=course(setting, after.model, place))
+        strengths.append(
+            TermStrength(
+                name=column.parameter, words=words, estimate=strength, course=course(setting, after.model, index)
+            )
         )
-    return tuple(made)
+    return tuple(strengths)
 
 
 def _words(setting: Setting, column: EffectColumn, value: float, density: float) -> str:
-    """What a strength of this sign is; of mass, how much."""
+    """Describes what a strength of this sign is; of mass, how much."""
     if not isinstance(column, TermColumn):
         return column.name
     if column.term.field != MASS:

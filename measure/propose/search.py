@@ -57,19 +57,19 @@ def search(
     names: tuple[str, ...],
     candidates: Sequence[int],
     *,
-    beside: Sequence[int] = (),
+    acting: Sequence[int] = (),
     level: float,
 ) -> tuple[Step, ...]:
-    """The terms looked at, in order: those taken, and the one at which it ended.
+    """Searches the terms: returns those looked at, in order: those taken, and the one at which it ended.
 
     Args:
         names: of the evidence's columns.
         candidates: columns of the terms.
-        beside: columns of effects that are known to act.
+        acting: columns of effects that are known to act.
         level: of each step's test.
     """
     steps: list[Step] = []
-    chosen = list(beside)
+    chosen = list(acting)
     while len(steps) < MOST:
         pool = [column for column in candidates if column not in chosen]
         if not pool:
@@ -95,24 +95,24 @@ def _best(
 ) -> Step:
     statistics = family.statistics(evidence, chosen)
     significant = [c for c in pool if family.p_value(float(statistics[c]), candidates) <= level]
-    looked = significant or [max(pool, key=lambda column: float(statistics[column]))]
-    held_out = gains(evidence, [list(chosen), *([*chosen, column] for column in looked)])
+    tested = significant or [max(pool, key=lambda column: float(statistics[column]))]
+    held_out = gains(evidence, [list(chosen), *([*chosen, column] for column in tested)])
     increments = held_out[1:] - held_out[0]
     leader = int(np.argmax(increments.sum(axis=1)))
     behind = increments[leader] - increments
     tied = [
-        place
-        for place in range(len(looked))
-        if behind[place].sum() <= _TIED * total_error(behind[place], evidence.recording)
+        index
+        for index in range(len(tested))
+        if behind[index].sum() <= _TIED * total_error(behind[index], evidence.recording)
     ]
-    place = max(tied, key=lambda p: float(statistics[looked[p]]))
-    gain, error = float(increments[place].sum()), total_error(increments[place], evidence.recording)
+    index = max(tied, key=lambda p: float(statistics[tested[p]]))
+    gain, error = float(increments[index].sum()), total_error(increments[index], evidence.recording)
     reason = ""
     if not significant:
         reason = "nulls show as much"
     elif gain <= (0.0 if first else _FAR * error):
         reason = "it does not predict what was left out better than the model before"
-    column = looked[place]
+    column = tested[index]
     return Step(
         name=names[column],
         column=column,
@@ -125,30 +125,33 @@ def _best(
     )
 
 
-def wrong(evidence: Evidence, pool: Sequence[int], taken: Sequence[int], beside: Sequence[int]) -> list[int]:
-    """As many other columns as were taken, of other directions than theirs, that predict left-out recordings best.
+def wrong(evidence: Evidence, pool: Sequence[int], taken: Sequence[int], acting: Sequence[int]) -> list[int]:
+    """Selects as many other columns as were taken, of other directions than theirs, that predict left-out recordings
+    best.
 
     Fewer where there are not as many; none where there is none.
 
     Args:
         pool: columns to choose from.
-        beside: columns of effects that are known to act.
+        acting: columns of effects that are known to act.
     """
-    close = _cosines(evidence, beside)
-    apart = [c for c in pool if c not in taken and all(abs(close[c, other]) < _APART for other in taken)]
+    close = _cosines(evidence, acting)
+    others_by_direction = [
+        c for c in pool if c not in taken and all(abs(close[c, column_taken]) < _APART for column_taken in taken)
+    ]
     chosen: list[int] = []
-    while apart and len(chosen) < len(taken):
-        held_out = gains(evidence, [[*beside, *chosen, column] for column in apart]).sum(axis=1)
-        chosen.append(apart.pop(int(np.argmax(held_out))))
+    while others_by_direction and len(chosen) < len(taken):
+        held_out = gains(evidence, [[*acting, *chosen, column] for column in others_by_direction]).sum(axis=1)
+        chosen.append(others_by_direction.pop(int(np.argmax(held_out))))
     return chosen
 
 
-def _cosines(evidence: Evidence, beside: Sequence[int]) -> np.ndarray:
-    """(column, column) of directions, beside the nuisances and some columns more; 0 with those."""
+def _cosines(evidence: Evidence, acting: Sequence[int]) -> np.ndarray:
+    """Computes cosines (column, column) of directions, beside the nuisances and some columns more; 0 with those."""
     total = evidence.curvature.sum(axis=0)
-    fixed = [*evidence.nuisance, *beside]
-    priors = np.concatenate([evidence.prior**-2, np.ones(len(evidence.nuisance) - len(THETA)), np.zeros(len(beside))])
+    fixed = [*evidence.nuisance, *acting]
+    priors = np.concatenate([evidence.prior**-2, np.ones(len(evidence.nuisance) - len(THETA)), np.zeros(len(acting))])
     inner = total[np.ix_(fixed, fixed)] + np.diag(priors)
-    left = total - total[:, fixed] @ np.linalg.solve(inner, total[fixed])
-    size = np.sqrt(np.maximum(np.diag(left), 1e-9 * np.diag(total)))
-    return left / np.outer(size, size)
+    remaining = total - total[:, fixed] @ np.linalg.solve(inner, total[fixed])
+    size = np.sqrt(np.maximum(np.diag(remaining), 1e-9 * np.diag(total)))
+    return remaining / np.outer(size, size)

@@ -29,7 +29,7 @@ _SOURCE = "none: to be found from what a model leaves"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shape:
+class TermShape:
     """Where a term is.
 
     Attributes:
@@ -48,9 +48,9 @@ class Shape:
         return f"{self.method}({', '.join(f'{p:g}' for p in self.place)})" if self.place else self.method
 
     def of(self, flat: Flat) -> Tensor:
-        """(vertex, 1, 1)."""
-        found = getattr(flat, self.method)
-        return found(*self.place) if self.place else found
+        """Computes the shape on a flat cloth, (vertex, 1, 1)."""
+        attribute = getattr(flat, self.method)
+        return attribute(*self.place) if self.place else attribute
 
 
 SHAPES: dict[str, str] = {
@@ -71,32 +71,32 @@ _LOCAL_WORDS = {
 }
 
 
-def shape_named(name: str) -> Shape:
-    """A shape of `SHAPES`, or near_U_V, stripe_U, band_V with shares of the width and the height in hundredths.
+def shape_named(name: str) -> TermShape:
+    """Parses a shape of `SHAPES`, or near_U_V, stripe_U, band_V with shares of the width and the height in hundredths.
 
     Raises:
         UsageError: no such shape.
     """
     if name in SHAPES:
-        return Shape(method=name, words=SHAPES[name])
-    found = _LOCAL.fullmatch(name)
-    place = () if found is None else tuple(int(part) / 100 for part in found.groups()[1:] if part is not None)
-    if found is None or len(place) != (2 if found[1] == "near" else 1) or max(place) > 1:
+        return TermShape(method=name, words=SHAPES[name])
+    match = _LOCAL.fullmatch(name)
+    arguments = () if match is None else tuple(int(part) / 100 for part in match.groups()[1:] if part is not None)
+    if match is None or len(arguments) != (2 if match[1] == "near" else 1) or max(arguments) > 1:
         raise UsageError(
-            f"no shape {name!r}",
+            f"there is no shape {name!r}",
             where="terms",
             fix=f"take one of {', '.join(SHAPES)}, or near_U_V, stripe_U, band_V in hundredths from 0 to 100",
         )
-    return Shape(method=found[1], place=place, words=_LOCAL_WORDS[found[1]].format(*place))
+    return TermShape(method=match[1], place=arguments, words=_LOCAL_WORDS[match[1]].format(*arguments))
 
 
-def local(method: str, *place: float) -> str:
-    """Name of a local shape at shares of the width and the height."""
-    return "_".join([method, *(f"{round(100 * share):02d}" for share in place)])
+def local(method: str, *shares: float) -> str:
+    """Names a local shape at shares of the width and the height."""
+    return "_".join([method, *(f"{round(100 * share):02d}" for share in shares)])
 
 
 @dataclass(frozen=True, kw_only=True)
-class Field:
+class TermField:
     """Description of a field.
 
     Attributes:
@@ -121,54 +121,58 @@ _PLACES = tuple(local("near", u, v) for u in (0.25, 0.5, 0.75, 1.0) for v in (0.
 _STRIPES = tuple(local("stripe", u) for u in (0.2, 0.4, 0.6, 0.8, 1.0))
 _BANDS = tuple(local("band", v) for v in (0.0, 0.25, 0.5, 0.75, 1.0))
 
-FIELDS: dict[str, Field] = {
-    "downwind": Field(unit="m/s²", step=0.5, words="a steady push downwind", shapes=_ALL),
-    "leftward": Field(unit="m/s²", step=0.5, words="a steady push across the wind, to its left", shapes=_ALL),
-    "upward": Field(unit="m/s²", step=0.5, words="a steady push upward", shapes=_ALL),
-    "downwind_squared": Field(
+FIELDS: dict[str, TermField] = {
+    "downwind": TermField(unit="m/s²", step=0.5, words="a steady push downwind", shapes=_ALL),
+    "leftward": TermField(unit="m/s²", step=0.5, words="a steady push across the wind, to its left", shapes=_ALL),
+    "upward": TermField(unit="m/s²", step=0.5, words="a steady push upward", shapes=_ALL),
+    "downwind_squared": TermField(
         unit="1/m", step=0.02, words="a push downwind as the square of the wind", shapes=_QUARTERS
     ),
-    "leftward_squared": Field(
+    "leftward_squared": TermField(
         unit="1/m", step=0.02, words="a push to the left as the square of the wind", shapes=_QUARTERS
     ),
-    "upward_squared": Field(unit="1/m", step=0.02, words="a push upward as the square of the wind", shapes=_QUARTERS),
-    "to_pole": Field(unit="m/s²", step=0.5, words="a steady pull to the pole, horizontally", shapes=_HALVES),
-    "toward_pole": Field(unit="1/s²", step=1.0, words="a spring to the pole, horizontally", shapes=_FLY),
-    "toward_height": Field(unit="1/s²", step=1.0, words="a spring to the height of the attachments", shapes=_FLY),
-    "against_motion": Field(unit="1/s", step=0.5, words="a resistance to motion", shapes=_QUARTERS),
-    "against_normal_motion": Field(unit="1/s", step=0.5, words="a resistance to normal motion", shapes=_QUARTERS),
-    "left_of_motion": Field(
+    "upward_squared": TermField(
+        unit="1/m", step=0.02, words="a push upward as the square of the wind", shapes=_QUARTERS
+    ),
+    "to_pole": TermField(unit="m/s²", step=0.5, words="a steady pull to the pole, horizontally", shapes=_HALVES),
+    "toward_pole": TermField(unit="1/s²", step=1.0, words="a spring to the pole, horizontally", shapes=_FLY),
+    "toward_height": TermField(unit="1/s²", step=1.0, words="a spring to the height of the attachments", shapes=_FLY),
+    "against_motion": TermField(unit="1/s", step=0.5, words="a resistance to motion", shapes=_QUARTERS),
+    "against_normal_motion": TermField(unit="1/s", step=0.5, words="a resistance to normal motion", shapes=_QUARTERS),
+    "left_of_motion": TermField(
         unit="1/s", step=0.5, words="a push to the left of the motion, as in a turning frame", shapes=("everywhere",)
     ),
-    "across": Field(unit="1/s", step=0.2, words="a pressure in proportion to the wind across it", shapes=_QUARTERS),
-    "across_squared": Field(
+    "across": TermField(unit="1/s", step=0.2, words="a pressure in proportion to the wind across it", shapes=_QUARTERS),
+    "across_squared": TermField(
         unit="1/m",
         step=0.1,
         words="a pressure as the square of the wind across it",
         shapes=("hoist", "fly", "upper", "lower", "upper_fly", "lower_fly"),
     ),
-    "across_even": Field(
+    "across_even": TermField(
         unit="1/m",
         step=0.1,
         words="a pressure as the square of the wind across it, always toward one side of the cloth",
         shapes=_QUARTERS,
     ),
-    "rising": Field(unit="1/s", step=0.2, words="the pressure of a wind that also blows upward", shapes=_HALVES),
-    "crossing": Field(unit="1/s", step=0.2, words="the pressure of a wind that also blows to the left", shapes=_HALVES),
-    "along": Field(unit="1/s", step=0.05, words="a friction in proportion to the wind along it", shapes=_QUARTERS),
-    "along_squared": Field(
+    "rising": TermField(unit="1/s", step=0.2, words="the pressure of a wind that also blows upward", shapes=_HALVES),
+    "crossing": TermField(
+        unit="1/s", step=0.2, words="the pressure of a wind that also blows to the left", shapes=_HALVES
+    ),
+    "along": TermField(unit="1/s", step=0.05, words="a friction in proportion to the wind along it", shapes=_QUARTERS),
+    "along_squared": TermField(
         unit="1/m", step=0.01, words="a friction as the square of the wind along it", shapes=_QUARTERS
     ),
-    "along_width": Field(
+    "along_width": TermField(
         unit="1/s", step=0.1, words="a friction in proportion to the wind along its width", shapes=("everywhere", "fly")
     ),
-    "along_height": Field(
+    "along_height": TermField(
         unit="1/s",
         step=0.1,
         words="a friction in proportion to the wind along its height",
         shapes=("everywhere", "fly"),
     ),
-    MASS: Field(
+    MASS: TermField(
         unit="1", step=0.5, words="more mass, as a share of the cloth's", shapes=(*_PLACES, *_STRIPES, *_BANDS)
     ),
 }
@@ -192,12 +196,12 @@ class Term:
 
     def __post_init__(self) -> None:
         if self.field not in FIELDS:
-            raise UsageError(f"no field {self.field!r}", where="terms", fix=f"take one of {', '.join(FIELDS)}")
+            raise UsageError(f"there is no field {self.field!r}", where="terms", fix=f"take one of {', '.join(FIELDS)}")
         shape_named(self.shape)
 
     @classmethod
     def named(cls, name: str) -> Term:
-        """The term of a name.
+        """Parses the term of a name.
 
         Raises:
             UsageError: not a term's.
@@ -219,14 +223,14 @@ class Term:
         return f"{FIELDS[self.field].words}, {self.at.words}"
 
     @property
-    def at(self) -> Shape:
+    def at(self) -> TermShape:
         """Its shape."""
         return shape_named(self.shape)
 
     def moved(self, *steps: float) -> Term:
-        """The same at a place of the cloth nearby, by shares of the width and the height."""
-        place = (min(1.0, max(0.0, p + step)) for p, step in zip(self.at.place, steps, strict=True))
-        return replace(self, shape=local(self.at.method, *place))
+        """Moves the term to a place of the cloth nearby, by shares of the width and the height."""
+        shifted = (min(1.0, max(0.0, p + step)) for p, step in zip(self.at.place, steps, strict=True))
+        return replace(self, shape=local(self.at.method, *shifted))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -274,7 +278,7 @@ class TermColumn(EffectColumn):
 
     @classmethod
     def of(cls, term: Term) -> TermColumn:
-        """With the step of its field."""
+        """Makes the column of a term, with the step of its field."""
         return cls(term=term, parameter=term.name, step=FIELDS[term.field].step)
 
     @cached_property
@@ -295,10 +299,10 @@ class TermColumn(EffectColumn):
 
 
 def dictionary() -> tuple[TermColumn, ...]:
-    """All terms that are tried."""
+    """Lists all terms that are tried."""
     return columns_of([Term(shape=shape, field=name) for name, entry in FIELDS.items() for shape in entry.shapes])
 
 
 def columns_of(terms: Sequence[Term]) -> tuple[TermColumn, ...]:
-    """The columns of terms."""
+    """Makes the columns of terms."""
     return tuple(TermColumn.of(term) for term in terms)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from measure.propose.outcome import Outcome, Retest
+from measure.propose.outcome import ProposalOutcome, Retest
 from measure.verdict.record import Estimate
 
 _NEAREST = 4
 """Further terms that are listed."""
 
 
-def words(outcome: Outcome) -> str:
-    """What was tried, what was found, what became of it."""
+def words(outcome: ProposalOutcome) -> str:
+    """Describes what was tried, what was found, what became of it."""
     lines = [f"{outcome.decision.value}: {outcome.reason} ({outcome.tried} terms were tried; nulls: {outcome.nulls})"]
     for step in outcome.steps:
         verb = "taken" if step.taken else f"not taken: {step.reason}"
@@ -20,8 +20,8 @@ def words(outcome: Outcome) -> str:
         )
     nearest = [ranked for ranked in outcome.ranking if ranked.name not in {step.name for step in outcome.steps}]
     if nearest:
-        shown = ", ".join(f"{ranked.name} {ranked.gain:.1f}" for ranked in nearest[:_NEAREST])
-        lines.append(f"  not tested further, listed by held-out gain: {shown}")
+        further = ", ".join(f"{ranked.name} {ranked.gain:.1f}" for ranked in nearest[:_NEAREST])
+        lines.append(f"  not tested further, listed by held-out gain: {further}")
     for strength in outcome.strengths:
         lines.append(f"{strength.name} {interval(strength.estimate)}: {strength.words}")
         lines.append(f"  {strength.course.words}")
@@ -48,8 +48,8 @@ def _tested(tested: Retest) -> list[str]:
 
 
 def interval(estimate: Estimate) -> str:
-    """`value [low, high] unit level`; metres as millimetres."""
+    """Formats `value [low, high] unit level`; metres as millimetres."""
     factor, unit = (1e3, "mm") if estimate.unit == "m" else (1.0, estimate.unit)
     value, low, high = (factor * v for v in (estimate.value, estimate.low, estimate.high))
-    shown = "" if unit == "1" else f" {unit}"
-    return f"{value:.3g} [{low:.3g}, {high:.3g}]{shown} {100 * estimate.level:.0f} %"
+    unit_text = "" if unit == "1" else f" {unit}"
+    return f"{value:.3g} [{low:.3g}, {high:.3g}]{unit_text} {100 * estimate.level:.0f} %"

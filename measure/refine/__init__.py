@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from measure.refine.metamodel import Metamodel
     from measure.refine.procedure import Settings, refine, squared
     from measure.refine.refinement import Interval, Refinement, Round
-    from measure.refine.simulator import Request, Simulator
+    from measure.refine.simulator import FilmRequest, Simulator
     from measure.refine.space import DENSITY, QUANTITIES, WIND, Space
     from measure.refine.target import Target
     from measure.refine.trace import Trace
-    from measure.refine.view import Camera, DrawnView, FixedView
+    from measure.refine.view import DrawnView, FilmCamera, FixedView
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -70,7 +70,7 @@ class Clip:
 
 
 def scenes_of(estimator: Estimator, *, aspect: float | None = None) -> tuple[Recipe, ...]:
-    """Recipes that are simulated to refine a model's estimates.
+    """Loads recipes that are simulated to refine a model's estimates.
 
     Args:
         aspect: length over height of the flag, for a model that knows several; None for the recipes' own.
@@ -81,32 +81,32 @@ def scenes_of(estimator: Estimator, *, aspect: float | None = None) -> tuple[Rec
     recipes = tuple(load(name) for name in _learned(estimator).scenes)
     if aspect is None:
         return recipes
-    return tuple(replace(one, scene=replace(one.scene, height=one.scene.width / aspect)) for one in recipes)
+    return tuple(replace(recipe, scene=replace(recipe.scene, height=recipe.scene.width / aspect)) for recipe in recipes)
 
 
 def space_of(estimator: Estimator) -> Space:
-    """The box that is searched for a model, with the prior that it learned.
+    """Makes the box that is searched for a model, with the prior that it learned.
 
     Raises:
         InputError: a model of another kind of cloth.
     """
-    own = _learned(estimator)
-    return Space.of(load(own.scenes[0])).learned(
-        [(Space.of(load(name)), float(films)) for name, films in own.films.items()]
+    learned_from = _learned(estimator)
+    return Space.of(load(learned_from.scenes[0])).learned(
+        [(Space.of(load(name)), float(films)) for name, films in learned_from.films.items()]
     )
 
 
 def _learned(estimator: Estimator) -> Learned:
-    """What a model of flags learned from, by its targets."""
+    """Finds what a model of flags learned from, by its targets."""
     names = estimator.learners[0].scaling.names
-    found = [own for targets, own in LEARNED.items() if set(targets) <= set(names)]
-    if not found:
+    matching = [data for targets, data in LEARNED.items() if set(targets) <= set(names)]
+    if not matching:
         raise InputError(
             f"the model estimates {', '.join(names) or 'nothing'}, but no wind and area weight of a flag",
             where=f"model {estimator.name!r}",
             fix="take the model of flags that comes with the package",
         )
-    return found[0]
+    return matching[0]
 
 
 def run(
@@ -121,7 +121,7 @@ def run(
     area_weight: tuple[float, float] | None = None,
     aspect: float | None = None,
 ) -> Refinement:
-    """Refine clips of one flag, with a progress bar.
+    """Refines clips of one flag, with a progress bar.
 
     Args:
         budget: simulated clips for each.
@@ -138,7 +138,7 @@ def run(
     recipes, space = scenes_of(estimator, aspect=aspect), space_of(estimator)
     if area_weight is not None:
         density = Range(low=area_weight[0], high=area_weight[1])
-        recipes = tuple(replace(one, material=replace(one.material, density=density)) for one in recipes)
+        recipes = tuple(replace(recipe, material=replace(recipe.material, density=density)) for recipe in recipes)
         space = Space.of(recipes[0])
     otherwise = view or DrawnView(prior=named(RENDERS), assets=Assets())
     targets = [

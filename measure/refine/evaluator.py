@@ -22,7 +22,7 @@ from flagdata.errors import CorruptError
 from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed
-from measure.refine.simulator import Request, Simulator
+from measure.refine.simulator import FilmRequest, Simulator
 from models.estimator import Estimator
 
 STAGES = ("simulate", "render", "embed")
@@ -72,7 +72,7 @@ class Evaluator:
     def evaluate(
         self, points: NDArray[np.float64], replicates: int, *, advance: Callable[[int], object] | None = None
     ) -> list[Evaluated]:
-        """Clips of points (n, 17) of [−1, 1]¹⁷, this many of each.
+        """Evaluates clips of points (n, 17) of [−1, 1]¹⁷, this many of each.
 
         Args:
             advance: called with the number of clips that were made or found.
@@ -81,34 +81,36 @@ class Evaluator:
             CorruptError: a file of the cache that cannot be read.
         """
         asked = [[self._request(point, number) for number in range(replicates)] for point in points.tolist()]
-        missing = [request for requests in asked for request in requests if self._found(request) is None]
+        missing = [request for requests in asked for request in requests if self._cached(request) is None]
         size = self.simulator.batch
         for first in range(0, len(missing), size):
             part = missing[first : first + size]
-            for request, made in zip(part, self._made(part), strict=True):
-                self._keep(request, made)
+            for request, evaluated in zip(part, self._simulated(part), strict=True):
+                self._keep(request, evaluated)
             if advance is not None:
                 advance(len(part))
         if advance is not None:
             advance(sum(len(requests) for requests in asked) - len(missing))
-        return [_together([self._found(request) for request in requests]) for requests in asked]
+        return [_together([self._cached(request) for request in requests]) for requests in asked]
 
     def clip(self, point: NDArray[np.float64], replicate: int = 0) -> NDArray[np.uint8] | None:
-        """All frames (frame, height, width) of one clip, simulated again; None where that fails."""
+        """Simulates all frames (frame, height, width) of one clip again; None where that fails."""
         return self.simulator.films([self._request(point.tolist(), replicate)])[0].clip
 
-    def _request(self, point: Iterable[float], replicate: int) -> Request:
-        own = tuple(round(float(value), _DECIMALS) + 0.0 for value in point)
-        return Request(
-            point=own, seed=child_seed(self.seed, "replicate", digest(repr(own)), replicate), replicate=replicate
+    def _request(self, point: Iterable[float], replicate: int) -> FilmRequest:
+        rounded = tuple(round(float(value), _DECIMALS) + 0.0 for value in point)
+        return FilmRequest(
+            point=rounded,
+            seed=child_seed(self.seed, "replicate", digest(repr(rounded)), replicate),
+            replicate=replicate,
         )
 
-    def _made(self, requests: list[Request]) -> list[Evaluated]:
+    def _simulated(self, requests: list[FilmRequest]) -> list[Evaluated]:
         films = self.simulator.films(requests)
-        there = [film.clip for film in films if film.clip is not None]
+        clips = [film.clip for film in films if film.clip is not None]
         begun = time.perf_counter()
-        embedded = self.embed(np.stack(there)) if there else np.zeros((0, 1))
-        share = (time.perf_counter() - begun) / max(1, len(there))
+        embedded = self.embed(np.stack(clips)) if clips else np.zeros((0, 1))
+        share = (time.perf_counter() - begun) / max(1, len(clips))
         rows = iter(embedded)
         return [
             Evaluated(
@@ -121,33 +123,34 @@ class Evaluator:
 
     @torch.no_grad()
     def embed(self, clips: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """(n, dimension) of clips (n, frame, height, width) uint8, one by one, so that none depends on the others."""
+        """Embeds clips (n, frame, height, width) uint8 to (n, dimension), one by one, so that none depends on the
+        others."""
         rows = []
         for clip in clips:
-            found = self.estimator.embeddings(self.estimator.inputs(clip[None]))
-            rows.append(torch.cat(found, dim=1)[0].double().cpu().numpy())
+            embedded = self.estimator.embeddings(self.estimator.inputs(clip[None]))
+            rows.append(torch.cat(embedded, dim=1)[0].double().cpu().numpy())
         return np.stack(rows)
 
-    def _path(self, request: Request) -> Path | None:
+    def _path(self, request: FilmRequest) -> Path | None:
         if self.folder is None:
             return None
         return self.folder / self.identity[:32] / f"{digest(repr(request))[:32]}.npz"
 
-    def _found(self, request: Request) -> Evaluated | None:
+    def _cached(self, request: FilmRequest) -> Evaluated | None:
         key, path = repr(request), self._path(request)
         if key not in self._kept and path is not None and path.exists():
             self._kept[key] = _read(path)
         return self._kept.get(key)
 
-    def _keep(self, request: Request, made: Evaluated) -> None:
-        self._kept[repr(request)] = made
+    def _keep(self, request: FilmRequest, evaluated: Evaluated) -> None:
+        self._kept[repr(request)] = evaluated
         path = self._path(request)
         if path is not None:
-            _write(path, made)
+            _write(path, evaluated)
 
 
 def fingerprint(estimator: Estimator) -> str:
-    """A hash of an estimator's weights and front end."""
+    """Hashes an estimator's weights and front end."""
     parts = [canonical({"front_end": asdict(estimator.front_end), "cropping": estimator.cropping.as_dict()})]
     for learner in estimator.learners:
         for name, value in sorted(learner.state_dict().items()):
@@ -155,19 +158,22 @@ def fingerprint(estimator: Estimator) -> str:
     return digest("\n".join(parts))
 
 
-def _together(found: list[Evaluated | None]) -> Evaluated:
-    there = [entry for entry in found if entry is not None]
-    width = max(entry.embedding.shape[1] for entry in there)
-    rows = [entry.embedding if entry.embedding.shape[1] == width else np.full((1, width), np.nan) for entry in there]
-    seconds = {stage: sum(entry.seconds[stage] for entry in there) for stage in STAGES}
-    return Evaluated(embedding=np.concatenate(rows), frame=there[0].frame, seconds=seconds)
+def _together(evaluated: list[Evaluated | None]) -> Evaluated:
+    present = [entry for entry in evaluated if entry is not None]
+    width = max(entry.embedding.shape[1] for entry in present)
+    rows = [entry.embedding if entry.embedding.shape[1] == width else np.full((1, width), np.nan) for entry in present]
+    seconds = {stage: sum(entry.seconds[stage] for entry in present) for stage in STAGES}
+    return Evaluated(embedding=np.concatenate(rows), frame=present[0].frame, seconds=seconds)
 
 
-def _write(path: Path, made: Evaluated) -> None:
-    frame = np.zeros((0, 0), np.uint8) if made.frame is None else made.frame
+def _write(path: Path, evaluated: Evaluated) -> None:
+    frame = np.zeros((0, 0), np.uint8) if evaluated.frame is None else evaluated.frame
     buffer = BytesIO()
     np.savez_compressed(
-        buffer, embedding=made.embedding, frame=frame, seconds=np.array([made.seconds[stage] for stage in STAGES])
+        buffer,
+        embedding=evaluated.embedding,
+        frame=frame,
+        seconds=np.array([evaluated.seconds[stage] for stage in STAGES]),
     )
     rewrite(path, sealed(buffer.getvalue()))
 

@@ -52,7 +52,7 @@ class Metamodel:
     def fit(
         cls, regressors: NDArray[np.float64], summaries: NDArray[np.float64], group: NDArray[np.int64]
     ) -> Metamodel:
-        """Fit it.
+        """Fits it.
 
         Args:
             regressors: (n, p − 1), without the constant.
@@ -65,7 +65,7 @@ class Metamodel:
         n, k = summaries.shape
         p = regressors.shape[1] + 1
         if n < least(p, k):
-            raise InputError(f"{n} evaluations for {p} regressors", fix=f"evaluate at least {least(p, k)}")
+            raise InputError(f"{n} evaluations are too few for {p} regressors", fix=f"evaluate at least {least(p, k)}")
         centre, spread = regressors.mean(axis=0), regressors.std(axis=0)
         if not (spread > 0).all():
             raise InputError("a regressor is the same in all evaluations", fix="spread the evaluated points")
@@ -79,7 +79,7 @@ class Metamodel:
         freedom = rows - p - k + 1
         if freedom < 1:
             raise InputError(
-                f"{rows:.1f} independent evaluations for {p} regressors and {k} summaries",
+                f"{rows:.1f} independent evaluations are too few for {p} regressors and {k} summaries",
                 fix="evaluate more points, or fewer replicates of each",
             )
         inverse = np.asarray(np.linalg.inv((x * weight[:, None]).T @ x), dtype=np.float64)
@@ -114,7 +114,7 @@ class Metamodel:
         )
 
     def draw(self, regressors: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-        """(m, k) one draw of that density at each of regressors (m, p − 1)."""
+        """Draws from that density at each of regressors (m, p − 1), (m, k)."""
         x = _design(regressors, self.centre, self.spread)
         stretch = 1 + ((x @ self.inverse) * x).sum(axis=1)
         factor = np.linalg.cholesky(self.scatter / self.freedom)
@@ -124,7 +124,7 @@ class Metamodel:
 
 
 def least(regressors: int, summaries: int) -> int:
-    """Fewest independent rows for p regressors with the constant and k summaries: such that ν ≥ 2."""
+    """Returns the fewest independent rows for p regressors with the constant and k summaries: such that ν ≥ 2."""
     return regressors + summaries + 1
 
 
@@ -135,14 +135,15 @@ def _design(
 
 
 def _correlation(residual: NDArray[np.float64], group: NDArray[np.int64]) -> float:
-    """Intra-class correlation of residuals (n, k) in their own covariance, 0 to 1; 0 without replicates."""
+    """Estimates the intra-class correlation of residuals (n, k) in their own covariance, 0 to 1; 0 without
+    replicates."""
     covariance = residual.T @ residual / len(residual)
     values, vectors = np.linalg.eigh(covariance)
     white = residual @ vectors / np.sqrt(np.maximum(values, values[-1] * 1e-12))
     products, pairs = 0.0, 0
     for number in np.unique(group):
-        own = white[group == number]
-        total = own.sum(axis=0)
-        products += float((total @ total - np.square(own).sum()) / 2)
-        pairs += len(own) * (len(own) - 1) // 2
+        of_group = white[group == number]
+        total = of_group.sum(axis=0)
+        products += float((total @ total - np.square(of_group).sum()) / 2)
+        pairs += len(of_group) * (len(of_group) - 1) // 2
     return float(np.clip(products / (pairs * residual.shape[1]), 0.0, 1.0)) if pairs else 0.0

@@ -28,7 +28,7 @@ REGRESSORS = 4
 
 
 def regressors(reported: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
-    """What the metamodel is linear in, of reported quantities (n, 5): (n, `REGRESSORS`).
+    """Computes what the metamodel is linear in, of reported quantities (n, 5): (n, `REGRESSORS`).
 
     The wind's share u of its range and √u, since a flag that hangs in a faint wind rises within a few tenths of its
     range; the logarithm of the area weight and the scale of bending, the two that all of the cloth's accelerations are
@@ -65,7 +65,7 @@ def posterior(
     winds: int = WINDS,
     draws: int = DRAWS,
 ) -> Posterior:
-    """Weigh prior draws by what was observed.
+    """Weighs prior draws by what was observed.
 
     Args:
         models: of each clip.
@@ -79,14 +79,16 @@ def posterior(
     low, high = space.wind.low, space.wind.high
     step = (high - low) / winds
     grid = low + step * (np.arange(winds, dtype=np.float64) + 0.5)
-    own = space.reported(prior)
-    found = np.stack([_likelihood(model, own, grid, y, space) for model, y in zip(models, observed, strict=True)])
-    marginal = np.asarray(logsumexp(found, axis=2)).sum(axis=0)
+    reported = space.reported(prior)
+    likelihoods = np.stack(
+        [_likelihood(model, reported, grid, y, space) for model, y in zip(models, observed, strict=True)]
+    )
+    marginal = np.asarray(logsumexp(likelihoods, axis=2)).sum(axis=0)
     weight = np.exp(marginal - logsumexp(marginal))
     rng = stream(seed, "posterior", "draws")
     chosen = rng.choice(cloths, size=draws, p=weight)
     out = np.empty((draws, len(models)))
-    for clip, table in enumerate(found):
+    for clip, table in enumerate(likelihoods):
         share = np.exp(table[chosen] - logsumexp(table[chosen], axis=1, keepdims=True)).cumsum(axis=1)
         cell = (rng.random((draws, 1)) > share / share[:, -1:]).sum(axis=1)
         out[:, clip] = grid[cell] + step * (rng.random(draws) - 0.5)
@@ -97,18 +99,18 @@ def posterior(
 
 def _likelihood(
     model: Metamodel,
-    own: NDArray[np.float64],
+    reported: NDArray[np.float64],
     grid: NDArray[np.floating],
     observed: NDArray[np.float64],
     space: Space,
 ) -> NDArray[np.float64]:
-    """(cloth, wind) logarithm of the density of what was observed."""
-    rows = np.repeat(own, len(grid), axis=0)
-    rows[:, 0] = np.tile(grid, len(own))
-    return model.log_density(regressors(rows, space), observed).reshape(len(own), len(grid))
+    """Computes the logarithm of the density of what was observed, (cloth, wind)."""
+    rows = np.repeat(reported, len(grid), axis=0)
+    rows[:, 0] = np.tile(grid, len(reported))
+    return model.log_density(regressors(rows, space), observed).reshape(len(reported), len(grid))
 
 
-def bending_table(space: Space, found: Posterior, level: float) -> NDArray[np.float64]:
-    """(15, 3): median and interval of each bending coefficient [N·m]: mostly the prior's."""
-    values = space.values(found.points)[:, :BENDING]
+def bending_table(space: Space, drawn: Posterior, level: float) -> NDArray[np.float64]:
+    """Tabulates median and interval of each bending coefficient [N·m], (15, 3): mostly the prior's."""
+    values = space.values(drawn.points)[:, :BENDING]
     return np.quantile(values, [0.5, (1 - level) / 2, (1 + level) / 2], axis=0).T

@@ -47,12 +47,13 @@ from sim.run.recipe import Recipe
 
 
 def squared(embedding: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Squared Euclidean distance of embeddings (…, d) to one (d,): (…), infinite where a simulation failed.
+    """Computes the squared Euclidean distance of embeddings (…, d) to one (d,): (…), infinite where a simulation
+    failed.
 
     Runia et al. 2020, section 3.1.
     """
-    found = np.square(embedding - target).sum(axis=-1)
-    return np.where(np.isfinite(found), found, np.inf)
+    distances = np.square(embedding - target).sum(axis=-1)
+    return np.where(np.isfinite(distances), distances, np.inf)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,7 +75,7 @@ class ReplicateMetric:
 
     @classmethod
     def of(cls, groups: list[NDArray[np.float64]]) -> ReplicateMetric:
-        """Measure it on the embeddings (replicate, d) of some θ; failed ones are left out.
+        """Measures it on the embeddings (replicate, d) of some θ; failed ones are left out.
 
         Deviations from their θ's mean are enlarged by √(R/(R − 1)), so that their covariance is that of replicates.
 
@@ -85,7 +86,7 @@ class ReplicateMetric:
         several = [group for group in finite if len(group) > 1]
         if len(several) < 2:
             raise InputError(
-                f"{len(several)} points with two replicates", fix="evaluate at least two points, each twice or more"
+                f"{len(several)} points have two replicates", fix="evaluate at least two points, each twice or more"
             )
         deviations = [(g - g.mean(axis=0)) * np.sqrt(len(g) / (len(g) - 1)) for g in several]
         rows = np.concatenate(deviations)
@@ -103,7 +104,7 @@ class ReplicateMetric:
         return cls(whitening=whitening, shrinkage=shrinkage, floor=float(np.median(between)), pairs=len(between))
 
     def squared(self, embedding: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Squared distance of embeddings (…, d) to one (d,): (…), infinite where a simulation failed."""
+        """Computes the squared distance of embeddings (…, d) to one (d,): (…), infinite where a simulation failed."""
         return squared(embedding @ self.whitening.T, self.whitening @ target)
 
 
@@ -142,12 +143,12 @@ class Settings:
 
     def __post_init__(self) -> None:
         if self.replicates < 2:
-            raise InputError("one replicate knows no noise floor", where="replicates", fix="give at least 2")
+            raise InputError("one replicate cannot show a noise floor", where="replicates", fix="give at least 2")
         if not 0 < self.level < 1:
-            raise InputError(f"a level of {self.level:g}", where="level", fix="give a share between 0 and 1")
+            raise InputError(f"the level is {self.level:g}", where="level", fix="give a share between 0 and 1")
         if self.batch < self.replicates:
             raise InputError(
-                f"batches of {self.batch} clips hold no {self.replicates} replicates",
+                f"batches of {self.batch} clips cannot hold {self.replicates} replicates",
                 where="batch",
                 fix=f"give at least {self.replicates}",
             )
@@ -174,7 +175,7 @@ def refine(
     cache: Path | None = None,
     advance: Callable[[int], object] | None = None,
 ) -> Refinement:
-    """Measure the cloth and the wind of a clip, or of several clips of one cloth, each in a wind of its own.
+    """Measures the cloth and the wind of a clip, or of several clips of one cloth, each in a wind of its own.
 
     Args:
         targets: one clip, or several of one flag.
@@ -192,7 +193,7 @@ def refine(
     chosen, several = settings or Settings(), tuple([targets] if isinstance(targets, Target) else targets)
     start.require(estimator)
     if not several:
-        raise InputError("no clip to measure", fix="give at least one target")
+        raise InputError("there is no clip to measure", fix="give at least one target")
     model = fingerprint(estimator)
     front = estimator.front_end
     evaluators = tuple(
@@ -207,10 +208,10 @@ def refine(
         )
         for target in several
     )
-    own = evaluators[0].simulator.space
-    if space is not None and space.identity != own.identity:
+    space_of_recipes = evaluators[0].simulator.space
+    if space is not None and space.identity != space_of_recipes.identity:
         raise InputError("the space has other ranges than the recipes", fix="take the space of the first recipe")
-    return _Run(several, estimator, chosen, evaluators, space or own, advance or (lambda _: None)).whole()
+    return _Run(several, estimator, chosen, evaluators, space or space_of_recipes, advance or (lambda _: None)).whole()
 
 
 @dataclass(frozen=True)
@@ -235,31 +236,31 @@ class _Run:
         groups: list[list[Evaluated]] = [[] for _ in self.targets]
         ends: list[float] = []
         rounds: list[Round] = []
-        found, reached, inferring = None, False, 0.0
+        current, reached, inferring = None, False, 0.0
         while True:
-            own = time.perf_counter()
-            asked = self._first(estimates) if found is None else self._next(found, len(ends), len(rounds))
-            inferring += time.perf_counter() - own
+            started = time.perf_counter()
+            asked = self._first(estimates) if current is None else self._next(current, len(ends), len(rounds))
+            inferring += time.perf_counter() - started
             for clip, evaluator in enumerate(self.evaluators):
                 groups[clip] += evaluator.evaluate(asked[clip], self.settings.replicates, advance=self.advance)
             points.append(asked)
-            own = time.perf_counter()
+            started = time.perf_counter()
             metrics = [ReplicateMetric.of([g.embedding for g in group]) for group in groups]
             everywhere = np.concatenate(points, axis=1)
-            found = self._posterior(everywhere, groups, observed, len(rounds))
-            near, floor = _nearest(metrics, groups, embedded), float(np.mean([m.floor for m in metrics]))
-            inferring += time.perf_counter() - own
+            current = self._posterior(everywhere, groups, observed, len(rounds))
+            nearest, floor = _nearest(metrics, groups, embedded), float(np.mean([m.floor for m in metrics]))
+            inferring += time.perf_counter() - started
             ends += [time.perf_counter() - begun] * (asked.shape[1] * self.settings.replicates)
             rounds.append(
                 Round(
                     evaluations=len(ends),
-                    distance=near,
+                    distance=nearest,
                     floor=floor,
                     seconds=ends[-1],
-                    intervals=self._intervals(found)[:2],
+                    intervals=self._intervals(current)[:2],
                 )
             )
-            reached = near <= floor
+            reached = nearest <= floor
             if reached and self.settings.to_floor and _settled(rounds, self.settings.settled):
                 stopped = "the nearest parameters fit as well as they fit themselves, and the wind's interval settled"
                 break
@@ -270,23 +271,23 @@ class _Run:
         return Refinement(
             targets=self.targets,
             level=self.settings.level,
-            intervals=self._intervals(found),
+            intervals=self._intervals(current),
             amortised=self._spans(estimates[0], self._prior()[:, :4]),
-            bending=bending_table(self.space, found, self.settings.level),
+            bending=bending_table(self.space, current, self.settings.level),
             rounds=tuple(rounds),
             traces=self._traces(np.concatenate(points, axis=1), groups, metrics, embedded, ends),
             floor=floor,
             reached=reached,
             stopped=stopped,
-            posterior=found,
+            posterior=current,
             evaluators=self.evaluators,
             seconds={**seconds, "infer": inferring},
-            findings=self._findings(found, metrics, groups, embedded, reached),
+            findings=self._findings(current, metrics, groups, embedded, reached),
             seed=self.settings.seed,
         )
 
     def _first(self, estimates: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-        """(clip, θ, 17): draws of the amortised posteriors, widened; the cloth of each clip's in turn."""
+        """Draws points (clip, θ, 17): draws of the amortised posteriors, widened; the cloth of each clip's in turn."""
         count = self.settings.fewest // self.settings.replicates
         rng = stream(self.settings.seed, OWN, "first")
         wide = [start.widened(draws, self.settings.widening, self.space) for draws in estimates]
@@ -296,15 +297,15 @@ class _Run:
         base = start.completed(self.space, shared, seed=self.settings.seed)
         return self._with_winds(base, chosen[:, :, 0])
 
-    def _next(self, found: Posterior, done: int, number: int) -> NDArray[np.float64]:
-        """(clip, θ, 17): draws of the refined posterior, their winds widened."""
-        left = self.settings.budget - done
-        count = max(1, min(self.settings.batch, left) // self.settings.replicates)
+    def _next(self, current: Posterior, done: int, number: int) -> NDArray[np.float64]:
+        """Draws points of the refined posterior, (clip, θ, 17), their winds widened."""
+        remaining = self.settings.budget - done
+        count = max(1, min(self.settings.batch, remaining) // self.settings.replicates)
         rng = stream(self.settings.seed, OWN, "next", number)
-        chosen = rng.choice(len(found.points), count, replace=False)
-        middle = found.winds.mean(axis=0)
-        winds = middle + self.settings.widening * (found.winds[chosen] - middle)
-        return self._with_winds(found.points[chosen], winds.T)
+        chosen = rng.choice(len(current.points), count, replace=False)
+        middle = current.winds.mean(axis=0)
+        winds = middle + self.settings.widening * (current.winds[chosen] - middle)
+        return self._with_winds(current.points[chosen], winds.T)
 
     def _with_winds(self, base: NDArray[np.float64], winds: NDArray[np.float64]) -> NDArray[np.float64]:
         """Cloths (θ, 17) with the winds (clip, θ) [m/s] of each clip."""
@@ -323,23 +324,23 @@ class _Run:
         models = []
         for clip, group in enumerate(groups):
             rows = np.concatenate([g.embedding for g in group])
-            place = np.repeat(np.arange(len(group)), [len(g.embedding) for g in group])
-            there = np.isfinite(rows).all(axis=1)
-            summaries = start.summaries(self.estimator, rows[there])
-            known = regressors(self.space.reported(points[clip]), self.space)[place[there]]
-            models.append(Metamodel.fit(known, summaries, place[there]))
+            number_of_point = np.repeat(np.arange(len(group)), [len(g.embedding) for g in group])
+            finite = np.isfinite(rows).all(axis=1)
+            summaries = start.summaries(self.estimator, rows[finite])
+            predictors = regressors(self.space.reported(points[clip]), self.space)[number_of_point[finite]]
+            models.append(Metamodel.fit(predictors, summaries, number_of_point[finite]))
         return posterior(self.space, models, observed, seed=child_seed(self.settings.seed, OWN, "posterior", number))
 
     def _prior(self) -> NDArray[np.float64]:
         return self.space.reported(self.space.prior(stream(self.settings.seed, OWN, "prior"), 4000))
 
-    def _intervals(self, found: Posterior) -> tuple[Interval, ...]:
+    def _intervals(self, current: Posterior) -> tuple[Interval, ...]:
         prior = self._prior()
-        own = self._spans(self.space.reported(found.points), prior)
+        spans = self._spans(self.space.reported(current.points), prior)
         for clip in range(1, len(self.targets)):
-            wind = self._spans(found.winds[:, [clip]], prior[:, :1])[0]
-            own = (*own, replace(wind, name=f"{wind.name}.{clip}"))
-        return own
+            wind = self._spans(current.winds[:, [clip]], prior[:, :1])[0]
+            spans = (*spans, replace(wind, name=f"{wind.name}.{clip}"))
+        return spans
 
     def _spans(self, draws: NDArray[np.float64], prior: NDArray[np.float64]) -> tuple[Interval, ...]:
         density, limits = self.space.density, limits_of("density")
@@ -374,7 +375,7 @@ class _Run:
 
     def _findings(
         self,
-        found: Posterior,
+        current: Posterior,
         metrics: Sequence[ReplicateMetric],
         groups: Sequence[Sequence[Evaluated]],
         embedded: Sequence[NDArray[np.float64]],
@@ -385,23 +386,23 @@ class _Run:
         if failed:
             out.append(Finding.of("failed-simulations", f"{failed} simulations failed and were left out", count=failed))
         if not reached:
-            near = _nearest(metrics, groups, embedded)
+            nearest = _nearest(metrics, groups, embedded)
             floor = float(np.mean([m.floor for m in metrics]))
             out.append(
                 Finding.of(
                     "above-noise-floor",
-                    f"the nearest parameters are {near / floor:.1f} times as far from the target as replicates "
+                    f"the nearest parameters are {nearest / floor:.1f} times as far from the target as replicates "
                     "are from each other: something of the target is in no simulation",
-                    value=near / floor,
+                    value=nearest / floor,
                     fix="give the camera and light it was filmed with, or more evaluations",
                 )
             )
-        if found.effective < 100:
+        if current.effective < 100:
             out.append(
                 Finding.of(
                     "few-effective-draws",
-                    f"the cloth's posterior rests on {found.effective:.0f} effective draws of the prior",
-                    value=found.effective,
+                    f"the cloth's posterior rests on {current.effective:.0f} effective draws of the prior",
+                    value=current.effective,
                 )
             )
         out += [
@@ -411,7 +412,7 @@ class _Run:
                 what=f"{PILED:.0%} of the draws of {entry.name} or more lie within {WITHIN:.0%} of an end of the range "
                 "that is searched, so that only a bound is given",
             )
-            for entry in self._intervals(found)
+            for entry in self._intervals(current)
             if entry.median is None
         ]
         if not self.evaluators[0].simulator.draws_damping:
@@ -436,14 +437,14 @@ class _Run:
 def _nearest(
     metrics: Sequence[ReplicateMetric], groups: Sequence[Sequence[Evaluated]], embedded: Sequence[NDArray[np.float64]]
 ) -> float:
-    """Smallest mean squared distance of a θ's replicates, the mean over targets at the same cloth."""
-    each = np.array(
+    """Finds the smallest mean squared distance of a θ's replicates, the mean over targets at the same cloth."""
+    distances = np.array(
         [
             [float(np.mean(metric.squared(g.embedding, target))) for g in group]
             for metric, group, target in zip(metrics, groups, embedded, strict=True)
         ]
     )
-    return float(each.mean(axis=0).min())
+    return float(distances.mean(axis=0).min())
 
 
 def _settled(rounds: Sequence[Round], share: float) -> bool:

@@ -46,16 +46,20 @@ class Interval:
     prior_share: float
 
     def phrase(self, digits: int, unit: str = "") -> str:
-        """Median and interval in words, or the bound, without the level.
+        """Words median and interval, or the bound, without the level.
 
         Args:
             unit: with the space before it.
         """
-        shown = self.span.phrase(digits, unit)
-        return f"{self.median:.{digits}f}{unit} {shown}" if self.median is not None and not self.span.bound else shown
+        interval_text = self.span.phrase(digits, unit)
+        return (
+            f"{self.median:.{digits}f}{unit} {interval_text}"
+            if self.median is not None and not self.span.bound
+            else interval_text
+        )
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values; an end that nothing bounds is null."""
+        """Returns JSON values; an end that nothing bounds is null."""
         low, high = self.span.ends()
         return {
             "name": self.name,
@@ -171,7 +175,7 @@ def intervals_of(
     ranges: Sequence[Range],
     limits: Sequence[tuple[float, float]],
 ) -> tuple[Interval, ...]:
-    """Intervals of draws (n, quantity) beside the prior's.
+    """Estimates intervals of draws (n, quantity) beside the prior's.
 
     Args:
         draws: of the first `QUANTITIES`.
@@ -182,23 +186,23 @@ def intervals_of(
     ends = [(1 - level) / 2, 0.5, (1 + level) / 2]
     low, middle, high = np.quantile(draws, ends, axis=0)
     least, _, most = np.quantile(prior, ends, axis=0)
-    found = []
+    intervals = []
     for i, quantity in enumerate(QUANTITIES[: draws.shape[1]]):
-        own = Span(low=float(low[i]), high=float(high[i]), level=level, bound=None, estimated=True)
+        span_of_draws = Span(low=float(low[i]), high=float(high[i]), level=level, bound=None, estimated=True)
         if i < len(ranges):
             first, last = ranges[i].low, ranges[i].high
             places = (draws[:, i] - first) / (last - first)
-            own = span(draws[:, i], places, level=level, limits=limits[i], assumed=(first, last))
-        found.append(
+            span_of_draws = span(draws[:, i], places, level=level, limits=limits[i], assumed=(first, last))
+        intervals.append(
             Interval(
                 name=quantity.name,
                 unit=quantity.unit,
-                median=float(middle[i]) if own.estimated else None,
-                span=own,
+                median=float(middle[i]) if span_of_draws.estimated else None,
+                span=span_of_draws,
                 prior_share=float((high[i] - low[i]) / (most[i] - least[i])),
             )
         )
-    return tuple(found)
+    return tuple(intervals)
 
 
 def _finite(values: NDArray[np.float64]) -> list[float | None]:

@@ -44,36 +44,37 @@ class Shown:
 
 
 def frames(trace: Trace, evaluator: Evaluator, *, steps: Sequence[int] = STEPS) -> list[Shown]:
-    """The nearest simulated clip after each of some steps, by its middle frame; steps beyond the trace are left out."""
-    shown = []
+    """Selects the nearest simulated clip after each of some steps, by its middle frame; steps beyond the trace are left
+    out."""
+    nearest = []
     for step in steps:
         if step >= len(trace):
             continue
-        place = trace.incumbent(evaluations=step + 1)
-        point = trace.points[place]
-        made = evaluator.evaluate(point[None], 1)[0]
+        index = trace.incumbent(evaluations=step + 1)
+        point = trace.points[index]
+        evaluated = evaluator.evaluate(point[None], 1)[0]
         wind = float(evaluator.simulator.space.values(point[None])[0, WIND])
-        shown.append(Shown(step=step, frame=made.frame, wind=wind, distance=float(trace.distances[place])))
-    return shown
+        nearest.append(Shown(step=step, frame=evaluated.frame, wind=wind, distance=float(trace.distances[index])))
+    return nearest
 
 
 def trace_picture(refinement: Refinement, clip: int = 0) -> str:
-    """Distance and wind over evaluations, as a PNG in a data URL: the paper's figure 8, intervals, the floor."""
+    """Draws distance and wind over evaluations, as a PNG in a data URL: the paper's figure 8, intervals, the floor."""
     trace, target = refinement.traces[clip], refinement.targets[clip]
     figure = Figure(figsize=(9.5, 3.1), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    distance_axes, wind_axes = figure.subplots(1, 2)
     number = np.arange(1, len(trace) + 1)
-    left.semilogy(number, trace.distances, ".", color=_OTHER, markersize=4, label="simulated clip")
-    left.semilogy(number, trace.distances[trace.best], color=_OWN, linewidth=1.4, label="nearest so far")
-    left.axhline(refinement.floor, color=_TARGET, linewidth=1.0, linestyle="--", label="noise floor")
-    left.set(xlabel="evaluations", ylabel="squared distance to the target")
-    left.legend(fontsize=8)
+    distance_axes.semilogy(number, trace.distances, ".", color=_OTHER, markersize=4, label="simulated clip")
+    distance_axes.semilogy(number, trace.distances[trace.best], color=_OWN, linewidth=1.4, label="nearest so far")
+    distance_axes.axhline(refinement.floor, color=_TARGET, linewidth=1.0, linestyle="--", label="noise floor")
+    distance_axes.set(xlabel="evaluations", ylabel="squared distance to the target")
+    distance_axes.legend(fontsize=8)
     space = refinement.evaluators[clip].simulator.space
-    right.plot(number, space.values(trace.points)[:, WIND], ".", color=_OTHER, markersize=4, label="evaluated")
+    wind_axes.plot(number, space.values(trace.points)[:, WIND], ".", color=_OTHER, markersize=4, label="evaluated")
     if clip == 0:
         count = [r.evaluations for r in refinement.rounds]
         winds = [r.intervals[0] for r in refinement.rounds]
-        right.fill_between(
+        wind_axes.fill_between(
             count,
             *np.clip([(w.span.low, w.span.high) for w in winds], space.wind.low, space.wind.high).T,
             color=_OWN,
@@ -81,7 +82,7 @@ def trace_picture(refinement: Refinement, clip: int = 0) -> str:
             linewidth=0,
             label=f"{refinement.level:.0%} interval",
         )
-        right.plot(
+        wind_axes.plot(
             count,
             [np.nan if w.median is None else w.median for w in winds],
             color=_OWN,
@@ -91,14 +92,14 @@ def trace_picture(refinement: Refinement, clip: int = 0) -> str:
             label="median",
         )
     if "wind_speed" in target.truth:
-        right.axhline(target.truth["wind_speed"], color=_TARGET, linewidth=1.0, linestyle="--", label="true wind")
-    right.set(xlabel="evaluations", ylabel="wind speed [m/s]", ylim=(space.wind.low, space.wind.high))
-    right.legend(fontsize=8)
+        wind_axes.axhline(target.truth["wind_speed"], color=_TARGET, linewidth=1.0, linestyle="--", label="true wind")
+    wind_axes.set(xlabel="evaluations", ylabel="wind speed [m/s]", ylim=(space.wind.low, space.wind.high))
+    wind_axes.legend(fontsize=8)
     return figure_url(figure, dpi=130)
 
 
 def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
-    """What a refinement found, with its trace and pictures; the page gives it a heading.
+    """Renders what a refinement found, with its trace and pictures; the page gives it a heading.
 
     Args:
         in_motion: whether the nearest simulated clip plays beside the target; it is simulated once more for that.
@@ -107,7 +108,7 @@ def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
     for number, (target, trace, evaluator) in enumerate(
         zip(refinement.targets, refinement.traces, refinement.evaluators, strict=True)
     ):
-        shown = frames(trace, evaluator, steps=STEPS)
+        frames_shown = frames(trace, evaluator, steps=STEPS)
         nearest = evaluator.clip(trace.points[trace.incumbent()]) if in_motion else None
         rate = evaluator.estimator.front_end.rate
         clips.append(
@@ -122,13 +123,13 @@ def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
                         "wind": f"{s.wind:.2f}",
                         "distance": f"{s.distance:.3g}",
                     }
-                    for s in shown
+                    for s in frames_shown
                 ],
                 "motion": nearest is not None
                 and [moving(clip, rate=rate, side=SIDE) for clip in (target.clip, nearest)],
             }
         )
-    found = render(
+    html = render(
         "measure.refine",
         "section.html.j2",
         {
@@ -146,11 +147,11 @@ def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
             "seconds": refinement.seconds,
         },
     )
-    return Markup(found)
+    return Markup(html)
 
 
 def _rows(refinement: Refinement) -> list[dict[str, str]]:
-    """The table of quantities: refined and, where the network estimates it, amortised."""
+    """Tabulates the quantities: refined and, where the network estimates it, amortised."""
     about = {quantity.name: quantity for quantity in QUANTITIES}
     before = {entry.name: entry for entry in refinement.amortised}
     rows = []

@@ -42,7 +42,7 @@ START_NOISE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class FilmRequest:
     """A film to be made.
 
     Attributes:
@@ -57,7 +57,7 @@ class Request:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Film:
+class SimulatedFilm:
     """What became of a request.
 
     Attributes:
@@ -82,7 +82,7 @@ class Simulator:
         assets: textures and backgrounds.
     """
 
-    scenes: tuple[Scene, ...]
+    scenes: tuple[SimulatedScene, ...]
     view: View
     renderer: str = "raster"
     batch: int = 8
@@ -99,7 +99,7 @@ class Simulator:
         renderer: str = "raster",
         batch: int = 8,
     ) -> Simulator:
-        """A simulator of clips of this length [frames] and rate [Hz].
+        """Makes a simulator of clips of this length [frames] and rate [Hz].
 
         Args:
             recipes: a scene's, or those of several scenes of one space.
@@ -108,15 +108,16 @@ class Simulator:
             InputError: see `Space.of`; scenes of different spaces, or none; fewer than one flag in a batch.
         """
         if batch < 1:
-            raise InputError(f"batches of {batch}", fix="take at least one flag")
+            raise InputError(f"the batches are of {batch}", fix="take at least one flag")
         several = (recipes,) if isinstance(recipes, Recipe) else tuple(recipes)
         spaces = {Space.of(recipe).identity for recipe in several}
         if len(spaces) != 1:
             raise InputError(
-                f"{len(several)} scenes of {len(spaces)} different search spaces", fix="give scenes of the same ranges"
+                f"{len(several)} scenes have {len(spaces)} different search spaces",
+                fix="give scenes of the same ranges",
             )
         scenes = tuple(
-            Scene(replace(recipe, time=replace(recipe.time, frames=frames, rate=rate))) for recipe in several
+            SimulatedScene(replace(recipe, time=replace(recipe.time, frames=frames, rate=rate))) for recipe in several
         )
         return cls(scenes=scenes, view=view, renderer=renderer, batch=batch)
 
@@ -137,8 +138,8 @@ class Simulator:
 
     @property
     def identity(self) -> str:
-        """A hash of all that shapes a film beside its request."""
-        own = {
+        """Hashes all that shapes a film beside its request."""
+        ingredients = {
             "recipes": [scene.recipe.identity() for scene in self.scenes],
             "view": self.view.identity,
             "renderer": self.renderer,
@@ -147,33 +148,35 @@ class Simulator:
             "space": self.space.identity,
             "conditioning": VERSION,
         }
-        return digest(canonical(own))
+        return digest(canonical(ingredients))
 
-    def films(self, requests: Sequence[Request]) -> list[Film]:
-        """Simulate, film and condition requests, those of each scene in batches."""
+    def films(self, requests: Sequence[FilmRequest]) -> list[SimulatedFilm]:
+        """Simulates, films and conditions requests, those of each scene in batches."""
         size = -(-self.batch // len(self.scenes))
-        found: dict[int, Film] = {}
+        films_made: dict[int, SimulatedFilm] = {}
         for number, scene in enumerate(self.scenes):
-            own = [place for place, request in enumerate(requests) if request.replicate % len(self.scenes) == number]
-            for first in range(0, len(own), size):
-                part = own[first : first + size]
-                found |= zip(part, self._batch(scene, [requests[place] for place in part], size=size), strict=True)
-        return [found[place] for place in range(len(requests))]
+            of_scene = [
+                index for index, request in enumerate(requests) if request.replicate % len(self.scenes) == number
+            ]
+            for first in range(0, len(of_scene), size):
+                part = of_scene[first : first + size]
+                films_made |= zip(part, self._batch(scene, [requests[index] for index in part], size=size), strict=True)
+        return [films_made[index] for index in range(len(requests))]
 
-    def _batch(self, scene: Scene, requests: Sequence[Request], *, size: int) -> list[Film]:
+    def _batch(self, scene: SimulatedScene, requests: Sequence[FilmRequest], *, size: int) -> list[SimulatedFilm]:
         begun = time.perf_counter()
         outcomes = run(scene.crew, scene.stepper, [scene.member(request) for request in requests], size=size)
         share = (time.perf_counter() - begun) / len(requests)
-        films: list[Film] = []
+        films: list[SimulatedFilm] = []
         for request, outcome in zip(requests, outcomes, strict=True):
             begun, clip = time.perf_counter(), None
             if outcome.sequence is not None:
                 zeta, camera = self.view.at(request.seed)
                 with torch.no_grad():
-                    seen = self._renderer.render(Meshes.flag(outcome.sequence, heading=0.0), zeta)
-                filmed = camera.filmed(seen.numpy(), seed=child_seed(request.seed, "camera"))
+                    rendered = self._renderer.render(Meshes.flag(outcome.sequence, heading=0.0), zeta)
+                filmed = camera.filmed(rendered.numpy(), seed=child_seed(request.seed, "camera"))
                 clip = FitFilm.of(filmed, np.arange(len(filmed)) / scene.recipe.time.rate).frames
-            films.append(Film(clip=clip, seconds={"simulate": share, "render": time.perf_counter() - begun}))
+            films.append(SimulatedFilm(clip=clip, seconds={"simulate": share, "render": time.perf_counter() - begun}))
         return films
 
     @cached_property
@@ -182,7 +185,7 @@ class Simulator:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class SimulatedScene:
     """A scene's recipe, and what is made of it once."""
 
     recipe: Recipe
@@ -199,8 +202,8 @@ class Scene:
     def stepper(self) -> Stepper:
         return Stepper.of(self.crew)
 
-    def member(self, request: Request) -> Member:
-        """The flag of a request."""
+    def member(self, request: FilmRequest) -> Member:
+        """Makes the flag of a request."""
         values = self.space.values(np.array([request.point]))[0]
         scene = self._template.scene
         start = roughened(scene.position, scene.handles, stream(request.seed, "start"), START_NOISE)

@@ -27,7 +27,7 @@ DIMENSION = BENDING + 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quantity:
+class ReportedQuantity:
     """A quantity that is reported.
 
     Attributes:
@@ -44,16 +44,18 @@ class Quantity:
 
 
 QUANTITIES = (
-    Quantity(name="wind_speed", unit="m/s", about="wind speed", digits=2),
-    Quantity(name="density", unit="kg/m²", about="area weight", digits=3),
-    Quantity(name="bending_scale", unit="log10(N·m)", about="mean logarithm of the bending coefficients", digits=2),
-    Quantity(
+    ReportedQuantity(name="wind_speed", unit="m/s", about="wind speed", digits=2),
+    ReportedQuantity(name="density", unit="kg/m²", about="area weight", digits=3),
+    ReportedQuantity(
+        name="bending_scale", unit="log10(N·m)", about="mean logarithm of the bending coefficients", digits=2
+    ),
+    ReportedQuantity(
         name="anisotropy",
         unit="1",
         digits=2,
         about="mean logarithm of the coefficients along the warp less that of those along the weft",
     ),
-    Quantity(
+    ReportedQuantity(
         name="nonlinearity",
         unit="1",
         digits=2,
@@ -89,7 +91,7 @@ class Space:
 
     @classmethod
     def of(cls, recipe: Recipe) -> Space:
-        """The ranges of a scene's recipe.
+        """Makes the space of a scene's recipe.
 
         Raises:
             InputError: a recipe that has no such ranges, or ranges of anything else but the damping; several materials,
@@ -116,7 +118,7 @@ class Space:
         return cls(material=spec.bases[0], factor=factor, density=density, wind=wind, common=common)
 
     def learned(self, parts: Sequence[tuple[Space, float]]) -> Space:
-        """The same box under the prior that a model learned from data sets of several scenes.
+        """Returns the same box under the prior that a model learned from data sets of several scenes.
 
         Args:
             parts: of each scene its box, and how much of the data shows it.
@@ -126,8 +128,8 @@ class Space:
         """
         for part, weight in parts:
             inner = all(
-                low.low <= own.low * (1 + 1e-9) and own.high * (1 - 1e-9) <= low.high
-                for own, low in zip(part.ranges, self.ranges, strict=True)
+                box_range.low <= part_range.low * (1 + 1e-9) and part_range.high * (1 - 1e-9) <= box_range.high
+                for part_range, box_range in zip(part.ranges, self.ranges, strict=True)
             )
             if weight <= 0 or not inner:
                 raise InputError(
@@ -152,14 +154,14 @@ class Space:
 
     @property
     def start_ranges(self) -> tuple[Range, Range, Range, Range]:
-        """Ranges of wind, density, bending scale and anisotropy: of the latter two the prior's mean and `_REACH` of its
-        standard deviations either way, within the box."""
+        """Returns ranges of wind, density, bending scale and anisotropy: of the latter two the prior's mean and
+        `_REACH` of its standard deviations either way, within the box."""
         table = np.log10(self.material.bending)
-        each = np.log10(_drawn(self.factor, _SHARES))
+        logs = np.log10(_drawn(self.factor, _SHARES))
         common = np.zeros(1) if self.common is None else np.log10(_drawn(self.common, _SHARES))
-        scale = _REACH * float(np.sqrt(each.var() / BENDING + common.var()))
-        slope = _REACH * float(np.sqrt(2 * each.var() / _COLUMNS))
-        middle, tilt = float(table.mean() + each.mean() + common.mean()), float(table[0].mean() - table[-1].mean())
+        scale = _REACH * float(np.sqrt(logs.var() / BENDING + common.var()))
+        slope = _REACH * float(np.sqrt(2 * logs.var() / _COLUMNS))
+        middle, tilt = float(table.mean() + logs.mean() + common.mean()), float(table[0].mean() - table[-1].mean())
         low, high = (float(end) for end in np.log10(self._factors))
         least, most = float(table.mean()) + low, float(table.mean()) + high
         slope = min(slope, high - low)
@@ -171,27 +173,28 @@ class Space:
         )
 
     def values(self, unit: NDArray[np.float64]) -> NDArray[np.float64]:
-        """SI values of points (n, 17) of [−1, 1]¹⁷.
+        """Converts points (n, 17) of [−1, 1]¹⁷ to SI values.
 
         Raises:
             InputError: points of another shape, or outside.
         """
         if unit.ndim != 2 or unit.shape[1] != DIMENSION or not (np.abs(unit) <= 1 + 1e-9).all():
             raise InputError(
-                f"points of shape {unit.shape}, or outside of [-1, 1]", fix=f"give (n, {DIMENSION}) within [-1, 1]"
+                f"the points have the shape {unit.shape}, or lie outside of [-1, 1]",
+                fix=f"give (n, {DIMENSION}) within [-1, 1]",
             )
         share = np.clip((unit + 1) / 2, 0.0, 1.0)
         columns = [[entry.at(float(value)) for value in share[:, i]] for i, entry in enumerate(self.ranges)]
         return np.array(columns, dtype=np.float64).T.reshape(len(unit), DIMENSION)
 
     def unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (n, 17) of [−1, 1]¹⁷ of SI values; those outside of the box are moved to its edge."""
+        """Converts SI values to points (n, 17) of [−1, 1]¹⁷; those outside of the box are moved to its edge."""
         out = np.empty_like(values, dtype=np.float64)
         for i, entry in enumerate(self.ranges):
-            low, high, own = entry.low, entry.high, values[:, i]
+            low, high, column = entry.low, entry.high, values[:, i]
             if entry.scale is Scale.LOG:
-                low, high, own = np.log(low), np.log(high), np.log(own)
-            out[:, i] = 2 * (own - low) / (high - low) - 1
+                low, high, column = np.log(low), np.log(high), np.log(column)
+            out[:, i] = 2 * (column - low) / (high - low) - 1
         return np.clip(out, -1.0, 1.0)
 
     def prior(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
@@ -213,7 +216,7 @@ class Space:
         return np.clip(2 * shares - 1, -1.0, 1.0)
 
     def reported(self, unit: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The `QUANTITIES` of points (n, 17): (n, quantity), in their units."""
+        """Computes the `QUANTITIES` of points (n, 17): (n, quantity), in their units."""
         values = self.values(unit)
         logs = np.log10(values[:, :BENDING]).reshape(-1, _ROWS, _COLUMNS)
         return np.stack(

@@ -30,7 +30,7 @@ _MARGIN = 1e-3  # of a logit's range: parameters at the very end of theirs have 
 
 
 def require(estimator: Estimator) -> None:
-    """Refuse a network that does not estimate `TARGETS`, each with a distribution.
+    """Refuses a network that does not estimate `TARGETS`, each with a distribution.
 
     Raises:
         InputError: it does not.
@@ -46,7 +46,7 @@ def require(estimator: Estimator) -> None:
 
 @torch.no_grad()
 def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The network's own estimates of `SUMMARISED` from embeddings (n, d), all learners' side by side: (n, 2).
+    """Computes the network's own estimates of `SUMMARISED` from embeddings (n, d), all learners' side by side: (n, 2).
 
     Each is a share of its target's range: the logistic function of the posterior's mean logit, which stays finite and
     nearly linear where the logit itself runs off, at winds near the ends of the range. A posterior's mean is the
@@ -71,19 +71,19 @@ def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[n
 def amortised(
     estimator: Estimator, clip: NDArray[np.uint8], space: Space, *, aspect: float, seed: int, draws: int
 ) -> NDArray[np.float64]:
-    """Draws of `TARGETS` for a clip (frame, height, width): (draw, 4), in the targets' units. Where the space's area
+    """Draws `TARGETS` for a clip (frame, height, width): (draw, 4), in the targets' units. Where the space's area
     weights are fewer than the network's, they hold for the clip, as does the aspect (length over height) for a network
     that estimates it.
     """
     target = next(target for target in estimator.targets if target.name == "density")
     low, high = max(space.density.low, target.low), min(space.density.high, target.high)
     fewer = low > target.low or high < target.high
-    known = [Known.everywhere("density", Stated(low=low, high=high), count=1)] if fewer else []
+    statements = [Known.everywhere("density", Stated(low=low, high=high), count=1)] if fewer else []
     if (shape := usable_aspect(estimator.targets, aspect, 1.0)) is not None:
-        known.append(Known.everywhere(ASPECT, shape, count=1))
-    found = estimator.estimate(estimator.inputs(clip[None]), seed=seed, draws=draws, known=known)
-    names = [target.name for target in found.targets]
-    return found.draws[0][:, [names.index(name) for name in TARGETS]].astype(np.float64)
+        statements.append(Known.everywhere(ASPECT, shape, count=1))
+    estimates = estimator.estimate(estimator.inputs(clip[None]), seed=seed, draws=draws, known=statements)
+    names = [target.name for target in estimates.targets]
+    return estimates.draws[0][:, [names.index(name) for name in TARGETS]].astype(np.float64)
 
 
 def _logits(values: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
@@ -94,7 +94,7 @@ def _logits(values: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
 
 
 def _ends(space: Space) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(4,) lower and upper ends of `TARGETS`."""
+    """Returns lower and upper ends of `TARGETS`, (4,)."""
     return np.array([entry.low for entry in space.start_ranges]), np.array([entry.high for entry in space.start_ranges])
 
 
@@ -106,20 +106,20 @@ def widened(values: NDArray[np.float64], factor: float, space: Space) -> NDArray
     return low + (high - low) / (1 + np.exp(-z))
 
 
-def completed(space: Space, given: NDArray[np.float64], *, seed: int) -> NDArray[np.float64]:
-    """Points (n, 17) of [−1, 1]¹⁷ with the wind and density of `given` (n, 4), and bending of the prior as near to its
-    scale and anisotropy as 20,000 draws come, no draw twice."""
+def completed(space: Space, drawn: NDArray[np.float64], *, seed: int) -> NDArray[np.float64]:
+    """Completes points (n, 17) of [−1, 1]¹⁷ with the wind and density of `drawn` (n, 4), and bending of the prior as
+    near to its scale and anisotropy as 20,000 draws come, no draw twice."""
     pool = space.prior(stream(seed, "refine", "pool"), _POOL)
-    offered, wanted = space.reported(pool)[:, 2:4], given[:, 2:4]
+    offered, wanted = space.reported(pool)[:, 2:4], drawn[:, 2:4]
     spread = offered.std(axis=0)
     tree = KDTree(offered / spread)
     taken: set[int] = set()
-    out = np.empty((len(given), DIMENSION))
+    out = np.empty((len(drawn), DIMENSION))
     for i, row in enumerate(wanted / spread):
-        _, near = tree.query(row, k=len(given) + 1)
-        place = next(int(n) for n in np.atleast_1d(near) if int(n) not in taken)
-        taken.add(place)
-        out[i] = pool[place]
+        _, nearest = tree.query(row, k=len(drawn) + 1)
+        index = next(int(n) for n in np.atleast_1d(nearest) if int(n) not in taken)
+        taken.add(index)
+        out[i] = pool[index]
     values = space.values(out)
-    values[:, DENSITY], values[:, WIND] = given[:, 1], given[:, 0]
+    values[:, DENSITY], values[:, WIND] = drawn[:, 1], drawn[:, 0]
     return space.unit(values)

@@ -36,14 +36,14 @@ class Target:
     def __post_init__(self) -> None:
         if self.clip.ndim != 3 or self.clip.dtype != np.uint8:
             raise InputError(
-                f"a clip of shape {self.clip.shape} and type {self.clip.dtype}",
+                f"the clip has the shape {self.clip.shape} and type {self.clip.dtype}",
                 where=f"target {self.name!r}",
                 fix="give uint8 of shape (frame, height, width)",
             )
 
 
 def of_recording(recording: Artifact, clip: NDArray[np.uint8], *, otherwise: View, space: Space) -> Target:
-    """A target of a recording in the lake: ζ and truth are what its row states, if it is simulated.
+    """Makes a target of a recording in the lake: ζ and truth are what its row states, if it is simulated.
 
     Args:
         clip: (frame, height, width) of it, conditioned.
@@ -56,19 +56,19 @@ def of_recording(recording: Artifact, clip: NDArray[np.uint8], *, otherwise: Vie
 def as_stated(
     name: str, clip: NDArray[np.uint8], parameters: Mapping[str, Any], *, otherwise: View, space: Space
 ) -> Target:
-    """A target of which `parameters` state what recordings of simulated flags state, or nothing.
+    """Makes a target of which `parameters` state what recordings of simulated flags state, or nothing.
 
     Args:
         clip: (frame, height, width), conditioned.
         parameters: name → value [SI], ζ and the camera among them if it is simulated.
         otherwise: the view of one that states no ζ.
     """
-    stated = of_parameters(parameters, where=f"target {name!r}") if parameters else None
-    return Target(name=name, clip=clip, view=stated or otherwise, truth=_truth(parameters, space))
+    stated_view = of_parameters(parameters, where=f"target {name!r}") if parameters else None
+    return Target(name=name, clip=clip, view=stated_view or otherwise, truth=_truth(parameters, space))
 
 
 def knows_view(target: Target) -> bool:
-    """Whether ζ and the camera are given, and not drawn."""
+    """Returns whether ζ and the camera are given, and not drawn."""
     return isinstance(target.view, FixedView)
 
 
@@ -77,5 +77,5 @@ def _truth(content: Mapping[str, Any], space: Space) -> dict[str, float]:
     if any(name not in content for name in names):
         return {name: float(content[name]) for name in ("density", "wind_speed") if name in content}
     point = space.unit(np.array([[float(content[name]) for name in names]]))
-    found = dict(zip((q.name for q in QUANTITIES), space.reported(point)[0].tolist(), strict=True))
-    return {**found, "density": float(content["density"]), "wind_speed": float(content["wind_speed"])}
+    truth = dict(zip((q.name for q in QUANTITIES), space.reported(point)[0].tolist(), strict=True))
+    return {**truth, "density": float(content["density"]), "wind_speed": float(content["wind_speed"])}

@@ -36,7 +36,8 @@ class Trace:
         return np.maximum.accumulate(np.where(new, order, 0))
 
     def incumbent(self, *, evaluations: int | None = None, seconds: float | None = None) -> int:
-        """Number of the nearest evaluation within so many evaluations, and so many seconds; the first at least."""
+        """Returns the number of the nearest evaluation within so many evaluations, and so many seconds; the first at
+        least."""
         count = len(self) if evaluations is None else min(evaluations, len(self))
         if seconds is not None:
             count = min(count, int(np.searchsorted(self.seconds, seconds, side="right")))

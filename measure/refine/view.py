@@ -31,7 +31,7 @@ _NAMED = "render."
 
 
 @dataclass(frozen=True, kw_only=True)
-class Camera:
+class FilmCamera:
     """The camera behind the picture: noise, then H.264.
 
     Attributes:
@@ -44,7 +44,8 @@ class Camera:
     shot_noise: float = 1.75
 
     def filmed(self, frames: NDArray[np.uint8], *, seed: int) -> NDArray[np.uint8]:
-        """Gray frames (n, height, width) as they come back from the camera's file, of colours (n, height, width, 3)."""
+        """Converts colours (n, height, width, 3) to gray frames (n, height, width) as they come back from the camera's
+        file."""
         spec = CameraSpec(
             coding=Coding.H264,
             jpeg_quality=90.0,
@@ -68,8 +69,8 @@ RANGES = {
 class View(Protocol):
     """Says by what ζ and camera a clip is filmed."""
 
-    def at(self, seed: int) -> tuple[RenderParameters, Camera]:
-        """ζ and the camera of the clip with this seed."""
+    def at(self, seed: int) -> tuple[RenderParameters, FilmCamera]:
+        """Returns ζ and the camera of the clip with this seed."""
         ...
 
     @property
@@ -83,10 +84,10 @@ class FixedView:
     """One ζ and camera for all clips, as the paper has it."""
 
     zeta: RenderParameters
-    camera: Camera
+    camera: FilmCamera
 
-    def at(self, seed: int) -> tuple[RenderParameters, Camera]:
-        """Always the same."""
+    def at(self, seed: int) -> tuple[RenderParameters, FilmCamera]:
+        """Returns the same for every clip."""
         del seed
         return self.zeta, self.camera
 
@@ -102,9 +103,9 @@ class DrawnView:
     prior: RenderPrior
     assets: Assets
 
-    def at(self, seed: int) -> tuple[RenderParameters, Camera]:
+    def at(self, seed: int) -> tuple[RenderParameters, FilmCamera]:
         drawn = {name: entry.at(stream(seed, "camera", name).random()) for name, entry in RANGES.items()}
-        return self.prior.draw(child_seed(seed, "zeta"), self.assets), Camera(**drawn)
+        return self.prior.draw(child_seed(seed, "zeta"), self.assets), FilmCamera(**drawn)
 
     @property
     def identity(self) -> str:
@@ -114,7 +115,7 @@ class DrawnView:
 
 
 def of_parameters(parameters: str | Mapping[str, Any], *, where: str) -> FixedView | None:
-    """The view that a simulated recording states in its parameters; None where it states none.
+    """Reads the view that a simulated recording states in its parameters; None where it states none.
 
     Args:
         parameters: of the catalog's row, JSON or decoded.
@@ -123,15 +124,15 @@ def of_parameters(parameters: str | Mapping[str, Any], *, where: str) -> FixedVi
         InputError: a ζ that this version cannot read.
     """
     content = json.loads(parameters) if isinstance(parameters, str) else parameters
-    stated = {key.removeprefix(_NAMED): value for key, value in content.items() if key.startswith(_NAMED)}
-    if "texture" not in stated or "background" not in stated:
+    entries = {key.removeprefix(_NAMED): value for key, value in content.items() if key.startswith(_NAMED)}
+    if "texture" not in entries or "background" not in entries:
         return None
-    known = {entry.name for entry in fields(RenderParameters)}
-    if unknown := sorted(set(stated) - known):
+    names = {entry.name for entry in fields(RenderParameters)}
+    if unknown := sorted(set(entries) - names):
         raise InputError(f"render parameters {', '.join(unknown)} are not known", where=where, fix="update flagdata")
-    whole = {
+    values = {
         name: round(value) if isinstance(getattr(RenderParameters, name, None), int) else value
-        for name, value in stated.items()
+        for name, value in entries.items()
     }
     camera = {name: float(content[f"camera.{name}"]) for name in RANGES if f"camera.{name}" in content}
-    return FixedView(zeta=RenderParameters(**whole), camera=Camera(**camera))
+    return FixedView(zeta=RenderParameters(**values), camera=FilmCamera(**camera))

@@ -13,6 +13,6 @@ if TYPE_CHECKING:
     from measure.report.document import as_document, from_document
     from measure.report.lead_sentences import lead
     from measure.report.report_page import page
-    from measure.report.statement import by_draw, stated
+    from measure.report.statement import by_draw, with_sentences
 
 __getattr__ = lazy_exports(__name__, __file__)

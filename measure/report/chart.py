@@ -36,7 +36,7 @@ class Scale(ABC):
 
     @abstractmethod
     def measure(self, value: float) -> float:
-        """What is linear along the axis."""
+        """Computes what is linear along the axis."""
 
     @abstractmethod
     def ticks(self, room: Callable[[str], float]) -> list[tuple[float, str]]:
@@ -44,7 +44,7 @@ class Scale(ABC):
 
     @abstractmethod
     def shows(self, value: float) -> bool:
-        """Whether a value has a place on the axis."""
+        """Returns whether a value has a place on the axis."""
 
 
 class Linear(Scale):
@@ -99,16 +99,16 @@ class Logarithmic(Scale):
     def ticks(self, room: Callable[[str], float]) -> list[tuple[float, str]]:
         first, last = math.ceil(math.log10(self.low)), math.floor(math.log10(self.high))
         if last - first < 2:
-            return self._apart([(v, number(v, digits=1)) for v in _within_decade(self.low, self.high)], room)
-        return self._apart([(10.0**n, _decade(n)) for n in range(first, last + 1)], room)
+            return self._spaced([(v, number(v, digits=1)) for v in _within_decade(self.low, self.high)], room)
+        return self._spaced([(10.0**n, _decade(n)) for n in range(first, last + 1)], room)
 
-    def _apart(self, ticks: list[tuple[float, str]], room: Callable[[str], float]) -> list[tuple[float, str]]:
-        """As many of the ticks, from the first on, as do not touch."""
-        kept: list[tuple[float, str]] = []
+    def _spaced(self, ticks: list[tuple[float, str]], room: Callable[[str], float]) -> list[tuple[float, str]]:
+        """Selects as many of the ticks, from the first on, as do not touch."""
+        spaced: list[tuple[float, str]] = []
         for value, label in ticks:
-            if not kept or abs(self(value) - self(kept[-1][0])) >= (room(label) + room(kept[-1][1])) / 2:
-                kept.append((value, label))
-        return kept
+            if not spaced or abs(self(value) - self(spaced[-1][0])) >= (room(label) + room(spaced[-1][1])) / 2:
+                spaced.append((value, label))
+        return spaced
 
 
 @dataclass(kw_only=True)
@@ -135,18 +135,18 @@ class Chart:
     marks: list[str] = field(default_factory=list)
 
     def line(self, xs: Sequence[float], ys: Sequence[float], kind: str) -> None:
-        """A line through the points; broken where a value is missing."""
+        """Draws a line through the points; broken where a value is missing."""
         path = path_through(*thinned([(self.x, xs), (self.y, ys)]))
         if path:
             self.marks.append(f'<path class="line {kind}" d="{path}"/>')
 
     def point(self, x: float, y: float, kind: str) -> None:
-        """A dot."""
+        """Draws a dot."""
         if self.x.shows(x) and self.y.shows(y):
             self.marks.append(f'<circle class="{kind}" cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="4"/>')
 
     def bar(self, left: float, right: float, height: float, kind: str) -> None:
-        """A bar of a histogram, from the axis up."""
+        """Draws a bar of a histogram, from the axis up."""
         top, bottom = self.y(height), self.y(self.y.low)
         self.marks.append(
             f'<rect class="{kind}" x="{self.x(left):.1f}" y="{top:.1f}" '
@@ -154,27 +154,27 @@ class Chart:
         )
 
     def upright(self, x: float, kind: str) -> None:
-        """A line across the chart at `x`."""
+        """Draws a line across the chart at `x`."""
         if self.x.shows(x):
             self.marks.append(f'<path class="line {kind}" d="M{self.x(x):.1f} {self.y.start:.1f}V{self.y.stop:.1f}"/>')
 
     def note(self, x: float, y: float, text: str, anchor: str) -> None:
-        """Text at a place of the chart, in the chart's units."""
+        """Writes text at a place of the chart, in the chart's units."""
         self.marks.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>')
 
     def svg(self) -> Markup:
-        """The finished chart."""
+        """Renders the finished chart."""
         inside = "".join([*self._frame(), *self.marks])
         return drawing(self.width, self.height, self.title, self.description, inside)
 
     def _frame(self) -> list[str]:
         left, right, bottom, top = self.x.start, self.x.stop, self.y.start, self.y.stop
         parts = []
-        for value, label in self.y.ticks(below):
+        for value, label in self.y.ticks(room_below):
             at = self.y(value)
             parts.append(f'<path class="grid" d="M{left:.1f} {at:.1f}H{right:.1f}"/>')
             parts.append(f'<text x="{left - 6:.1f}" y="{at + 4:.1f}" text-anchor="end">{escape(label)}</text>')
-        for value, label in self.x.ticks(beside):
+        for value, label in self.x.ticks(room_beside):
             at = self.x(value)
             parts.append(f'<path class="tick" d="M{at:.1f} {bottom:.1f}v4"/>')
             parts.append(f'<text x="{at:.1f}" y="{bottom + 17:.1f}" text-anchor="middle">{escape(label)}</text>')
@@ -189,7 +189,7 @@ class Chart:
 
 
 def drawing(width: float, height: float, title: str, description: str, inside: str) -> Markup:
-    """An SVG that names and describes itself. `inside` is markup already."""
+    """Makes an SVG that names and describes itself. `inside` is markup already."""
     return Markup(
         f'<svg role="img" viewBox="0 0 {width:g} {height:g}" '
         f'aria-label="{escape(title)}: {escape(description)}">{inside}</svg>'
@@ -197,23 +197,23 @@ def drawing(width: float, height: float, title: str, description: str, inside: s
 
 
 def thinned(axes: Sequence[tuple[Scale, Sequence[float]]]) -> tuple[list[float], list[float]]:
-    """Places of a line's points: of each stretch too dense to show, its lowest and highest; NaN where none is shown."""
+    """Thins a line's points: of each stretch too dense to show, its lowest and highest; NaN where none is shown."""
     (x, xs), (y, ys) = axes
     places = [(x(a), y(b)) if x.shows(a) and y.shows(b) else (math.nan, math.nan) for a, b in zip(xs, ys, strict=True)]
     stretch = max(1, math.ceil(2 * len(places) / _MOST_POINTS))
     if stretch <= 2:
-        kept = places
+        points = places
     else:
-        kept = []
+        points = []
         for begin in range(0, len(places), stretch):
             part = places[begin : begin + stretch]
             ends = {min(range(len(part)), key=lambda i: part[i][1]), max(range(len(part)), key=lambda i: part[i][1])}
-            kept += [(math.nan, math.nan)] if any(math.isnan(p[1]) for p in part) else [part[i] for i in sorted(ends)]
-    return [p[0] for p in kept], [p[1] for p in kept]
+            points += [(math.nan, math.nan)] if any(math.isnan(p[1]) for p in part) else [part[i] for i in sorted(ends)]
+    return [p[0] for p in points], [p[1] for p in points]
 
 
 def path_through(xs: Sequence[float], ys: Sequence[float]) -> str:
-    """SVG path data through the points, lifted at NaN."""
+    """Writes SVG path data through the points, lifted at NaN."""
     parts, pen = [], "M"
     for x, y in zip(xs, ys, strict=True):
         if math.isnan(x) or math.isnan(y):
@@ -224,24 +224,24 @@ def path_through(xs: Sequence[float], ys: Sequence[float]) -> str:
     return "".join(parts)
 
 
-def beside(label: str) -> float:
-    """Room that a label needs among others on the same line."""
+def room_beside(label: str) -> float:
+    """Returns the room that a label needs among others on the same line."""
     return _CHARACTER * (len(label) + 2)
 
 
-def below(label: str) -> float:
-    """Room that a label needs among others above each other."""
+def room_below(label: str) -> float:
+    """Returns the room that a label needs among others above each other."""
     return _LINE if label else 0.0
 
 
 def _round_step(least: float) -> float:
-    """The smallest of 1, 2, 5 × 10ⁿ that is not below `least`."""
+    """Finds the smallest of 1, 2, 5 × 10ⁿ that is not below `least`."""
     power = 10.0 ** math.floor(math.log10(least))
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))
 
 
 def _within_decade(low: float, high: float) -> list[float]:
-    """Those of 1, 2, 3, 5, 7 × 10ⁿ that lie between."""
+    """Lists those of 1, 2, 3, 5, 7 × 10ⁿ that lie between."""
     exponents = range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
     return [f * 10.0**n for n in exponents for f in (1, 2, 3, 5, 7) if low <= f * 10.0**n <= high]
 

@@ -16,7 +16,7 @@ from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
 
 from flagdata.pages.pictures import data_url
-from measure.report.chart import Chart, Linear, beside, drawing
+from measure.report.chart import Chart, Linear, drawing, room_beside
 from measure.verdict.quantity import Display, display
 from measure.verdict.record import Residual
 
@@ -36,11 +36,12 @@ class Shade:
     high: float
     colours: str
 
-    def shown(self) -> Display:
+    def in_unit(self) -> Display:
         return display((self.low, self.high), "m")
 
     def picture(self, values: NDArray[np.float64]) -> str:
-        """URL of a PNG of values (row, column) [m], the first row on top; transparent where there is no value."""
+        """Encodes a PNG of values (row, column) [m], the first row on top, as a URL; transparent where there is no
+        value."""
         part = (values - self.low) / (self.high - self.low)
         indices = np.where(np.isfinite(part), part * (_LEVELS - 1), _LEVELS).round().astype(np.uint8)
         image = Image.frombytes("P", (indices.shape[1], indices.shape[0]), indices.tobytes())
@@ -52,20 +53,20 @@ class Shade:
 
 
 def size_shade(residuals: Sequence[Residual]) -> Shade:
-    """One scale for the errors of all recordings, before and after, from zero."""
+    """Scales the errors of all recordings, before and after, from zero."""
     return Shade(
         low=0.0, high=_largest([v for r in residuals for v in (*r.in_space, *r.in_space_after)]), colours="viridis"
     )
 
 
 def mean_shade(residuals: Sequence[Residual]) -> Shade:
-    """One scale for the components of the mean errors of all recordings, symmetric about zero."""
+    """Scales the components of the mean errors of all recordings, symmetric about zero."""
     reach = _largest([c for r in residuals for m in r.mean for c in m])
     return Shade(low=-reach, high=reach, colours="RdBu_r")
 
 
 def size_maps(residual: Residual, shade: Shade, after_label: str) -> list[tuple[str, Markup]]:
-    """(heading, chart) of the root mean square error over the cloth: of the base model, then of `after_label`."""
+    """Draws (heading, chart) of the root mean square error over the cloth: of the base model, then of `after_label`."""
     parts = [("base model", residual.in_space)]
     if residual.in_space_after:
         parts.append((after_label, residual.in_space_after))
@@ -73,40 +74,40 @@ def size_maps(residual: Residual, shade: Shade, after_label: str) -> list[tuple[
 
 
 def mean_maps(residual: Residual, shade: Shade) -> list[tuple[str, Markup]]:
-    """(heading, chart) of x, y and z of the base model's mean error over the cloth."""
+    """Draws (heading, chart) of x, y and z of the base model's mean error over the cloth."""
     parts = [(f"mean error in {axis}", [m[i] for m in residual.mean]) for i, axis in enumerate("xyz")]
     return _maps(residual, parts, shade, "mean error of the base model") if residual.mean else []
 
 
 def colour_bar(shade: Shade, meaning: str) -> Markup:
-    """What the colours mean."""
-    shown = shade.shown()
-    scale = Linear(shade.low * shown.factor, shade.high * shown.factor, 12, 288)
+    """Draws what the colours mean."""
+    in_unit = shade.in_unit()
+    scale = Linear(shade.low * in_unit.factor, shade.high * in_unit.factor, 12, 288)
     image = shade.picture(np.linspace(shade.low, shade.high, 128)[None, :])
     parts = [f'<image href="{image}" x="12" y="0" width="276" height="10" preserveAspectRatio="none"/>']
-    for value, label in scale.ticks(beside):
+    for value, label in scale.ticks(room_beside):
         parts.append(f'<path class="tick" d="M{scale(value):.1f} 10v4"/>')
         parts.append(f'<text x="{scale(value):.1f}" y="26" text-anchor="middle">{escape(label)}</text>')
     parts.append(
-        f'<text class="label" x="150" y="43" text-anchor="middle">{escape(meaning)} [{escape(shown.unit)}]</text>'
+        f'<text class="label" x="150" y="43" text-anchor="middle">{escape(meaning)} [{escape(in_unit.unit)}]</text>'
     )
-    ends = f"{scale.low:.3g} to {scale.high:.3g} {shown.unit}"
+    ends = f"{scale.low:.3g} to {scale.high:.3g} {in_unit.unit}"
     return drawing(300, 48, f"Colours of the {meaning}", ends, "".join(parts))
 
 
 def triangles(markers: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(triangle, 3) over markers (marker, 2) [m], without slivers; empty where they lie on a line."""
+    """Triangulates markers (marker, 2) [m], (triangle, 3), without slivers; empty where they lie on a line."""
     if on_a_line(markers):
         return np.zeros((0, 3), dtype=np.int64)
     leaning = markers @ np.array([[1.0, 0.0], [_LEAN, 1.0]])
-    found = Delaunay(leaning).simplices.astype(np.int64)
-    a, b, c = (markers[found[:, i]] for i in range(3))
+    faces = Delaunay(leaning).simplices.astype(np.int64)
+    a, b, c = (markers[faces[:, i]] for i in range(3))
     area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-    return found[area > _SLIVER * np.median(area)]
+    return faces[area > _SLIVER * np.median(area)]
 
 
 def on_a_line(markers: NDArray[np.float64]) -> bool:
-    """Whether markers (marker, 2) span no area."""
+    """Returns whether markers (marker, 2) span no area."""
     if len(markers) < 4:
         return True
     spread = np.linalg.svd(markers - markers.mean(axis=0), compute_uv=False)
@@ -128,7 +129,7 @@ def _map(markers: NDArray[np.float64], values: NDArray[np.float64], shade: Shade
     (left, bottom), (right, top) = markers.min(axis=0), markers.max(axis=0)
     across = _WIDTH - _LEFT - 14
     tall = float(np.clip(across * (top - bottom) / (right - left), 30, 320))
-    known = np.isfinite(values)
+    finite = np.isfinite(values)
     chart = Chart(
         title=title,
         description="colours over the cloth",
@@ -139,38 +140,38 @@ def _map(markers: NDArray[np.float64], values: NDArray[np.float64], shade: Shade
         width=_WIDTH,
         height=_TOP + tall + _BOTTOM,
     )
-    if np.count_nonzero(known) >= 4 and not on_a_line(markers[known]):
+    if np.count_nonzero(finite) >= 4 and not on_a_line(markers[finite]):
         rows = max(2, round(_PIXELS * tall / across))
         grid = np.meshgrid(np.linspace(left, right, _PIXELS), np.linspace(top, bottom, rows))
-        image = shade.picture(LinearNDInterpolator(markers[known], values[known])(*grid))
+        image = shade.picture(LinearNDInterpolator(markers[finite], values[finite])(*grid))
         chart.marks.append(
             f'<image href="{image}" x="{_LEFT:g}" y="{_TOP:g}" width="{across:.1f}" height="{tall:.1f}" '
             'preserveAspectRatio="none"/>'
         )
     kinds = ("marker lost", "marker")
-    for (u, v), there in zip(markers.tolist(), known.tolist(), strict=True):
-        chart.marks.append(f'<circle class="{kinds[there]}" cx="{chart.x(u):.1f}" cy="{chart.y(v):.1f}" r="1"/>')
+    for (u, v), is_finite in zip(markers.tolist(), finite.tolist(), strict=True):
+        chart.marks.append(f'<circle class="{kinds[is_finite]}" cx="{chart.x(u):.1f}" cy="{chart.y(v):.1f}" r="1"/>')
     return chart.svg()
 
 
 def _profile(markers: NDArray[np.float64], values: NDArray[np.float64], shade: Shade, title: str) -> Markup:
-    """Markers on a line: the value against the distance along it."""
+    """Draws markers on a line: the value against the distance along it."""
     along = np.linalg.norm(markers - markers[:1], axis=1) if len(markers) else np.zeros(0)
     order = np.argsort(along)
-    shown = shade.shown()
+    in_unit = shade.in_unit()
     chart = Chart(
         title=title,
         description="against the distance along the markers",
         x=Linear.over(along.tolist(), 50, 288),
-        y=Linear(shade.low * shown.factor, shade.high * shown.factor, 150, _TOP),
+        y=Linear(shade.low * in_unit.factor, shade.high * in_unit.factor, 150, _TOP),
         x_label="along the markers [m]",
-        y_label=f"error [{shown.unit}]",
+        y_label=f"error [{in_unit.unit}]",
         width=_WIDTH,
         height=192,
     )
     if shade.low < 0:
         chart.line([chart.x.low, chart.x.high], [0.0, 0.0], "zero")
-    chart.line(along[order].tolist(), (values[order] * shown.factor).tolist(), "before")
+    chart.line(along[order].tolist(), (values[order] * in_unit.factor).tolist(), "before")
     return chart.svg()
 
 

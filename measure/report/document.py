@@ -31,17 +31,17 @@ _INFINITE = {"Infinity": math.inf, "-Infinity": -math.inf}
 
 
 def as_document(verdict: Verdict) -> dict[str, Any]:
-    """The verdict as JSON values, with its schema tag."""
+    """Returns the verdict as JSON values, with its schema tag."""
     content = plain({**verdict.as_dict(), "residuals": ()})
     content["residuals"] = [
-        {**plain({**own, **dict.fromkeys(_MOVING)}), **{name: _packed(own[name]) for name in _MOVING}}
-        for own in map(dataclasses.asdict, verdict.residuals)
+        {**plain({**residual, **dict.fromkeys(_MOVING)}), **{name: _packed(residual[name]) for name in _MOVING}}
+        for residual in map(dataclasses.asdict, verdict.residuals)
     ]
     return content
 
 
 def from_document(document: Mapping[str, Any]) -> Verdict:
-    """The verdict that a document holds.
+    """Reads the verdict that a document holds.
 
     Raises:
         InputError: another schema, a field that is missing, unknown or of another type; it says which.
@@ -51,12 +51,13 @@ def from_document(document: Mapping[str, Any]) -> Verdict:
         content["ranking"] = [_current(candidate) for candidate in content["ranking"]]
     tag = content.pop("schema", None)
     if tag != SCHEMA:
-        raise InputError(f"schema {tag!r}", where="schema", fix=f"give a document of schema {SCHEMA!r}")
+        raise InputError(f"the schema is {tag!r}", where="schema", fix=f"give a document of schema {SCHEMA!r}")
     return _read(content, Verdict, "verdict")
 
 
 def _current(candidate: Any) -> Any:
-    """A candidate with the names of today: documents of version 0.1 called the p of heterogeneity `steady`."""
+    """Renames a candidate's entries to the names of today: documents of version 0.1 called the p of heterogeneity
+    `steady`."""
     if not isinstance(candidate, Mapping) or "steady" not in candidate:
         return candidate
     return {"heterogeneity" if name == "steady" else name: value for name, value in candidate.items()}
@@ -86,12 +87,12 @@ def _unpacked(value: Mapping[str, Any], where: str) -> _Moving:
         return data.astype(np.float64).reshape(value["shape"]).tolist()
     except (KeyError, TypeError, ValueError, binascii.Error) as error:
         raise InputError(
-            f"packed values that cannot be read: {error}", where=where, fix="give shape, and float32 in base64"
+            f"the packed values cannot be read: {error}", where=where, fix="give shape, and float32 in base64"
         ) from error
 
 
 def _read(value: Any, kind: Any, where: str) -> Any:
-    """`value` as `kind`: one of the verdict's types, built from dataclasses, tuples, lists, numbers and texts."""
+    """Reads `value` as `kind`: one of the verdict's types, built from dataclasses, tuples, lists, numbers and texts."""
     if get_origin(kind) in (Union, types.UnionType):
         (present,) = (k for k in get_args(kind) if k is not types.NoneType)
         return None if value is None else _read(value, present, where)
@@ -111,8 +112,8 @@ def _read(value: Any, kind: Any, where: str) -> Any:
     try:
         return kind(text)
     except ValueError as error:
-        known = ", ".join(repr(str(k)) for k in kind)
-        raise InputError(f"unknown value {text!r}", where=where, fix=f"give one of {known}") from error
+        choices = ", ".join(repr(str(k)) for k in kind)
+        raise InputError(f"the value {text!r} is unknown", where=where, fix=f"give one of {choices}") from error
 
 
 def _record(value: Any, kind: Any, where: str) -> Any:
@@ -123,11 +124,12 @@ def _record(value: Any, kind: Any, where: str) -> Any:
         for f in dataclasses.fields(kind)
         if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
     }
-    for name, wrong in (("unknown", content.keys() - hints.keys()), ("missing", needed - content.keys())):
+    for has, wrong in (
+        ("it has the unknown field", content.keys() - hints.keys()),
+        ("it lacks the field", needed - content.keys()),
+    ):
         if wrong:
-            raise InputError(
-                f"{name} field {', '.join(sorted(wrong))}", where=where, fix=f"the fields are {', '.join(hints)}"
-            )
+            raise InputError(f"{has} {', '.join(sorted(wrong))}", where=where, fix=f"the fields are {', '.join(hints)}")
     return kind(**{name: _read(item, hints[name], f"{where}.{name}") for name, item in content.items()})
 
 
@@ -141,7 +143,7 @@ def _sequence(value: Any, kind: Any, where: str) -> Any:
     if inner[-1] is Ellipsis:
         return tuple(_read(item, inner[0], f"{where}[{n}]") for n, item in enumerate(items))
     if len(items) != len(inner):
-        raise InputError(f"{len(items)} entries", where=where, fix=f"give {len(inner)}")
+        raise InputError(f"there are {len(items)} entries", where=where, fix=f"give {len(inner)}")
     return tuple(_read(item, k, f"{where}[{n}]") for n, (item, k) in enumerate(zip(items, inner, strict=True)))
 
 
@@ -155,5 +157,7 @@ def _number(value: Any, where: str) -> float:
 
 def _expected(value: Any, kind: Any, wanted: str, where: str) -> Any:
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        raise InputError(f"{type(value).__name__} instead of {wanted}", where=where, fix=f"give {wanted}")
+        raise InputError(
+            f"the value is of type {type(value).__name__}, not {wanted}", where=where, fix=f"give {wanted}"
+        )
     return value

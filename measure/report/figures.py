@@ -17,23 +17,23 @@ _FAR = 6.0  # an observed statistic this many times the largest null is shown on
 
 
 def root_mean_square(values: Sequence[float]) -> float:
-    """Root mean square of the values that are there; NaN where none is."""
+    """Computes the root mean square of the values that are there; NaN where none is."""
     finite = [v for v in values if math.isfinite(v)]
     return math.sqrt(sum(v * v for v in finite) / len(finite)) if finite else math.nan
 
 
 def in_time(residual: Residual) -> Markup:
-    """The error against time, over the markers."""
-    shown = display([*residual.in_time, *residual.in_time_after], "m")
-    before = [v * shown.factor for v in residual.in_time]
-    after = [v * shown.factor for v in residual.in_time_after]
+    """Draws the error against time, over the markers."""
+    in_unit = display([*residual.in_time, *residual.in_time_after], "m")
+    before = [v * in_unit.factor for v in residual.in_time]
+    after = [v * in_unit.factor for v in residual.in_time_after]
     chart = Chart(
         title=f"Prediction error in time, {residual.recording}",
         description="root mean square over the markers, frame by frame",
         x=Linear.over(residual.times, _LEFT, _RIGHT),
         y=Linear.over([*before, *after], 194, _TOP, at_least=[0.0]),
         x_label="time [s]",
-        y_label=f"error [{shown.unit}]",
+        y_label=f"error [{in_unit.unit}]",
         height=236,
     )
     chart.line(residual.times, before, "before")
@@ -43,7 +43,7 @@ def in_time(residual: Residual) -> Markup:
 
 
 def in_frequency(residual: Residual) -> Markup:
-    """The error's power spectral density, both axes logarithmic."""
+    """Draws the error's power spectral density, both axes logarithmic."""
     pairs = [(f, p) for f, p in zip(residual.frequencies, residual.spectrum, strict=True) if f > 0]
     chart = Chart(
         title=f"Prediction error in frequency, {residual.recording}",
@@ -61,29 +61,30 @@ def in_frequency(residual: Residual) -> Markup:
 
 
 def against_wind(residuals: Sequence[Residual]) -> Markup:
-    """The error of each recording against its mean logged wind; hollow where the models were not fitted to it."""
+    """Draws the error of each recording against its mean logged wind; hollow where the models were not fitted to it."""
     placed = [r for r in residuals if math.isfinite(r.speed)]
     before = [root_mean_square(r.in_time) for r in placed]
     after = [root_mean_square(r.in_time_after) for r in placed]
-    shown = display([*before, *after], "m")
+    in_unit = display([*before, *after], "m")
     chart = Chart(
         title="Prediction error against wind",
         description="one point a recording",
         x=Linear.over([r.speed for r in placed], _LEFT, _RIGHT),
-        y=Linear.over([v * shown.factor for v in (*before, *after)], 194, _TOP, at_least=[0.0]),
+        y=Linear.over([v * in_unit.factor for v in (*before, *after)], 194, _TOP, at_least=[0.0]),
         x_label="mean logged wind [m/s]",
-        y_label=f"error [{shown.unit}]",
+        y_label=f"error [{in_unit.unit}]",
         height=236,
     )
     for residual, first, second in zip(placed, before, after, strict=True):
         state = " unseen" if residual.held_out else ""
-        chart.point(residual.speed, first * shown.factor, f"dot before{state}")
-        chart.point(residual.speed, second * shown.factor, f"dot after{state}")
+        chart.point(residual.speed, first * in_unit.factor, f"dot before{state}")
+        chart.point(residual.speed, second * in_unit.factor, f"dot after{state}")
     return chart.svg()
 
 
 def null_distribution(test: NullTest) -> Markup:
-    """A histogram of the statistic over simulated nulls, the observed one, and the least that would be significant."""
+    """Draws a histogram of the statistic over simulated nulls, the observed one, and the least that would be
+    significant."""
     null = [v for v in test.null if math.isfinite(v)]
     values = [v for v in (*null, test.statistic) if math.isfinite(v)]
     critical = test.critical
@@ -104,18 +105,18 @@ def null_distribution(test: NullTest) -> Markup:
         chart.bar(left, right, count, "null")
     if critical is not None:
         chart.upright(critical, "critical")
-        _named(chart, critical, 14, f"significant from {number(critical)} (level {test.level:g})")
+        _label(chart, critical, 14, f"significant from {number(critical)} (level {test.level:g})")
     chart.upright(test.statistic, "observed")
-    _named(chart, test.statistic, 30, f"observed {number(test.statistic)}")
+    _label(chart, test.statistic, 30, f"observed {number(test.statistic)}")
     chart.note(_LEFT, 48, "nulls in a bin", "start")
     return chart.svg()
 
 
-def _named(chart: Chart, value: float, y: float, text: str) -> None:
-    """A label above the chart, at the side of `value` where there is room."""
-    place = chart.x(value)
-    leftward = place > (chart.x.start + chart.x.stop) / 2
-    chart.note(place + (4 if leftward else -4), y, text, "end" if leftward else "start")
+def _label(chart: Chart, value: float, y: float, text: str) -> None:
+    """Draws a label above the chart, at the side of `value` where there is room."""
+    at = chart.x(value)
+    leftward = at > (chart.x.start + chart.x.stop) / 2
+    chart.note(at + (4 if leftward else -4), y, text, "end" if leftward else "start")
 
 
 def _histogram(values: Sequence[float], *, ratio: bool) -> tuple[list[float], list[int]]:

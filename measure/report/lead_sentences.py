@@ -27,7 +27,7 @@ _NONE = "little or no"
 
 
 def lead(verdict: Verdict) -> str:
-    """The sentence."""
+    """Writes the verdict's first sentence."""
     if verdict.conclusion is Conclusion.UNTESTED:
         test = verdict.test
         return (
@@ -47,79 +47,84 @@ def lead(verdict: Verdict) -> str:
             f"The base model {does}, no effect is needed; {evidence(verdict.test)} that anything is missing, {p}",
             verdict,
         )
-    return _closed(f"{_found(verdict)}; {_strength(verdict)}", verdict)
+    return _closed(f"{_what_was_found(verdict)}; {_strength(verdict)}", verdict)
 
 
-def _closed(said: str, verdict: Verdict) -> str:
-    """With where the model that is offered errs, if it does by more than may be called explained."""
-    return ". ".join([said, *([text] if (text := erring_text(verdict)) else [])]) + "."
+def _closed(sentence: str, verdict: Verdict) -> str:
+    """Adds where the model that is offered errs, if it does by more than may be called explained."""
+    return ". ".join([sentence, *([text] if (text := erring_text(verdict)) else [])]) + "."
 
 
 def evidence(test: NullTest) -> str:
-    """ "moderate evidence": the words for a p."""
+    """Words a p, as "moderate evidence": the words for a p."""
     word = next((word for most, word in _EVIDENCE if test.p_value.value <= most), _NONE)
     return f"{word} evidence"
 
 
 def p_text(test: NullTest) -> str:
-    """ "p = 0.024, could be up to 0.07": with the upper end of the interval that the number of nulls leaves."""
+    """Writes "p = 0.024, could be up to 0.07": with the upper end of the interval that the number of nulls leaves."""
     p = test.p_value
     text = f"p = {probability(p.value)}"
     return f"{text}, could be up to {probability(p.high)}" if p.high > p.value else text
 
 
 def explained(verdict: Verdict) -> str:
-    """ "33 % of the error that a better model could remove", on data that neither model was fitted to.
+    """Words the explained part, as "33 % of the error that a better model could remove", on data that neither model was
+    fitted to.
 
     Of squared errors, each comparison in units of the base model's, those of all that lie above the floor together.
     Where none does, of the whole error. Empty where no error after is known.
     """
-    there = [c for c in verdict.comparisons if known(c.after) and known(c.before) and c.before.value > 0]
-    above = [c for c in there if c.share is not None and not math.isnan(c.share) and known(c.floor)]
-    removed = sum(1 - (c.after.value / c.before.value) ** 2 for c in above or there)
-    if there and removed <= 0:
+    compared = [c for c in verdict.comparisons if known(c.after) and known(c.before) and c.before.value > 0]
+    above = [c for c in compared if c.share is not None and not math.isnan(c.share) and known(c.floor)]
+    removed = sum(1 - (c.after.value / c.before.value) ** 2 for c in above or compared)
+    if compared and removed <= 0:
         return "none of the error on unseen data"
     if above:
         most = sum(1 - (c.floor.value / c.before.value) ** 2 for c in above)
         return f"{number(100 * removed / most, digits=2)} % of the error that a better model could remove"
-    return f"{number(100 * removed / len(there), digits=2)} % of the squared error" if there else ""
+    return f"{number(100 * removed / len(compared), digits=2)} % of the squared error" if compared else ""
 
 
-def _found(verdict: Verdict) -> str:
-    """What was found, without the evidence."""
+def _what_was_found(verdict: Verdict) -> str:
+    """Writes what was found, without the evidence."""
     if verdict.conclusion is Conclusion.OUTSIDE or not verdict.named:
         return "The base model lacks something that no effect of the library explains"
-    named = _by_effect(named_candidates(verdict) or [c for c in verdict.ranking if not c.why_not])
-    whole = explained(verdict)
+    effects = _by_effect(named_candidates(verdict) or [c for c in verdict.ranking if not c.why_not])
+    share_explained = explained(verdict)
     explains = "removes" if erring(verdict) else "explains"
     if verdict.conclusion is Conclusion.ONE_OF:
-        either = " or ".join(shortened([_sized(verdict, one) for one in named]))
-        does = f"{explains} {whole}" if whole else f"{explains} what the base model lacks"
-        return f"Adding {'one of ' if len(named) > 1 else ''}{either} {does}; these recordings do not decide which"
-    added = listed([_sized(verdict, one) for one in named])
+        either = " or ".join(shortened([_sized(verdict, effect) for effect in effects]))
+        does = f"{explains} {share_explained}" if share_explained else f"{explains} what the base model lacks"
+        return f"Adding {'one of ' if len(effects) > 1 else ''}{either} {does}; these recordings do not decide which"
+    added = listed([_sized(verdict, effect) for effect in effects])
     if verdict.conclusion is Conclusion.PARTLY:
-        does = f"{explains} {whole}, not all that is missing" if whole else f"{explains} a part of what is missing"
+        does = (
+            f"{explains} {share_explained}, not all that is missing"
+            if share_explained
+            else f"{explains} a part of what is missing"
+        )
         return f"Adding {added} {does}: {_incomplete(verdict)}"
-    return f"Adding {added} {explains} {whole or 'what the base model lacks'}"
+    return f"Adding {added} {explains} {share_explained or 'what the base model lacks'}"
 
 
 def _by_effect(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
-    """Those of one effect together: several strengths of it are one effect."""
-    found: dict[str, list[Candidate]] = {}
-    for one in candidates:
-        found.setdefault(one.effect, []).append(one)
-    return list(found.values())
+    """Groups candidates by effect: several strengths of it are one effect."""
+    by_effect: dict[str, list[Candidate]] = {}
+    for candidate in candidates:
+        by_effect.setdefault(candidate.effect, []).append(candidate)
+    return list(by_effect.values())
 
 
 def _sized(verdict: Verdict, candidates: Sequence[Candidate]) -> str:
-    """An effect with its strength, or its strengths."""
+    """Names an effect with its strength, or its strengths."""
     if len(candidates) > 1:
-        each = [f"{readable(one.parameter)} {with_level(one.strength)}" for one in candidates]
-        return f"{candidates[0].effect} ({joined(each, verdict)})"
+        strengths = [f"{readable(candidate.parameter)} {with_level(candidate.strength)}" for candidate in candidates]
+        return f"{candidates[0].effect} ({joined(strengths, verdict)})"
     (candidate,) = candidates
     several = sum(c.effect == candidate.effect for c in verdict.ranking) > 1
-    what = "" if several else f"{readable(candidate.parameter)} "
-    return f"{candidate_title(verdict, candidate)} ({what}{with_level(candidate.strength)})"
+    parameter = "" if several else f"{readable(candidate.parameter)} "
+    return f"{candidate_title(verdict, candidate)} ({parameter}{with_level(candidate.strength)})"
 
 
 def _strength(verdict: Verdict) -> str:
@@ -130,13 +135,13 @@ def _strength(verdict: Verdict) -> str:
 
 
 def _incomplete(verdict: Verdict) -> str:
-    """Why what is named is not enough."""
+    """Explains why what is named is not enough."""
     for candidate in verdict.ranking:
         if not candidate.why_not and heterogeneous(candidate, verdict.test.level):
-            each = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
+            strengths = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
             unit = "" if candidate.strength.unit == "1" else f" {candidate.strength.unit}"
             return (
-                f"fitted to each recording alone it is {each}{unit}, which differs by more than chance, so that "
+                f"fitted to each recording alone it is {strengths}{unit}, which differs by more than chance, so that "
                 "another dependence on the wind would fit better"
             )
     return "the errors that remain are larger than those of simulations"

@@ -45,7 +45,7 @@ VIEW = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class MotionClip:
     """One recording's stretch, ready for the page.
 
     Attributes:
@@ -86,7 +86,7 @@ class Motion:
         return _finite_reach(self.observed[..., 2]) * math.cos(ELEVATION) + self.radius * math.sin(ELEVATION)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values for the player."""
+        """Returns JSON values for the player."""
         size = _finite_reach(self.observed)
         errors = [p - self.observed for p in (self.before, self.after) if p is not None]
         reach = max((_finite_reach(e) for e in errors), default=1.0)
@@ -107,78 +107,78 @@ class Motion:
         }
 
 
-def motion(residual: Residual) -> Motion | None:
-    """The stretch a residual holds, its markers thinned evenly; None where it holds none, or no times."""
+def motion(residual: Residual) -> MotionClip | None:
+    """Makes the stretch a residual holds, its markers thinned evenly; None where it holds none, or no times."""
     observed, before, after = (_array(p) for p in (residual.observed, residual.before, residual.after))
     rate = _rate(residual.times)
     if observed.size == 0 or before.shape != observed.shape or math.isnan(rate):
         return None
-    kept = _spread(observed.shape[1], _MARKERS)
+    chosen = _spread(observed.shape[1], _MARKERS)
     part = slice(0, _FRAMES)
-    uv = np.asarray(residual.markers, dtype=np.float64).reshape(-1, 2)[kept]
-    seen = observed[part][:, kept]
-    centre = np.array([_centre(seen[..., i]) for i in range(3)])
-    seen = seen - centre
-    first = before[part][:, kept] - centre
-    return Motion(
+    uv = np.asarray(residual.markers, dtype=np.float64).reshape(-1, 2)[chosen]
+    shown_positions = observed[part][:, chosen]
+    centre = np.array([_centre(shown_positions[..., i]) for i in range(3)])
+    shown_positions = shown_positions - centre
+    first = before[part][:, chosen] - centre
+    return MotionClip(
         recording=residual.recording,
         held_out=residual.held_out,
         rate=rate,
-        frames=len(seen),
-        markers=len(kept),
+        frames=len(shown_positions),
+        markers=len(chosen),
         of_frames=len(observed),
         of_markers=observed.shape[1],
         edges=_edges(uv),
-        observed=seen,
+        observed=shown_positions,
         before=first,
-        after=after[part][:, kept] - centre if after.shape == observed.shape else None,
-        azimuth=_azimuth(seen),
-        factor=_enlargement(seen, first),
+        after=after[part][:, chosen] - centre if after.shape == observed.shape else None,
+        azimuth=_azimuth(shown_positions),
+        factor=_enlargement(shown_positions, first),
     )
 
 
-def still(shown: Motion, after_label: str) -> Markup:
-    """The first frame as the player draws it: one panel a model, the observed cloth under the prediction.
+def still(stretch: MotionClip, after_label: str) -> Markup:
+    """Draws the first frame as the player draws it: one panel a model, the observed cloth under the prediction.
 
     The view is from the side, turned and raised a little; `motion.js` uses the same projection.
     """
-    panels = [("base model", "before", shown.before)]
-    if shown.after is not None:
-        panels.append((after_label, "after", shown.after))
-    scale = _HALF * _FILLED / shown.radius
-    tall = shown.rise * scale / _FILLED
+    panels = [("base model", "before", stretch.before)]
+    if stretch.after is not None:
+        panels.append((after_label, "after", stretch.after))
+    scale = _HALF * _FILLED / stretch.radius
+    tall = stretch.rise * scale / _FILLED
     parts = []
     for number, (heading, kind, predicted) in enumerate(panels):
-        enlarged = shown.observed[0] + shown.factor * (predicted[0] - shown.observed[0])
+        enlarged = stretch.observed[0] + stretch.factor * (predicted[0] - stretch.observed[0])
         centre = (_HALF * (2 * number + 1) + _GAP * number, tall + _HEAD)
         parts.append(
             f'<text class="label" x="{centre[0] - _HALF + 8:g}" y="14">{escape(heading)}</text>'
-            f'<path class="mesh observed" d="{_wires(shown.observed[0], shown, scale, centre)}"/>'
-            f'<path class="mesh {kind}" d="{_wires(enlarged, shown, scale, centre)}"/>'
+            f'<path class="mesh observed" d="{_wires(stretch.observed[0], stretch, scale, centre)}"/>'
+            f'<path class="mesh {kind}" d="{_wires(enlarged, stretch, scale, centre)}"/>'
         )
     width = 2 * _HALF * len(panels) + _GAP * (len(panels) - 1)
     return drawing(
-        width, 2 * tall + _HEAD + 4, "Observed cloth and predictions", f"a frame of {shown.recording}", "".join(parts)
+        width, 2 * tall + _HEAD + 4, "Observed cloth and predictions", f"a frame of {stretch.recording}", "".join(parts)
     )
 
 
-def _wires(points: NDArray[np.float64], shown: Motion, scale: float, centre: tuple[float, float]) -> str:
-    """Path data of the edges between markers (marker, xyz), as seen from `shown.azimuth` and `ELEVATION`."""
+def _wires(points: NDArray[np.float64], stretch: MotionClip, scale: float, centre: tuple[float, float]) -> str:
+    """Writes path data of the edges between markers (marker, xyz), as seen from `stretch.azimuth` and `ELEVATION`."""
     x, y, z = points.T
-    right = x * math.cos(shown.azimuth) + y * math.sin(shown.azimuth)
-    away = -x * math.sin(shown.azimuth) + y * math.cos(shown.azimuth)
+    right = x * math.cos(stretch.azimuth) + y * math.sin(stretch.azimuth)
+    away = -x * math.sin(stretch.azimuth) + y * math.cos(stretch.azimuth)
     up = z * math.cos(ELEVATION) + away * math.sin(ELEVATION)
     across, down = centre[0] + scale * right, centre[1] - scale * up
-    there = np.isfinite(across) & np.isfinite(down)
+    finite = np.isfinite(across) & np.isfinite(down)
     return "".join(
         f"M{across[a]:.1f} {down[a]:.1f}L{across[b]:.1f} {down[b]:.1f}"
-        for a, b in shown.edges.tolist()
-        if there[a] and there[b]
+        for a, b in stretch.edges.tolist()
+        if finite[a] and finite[b]
     )
 
 
 def _azimuth(observed: NDArray[np.float64]) -> float:
-    """The direction [rad] of the cloth's longest horizontal extent, turned by a sixth of a right angle."""
+    """Computes the direction [rad] of the cloth's longest horizontal extent, turned by a sixth of a right angle."""
     flat = observed[..., :2].reshape(-1, 2)
     flat = flat[np.isfinite(flat).all(axis=1)]
     x, y = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2][0] if len(flat) > 1 else (1.0, 0.0)
@@ -186,7 +186,7 @@ def _azimuth(observed: NDArray[np.float64]) -> float:
 
 
 def _edges(uv: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(edge, 2): the sides of the triangles over the markers, or neighbours along a line."""
+    """Lists edges (edge, 2): the sides of the triangles over the markers, or neighbours along a line."""
     if on_a_line(uv):
         order = np.argsort(np.linalg.norm(uv - uv[:1], axis=1))
         return np.stack([order[:-1], order[1:]], axis=1).astype(np.int64)
@@ -195,7 +195,7 @@ def _edges(uv: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _enlargement(observed: NDArray[np.float64], predicted: NDArray[np.float64]) -> int:
-    """The largest factor that keeps nearly all errors within a part of the cloth's size."""
+    """Chooses the largest factor that keeps nearly all errors within a part of the cloth's size."""
     errors = np.linalg.norm(predicted - observed, axis=-1)
     errors = errors[np.isfinite(errors)]
     typical = float(np.quantile(errors, 0.99)) if errors.size else 0.0

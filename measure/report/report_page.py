@@ -31,7 +31,7 @@ _MOST = 8
 
 
 def overview(comparisons: Sequence[Comparison], *, after: str) -> Markup:
-    """Bars of each comparison in per cent of the base model's error, the floor shaded; empty where there is none.
+    """Draws bars of each comparison in per cent of the base model's error, the floor shaded; empty where there is none.
 
     Args:
         after: what the model after is called, "with lift".
@@ -43,29 +43,35 @@ def overview(comparisons: Sequence[Comparison], *, after: str) -> Markup:
     scale = Linear(0.0, max(110.0, *(min(v, 250.0) for v in ends if math.isfinite(v))), _LEFT, _WIDTH - _RIGHT)
     height = _ROW * len(drawn) + 24
     parts = [_axis(scale, height - 18)]
-    said = []
-    for place, one in enumerate(drawn):
-        parts += _row(one, scale, 6 + _ROW * place)
-        share = f"{100 * one.after.value / one.before.value:.0f} % {after}" if known(one.after) else "base model alone"
-        said.append(f"{one.what}: {share}")
+    captions = []
+    for row, comparison in enumerate(drawn):
+        parts += _row(comparison, scale, 6 + _ROW * row)
+        share = (
+            f"{100 * comparison.after.value / comparison.before.value:.0f} % {after}"
+            if known(comparison.after)
+            else "base model alone"
+        )
+        captions.append(f"{comparison.what}: {share}")
     title = "Errors on unseen data in per cent of the base model's"
-    return drawing(_WIDTH, height, title, "; ".join(said), "".join(parts))
+    return drawing(_WIDTH, height, title, "; ".join(captions), "".join(parts))
 
 
-def _row(one: Comparison, scale: Linear, top: float) -> list[str]:
-    """What is compared, its bars, and the floor behind them."""
-    parts = [f'<text class="label" x="{_LEFT - 8:g}" y="{top + 17:g}" text-anchor="end">{_short(one.what)}</text>']
-    if known(one.floor):
-        width = scale(min(100 * one.floor.value / one.before.value, scale.high)) - _LEFT
+def _row(comparison: Comparison, scale: Linear, top: float) -> list[str]:
+    """Draws what is compared, its bars, and the floor behind them."""
+    parts = [
+        f'<text class="label" x="{_LEFT - 8:g}" y="{top + 17:g}" text-anchor="end">{_short(comparison.what)}</text>'
+    ]
+    if known(comparison.floor):
+        width = scale(min(100 * comparison.floor.value / comparison.before.value, scale.high)) - _LEFT
         parts.append(f'<rect class="floor" x="{_LEFT:g}" y="{top - 3:g}" width="{width:.1f}" height="36"/>')
-    parts.append(_bar(one.before, one.before.value, scale, top, "before"))
-    if known(one.after):
-        parts.append(_bar(one.after, one.before.value, scale, top + 15, "after"))
+    parts.append(_bar(comparison.before, comparison.before.value, scale, top, "before"))
+    if known(comparison.after):
+        parts.append(_bar(comparison.after, comparison.before.value, scale, top + 15, "after"))
     return parts
 
 
 def _bar(estimate: Estimate, unit: float, scale: Linear, top: float, kind: str) -> str:
-    """A bar from 0 with its interval and its figure."""
+    """Draws a bar from 0 with its interval and its figure."""
     value, low, high = (
         scale(min(100 * v / unit if math.isfinite(v) else scale.high, scale.high))
         for v in (estimate.value, estimate.low, estimate.high)
@@ -88,7 +94,7 @@ def _axis(scale: Linear, bottom: float) -> str:
 
 
 def _short(text: str) -> str:
-    """What fits beside a bar."""
+    """Shortens a text to what fits beside a bar."""
     return str(escape(text if len(text) <= 30 else f"{text[:29]}…"))
 
 
@@ -115,10 +121,10 @@ class ResidualView:
 
 
 def page(verdict: Verdict) -> str:
-    """The report of `verdict`, HTML."""
+    """Renders the report of `verdict`, HTML."""
     errors = rows.errors_scale(verdict.comparisons)
     gains = rows.gain_scale(verdict.ranking)
-    named = sentences.named_candidates(verdict)
+    named_candidates = sentences.named_candidates(verdict)
     motions = [m for m in map(motion.motion, verdict.residuals) if m is not None]
     values = {
         "verdict": verdict,
@@ -126,7 +132,7 @@ def page(verdict: Verdict) -> str:
         **opening(verdict),
         "test_sentence": sentences.test_sentence(verdict),
         "remark": sentences.test_remark(verdict.test),
-        "named": named,
+        "named": named_candidates,
         "rejected": sentences.rejected(verdict),
         "control_summary": sentences.control_summary(verdict),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
@@ -136,7 +142,7 @@ def page(verdict: Verdict) -> str:
         "ranking_level": sentences.common_level(c.strength for c in verdict.ranking),
         "lengths": _lengths(verdict),
         "errors_row": lambda comparison: rows.errors_row(comparison, errors),
-        "gain_row": lambda c: rows.gain_row(c, gains, "after" if c in named else "single"),
+        "gain_row": lambda c: rows.gain_row(c, gains, "after" if c in named_candidates else "single"),
         "title": lambda c: sentences.candidate_title(verdict, c),
         "strength_row": rows.strength_row,
         "null": figures.null_distribution(verdict.test),
@@ -151,7 +157,7 @@ def page(verdict: Verdict) -> str:
 
 
 def opening(verdict: Verdict) -> dict[str, Any]:
-    """What the top of a page of markers or films shows: sentence, chart and what speaks against them."""
+    """Returns what the top of a page of markers or films shows: sentence, chart and what speaks against them."""
     first = lead(verdict)
     after = sentences.after_label(verdict)
     return {
@@ -172,9 +178,9 @@ def opening(verdict: Verdict) -> dict[str, Any]:
 
 
 def _lengths(verdict: Verdict) -> quantity.Display:
-    """Millimetres or metres for all errors of the table."""
-    shown = [e for c in verdict.comparisons for e in (c.before, c.after, c.floor, c.control) if e is not None]
-    return quantity.display([e.value for e in shown], "m")
+    """Chooses millimetres or metres for all errors of the table."""
+    errors = [e for c in verdict.comparisons for e in (c.before, c.after, c.floor, c.control) if e is not None]
+    return quantity.display([e.value for e in errors], "m")
 
 
 def _residuals(residuals: tuple[Residual, ...], after_label: str) -> dict[str, Any]:
@@ -195,8 +201,8 @@ def _residuals(residuals: tuple[Residual, ...], after_label: str) -> dict[str, A
     }
 
 
-def _motions(motions: list[motion.Motion], after_label: str) -> dict[str, Any]:
-    """The player's data, unseen recordings first."""
+def _motions(motions: list[motion.MotionClip], after_label: str) -> dict[str, Any]:
+    """Returns the player's data, unseen recordings first."""
     ordered = sorted(motions, key=lambda m: not m.held_out)
     stills = [motion.still(m, after_label) for m in ordered]
     data = {
@@ -212,7 +218,7 @@ def _motions(motions: list[motion.Motion], after_label: str) -> dict[str, Any]:
 
 
 def _flattened(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, str]]:
-    """(dotted name, value) of nested provenance."""
+    """Yields (dotted name, value) of nested provenance."""
     for name, value in values.items():
         if isinstance(value, Mapping):
             yield from _flattened(value, f"{prefix}{name}.")
@@ -221,7 +227,7 @@ def _flattened(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[st
 
 
 def _data(value: float | None, text: str) -> Markup:
-    """A number as people read it, with the number as it is for programs."""
+    """Writes a number as people read it, with the number as it is for programs."""
     return (
         Markup(f'<span class="none">{text}</span>')
         if text == quantity.NONE
@@ -229,21 +235,21 @@ def _data(value: float | None, text: str) -> Markup:
     )
 
 
-def _estimate(estimate: Estimate | None, shown: quantity.Display | None = None) -> Markup:
-    """The value over its interval."""
-    value, ends = quantity.estimate_parts(estimate, shown=shown)
+def _estimate(estimate: Estimate | None, display_as: quantity.Display | None = None) -> Markup:
+    """Writes the value over its interval."""
+    value, ends = quantity.estimate_parts(estimate, display_as=display_as)
     return _data(estimate.value if estimate else None, value) + Markup('<span class="ends">{}</span>').format(ends)
 
 
 def _full(estimate: Estimate) -> Markup:
-    """The value, its interval and the interval's level."""
+    """Writes the value, its interval and the interval's level."""
     value, ends = quantity.estimate_parts(estimate)
     ends_text = f"{ends} {quantity.level_text(estimate.level)}" if ends else ""
     return _data(estimate.value, value) + Markup('<span class="ends">{}</span>').format(ends_text)
 
 
 def _parameter(estimate: Estimate) -> Markup:
-    """The same, unless the data leave it open."""
+    """Writes the parameter, unless the data leave it open."""
     text = sentences.parameter_text(estimate)
     return _full(estimate) if text == quantity.with_level(estimate) else _data(estimate.value, text)
 

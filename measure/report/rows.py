@@ -17,34 +17,34 @@ _STEP = 13.0
 
 
 def errors_scale(comparisons: Sequence[Comparison]) -> Linear:
-    """One axis for the errors of all comparisons, from zero."""
-    shown = [e for c in comparisons for e in (c.before, c.after, c.floor, c.control) if e is not None]
-    ends = [v for e in shown for v in (e.value, e.low, e.high)]
+    """Makes one axis for the errors of all comparisons, from zero."""
+    errors = [e for c in comparisons for e in (c.before, c.after, c.floor, c.control) if e is not None]
+    ends = [v for e in errors for v in (e.value, e.low, e.high)]
     return Linear.over(ends, _INSET, _WIDTH - _INSET, at_least=[0.0])
 
 
 def errors_row(comparison: Comparison, scale: Linear) -> Markup:
-    """The errors of one comparison: before, after and control with their intervals; floor shaded."""
-    shown = [(comparison.before, "before"), (comparison.after, "after"), (comparison.control, "control")]
-    there = [(e, kind) for e, kind in shown if e is not None and known(e)]
-    height = 15 * len(there) + 3
+    """Draws the errors of one comparison: before, after and control with their intervals; floor shaded."""
+    estimates = [(comparison.before, "before"), (comparison.after, "after"), (comparison.control, "control")]
+    present = [(e, kind) for e, kind in estimates if e is not None and known(e)]
+    height = 15 * len(present) + 3
     parts = []
     if known(comparison.floor):
         edge = scale(min(max(comparison.floor.value, scale.low), scale.high))
         parts.append(f'<rect class="floor" x="{scale(0):.1f}" y="0" width="{edge - scale(0):.1f}" height="{height}"/>')
-    parts += [_whisker(estimate, scale, 9.0 + 15 * place, kind) for place, (estimate, kind) in enumerate(there)]
+    parts += [_whisker(estimate, scale, 9.0 + 15 * row, kind) for row, (estimate, kind) in enumerate(present)]
     caption = f"before {estimate_text(comparison.before)}, after {estimate_text(comparison.after)}"
     return drawing(_WIDTH, height, f"Errors, {comparison.what}", caption, "".join(parts))
 
 
 def gain_scale(candidates: Sequence[Candidate]) -> Linear:
-    """One axis for all held-out gains."""
+    """Makes one axis for all held-out gains."""
     ends = [c.gain + side * c.gain_error for c in candidates for side in (-1, 1)]
     return Linear.over(ends, _INSET, _WIDTH - _INSET, at_least=[0.0])
 
 
 def gain_row(candidate: Candidate, scale: Linear, kind: str) -> Markup:
-    """A candidate's held-out gain ± its standard error."""
+    """Draws a candidate's held-out gain ± its standard error."""
     if math.isnan(candidate.gain):
         return Markup("")
     estimate = Estimate(
@@ -59,7 +59,7 @@ def gain_row(candidate: Candidate, scale: Linear, kind: str) -> Markup:
 
 
 def strength_row(candidate: Candidate) -> Markup:
-    """The strength on each recording alone, top to bottom in their order, over the interval of all together."""
+    """Draws the strength on each recording alone, top to bottom in their order, over the interval of all together."""
     single = [e for e in candidate.by_recording if known(e)]
     if not single or not known(candidate.strength):
         return Markup("")
@@ -71,9 +71,9 @@ def strength_row(candidate: Candidate) -> Markup:
     if math.isfinite(low) and math.isfinite(high):
         parts.append(f'<rect class="band" x="{low:.1f}" y="0" width="{max(high - low, 1):.1f}" height="{height:g}"/>')
     parts.append(_null(scale, candidate.null, height))
-    for place, estimate in enumerate(candidate.by_recording):
+    for row, estimate in enumerate(candidate.by_recording):
         if known(estimate):
-            parts.append(_whisker(estimate, scale, 9.5 + _STEP * place, "single"))
+            parts.append(_whisker(estimate, scale, 9.5 + _STEP * row, "single"))
     caption = "; ".join(estimate_text(e) for e in candidate.by_recording)
     return drawing(_WIDTH, height, f"{candidate.effect} on each recording alone", caption, "".join(parts))
 
@@ -83,7 +83,7 @@ def _null(scale: Linear, value: float, height: float) -> str:
 
 
 def _whisker(estimate: Estimate, scale: Linear, y: float, kind: str) -> str:
-    """A dot with its interval; an open end runs to the edge."""
+    """Draws a dot with its interval; an open end runs to the edge."""
     low, high, value = (
         scale(min(max(v if not math.isnan(v) else estimate.value, scale.low), scale.high))
         for v in (estimate.low, estimate.high, estimate.value)

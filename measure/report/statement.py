@@ -11,12 +11,12 @@ import numpy as np
 from measure.forecasting.regressors import FieldColumn, library
 from measure.forecasting.segments import Cut
 from measure.loop.corrective_field import Mode
-from measure.loop.run import Outcome
+from measure.loop.run import LoopOutcome
 from measure.nulls import bank as banks
 from measure.nulls.conformal import MOST_KINDS
 from measure.observe.trajectory import Experiment, Specimen
 from measure.probes.course import ALONG, LEFT, Variation
-from measure.probes.lines import STROUHAL, Line
+from measure.probes.lines import STROUHAL, SpectralLine
 from measure.report.lead_sentences import lead
 from measure.report.sentences import listed
 from measure.verdict.criteria import CRITERIA
@@ -45,31 +45,31 @@ _ROUGH = 0.1
 _AXES = ("along the wind", "across the wind", "up")
 
 
-def stated(outcome: Outcome) -> Verdict:
-    """The verdict of an outcome, with all that it says in sentences."""
+def with_sentences(outcome: LoopOutcome) -> Verdict:
+    """States the verdict of an outcome, with all that it says in sentences."""
     verdict, experiment = outcome.verdict, outcome.experiment
-    said = [lead(verdict), *by_draw(verdict.test), *bounds(outcome.at_bounds), *ratios(experiment)]
+    parts = [lead(verdict), *by_draw(verdict.test), *bounds(outcome.at_bounds), *ratios(experiment)]
     return replace(
         verdict,
-        words=" ".join(said),
+        words=" ".join(parts),
         separating=separating(verdict),
         proposal=_lacking(outcome),
         assumptions=(*assumptions(experiment), *unweighed(verdict), *clocks(experiment, outcome.lags)),
     )
 
 
-def _lacking(outcome: Outcome) -> str:
-    """What the library lacks looks like, where it has no answer or half of one."""
+def _lacking(outcome: LoopOutcome) -> str:
+    """Describes what the library lacks, where it has no answer or half of one."""
     if not outcome.field:
         return ""
     sentences = [] if outcome.line is None else [shedding(outcome.line)]
-    if outcome.course is not None and outcome.course.whole[ALONG] > 0:
+    if outcome.course is not None and outcome.course.total[ALONG] > 0:
         sentences.append(blowing(outcome.course))
-    return " ".join([*sentences, proposal(outcome.field, whole=outcome.whole)])
+    return " ".join([*sentences, proposal(outcome.field, is_all=outcome.whole)])
 
 
 def by_draw(test: NullTest) -> tuple[str, ...]:
-    """That other nulls could decide otherwise, and how many would settle it; nothing where they hardly could."""
+    """Says that other nulls could decide otherwise, and how many would settle it; nothing where they hardly could."""
     if not test.open:
         return ()
     if test.settling is None:
@@ -79,14 +79,14 @@ def by_draw(test: NullTest) -> tuple[str, ...]:
 
 
 def bounds(ended: Sequence[str]) -> tuple[str, ...]:
-    """Which calibrated parameters are at a bound of the model; nothing where none is."""
+    """Says which calibrated parameters are at a bound of the model; nothing where none is."""
     if not ended:
         return ()
     return (f"The fit ends at the bound of {' and '.join(ended)}: its interval is not reliable.",)
 
 
 def ratios(experiment: Experiment) -> tuple[str, ...]:
-    """What the numbers are of where the mass of the cloth is not known; nothing where it is."""
+    """Says what the numbers are of where the mass of the cloth is not known; nothing where it is."""
     if experiment.specimen.mass_known:
         return ()
     sentence = (
@@ -97,7 +97,7 @@ def ratios(experiment: Experiment) -> tuple[str, ...]:
 
 
 def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
-    """By how much the logs of the wind were moved, estimated from the errors [s]; nothing where none was."""
+    """Says by how much the logs of the wind were moved, estimated from the errors [s]; nothing where none was."""
     moved = [
         f"{recording.name} by {number(lag, digits=2)} s"
         for recording, lag in zip(experiment.recordings, late, strict=True)
@@ -107,16 +107,16 @@ def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
 
 
 def unweighed(verdict: Verdict) -> tuple[str, ...]:
-    """Which effects of the library a cloth cannot have as it is held; nothing where it can have all."""
-    weighed = {(candidate.effect, candidate.parameter) for candidate in verdict.ranking}
-    absent = [column.effect for column in library() if (column.effect, column.parameter) not in weighed]
+    """Lists which effects of the library a cloth cannot have as it is held; nothing where it can have all."""
+    ranked = {(candidate.effect, candidate.parameter) for candidate in verdict.ranking}
+    absent = [column.effect for column in library() if (column.effect, column.parameter) not in ranked]
     missing = list(dict.fromkeys(absent))
     why = "not weighed, since the cloth cannot have it as it is held and in its wind"
     return (f"{why}: {listed(missing)}",) if missing else ()
 
 
 def separating(verdict: Verdict) -> str:
-    """The cheapest known experiment that separates the named effects."""
+    """Names the cheapest known experiment that separates the named effects."""
     if verdict.conclusion is not Conclusion.ONE_OF:
         return ""
     pairs = [text for effects, text in _SEPARATES.items() if effects <= set(verdict.named)]
@@ -125,20 +125,20 @@ def separating(verdict: Verdict) -> str:
     return "a longer recording, at one more wind speed: the effects named differ in how they grow with the wind"
 
 
-def proposal(modes: Sequence[Mode], *, whole: bool = True) -> str:
-    """What the corrective field looks like: the most significant modes.
+def proposal(modes: Sequence[Mode], *, is_all: bool = True) -> str:
+    """Describes the corrective field: the most significant modes.
 
     Args:
-        whole: whether it is all that the base model lacks, or what a named effect leaves.
+        is_all: whether it is all that the base model lacks, or what a named effect leaves.
     """
     largest = sorted(modes, key=lambda mode: -abs(mode.value / mode.error))[:3]
     terms = [f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in largest]
-    fitted = "fits the errors best" if whole else "fits the remaining errors best"
+    fitted = "fits the errors best" if is_all else "fits the remaining errors best"
     return f"The smooth force field that {fitted}, per mass: {'; '.join(terms)}."
 
 
-def shedding(line: Line) -> str:
-    """What a line of the errors' spectra looks like."""
+def shedding(line: SpectralLine) -> str:
+    """Describes a line of the errors' spectra."""
     return (
         f"The errors oscillate {_AXES[line.axis]} at {line.reduced:.2g} Hz for each m/s of wind, as vortices behind a "
         f"cylinder of {number(STROUHAL / line.reduced, digits=2)} m do."
@@ -146,8 +146,8 @@ def shedding(line: Line) -> str:
 
 
 def blowing(variation: Variation) -> str:
-    """What a course of the wind looks like that is none of turbulence."""
-    along, turned = (math.sqrt(max(variation.whole[part], 0.0)) for part in (ALONG, LEFT))
+    """Describes a course of the wind that is none of turbulence."""
+    along, turned = (math.sqrt(max(variation.total[part], 0.0)) for part in (ALONG, LEFT))
     fast = math.sqrt(max(variation.fast[ALONG], 0.0))
     return (
         f"The errors look like those of a wind that varies by {number(100 * along, digits=2)} % of its mean along its "
@@ -167,26 +167,26 @@ def _where(mode: FieldColumn) -> str:
     return f"{_AXES[mode.axis]}, {shapes[mode.mode]}"
 
 
-def _weighed(specimen: Specimen) -> tuple[str, ...]:
-    """How well its mass is known, and what that leaves open; nothing where it is not known."""
-    known = specimen.density_uncertainty
+def _how_well_weighed(specimen: Specimen) -> tuple[str, ...]:
+    """Says how well the cloth's mass is known, and what that leaves open; nothing where it is not known."""
+    uncertainty = specimen.density_uncertainty
     if not specimen.mass_known:
         return ()
-    known_to = f"its density is known to {100 * known:.2g} % (one standard deviation)"
+    known_to = f"its density is known to {100 * uncertainty:.2g} % (one standard deviation)"
     weighing = (
         ": a pressure of the air that is off by as much differs from another weight only in how the cloth stretches, "
         "which a cloth that was weighed to 2 % would settle (density-uncertainty = 0.02)"
     )
-    return (known_to + weighing if known >= _ROUGH else known_to,)
+    return (known_to + weighing if uncertainty >= _ROUGH else known_to,)
 
 
 def assumptions(experiment: Experiment) -> tuple[str, ...]:
-    """What was taken as given."""
+    """Lists what was taken as given."""
     specimen = experiment.specimen
     size = np.ptp(specimen.mesh.rest, axis=0)
     air = specimen.air.plain
     cut = Cut.of(experiment.recordings[0].rate, min(len(r.positions) for r in experiment.recordings))
-    every = "every frame" if cut.stride == 1 else f"every {cut.stride}th frame"
+    which_frames = "every frame" if cut.stride == 1 else f"every {cut.stride}th frame"
     winds = [recording.wind.uncertainty for recording in experiment.recordings]
     gain, direction, clock = (max(parts) for parts in zip(*winds, strict=True))
     logged = (
@@ -194,7 +194,7 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"{number(100 * gain, digits=2)} % in speed, {number(math.degrees(direction), digits=2)}° in direction and "
         f"{number(clock, digits=2)} s in time"
     )
-    held = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
+    attachment = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
     if experiment.carried:
         places = ", carried where the markers at them go"
     else:
@@ -209,11 +209,11 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
     cloth = f"{specimen.material.name} (nominally {number(specimen.material.density)} kg/m²)"
     return (
         f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
-        *_weighed(specimen),
-        f"it is held at {len(specimen.held)} points {held}{places}",
+        *_how_well_weighed(specimen),
+        f"it is held at {len(specimen.held)} points {attachment}{places}",
         f"the base model's air pushes along the cloth's normal with ρ w² per area, ρ = {number(air.density)} kg/m³",
         logged,
-        f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {every} of the recordings",
+        f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {which_frames} of the recordings",
         "density, bending and internal damping are calibrated, so that what only changes them is not an effect",
         between,
         f"a strength may be off by a factor of {factor} by the fit's mesh and a mistold cloth: its interval says so",

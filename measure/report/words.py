@@ -26,7 +26,7 @@ _NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 def words(verdict: Verdict) -> str:
-    """The verdict, its test, the errors before and after, what else was weighed and what was assumed.
+    """Writes the verdict, its test, the errors before and after, what else was weighed and what was assumed.
 
     Lines of at most 100 characters, except where a name is longer; no final line break.
     """
@@ -43,7 +43,7 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
     if power := sentences.power_text(verdict):
         yield _item("power", power)
     for candidate in sentences.named_candidates(verdict):
-        yield _item(sentences.candidate_title(verdict, candidate), _weighed(candidate))
+        yield _item(sentences.candidate_title(verdict, candidate), _candidate_text(candidate))
     for comparison in verdict.comparisons:
         yield _item(comparison.what, _compared(comparison, sentences.after_label(verdict)))
     if control := sentences.control_summary(verdict):
@@ -55,13 +55,13 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
         if known(parameter.after):
             moved = f" → {estimate_text(parameter.after)}, a shift of {in_errors(parameter.shift)} standard errors"
         yield _item(parameter.name, f"{sentences.parameter_text(parameter.before)}{moved}")
-    others = sentences.rejected(verdict)
-    for candidate in others[:_RUNNERS_UP]:
+    rejected = sentences.rejected(verdict)
+    for candidate in rejected[:_RUNNERS_UP]:
         yield _item(
             f"not {sentences.candidate_title(verdict, candidate)}", candidate.why_not or "no reason was recorded"
         )
-    if len(others) > _RUNNERS_UP:
-        yield _item("", f"and {len(others) - _RUNNERS_UP} more were weighed; the page has them all")
+    if len(rejected) > _RUNNERS_UP:
+        yield _item("", f"and {len(rejected) - _RUNNERS_UP} more were weighed; the page has them all")
     for label, text in (("would separate", verdict.separating), ("proposal", verdict.proposal)):
         if text:
             yield _item(label, text)
@@ -71,7 +71,7 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
         yield _item(kind, text)
 
 
-def _weighed(candidate: Candidate) -> str:
+def _candidate_text(candidate: Candidate) -> str:
     gain = with_error(candidate.gain, candidate.gain_error)
     parts = [
         f"{readable(candidate.parameter)} {with_level(candidate.strength)}",
@@ -85,15 +85,15 @@ def _weighed(candidate: Candidate) -> str:
 
 
 def _compared(comparison: Comparison, after_label: str) -> str:
-    shown = display([e.value for e in (comparison.before, comparison.floor) if known(e)], "m")
-    parts = [f"error {estimate_text(comparison.before, shown=shown)}"]
+    in_unit = display([e.value for e in (comparison.before, comparison.floor) if known(e)], "m")
+    parts = [f"error {estimate_text(comparison.before, display_as=in_unit)}"]
     if known(comparison.after):
-        parts[0] += f" → {estimate_text(comparison.after, shown=shown)} {after_label}"
-        parts.append(f"reduction {estimate_text(comparison.reduction, shown=shown)}")
+        parts[0] += f" → {estimate_text(comparison.after, display_as=in_unit)} {after_label}"
+        parts.append(f"reduction {estimate_text(comparison.reduction, display_as=in_unit)}")
         parts.append(f"E_red {share(comparison.share)}")
     parts.append(sentences.floor_text(comparison))
     if known(comparison.control):
-        parts.append(f"control {comparison.control_name} {estimate_text(comparison.control, shown=shown)}")
+        parts.append(f"control {comparison.control_name} {estimate_text(comparison.control, display_as=in_unit)}")
         if known(comparison.apart):
             parts[-1] += f", worse by {estimate_text(comparison.apart)} nat per segment"
     parts.append(f"intervals {level_text(comparison.before.level)}, n = {comparison.frames} frames")
@@ -101,12 +101,12 @@ def _compared(comparison: Comparison, after_label: str) -> str:
 
 
 def _joined(parts: Sequence[str]) -> str:
-    """The parts in a row; lines break between them, not within."""
+    """Joins the parts in a row; lines break between them, not within."""
     return "; ".join(part.replace(" ", _NO_BREAK) for part in parts)
 
 
 def _item(label: str, text: str) -> list[str]:
-    """`label: text`, its further lines set in."""
+    """Wraps `label: text`, its further lines set in."""
     return _wrapped(f"  {label}: {text}" if label else f"  {text}", indent="    ")
 
 

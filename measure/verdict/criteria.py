@@ -92,7 +92,7 @@ class Criteria:
         for name in ("level", "interval", "strength_factor", "room", "least_power"):
             value = getattr(self, name)
             if not 0 < value < 1:
-                raise UsageError(f"a {name} of {value!r}", where="criteria", fix="give one between 0 and 1")
+                raise UsageError(f"{name} is {value!r}", where="criteria", fix="give one between 0 and 1")
 
     @property
     def reach(self) -> float:
@@ -105,7 +105,7 @@ class Criteria:
         return recipe_hash(asdict(self))
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values, with their hash."""
+        """Returns JSON values, with their hash."""
         return {**asdict(self), "hash": self.hash}
 
 

@@ -47,7 +47,7 @@ def display(values: Iterable[float], unit: str) -> Display:
 
 
 def known(estimate: Estimate | None) -> bool:
-    """Whether there is anything to show."""
+    """Returns whether there is anything to show."""
     return estimate is not None and not math.isnan(estimate.value)
 
 
@@ -59,7 +59,7 @@ def decimals(uncertainty: float) -> int:
 
 
 def number(value: float | None, *, digits: int = _DIGITS) -> str:
-    """A number without an uncertainty, to `digits` significant digits."""
+    """Formats a number without an uncertainty, to `digits` significant digits."""
     if value is None or math.isnan(value):
         return NONE
     if value == 0 or math.isinf(value):
@@ -71,24 +71,25 @@ def number(value: float | None, *, digits: int = _DIGITS) -> str:
 
 
 def probability(value: float | None) -> str:
-    """A p-value: two digits, one below 0.001."""
+    """Formats a p-value: two digits, one below 0.001."""
     if value is None or math.isnan(value):
         return NONE
     return number(value, digits=2 if value >= 1e-3 else 1)
 
 
-def estimate_text(estimate: Estimate | None, *, shown: Display | None = None) -> str:
-    """`6.2 m/s [5.7, 6.8]` or `at least 5.7 m/s`, without the level, which a table's caption or `with_level` states."""
-    return " ".join(estimate_parts(estimate, shown=shown)).rstrip()
+def estimate_text(estimate: Estimate | None, *, display_as: Display | None = None) -> str:
+    """Formats `6.2 m/s [5.7, 6.8]` or `at least 5.7 m/s`, without the level, which a table's caption or `with_level`
+    states."""
+    return " ".join(estimate_parts(estimate, display_as=display_as)).rstrip()
 
 
-def estimate_parts(estimate: Estimate | None, *, shown: Display | None = None) -> tuple[str, str]:
-    """`6.2 m/s` and `[5.7, 6.8]`; the second is empty where there is no interval."""
+def estimate_parts(estimate: Estimate | None, *, display_as: Display | None = None) -> tuple[str, str]:
+    """Formats `6.2 m/s` and `[5.7, 6.8]`; the second is empty where there is no interval."""
     if estimate is None or not known(estimate):
         return NONE, ""
     if estimate.bound is not None:
-        return _bounded(estimate, estimate.bound, shown), ""
-    inside = shown or display((estimate.value, estimate.low, estimate.high), estimate.unit)
+        return _bounded(estimate, estimate.bound, display_as), ""
+    inside = display_as or display((estimate.value, estimate.low, estimate.high), estimate.unit)
     value, low, high = (inside.factor * v for v in (estimate.value, estimate.low, estimate.high))
     half = (high - low) / 2
     if math.isnan(half):
@@ -96,27 +97,27 @@ def estimate_parts(estimate: Estimate | None, *, shown: Display | None = None) -
     if not 0 < half < math.inf:
         return f"{number(value)}{inside.suffix}", f"[{number(low)}, {number(high)}]"
     largest = max(abs(value), abs(low), abs(high))
-    place = min(decimals(half), _MOST_DIGITS - 1 - math.floor(math.log10(largest)))
+    rounded_to = min(decimals(half), _MOST_DIGITS - 1 - math.floor(math.log10(largest)))
     power = ""
     if not (_NARROWEST <= largest < _WIDEST):
         exponent = math.floor(math.log10(largest))
         value, low, high = (v / 10.0**exponent for v in (value, low, high))
-        place += exponent
+        rounded_to += exponent
         power = f" × {_power(exponent)}"
-    ends = f"[{_fixed(low, place)}{power}, {_fixed(high, place)}{power}]"
-    return f"{_fixed(value, place)}{power}{inside.suffix}", ends
+    ends = f"[{_fixed(low, rounded_to)}{power}, {_fixed(high, rounded_to)}{power}]"
+    return f"{_fixed(value, rounded_to)}{power}{inside.suffix}", ends
 
 
-def _bounded(estimate: Estimate, bound: str, shown: Display | None) -> str:
-    """`at least 900 N/m²`."""
+def _bounded(estimate: Estimate, bound: str, display_as: Display | None) -> str:
+    """Formats `at least 900 N/m²`."""
     if bound not in _BOUNDS:
         return "not determined"
-    inside = shown or display((estimate.value,), estimate.unit)
+    inside = display_as or display((estimate.value,), estimate.unit)
     return f"{_BOUNDS[bound]} {number(inside.factor * estimate.value, digits=2)}{inside.suffix}"
 
 
 def with_level(estimate: Estimate) -> str:
-    """`6.2 m/s [5.7, 6.8] 90 %`."""
+    """Formats `6.2 m/s [5.7, 6.8] 90 %`."""
     if not known(estimate):
         return NONE
     if estimate.bound is not None and estimate.bound not in _BOUNDS:
@@ -125,30 +126,30 @@ def with_level(estimate: Estimate) -> str:
 
 
 def in_errors(value: float | None) -> str:
-    """A number of standard errors: one decimal, none from 10 on."""
+    """Formats a number of standard errors: one decimal, none from 10 on."""
     if value is None or math.isnan(value):
         return NONE
     return _fixed(value, 0 if abs(value) >= 9.95 else 1)
 
 
 def share(value: float | None) -> str:
-    """A fraction, two decimals."""
+    """Formats a fraction, two decimals."""
     return NONE if value is None or math.isnan(value) else _fixed(value, 2)
 
 
 def level_text(level: float) -> str:
-    """`90 %`."""
+    """Formats `90 %`."""
     return f"{100 * level:g} %"
 
 
 def with_error(value: float, error: float) -> str:
-    """`12.3 ± 0.4`."""
+    """Formats `12.3 ± 0.4`."""
     if math.isnan(value):
         return NONE
     if not 0 < error < math.inf:
         return number(value)
-    place = decimals(error)
-    return f"{_fixed(value, place)} ± {_fixed(error, place)}"
+    rounded_to = decimals(error)
+    return f"{_fixed(value, rounded_to)} ± {_fixed(error, rounded_to)}"
 
 
 def _power(exponent: int) -> str:
@@ -156,7 +157,7 @@ def _power(exponent: int) -> str:
 
 
 def _fixed(value: float, places: int) -> str:
-    """`value` rounded to `places` decimals (negative: to tens, hundreds), zero without a sign."""
+    """Rounds `value` to `places` decimals (negative: to tens, hundreds), zero without a sign."""
     if math.isinf(value):
         return f"{MINUS if value < 0 else ''}∞"
     text = f"{round(value, places) + 0.0:.{max(places, 0)}f}"

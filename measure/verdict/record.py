@@ -196,9 +196,9 @@ class NullTest:
 
     @property
     def kinds_needed(self) -> int:
-        """The fewest kinds by which the level can be tested, each as many independent nulls as these."""
-        each = 1.0 if self.effective is None else self.effective / self.kinds
-        return math.ceil((1 / self.level - 1) / each - 1e-9)
+        """Computes the fewest kinds by which the level can be tested, each as many independent nulls as these."""
+        nulls_of_kind = 1.0 if self.effective is None else self.effective / self.kinds
+        return math.ceil((1 / self.level - 1) / nulls_of_kind - 1e-9)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -281,5 +281,5 @@ class Verdict:
     seconds: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {"schema": "flagdata.verdict/1", **asdict(self)}

@@ -57,7 +57,7 @@ class Edges:
 
     @classmethod
     def of(cls, reference: NDArray[np.uint8], outside: NDArray[np.bool_]) -> Edges | None:
-        """Those of a picture (height, width) in places that may be the background's; None where there are too few."""
+        """Finds the edges of a picture (height, width) within the background's mask; None where there are too few."""
         smoothed = [_smoothed(reference, blur) for blur in _BLURS]
         slopes = [
             np.stack([cv2.Sobel(picture, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)], axis=-1)
@@ -84,25 +84,26 @@ class Edges:
         return replace(self, axes=np.linalg.eigh(slopes.T @ slopes)[1][:, 1:].T)
 
     def misfit(self, picture: NDArray[np.uint8], shift: tuple[float, float]) -> float:
-        """Mean difference of a picture from the reference at a shift [gray levels], each up to twice `_HUBER`."""
+        """Computes the mean difference of a picture from the reference at a shift [gray levels], each clipped at `2 *
+        _HUBER`."""
         away = self._difference(_smoothed(picture, _BLURS[-1]), -1, np.array(shift))
         return float(np.minimum(np.abs(away), 2 * _HUBER).mean())
 
     def shift(self, picture: NDArray[np.uint8], guess: tuple[float, float]) -> tuple[float, float] | None:
-        """Along x and y [px], from the reference picture to this one; None where none fits.
+        """Estimates the shift along x and y [px] from the reference picture to this one; None where none fits.
 
         Args:
             guess: of a frame nearby.
         """
         smoothed = [_smoothed(picture, blur) for blur in _BLURS]
-        near = np.array(guess, dtype=np.float64)
-        shift = self._refined(smoothed, near)
+        start = np.array(guess, dtype=np.float64)
+        shift = self._refined(smoothed, start)
         if shift is None:
-            shift = self._refined(smoothed, self._searched(smoothed[0], near))
+            shift = self._refined(smoothed, self._searched(smoothed[0], start))
         return None if shift is None else (float(shift[0]), float(shift[1]))
 
     def _refined(self, smoothed: list[NDArray[np.float32]], guess: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """The shift near a guess; None where it does not fit."""
+        """Refines a guess of the shift by Gauss–Newton steps, coarse to fine; None where it does not fit."""
         shift, difference = guess.copy(), np.zeros(len(self.places))
         for level, picture in enumerate(smoothed):
             slopes = self.slopes[level].astype(np.float64)
@@ -122,22 +123,22 @@ class Edges:
         return shift if fits else None
 
     def _searched(self, smoothed: NDArray[np.float32], guess: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The best of all shifts on a grid about a guess: after a jerk of the camera."""
+        """Searches a grid of shifts about a guess for the best one, as is needed after a jerk of the camera."""
         steps = np.arange(-_JERK, _JERK + 1, _GRID, dtype=np.float64)
         shifts = (
             guess + np.stack(np.meshgrid(*[steps] * len(self.axes)), axis=-1).reshape(-1, len(self.axes)) @ self.axes
         )
-        some = slice(None, None, max(1, len(self.places) // _LOOKED))
-        at = (self.places[some][None] + shifts[:, None]).astype(np.float32)
-        seen = cv2.remap(smoothed, at[..., 0], at[..., 1], cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
-        misfit = np.minimum(np.abs(seen - self.values[0][some]), 2 * _HUBER).mean(axis=1)
+        subset = slice(None, None, max(1, len(self.places) // _LOOKED))
+        at = (self.places[subset][None] + shifts[:, None]).astype(np.float32)
+        values = cv2.remap(smoothed, at[..., 0], at[..., 1], cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+        misfit = np.minimum(np.abs(values - self.values[0][subset]), 2 * _HUBER).mean(axis=1)
         away = np.linalg.norm(shifts - guess, axis=1) / _JERK
         return shifts[int(np.argmin(misfit + 0.1 * _HUBER * away))]
 
     def _difference(self, smoothed: NDArray[np.float32], level: int, shift: NDArray[np.float64]) -> NDArray[np.float64]:
         at = (self.places + shift).astype(np.float32)
-        seen = cv2.remap(smoothed, at[:, :1], at[:, 1:], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        return np.asarray(seen, dtype=np.float64)[:, 0] - self.values[level]
+        values = cv2.remap(smoothed, at[:, :1], at[:, 1:], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(values, dtype=np.float64)[:, 0] - self.values[level]
 
 
 def _smoothed(picture: NDArray[np.uint8], blur: float) -> NDArray[np.float32]:
@@ -191,7 +192,7 @@ class Camera:
 
     @property
     def known(self) -> bool:
-        """Whether the background shows how the camera moves."""
+        """Returns whether the background shows how the camera moves."""
         return self.support > 0
 
     @property
@@ -205,7 +206,7 @@ class Camera:
         return f"{self.support} {'corners' if self.edges is None else 'pixels at edges'} of the background"
 
     def follow(self, picture: NDArray[np.uint8], guess: Transform) -> Transform | None:
-        """Where the reference picture is in another one; None where too few features are found.
+        """Registers a frame: the transform from the reference picture to it; None where too few features are matched.
 
         Args:
             picture: (height, width) gray, as large as the reference.
@@ -216,14 +217,14 @@ class Camera:
         if self.edges is not None:
             shift = self.edges.shift(picture, (float(guess[0, 2]), float(guess[1, 2])))
             return None if shift is None else np.array([[1.0, 0.0, shift[0]], [0.0, 1.0, shift[1]]])
-        places, found = _followed(self.reference, picture, self.corners, guess)
-        return _similarity(self.corners[found], places[found])
+        places, matched = _followed(self.reference, picture, self.corners, guess)
+        return _similarity(self.corners[matched], places[matched])
 
 
 def camera_of(
     pictures: Sequence[NDArray[np.uint8]], *, outside: NDArray[np.bool_] | None = None, least: float = 0.0
 ) -> tuple[Camera, list[Transform]]:
-    """The camera of a film, from a sample of its frames in order, and the transform of each of them.
+    """Returns the camera of a film, from a sample of its frames in order, and the transform of each of them.
 
     Args:
         pictures: (height, width) gray, of one size, `WORK` px at most; the middle one becomes the reference.
@@ -233,14 +234,14 @@ def camera_of(
     middle = len(pictures) // 2
     reference = pictures[middle]
     height, width = reference.shape
-    found = cv2.goodFeaturesToTrack(
+    features = cv2.goodFeaturesToTrack(
         reference,
         _CORNERS,
         _QUALITY,
         max(4.0, _APART * float(np.hypot(height, width))),
         mask=None if outside is None else outside.astype(np.uint8),
     )
-    corners = np.zeros((0, 2), np.float32) if found is None else np.asarray(found, np.float32).reshape(-1, 2)
+    corners = np.zeros((0, 2), np.float32) if features is None else np.asarray(features, np.float32).reshape(-1, 2)
     still = Camera(reference=reference, corners=corners[:0], moves=False)
     unmoved = [STILL] * len(pictures)
     if len(corners) < _FEWEST:
@@ -262,7 +263,7 @@ def camera_of(
 def by_edges(
     pictures: Sequence[NDArray[np.uint8]], *, outside: NDArray[np.bool_], least: float = 0.0
 ) -> tuple[Camera, list[Transform]]:
-    """The same from the background's edges.
+    """Estimates the camera and its transforms as `camera_of` does, from the background's edges in place of its corners.
 
     Args:
         outside: (height, width) where they may lie.
@@ -273,14 +274,16 @@ def by_edges(
     unmoved = [STILL] * len(pictures)
     if edges is None:
         return still, unmoved
-    both, across = (_aligned(pictures, replace(still, edges=one, moves=True)) for one in (edges, edges.across))
-    found = both if both.misfit < _BETTER * across.misfit else across
-    if found.lost > _LOST * len(pictures):
+    both_axes, one_axis = (
+        _aligned(pictures, replace(still, edges=candidate, moves=True)) for candidate in (edges, edges.across)
+    )
+    aligned = both_axes if both_axes.misfit < _BETTER * one_axis.misfit else one_axis
+    if aligned.lost > _LOST * len(pictures):
         return still, unmoved
     height, width = pictures[middle].shape
-    if motion(found.transforms, (width / 2, height / 2)) < least:
-        return replace(found.camera, moves=False), unmoved
-    return found.camera, found.transforms
+    if motion(aligned.transforms, (width / 2, height / 2)) < least:
+        return replace(aligned.camera, moves=False), unmoved
+    return aligned.camera, aligned.transforms
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -299,31 +302,32 @@ def _aligned(pictures: Sequence[NDArray[np.uint8]], camera: Camera) -> _Aligned:
     for order in (range(middle + 1, len(pictures)), range(middle - 1, -1, -1)):
         guess = STILL
         for k in order:
-            found = camera.follow(pictures[k], guess)
-            lost += found is None
-            guess = transforms[k] = found if found is not None else guess
+            transform = camera.follow(pictures[k], guess)
+            lost += transform is None
+            guess = transforms[k] = transform if transform is not None else guess
     misfit = 0.0
     if camera.edges is not None:
         pairs = zip(pictures, transforms, strict=True)
-        misfit = float(np.mean([camera.edges.misfit(one, (at[0, 2], at[1, 2])) for one, at in pairs]))
+        misfit = float(np.mean([camera.edges.misfit(picture, (at[0, 2], at[1, 2])) for picture, at in pairs]))
     return _Aligned(camera=camera, transforms=transforms, lost=lost, misfit=misfit)
 
 
-def motion(transforms: Sequence[Transform], place: tuple[float, float]) -> float:
-    """Root mean square distance [px] of a place's image from its mean."""
-    at = path(transforms, place)
+def motion(transforms: Sequence[Transform], point: tuple[float, float]) -> float:
+    """Computes the root mean square distance [px] of a point's images from their mean."""
+    at = path(transforms, point)
     return float(np.sqrt(np.square(at - at.mean(axis=0)).sum(axis=1).mean()))
 
 
-def path(transforms: Sequence[Transform], place: tuple[float, float]) -> NDArray[np.float64]:
-    """(n, 2) where a place of the reference picture is in each frame [px]."""
-    return np.stack([transform @ np.array([*place, 1.0]) for transform in transforms])
+def path(transforms: Sequence[Transform], point: tuple[float, float]) -> NDArray[np.float64]:
+    """Returns (n, 2) positions of a point of the reference picture in each frame [px]."""
+    return np.stack([transform @ np.array([*point, 1.0]) for transform in transforms])
 
 
 def _sampled(
     pictures: Sequence[NDArray[np.uint8]], corners: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_], list[Transform]]:
-    """(frame, corner, 2) places, (frame, corner) whether a corner follows its frame's transform, and those."""
+    """Tracks corners through a sample: (frame, corner, 2) positions, (frame, corner) whether each follows its frame's
+    transform, and the transforms."""
     count, middle = len(pictures), len(pictures) // 2
     places = np.repeat(corners[None], count, axis=0)
     follows = np.zeros((count, len(corners)), bool)
@@ -332,22 +336,22 @@ def _sampled(
     for order in (range(middle + 1, count), range(middle - 1, -1, -1)):
         guess = STILL
         for k in order:
-            places[k], found = _followed(pictures[middle], pictures[k], corners, guess)
-            transform = _similarity(corners[found], places[k][found])
+            places[k], tracked = _followed(pictures[middle], pictures[k], corners, guess)
+            transform = _similarity(corners[tracked], places[k][tracked])
             if transform is not None:
                 guess = transform
                 away = np.linalg.norm(places[k] - _moved(corners, transform), axis=1)
-                follows[k] = found & (away < _INLIER)
+                follows[k] = tracked & (away < _INLIER)
             transforms[k] = guess
     return places, follows, transforms
 
 
 def _again(camera: Camera, pictures: Sequence[NDArray[np.uint8]], guesses: Sequence[Transform]) -> list[Transform]:
-    found = []
+    transforms = []
     for picture, guess in zip(pictures, guesses, strict=True):
         transform = camera.follow(picture, guess)
-        found.append(transform if transform is not None else guess)
-    return found
+        transforms.append(transform if transform is not None else guess)
+    return transforms
 
 
 def _followed(
@@ -372,7 +376,7 @@ def _moved(places: NDArray[np.float32], transform: Transform) -> NDArray[np.floa
 
 
 def _similarity(before: NDArray[np.float32], after: NDArray[np.float32]) -> Transform | None:
-    """The similarity that most pairs of places agree on; None where too few do or no camera turns and zooms so."""
+    """Fits the similarity that most pairs of points agree on; None where too few do or no camera turns and zooms so."""
     if len(before) < _FEWEST:
         return None
     transform, inside = cv2.estimateAffinePartial2D(

@@ -89,7 +89,8 @@ class Conditioning:
         return dict(zip(SIDES, (self.cut > CUT).mean(axis=0).tolist(), strict=True))
 
     def follow(self, frame: NDArray[np.uint8], guess: Transform) -> Transform | None:
-        """Where the reference picture is in a frame; None where the background's features are not found.
+        """Registers a frame: the transform from the reference picture to it; None where the background's features are
+        not found.
 
         Args:
             frame: (height, width) of the film.
@@ -98,11 +99,11 @@ class Conditioning:
         return self.camera.follow(shrunk(frame, self.scale), guess) if self.camera.moves else STILL
 
     def show(self, frame: NDArray[np.uint8], transform: Transform) -> NDArray[np.uint8]:
-        """(size, size) picture of the flag: registered, cropped, scaled, all else frozen."""
+        """Returns the (size, size) picture of the flag: registered, cropped, scaled, all else frozen."""
         drawn = _framed(frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves)
         away = drawn - self._still
-        kept = np.clip(self.kept * away, -_NOISES * self.noise, _NOISES * self.noise)
-        return np.rint(self._still + kept + self.weight * (away - kept)).astype(np.uint8)
+        residual = np.clip(self.kept * away, -_NOISES * self.noise, _NOISES * self.noise)
+        return np.rint(self._still + residual + self.weight * (away - residual)).astype(np.uint8)
 
     @cached_property
     def _still(self) -> NDArray[np.float32]:
@@ -129,7 +130,7 @@ class Conditioned:
 def conditioned(
     frames: NDArray[np.uint8], times: NDArray[np.float64], *, size: int = 300, flag: int | None = None
 ) -> Conditioned:
-    """A short film in memory, made fit.
+    """Conditions a short film in memory.
 
     Args:
         frames: (n, height, width) gray.
@@ -142,12 +143,14 @@ def conditioned(
         UsageError: a flag of a number that the film does not have.
     """
     if len(frames) < LEAST or len(times) != len(frames):
-        raise InputError(f"{len(frames)} frames at {len(times)} instants", fix="give three frames or more, each a time")
-    every = -(-len(frames) // SAMPLE)
-    found = conditioning_of(frames[::every], times=times[::every], size=size, flag=flag)
-    follower = Follower(found)
-    shown = np.stack([follower.show(frame) for frame in frames])
-    return Conditioned(frames=shown, found=found, path=follower.path, lost=follower.lost)
+        raise InputError(
+            f"{len(frames)} frames have {len(times)} instants", fix="give three frames or more, each a time"
+        )
+    stride = -(-len(frames) // SAMPLE)
+    conditioning = conditioning_of(frames[::stride], times=times[::stride], size=size, flag=flag)
+    follower = Follower(conditioning)
+    pictures = np.stack([follower.show(frame) for frame in frames])
+    return Conditioned(frames=pictures, found=conditioning, path=follower.path, lost=follower.lost)
 
 
 class Follower:
@@ -157,8 +160,8 @@ class Follower:
         lost: frames in which the background's features were not found.
     """
 
-    def __init__(self, found: Conditioning) -> None:
-        self._found, self._last = found, STILL
+    def __init__(self, conditioning: Conditioning) -> None:
+        self._found, self._last = conditioning, STILL
         self._path: list[NDArray[np.float64]] = []
         self.lost = 0
 
@@ -168,8 +171,8 @@ class Follower:
         return np.array(self._path).reshape(-1, 2)
 
     def motion(self) -> dict[str, float]:
-        """Drift, the largest distance between places of the square's centre, smoothed over `_DRIFT` frames, and shake,
-        the root mean square of its steps from frame to frame [px of the film]."""
+        """Returns drift, the largest distance between positions of the square's centre, smoothed over `_DRIFT` frames,
+        and shake, the root mean square of its steps from frame to frame [px of the film]."""
         at = self.path
         if len(at) < 2:
             return {"drift": 0.0, "shake": 0.0}
@@ -182,15 +185,15 @@ class Follower:
         }
 
     def show(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """(size, size) picture of the next frame (height, width)."""
-        found = self._found
-        transform = found.follow(frame, self._last)
+        """Returns the (size, size) picture of the next frame (height, width)."""
+        conditioning = self._found
+        transform = conditioning.follow(frame, self._last)
         if transform is None:
             self.lost += 1
         else:
             self._last = transform
-        self._path.append(_centre(found.square, self._last, found.scale))
-        return found.show(frame, self._last)
+        self._path.append(_centre(conditioning.square, self._last, conditioning.scale))
+        return conditioning.show(frame, self._last)
 
 
 def conditioning_of(
@@ -201,7 +204,7 @@ def conditioning_of(
     flag: int | None = None,
     within: tuple[int, int, int, int] | None = None,
 ) -> Conditioning:
-    """What a sample of a film's frames shows.
+    """Finds camera, moving cloth and the square to crop to in a sample of a film's frames.
 
     Args:
         sample: (height, width) gray, spread over the film, in order; three or more.
@@ -224,7 +227,7 @@ def conditioning_of(
     )
     if flag is not None and not 1 <= flag <= len(regions):
         raise UsageError(
-            f"flag {flag} of a film in which {len(regions)} regions move like cloth",
+            f"there is no flag {flag}: {len(regions)} regions of the film move like cloth",
             where="--flag",
             fix="give a number from the page's picture" if regions else "give --crop around the flag",
         )
@@ -233,7 +236,7 @@ def conditioning_of(
     if regions:
         left, top, right, bottom = regions[chosen].box
         box = (left / scale, top / scale, right / scale, bottom / scale)
-    square = framing.square_about(box, width=width, height=height, whole=not camera.moves or not regions)
+    square = framing.square_about(box, width=width, height=height, allow_centred=not camera.moves or not regions)
     step = -(-len(sample) // _BACKGROUND)
     framed = [
         _framed(frame, square, size, transform, scale=scale, moves=camera.moves)
@@ -263,7 +266,7 @@ def conditioning_of(
 
 
 def shrunk(frame: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
-    """A frame (height, width) averaged down."""
+    """Averages a frame (height, width) down."""
     if scale >= 1:
         return np.ascontiguousarray(frame)
     size = (max(1, round(frame.shape[1] * scale)), max(1, round(frame.shape[0] * scale)))
@@ -273,7 +276,7 @@ def shrunk(frame: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
 def _camera_and_regions(
     small: list[NDArray[np.uint8]], times: NDArray[np.float64], inside: NDArray[np.bool_] | None, unit: float
 ) -> tuple[Camera, list[Transform], NDArray[np.uint8], tuple[Region, ...]]:
-    """Camera and cloth, each found again with the other known, and the registered pictures.
+    """Estimates the camera and the cloth in turns, each with the other's last estimate, and registers the pictures.
 
     Args:
         unit: pixels of `small` in one of the pictures that come out, of a film that is shown whole.
@@ -299,7 +302,7 @@ def _camera_and_regions(
 
 
 def _outside(regions: Sequence[Region], shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Where the background is: away from all moving cloth."""
+    """Masks the background: away from all moving cloth."""
     outside = np.ones(shape, bool)
     for region in regions:
         outside &= ~_widened(region.mask, _AHEAD).astype(bool)
@@ -337,7 +340,7 @@ def _centre(square: Square, transform: Transform, scale: float) -> NDArray[np.fl
 
 
 def _widened(mask: NDArray[np.bool_], share: float) -> NDArray[np.uint8]:
-    """The mask widened by a share of its size."""
+    """Widens the mask by a share of its size."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     radius = max(1, round(share * max(np.ptp(rows), np.ptp(columns))))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
@@ -345,20 +348,20 @@ def _widened(mask: NDArray[np.bool_], share: float) -> NDArray[np.uint8]:
 
 
 def _weight(mask: NDArray[np.bool_], square: Square, size: int, scale: float) -> NDArray[np.float32]:
-    """(size, size) 1 on and about the cloth, falling to 0 across the feather."""
+    """Weighs pixels (size, size): 1 on and about the cloth, falling to 0 across the feather."""
     extent = max(np.ptp(np.flatnonzero(mask.any(axis=1))), np.ptp(np.flatnonzero(mask.any(axis=0)))) + 1
-    near = _widened(mask, _AROUND + _FEATHER)
+    widened = _widened(mask, _AROUND + _FEATHER)
     step = square.side / size
-    place = np.array([[step, 0.0, square.x + step / 2 - 0.5], [0.0, step, square.y + step / 2 - 0.5]])
-    place = np.column_stack([place[:, :2] * scale, (place[:, 2] + 0.5) * scale - 0.5])
-    out = cv2.warpAffine(near, place, (size, size), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
+    to_reference = np.array([[step, 0.0, square.x + step / 2 - 0.5], [0.0, step, square.y + step / 2 - 0.5]])
+    to_reference = np.column_stack([to_reference[:, :2] * scale, (to_reference[:, 2] + 0.5) * scale - 0.5])
+    out = cv2.warpAffine(widened, to_reference, (size, size), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
     feather = max(_FEATHER * extent / scale / step, 1.0)
     away = cv2.distanceTransform(np.asarray(out, dtype=np.uint8), cv2.DIST_L2, 5)
     return np.clip(away / feather, 0.0, 1.0).astype(np.float32)
 
 
 def _noise(stack: NDArray[np.uint8], weight: NDArray[np.float32]) -> float:
-    """Deviation of the camera's noise where the film (n, size, size) is frozen [gray levels].
+    """Estimates the deviation of the camera's noise where the film (n, size, size) is frozen [gray levels].
 
     By the differences of frames, which have √2 times the noise of one.
     """
@@ -366,8 +369,8 @@ def _noise(stack: NDArray[np.uint8], weight: NDArray[np.float32]) -> float:
     if not frozen.any():
         return _ROUNDING
     change = np.diff(stack.astype(np.float32), axis=0)
-    left = np.stack([noise.rough(picture)[frozen] for picture in change])
-    return max(noise.deviation(left) / np.sqrt(2), _ROUNDING)
+    rough = np.stack([noise.rough(picture)[frozen] for picture in change])
+    return max(noise.deviation(rough) / np.sqrt(2), _ROUNDING)
 
 
 def _inside(within: tuple[int, int, int, int], shape: tuple[int, ...], scale: float) -> NDArray[np.bool_]:

@@ -39,19 +39,19 @@ class Square:
     side: int
 
     def beyond(self, width: int, height: int) -> float:
-        """Share of the square that lies beyond a picture of this size."""
+        """Computes the share of the square beyond a picture of this size."""
         across = min(self.x + self.side, width) - max(self.x, 0)
         down = min(self.y + self.side, height) - max(self.y, 0)
         return 1 - max(across, 0) * max(down, 0) / self.side**2
 
 
-def square_about(box: tuple[float, float, float, float], *, width: int, height: int, whole: bool) -> Square:
-    """The square about a box of a picture.
+def square_about(box: tuple[float, float, float, float], *, width: int, height: int, allow_centred: bool) -> Square:
+    """Chooses the square about a box of a picture.
 
     Args:
         box: left, top, right and bottom [px].
         width, height: of the picture [px].
-        whole: whether the largest centred square may be left as it is, where the box fills enough of it.
+        allow_centred: whether the largest centred square may be left as it is, where the box fills enough of it.
     """
     left, top, right, bottom = box
     extent = max(right - left, bottom - top)
@@ -64,27 +64,28 @@ def square_about(box: tuple[float, float, float, float], *, width: int, height: 
         and top - margin_y >= middle.y
         and bottom + margin_y <= middle.y + side
     )
-    if whole and inside and LEAST_FILL <= extent / side <= MOST_FILL:
+    if allow_centred and inside and LEAST_FILL <= extent / side <= MOST_FILL:
         return middle
     side = max(16, math.ceil(max(extent / MOST_FILL, min(extent / FILL, side))))
     return Square(x=_begin(left, right, side, width), y=_begin(top, bottom, side, height), side=side)
 
 
 def centred(width: int, height: int) -> Square:
-    """The largest centred square of a picture of this size [px]."""
+    """Returns the largest centred square of a picture of this size [px]."""
     side = min(width, height)
     return Square(x=(width - side) // 2, y=(height - side) // 2, side=side)
 
 
 def _begin(low: float, high: float, side: int, length: int) -> int:
-    """Where a square about low to high begins, moved towards the picture of this length where it reaches beyond."""
+    """Returns where a square about low to high begins, moved towards the picture of this length where it reaches
+    beyond."""
     about = (low + high - side) / 2
     inside = min(max(about, 0.0), length - side) if length >= side else (length - side) / 2
     return round(about + min(max(inside - about, -_ASIDE * side), _ASIDE * side))
 
 
 def cut(picture: NDArray[np.uint8], square: Square, size: int) -> NDArray[np.uint8]:
-    """(size, size) of a square of an unmoved picture (height, width)."""
+    """Crops a square of an unmoved picture (height, width) to (size, size)."""
     height, width = picture.shape
     rows = np.arange(square.y, square.y + square.side).clip(0, height - 1)
     columns = np.arange(square.x, square.x + square.side).clip(0, width - 1)
@@ -97,17 +98,19 @@ def cut(picture: NDArray[np.uint8], square: Square, size: int) -> NDArray[np.uin
 
 
 def warp(picture: NDArray[np.uint8], square: Square, size: int, transform: Transform) -> NDArray[np.uint8]:
-    """(size, size) of the square of the reference picture, as a picture (height, width) shows it.
+    """Crops the square of the reference picture, as a picture (height, width) shows it, to (size, size).
 
     Args:
         transform: from the reference picture to this one [px].
     """
     finer = max(1, math.ceil(square.side * float(np.hypot(transform[0, 0], transform[1, 0])) / size - 1e-9))
     step = square.side / (size * finer)
-    place = np.array([[step, 0.0, square.x + step / 2 - 0.5], [0.0, step, square.y + step / 2 - 0.5], [0.0, 0.0, 1.0]])
+    to_reference = np.array(
+        [[step, 0.0, square.x + step / 2 - 0.5], [0.0, step, square.y + step / 2 - 0.5], [0.0, 0.0, 1.0]]
+    )
     grid = cv2.warpAffine(
         picture,
-        transform @ place,
+        transform @ to_reference,
         (size * finer, size * finer),
         flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,
@@ -118,7 +121,7 @@ def warp(picture: NDArray[np.uint8], square: Square, size: int, transform: Trans
 
 
 def scaled(transform: Transform, scale: float) -> Transform:
-    """A transform between pictures shrunk by `scale` (new over old), as one between the pictures themselves."""
+    """Rescales a transform between pictures shrunk by `scale` (new over old) to one between the pictures themselves."""
     linear = transform[:, :2]
     shift = scale / 2 - 0.5
     moved = linear @ np.array([shift, shift]) + transform[:, 2] - shift

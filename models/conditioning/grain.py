@@ -22,13 +22,13 @@ DEVIATION = 0.5
 
 
 def grained(clip: NDArray[np.uint8], *, seed: int) -> NDArray[np.uint8]:
-    """A clip (n, height, width) gray with noise where it never changes, if that is most of it; else the clip itself.
-    What is black all the time lies beyond the picture, and neither counts nor changes.
+    """Adds noise to a clip (n, height, width) gray where it never changes, if that is most of it; else returns the clip
+    itself. else the clip itself. What is black all the time lies beyond the picture, and neither counts nor changes.
     """
     greatest = clip.max(axis=0)
-    shown, still = greatest > 0, greatest == clip.min(axis=0)
-    share = np.count_nonzero(still & shown) / max(np.count_nonzero(shown), 1)
+    lit, still = greatest > 0, greatest == clip.min(axis=0)
+    share = np.count_nonzero(still & lit) / max(np.count_nonzero(lit), 1)
     if not STILL < share < 1:  # where nothing at all moves there is nothing to read
         return clip
     noise = DEVIATION * stream(seed, "grain").standard_normal(clip.shape, dtype=np.float32)
-    return np.clip(np.rint(clip + noise * (still & shown)), 0, 255).astype(np.uint8)
+    return np.clip(np.rint(clip + noise * (still & lit)), 0, 255).astype(np.uint8)

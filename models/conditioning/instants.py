@@ -32,37 +32,37 @@ TimedFrame = tuple[float, NDArray[np.uint8]]
 def at_instants(
     frames: Sequence[TimedFrame], instants: NDArray[np.floating], *, period: float, interpolator: Interpolator
 ) -> tuple[NDArray[np.uint8], int]:
-    """(n, height, width) a film's pictures at n instants, and how many of them were interpolated.
+    """Resamples a film at n instants: (n, height, width) pictures, and how many of them were interpolated.
 
     Args:
         frames: two or more, in order.
         instants: [s], evenly; one before the first frame is shown by that, one beyond the last by the last.
         period: of the film [s].
     """
-    near = NEAR if period <= instants[1] - instants[0] else NEAR_OF_SLOW
+    tolerance = NEAR if period <= instants[1] - instants[0] else NEAR_OF_SLOW
     times = np.array([time for time, _ in frames])
     before = np.searchsorted(times, instants, side="right").clip(1, len(times) - 1) - 1
-    place = ((instants - times[before]) / (times[before + 1] - times[before])).clip(0.0, 1.0)
-    shown, interpolated = [], 0
-    for k, instant, at in zip(before.tolist(), instants.tolist(), place.tolist(), strict=True):
-        nearest = round(at)
-        if abs(at - nearest) <= near:
-            shown.append(frames[k + nearest][1])
+    fractions = ((instants - times[before]) / (times[before + 1] - times[before])).clip(0.0, 1.0)
+    pictures, interpolated = [], 0
+    for k, instant, fraction in zip(before.tolist(), instants.tolist(), fractions.tolist(), strict=True):
+        nearest = round(fraction)
+        if abs(fraction - nearest) <= tolerance:
+            pictures.append(frames[k + nearest][1])
         else:
-            shown.append(interpolator.between(frames[k], frames[k + 1], instant))
+            pictures.append(interpolator.between(frames[k], frames[k + 1], instant))
             interpolated += 1
-    return np.stack(shown), interpolated
+    return np.stack(pictures), interpolated
 
 
 class Interpolator:
     """Pictures between frames of one film. Flows of the last pairs are kept.
 
     Args:
-        kept: how many.
+        capacity: how many are kept.
     """
 
-    def __init__(self, *, kept: int = _FLOWS) -> None:
-        self._kept = kept
+    def __init__(self, *, capacity: int = _FLOWS) -> None:
+        self._kept = capacity
         # The search divides the picture among threads, and its result depends on how many there are.
         cv2.setNumThreads(1)
         self._search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
@@ -71,7 +71,7 @@ class Interpolator:
     def between(
         self, first: tuple[float, NDArray[np.uint8]], second: tuple[float, NDArray[np.uint8]], instant: float
     ) -> NDArray[np.uint8]:
-        """(height, width) gray at an instant from the first frame's to the second's.
+        """Interpolates a picture (height, width) gray at an instant from the first frame's to the second's.
 
         Args:
             first, second: (time [s], (height, width) gray) of frames that follow each other.
@@ -94,7 +94,7 @@ class Interpolator:
     def _flow(
         self, first: tuple[float, NDArray[np.uint8]], second: tuple[float, NDArray[np.uint8]]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(height, width, 2) flows from the first frame to the second and back [px, x then y]."""
+        """Returns (height, width, 2) flows from the first frame to the second and back [px, x then y]."""
         key = (first[0], second[0])
         if key not in self._flows:
             while len(self._flows) >= self._kept:

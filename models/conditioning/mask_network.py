@@ -45,23 +45,23 @@ class MaskNetwork(nn.Module):
         widths, inputs = _WIDTHS, 4 * CHANNELS
         self.down = nn.ModuleList(_twice(a, b) for a, b in zip((inputs, *widths[:-1]), widths, strict=True))
         self.up = nn.ModuleList(
-            _twice(below + own, own) for below, own in zip(widths[:0:-1], widths[-2::-1], strict=True)
+            _twice(below + width, width) for below, width in zip(widths[:0:-1], widths[-2::-1], strict=True)
         )
         self.fine = nn.Sequential(
             nn.Conv2d(widths[0] // 4 + CHANNELS, 8, 3, padding=1), nn.ReLU(inplace=True), nn.Conv2d(8, OUTPUTS, 1)
         )
 
     def forward(self, x: Tensor) -> Tensor:
-        """Logits. The picture is continued at its edges to a multiple of 16 pixels."""
+        """Computes logits. The picture is continued at its edges to a multiple of 16 pixels."""
         rows, columns = x.shape[-2:]
         padded = functional.pad(x, (0, -columns % _MULTIPLE, 0, -rows % _MULTIPLE), mode="replicate")
-        kept: list[Tensor] = []
+        levels: list[Tensor] = []
         y = functional.pixel_unshuffle(padded, 2)
         for block in self.down:
-            y = block(functional.max_pool2d(y, 2) if kept else y)
-            kept.append(y)
-        for block, beside in zip(self.up, kept[-2::-1], strict=True):
-            y = block(torch.cat([functional.interpolate(y, scale_factor=2.0, mode="nearest"), beside], dim=1))
+            y = block(functional.max_pool2d(y, 2) if levels else y)
+            levels.append(y)
+        for block, skip in zip(self.up, levels[-2::-1], strict=True):
+            y = block(torch.cat([functional.interpolate(y, scale_factor=2.0, mode="nearest"), skip], dim=1))
         y = torch.cat([functional.pixel_shuffle(y, 2), padded], dim=1)
         return self.fine(y)[..., :rows, :columns]
 
@@ -74,28 +74,29 @@ def _twice(inputs: int, width: int) -> nn.Sequential:
 
 
 def inputs_of(pictures: NDArray[np.generic], stills: Stills) -> Tensor:
-    """(n, 4, rows, columns) for pictures (n, rows, columns) of one film: its gray levels less the mean of the usual
-    picture, over its deviation. Black bars at the edges, as an ingested film may have them, do not count and are 0."""
-    shown = _shown(stills)
-    usual = stills.usual[shown]
+    """Stacks the network's inputs (n, 4, rows, columns) for pictures (n, rows, columns) of one film: its gray levels
+    less the mean of the usual picture, over its deviation. Black bars at the edges, as an ingested film may have them,
+    do not count and are 0."""
+    lit = _lit(stills)
+    usual = stills.usual[lit]
     middle, spread = float(usual.mean()), float(usual.std()) + _SCALE
     same = (
         np.stack([stills.usual, stills.least, stills.greatest]).astype(np.float32)[None].repeat(len(pictures), axis=0)
     )
-    both = np.concatenate([np.asarray(pictures, np.float32)[:, None], same], axis=1)
-    return torch.from_numpy((both - middle) / spread * shown)
+    channels = np.concatenate([np.asarray(pictures, np.float32)[:, None], same], axis=1)
+    return torch.from_numpy((channels - middle) / spread * lit)
 
 
-def _shown(stills: Stills) -> NDArray[np.bool_]:
-    """(rows, columns) all but rows and columns that are black all the time; everything where all of it is."""
+def _lit(stills: Stills) -> NDArray[np.bool_]:
+    """Masks (rows, columns) that are black all the time; keeps everything where all of it is."""
     brightest = stills.greatest
-    shown = np.logical_and.outer(brightest.max(axis=1) > _BLACK, brightest.max(axis=0) > _BLACK)
-    return shown if shown.any() else ~shown
+    lit = np.logical_and.outer(brightest.max(axis=1) > _BLACK, brightest.max(axis=0) > _BLACK)
+    return lit if lit.any() else ~lit
 
 
 @cache
 def shipped() -> MaskNetwork:
-    """The network that comes with the package.
+    """Loads the mask network that comes with the package.
 
     Raises:
         CorruptError: its files are not as they were written, or do not fit this code.

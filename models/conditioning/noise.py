@@ -14,10 +14,11 @@ _MEDIAN = 0.6745
 
 
 def rough(picture: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(height, width) what is left of a picture without its smooth parts."""
+    """Filters smooth parts out of a picture (height, width)."""
     return np.asarray(cv2.filter2D(picture, cv2.CV_32F, _ROUGH), dtype=np.float32)
 
 
-def deviation(left: NDArray[np.float32]) -> float:
-    """Standard deviation of a pixel's noise, from what `rough` left of pixels, by the median [gray levels]."""
-    return float(np.median(np.abs(left))) / (_MEDIAN * _LEFT)
+def deviation(rough_pixels: NDArray[np.float32]) -> float:
+    """Estimates the standard deviation of a pixel's noise from pixels filtered by `rough`, by the median [gray
+    levels]."""
+    return float(np.median(np.abs(rough_pixels))) / (_MEDIAN * _LEFT)

@@ -64,20 +64,20 @@ class Outliner:
 
     @classmethod
     def of(cls, pictures: NDArray[np.uint8]) -> Outliner | None:
-        """From pictures (n, size / 2, size / 2) as `Conditioning.show` gives them, `halved`, spread over the film; None
-        where they are fewer than ten or no upright hoist with cloth beside it is found.
+        """Finds the hoist in pictures (n, size / 2, size / 2) as `Conditioning.show` gives them, `halved`, spread over
+        the film. Returns None where they are fewer than ten or show no upright hoist with cloth beside it.
         """
         if len(pictures) < _FEWEST:
             return None
         small = pictures[:: -(-len(pictures) // SAMPLE)]
         network, stills = shipped(), Stills.of(small)
         maps = torch.cat(list(_maps(network, small[:: -(-len(small) // _LOOKED_AT)], stills)))
-        ends = [_end(one) for one in maps[:, 1:].mean(dim=0).double()]
+        ends = [_end(logits) for logits in maps[:, 1:].mean(dim=0).double()]
         if any(end is None for end in ends):
             return None
         places = np.stack([end for end in ends if end is not None])
         across, down = places[1] - places[0]
-        cloth = np.stack([_whole(one) for one in (maps[:, 0].sigmoid() > _CLOTH).numpy()])
+        cloth = np.stack([_largest_filled(mask) for mask in (maps[:, 0].sigmoid() > _CLOTH).numpy()])
         if abs(across) > _UPRIGHT * down or cloth.sum(axis=(1, 2)).mean() < _LEAST * down**2:
             return None
         usual = cloth.mean(axis=0)
@@ -87,50 +87,54 @@ class Outliner:
         return cls(stills=stills, hoist=_lowered(usual > 0.5, places, side), side=side, network=network)
 
     def masks(self, pictures: NDArray[np.uint8]) -> tuple[Masks, NDArray[np.float64]]:
-        """The cloth in pictures (n, size / 2, size / 2), `halved`, that follow one another in the film: the
-        largest part that is cloth, on its side of the hoist's line, with its holes filled; and (n,) Dice's coefficient
-        with the truth that the network expects.
+        """Segments the cloth in pictures (n, size / 2, size / 2), `halved`, that follow one another in the film: the
+        largest part that is cloth, on its side of the hoist's line, with its holes filled. Also returns Dice's
+        coefficient (n,) with the truth, as the network expects it.
 
         A picture's probabilities count a half and its neighbours' a quarter each, so that an outline does not tremble
         from picture to picture.
         """
-        shown = np.concatenate([maps[:, 0].sigmoid().numpy() for maps in _maps(self.network, pictures, self.stills)])
-        ends = np.concatenate([shown[:1], shown, shown[-1:]])
-        shown = (ends[:-2] + 2 * ends[1:-1] + ends[2:]) / 4
-        shown *= _beside(self.hoist, self.side, self.stills.usual.shape)
-        cloth = np.stack([_whole(one > _CLOTH) for one in shown])
-        both = 2 * (shown * cloth).sum(axis=(1, 2))
-        return cloth, (both / np.maximum(shown.sum(axis=(1, 2)) + cloth.sum(axis=(1, 2)), 1.0)).astype(np.float64)
+        probability = np.concatenate(
+            [maps[:, 0].sigmoid().numpy() for maps in _maps(self.network, pictures, self.stills)]
+        )
+        ends = np.concatenate([probability[:1], probability, probability[-1:]])
+        probability = (ends[:-2] + 2 * ends[1:-1] + ends[2:]) / 4
+        probability *= _side_of_hoist(self.hoist, self.side, self.stills.usual.shape)
+        cloth = np.stack([_largest_filled(picture > _CLOTH) for picture in probability])
+        intersection = 2 * (probability * cloth).sum(axis=(1, 2))
+        return cloth, (intersection / np.maximum(probability.sum(axis=(1, 2)) + cloth.sum(axis=(1, 2)), 1.0)).astype(
+            np.float64
+        )
 
 
 def _maps(network: MaskNetwork, small: NDArray[np.uint8], stills: Stills) -> Iterator[Tensor]:
-    """(n, 3, rows, columns) logits of a few pictures after another."""
+    """Yields (n, 3, rows, columns) logits, a few pictures at a time."""
     for k in range(0, len(small), _TOGETHER):
-        some = inputs_of(small[k : k + _TOGETHER], stills).contiguous(memory_format=torch.channels_last)
+        inputs = inputs_of(small[k : k + _TOGETHER], stills).contiguous(memory_format=torch.channels_last)
         with torch.inference_mode():
-            maps = network(some)
+            maps = network(inputs)
         yield maps
 
 
 def _end(logits: Tensor) -> NDArray[np.float64] | None:
-    """(2,) column and row of an end; None where its place is not certain."""
+    """Locates an end of the hoist: (2,) column and row; None where its position is not certain."""
     shares = logits.flatten().softmax(dim=0).reshape(logits.shape).numpy()
     row, column = np.unravel_index(int(shares.argmax()), shares.shape)
     rows, columns = (
         np.arange(max(0, at - _NEAR), min(length, at + _NEAR + 1))
         for at, length in zip((int(row), int(column)), shares.shape, strict=True)
     )
-    near = shares[np.ix_(rows, columns)]
-    total = float(near.sum())
+    neighbourhood = shares[np.ix_(rows, columns)]
+    total = float(neighbourhood.sum())
     if total < _CERTAIN:
         return None
-    return np.array([near.sum(axis=0) @ columns, near.sum(axis=1) @ rows]) / total + 0.5
+    return np.array([neighbourhood.sum(axis=0) @ columns, neighbourhood.sum(axis=1) @ rows]) / total + 0.5
 
 
 def _lowered(usual: Masks, places: NDArray[np.float64], side: float) -> NDArray[np.float64]:
-    """(2, 2) the hoist's ends, the upper one where the cloth's upper edge beside it meets the hoist's line: a pole's
-    top is not the cloth's corner. The network's place is kept where the cloth does not show the edge, or shows one that
-    does not lead there.
+    """Moves the hoist's upper end (2, 2) to where the cloth's upper edge beside it meets the hoist's line: a pole's top
+    is not the cloth's corner. The network's point is unchanged where the cloth does not show the edge, or shows one
+    that does not lead there.
 
     Args:
         usual: (rows, columns) where cloth is most of the time.
@@ -140,23 +144,23 @@ def _lowered(usual: Masks, places: NDArray[np.float64], side: float) -> NDArray[
     length = float(places[1, 1] - places[0, 1])
     columns = np.unique(np.floor(places[:, 0].mean() + side * np.linspace(*_BESIDE, 16) * length).astype(int))
     columns = columns[(columns >= 0) & (columns < usual.shape[1])]
-    shown = usual[:, columns]
-    if len(columns) < 3 or not shown.any(axis=0).all():
+    strip = usual[:, columns]
+    if len(columns) < 3 or not strip.any(axis=0).all():
         return places
-    row = float(np.polyval(np.polyfit(columns + 0.5, shown.argmax(axis=0), 1), places[0, 0]))
+    row = float(np.polyval(np.polyfit(columns + 0.5, strip.argmax(axis=0), 1), places[0, 0]))
     if abs(row - places[0, 1]) > _APART * length:
         return places
     return np.stack([np.array([places[0, 0], row]), places[1]])
 
 
-def _beside(hoist: NDArray[np.float64], side: float, shape: tuple[int, ...]) -> Masks:
-    """Places on the cloth's side of the line through the hoist: a pole before the cloth is not cloth."""
+def _side_of_hoist(hoist: NDArray[np.float64], side: float, shape: tuple[int, ...]) -> Masks:
+    """Masks the cloth's side of the line through the hoist: a pole before the cloth is not cloth."""
     (x, y), (across, down) = hoist[0], hoist[1] - hoist[0]
     rows, columns = np.indices(shape) + 0.5
     return side * (columns - x - (rows - y) * across / down) > 0
 
 
-def _whole(cloth: Masks) -> Masks:
+def _largest_filled(cloth: Masks) -> Masks:
     count, labels, statistics, _ = cv2.connectedComponentsWithStats(cloth.astype(np.uint8))
     if count < 2:
         return np.zeros(cloth.shape, bool)

@@ -72,7 +72,7 @@ class Region:
 def regions_of(
     pictures: NDArray[np.uint8], times: NDArray[np.float64], *, within: NDArray[np.bool_] | None = None
 ) -> tuple[Region, ...]:
-    """The regions of a film, the strongest motion first; none where nothing moves.
+    """Finds the regions of a film that move like cloth, the strongest motion first; none where nothing moves.
 
     Args:
         pictures: (n, height, width) gray, registered, in order; n of 3 or more.
@@ -81,8 +81,8 @@ def regions_of(
     """
     height, width = pictures.shape[1:]
     coarse = _shrunk(pictures)
-    near = nearby(times)
-    change = np.abs(coarse[1:][near] - coarse[:-1][near]).mean(axis=0)
+    adjacent = nearby(times)
+    change = np.abs(coarse[1:][adjacent] - coarse[:-1][adjacent]).mean(axis=0)
     change = cv2.GaussianBlur(change, (0, 0), 1.0)
     floor = float(np.median(change))
     change = np.maximum(change - floor, 0.0)
@@ -100,20 +100,20 @@ def regions_of(
         return ()
     order = [int(k) for k in np.argsort(-weights, kind="stable")[:_MOST] if weights[k] >= _NUMBERED * weights.max()]
     deviation = _deviation(pictures)
-    others = np.isin(labels, [k + 1 for k in order])
-    found = []
+    chosen = np.isin(labels, [k + 1 for k in order])
+    regions = []
     for k in order:
-        own = labels == k + 1
-        mask = _outline(own, others & ~own, deviation, within)
+        region = labels == k + 1
+        mask = _outline(region, chosen & ~region, deviation, within)
         hoist, aspect = _hoist(mask, deviation)
-        found.append(Region(mask=mask, share=float(weights[k] / weights.sum()), hoist=hoist, aspect=aspect))
-    return tuple(found)
+        regions.append(Region(mask=mask, share=float(weights[k] / weights.sum()), hoist=hoist, aspect=aspect))
+    return tuple(regions)
 
 
 def nearby(times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(n − 1,) whether each picture follows the one before so soon that they are compared."""
-    apart = np.diff(times)
-    return apart <= max(MOMENT, float(apart.min()) * 1.5)
+    """Returns (n − 1,) whether each picture follows the one before so soon that they are compared."""
+    intervals = np.diff(times)
+    return intervals <= max(MOMENT, float(intervals.min()) * 1.5)
 
 
 def _shrunk(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -125,31 +125,31 @@ def _shrunk(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def _deviation(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """(height, width) 95 % quantile of the distance from the median in time: a rare visit counts."""
-    some = pictures[:: -(-len(pictures) // _DEVIATION)]
-    middle = np.median(some, axis=0).astype(np.int16)
-    away = np.sort(np.abs(some.astype(np.int16) - middle), axis=0)
+    """Computes the 95 % quantile (height, width) of the distance from the median in time: a rare visit counts."""
+    subset = pictures[:: -(-len(pictures) // _DEVIATION)]
+    middle = np.median(subset, axis=0).astype(np.int16)
+    away = np.sort(np.abs(subset.astype(np.int16) - middle), axis=0)
     rank = min(len(away) - 1, int(np.ceil(0.95 * len(away))))
     return np.asarray(cv2.GaussianBlur(away[rank].astype(np.float32), (0, 0), 1.0), np.float32)
 
 
 def _outline(
-    own: NDArray[np.bool_],
-    others: NDArray[np.bool_],
+    region: NDArray[np.bool_],
+    other_regions: NDArray[np.bool_],
     deviation: NDArray[np.float32],
     within: NDArray[np.bool_] | None,
 ) -> NDArray[np.bool_]:
-    """All places that the cloth visits, its plain parts and the gaps between folds filled."""
-    size = _size(own)
+    """Outlines all places that the cloth visits, its plain parts and the gaps between folds filled."""
+    size = _size(region)
     noise = float(np.median(deviation))
-    moving = deviation > max(_NOISES * noise, _VISITED * float(np.quantile(deviation[own], 0.99)), 2.0)
-    near = cv2.dilate(own.astype(np.uint8), _disc(_REACH * size)).astype(bool) & ~others
+    moving = deviation > max(_NOISES * noise, _VISITED * float(np.quantile(deviation[region], 0.99)), 2.0)
+    reachable = cv2.dilate(region.astype(np.uint8), _disc(_REACH * size)).astype(bool) & ~other_regions
     if within is not None:
-        near &= within
-    moving = (moving & near) | own
-    moving = cv2.morphologyEx(moving.astype(np.uint8), cv2.MORPH_OPEN, _disc(1.5)).astype(bool) | own
+        reachable &= within
+    moving = (moving & reachable) | region
+    moving = cv2.morphologyEx(moving.astype(np.uint8), cv2.MORPH_OPEN, _disc(1.5)).astype(bool) | region
     _, labels = cv2.connectedComponents(moving.astype(np.uint8))
-    connected = np.isin(labels, np.unique(labels[own])) & moving
+    connected = np.isin(labels, np.unique(labels[region])) & moving
     pad = int(np.ceil(_CLOSED * size)) + 1
     padded = np.pad(connected.astype(np.uint8), pad)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, _disc(_CLOSED * size))[pad:-pad, pad:-pad]
@@ -160,13 +160,13 @@ def _outline(
 
 
 def _without_pole(mask: NDArray[np.uint8], size: float) -> NDArray[np.uint8]:
-    """The mask without long strips as thin as a pole that sways; a tip stays, as it is short."""
+    """Removes long strips as thin as a pole that sways from the mask; a tip stays, as it is short."""
     body = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _disc(_THIN * size))
     return mask & np.asarray(cv2.dilate(body, _disc(2 * _THIN * size)), np.uint8) if body.any() else mask
 
 
 def _hoist(mask: NDArray[np.bool_], deviation: NDArray[np.float32]) -> tuple[Side, float]:
-    """The side at which the cloth moves least, and its width over its height there."""
+    """Finds the side at which the cloth moves least, and its width over its height there."""
     rows, columns = np.nonzero(mask)
     moves = deviation[rows, columns]
     left, right, top, bottom = columns.min(), columns.max(), rows.min(), rows.max()
@@ -176,8 +176,8 @@ def _hoist(mask: NDArray[np.bool_], deviation: NDArray[np.float32]) -> tuple[Sid
     of_left, of_right, of_top, of_bottom = (float(moves[at].mean()) for at in (at_left, at_right, at_top, at_bottom))
     if min(of_left, of_right) > _ALIKE * max(of_left, of_right) and of_top < of_bottom * _ALIKE:
         return "top", float(wide / high)
-    near = columns < left + _HOIST * wide if of_left <= of_right else columns > right - _HOIST * wide
-    return ("left" if of_left <= of_right else "right"), float(wide / (np.ptp(rows[near]) + 1))
+    at_hoist = columns < left + _HOIST * wide if of_left <= of_right else columns > right - _HOIST * wide
+    return ("left" if of_left <= of_right else "right"), float(wide / (np.ptp(rows[at_hoist]) + 1))
 
 
 def _size(mask: NDArray[np.bool_]) -> float:

@@ -55,11 +55,11 @@ class Distinct:
             yield from self._next(waiting, changes)
 
     def _next(self, waiting: deque[TimedFrame], changes: deque[float]) -> Iterator[TimedFrame]:
-        own = len(changes) - len(waiting)  # place of the first that waits
-        known = [0.0 if np.isinf(change) else change for change in changes]  # the film's first frame has none
-        before, after = known[max(0, own - _ABOUT) : own], known[own + 1 : own + _ABOUT + 1]
+        index = len(changes) - len(waiting)  # place of the first that waits
+        finite = [0.0 if np.isinf(change) else change for change in changes]  # the film's first frame has none
+        before, after = finite[max(0, index - _ABOUT) : index], finite[index + 1 : index + _ABOUT + 1]
         self.frames += 1
-        if changes[own] < SHARE * min(max(before, default=0.0), max(after, default=0.0)):
+        if changes[index] < SHARE * min(max(before, default=0.0), max(after, default=0.0)):
             self.repeated += 1
             waiting.popleft()
         else:

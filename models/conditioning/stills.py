@@ -34,17 +34,20 @@ class Stills:
 
     @classmethod
     def of(cls, small: Sequence[NDArray[np.generic]] | NDArray[np.generic]) -> Stills:
-        """From pictures (n, rows, columns), of which `SAMPLE` spread over all are taken."""
-        ordered = np.sort(np.stack([np.asarray(one, np.float32) for one in small[:: -(-len(small) // SAMPLE)]]), axis=0)
-        some = min(max(1, int(_USUAL * len(ordered))), len(ordered) - 1)
-        place = (ordered[some:] - ordered[: len(ordered) - some]).argmin(axis=0)[None]
-        middle = np.take_along_axis(ordered, place + some // 2, axis=0)[0]
+        """Computes the usual, least and greatest picture from pictures (n, rows, columns), of which `SAMPLE` spread
+        over all are taken."""
+        ordered = np.sort(
+            np.stack([np.asarray(picture, np.float32) for picture in small[:: -(-len(small) // SAMPLE)]]), axis=0
+        )
+        window = min(max(1, int(_USUAL * len(ordered))), len(ordered) - 1)
+        first = (ordered[window:] - ordered[: len(ordered) - window]).argmin(axis=0)[None]
+        middle = np.take_along_axis(ordered, first + window // 2, axis=0)[0]
         low, high = np.quantile(ordered, (_LEAST, _GREATEST), axis=0)
         return cls(usual=_bytes(middle), least=_bytes(low), greatest=_bytes(high))
 
 
 def halved(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A picture averaged down by `HALVED`."""
+    """Averages a picture down by `HALVED`."""
     size = (picture.shape[1] // HALVED, picture.shape[0] // HALVED)
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
 

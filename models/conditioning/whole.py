@@ -26,7 +26,8 @@ _NEAR = 5
 def at_edges(
     registered: NDArray[np.uint8], times: NDArray[np.float64], transforms: Sequence[Transform], mask: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """(n, 4) length along each of `SIDES` at which the cloth moves, in sizes of the cloth.
+    """Measures how much of the cloth moves at the picture's edges: (n, 4) length along each of `SIDES`, in sizes of the
+    cloth.
 
     Args:
         registered: (n, height, width) gray, in order.
@@ -37,25 +38,25 @@ def at_edges(
     count, height, width = registered.shape
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     size = max(np.ptp(rows), np.ptp(columns)) + 1
-    near = cv2.dilate(mask.astype(np.uint8), np.ones((_NEAR, _NEAR), np.uint8)) > 0
+    cloth = cv2.dilate(mask.astype(np.uint8), np.ones((_NEAR, _NEAR), np.uint8)) > 0
     y, x = np.indices((height, width))
     nearest = np.argmin([x, y, width - 1 - x, height - 1 - y], axis=0)
     pictures = registered.astype(np.int16)
     inside = [_inside(transform, (height, width)) for transform in transforms]
-    found = np.zeros((count, len(SIDES)))
+    lengths = np.zeros((count, len(SIDES)))
     near_before = np.concatenate([[False], nearby(times)])
     for k in np.flatnonzero(near_before).tolist():
-        both = inside[k] & inside[k - 1]
-        ring = both & ~_eroded(both, _STRIP) & near
+        overlap = inside[k] & inside[k - 1]
+        ring = overlap & ~_eroded(overlap, _STRIP) & cloth
         moving = nearest[ring & (np.abs(pictures[k] - pictures[k - 1]) > _CHANGE)]
-        found[k] = np.bincount(moving, minlength=len(SIDES)) / _STRIP / size
+        lengths[k] = np.bincount(moving, minlength=len(SIDES)) / _STRIP / size
     for k in np.flatnonzero(~near_before)[::-1].tolist():
-        found[k] = found[min(k + 1, count - 1)]
-    return found
+        lengths[k] = lengths[min(k + 1, count - 1)]
+    return lengths
 
 
 def _inside(transform: Transform, shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Which places of the reference picture lie in a picture, without its outermost pixels."""
+    """Masks the pixels of the reference picture that lie in a picture, without its outermost pixels."""
     ones = np.ones(shape, np.uint8)
     if transform is not STILL:
         moved = cv2.warpAffine(ones, transform, shape[::-1], flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)

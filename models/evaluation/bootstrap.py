@@ -21,7 +21,7 @@ DRAWS = 2000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class ScoreEstimate:
     """A score and its interval.
 
     Attributes:
@@ -38,15 +38,15 @@ class Estimate:
     groups: int
 
     @property
-    def known(self) -> bool:
-        """Whether it has an interval."""
+    def has_interval(self) -> bool:
+        """Returns whether it has an interval."""
         return math.isfinite(self.low) and math.isfinite(self.high)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values; null for what is not known."""
+        """Returns JSON values; null for what is not known."""
         return {
             "value": self.value if math.isfinite(self.value) else None,
-            "interval": [self.low, self.high] if self.known else None,
+            "interval": [self.low, self.high] if self.has_interval else None,
             "level": LEVEL,
             "clips": self.clips,
             "groups": self.groups,
@@ -75,7 +75,9 @@ class Resamples:
             draws: how many, at least 1.
         """
         if draws < 1:
-            raise InputError(f"{draws} bootstrap draws", where="draws", fix=f"give at least 1; {DRAWS} is usual")
+            raise InputError(
+                f"{draws} bootstrap draws are too few", where="draws", fix=f"give at least 1; {DRAWS} is usual"
+            )
         labels, index = np.unique(group, return_inverse=True)
         size = len(labels)
         drawn = generator.multinomial(size, np.full(size, 1 / size), size=draws)
@@ -92,24 +94,24 @@ class Resamples:
         return self.counts @ per_group
 
     def pair_ratio(self, hits: NDArray[np.float64], of: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Σ hits / Σ of (1 + draws,), where both (G, G) are sums over pairs of groups; a pair counts as often as the
-        product of its groups' occurrences."""
+        """Computes Σ hits / Σ of (1 + draws,), where both (G, G) are sums over pairs of groups; a pair counts as often
+        as the product of its groups' occurrences."""
         upper = np.einsum("bi,bi->b", self.counts @ hits, self.counts)
         return ratio(upper, np.einsum("bi,bi->b", self.counts @ of, self.counts))
 
 
 def ratio(upper: NDArray[np.float64], lower: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quotient, NaN where the denominator is not positive."""
+    """Divides, NaN where the denominator is not positive."""
     return np.divide(upper, lower, out=np.full(np.shape(upper), np.nan), where=lower > 0)
 
 
-def estimate(values: NDArray[np.float64], *, clips: int, groups: int) -> Estimate:
-    """The interval of values (1 + draws,), of which the first is the data's.
+def estimate(values: NDArray[np.float64], *, clips: int, groups: int) -> ScoreEstimate:
+    """Returns the interval of values (1 + draws,), of which the first is the data's.
 
     Draws in which the score is undefined (none of a bin's groups occurs) are left out.
     """
     drawn = values[1:][np.isfinite(values[1:])]
     if groups < 2 or drawn.size == 0:
-        return Estimate(value=float(values[0]), low=math.nan, high=math.nan, clips=clips, groups=groups)
+        return ScoreEstimate(value=float(values[0]), low=math.nan, high=math.nan, clips=clips, groups=groups)
     low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return Estimate(value=float(values[0]), low=float(low), high=float(high), clips=clips, groups=groups)
+    return ScoreEstimate(value=float(values[0]), low=float(low), high=float(high), clips=clips, groups=groups)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from flagdata.errors import InputError
-from models.evaluation.bootstrap import Estimate, Resamples, estimate
+from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate
 from models.evaluation.predictions import Predictions
 
 LEVELS = (0.50, 0.80, 0.90)
@@ -38,18 +38,18 @@ class Cells:
 
     @classmethod
     def of(cls, truth: NDArray, draws: NDArray) -> Cells:
-        """From truth (n,) and draws (n, s)."""
+        """Ranks truth (n,) among draws (n, s)."""
         size = draws.shape[1] + 1
         below = (draws < truth[:, None]).sum(axis=1)
         up_to = (draws <= truth[:, None]).sum(axis=1)
         return cls(low=below / size, high=(up_to + 1) / size)
 
     def below(self, level: float) -> Array:
-        """Share (n,) of each cell below a level."""
+        """Computes the share (n,) of each cell below a level."""
         return np.clip((level - self.low) / (self.high - self.low), 0.0, 1.0)
 
     def central(self, level: float) -> Array:
-        """Share (n,) of each cell inside the central interval of a level."""
+        """Computes the share (n,) of each cell inside the central interval of a level."""
         return self.below((1 + level) / 2) - self.below((1 - level) / 2)
 
 
@@ -58,7 +58,7 @@ class Coverage:
     """Share of truths within intervals of a nominal level."""
 
     level: float
-    share: Estimate
+    share: ScoreEstimate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,14 +85,14 @@ class RankHistogram:
 
 
 def cells(predictions: Predictions, target: str) -> Cells:
-    """Where each clip's truth stands among the model's draws of a target.
+    """Ranks each clip's truth among the model's draws of a target.
 
     Raises:
         InputError: the model gives no draws.
     """
-    place = predictions.column(target)
-    draws = _draws(predictions)[:, :, place]
-    return Cells.of(predictions.truth[:, place].astype(np.float32), draws)
+    column = predictions.column(target)
+    draws = _draws(predictions)[:, :, column]
+    return Cells.of(predictions.truth[:, column].astype(np.float32), draws)
 
 
 def _draws(predictions: Predictions) -> NDArray[np.float32]:
@@ -106,7 +106,8 @@ def _draws(predictions: Predictions) -> NDArray[np.float32]:
 
 
 def coverage_values(predictions: Predictions, target: str, level: float, resamples: Resamples) -> Array:
-    """(1 + draws,): share of clips whose central interval of a level has the truth, in the data and in each draw."""
+    """Computes (1 + draws,): share of clips whose central interval of a level has the truth, in the data and in each
+    draw."""
     return _mean(cells(predictions, target).central(level), resamples)
 
 
@@ -118,9 +119,10 @@ def _mean(share: Array, resamples: Resamples) -> Array:
 def coverage(
     runs: tuple[Predictions, ...], target: str, resamples: Resamples, *, levels: tuple[float, ...] = LEVELS
 ) -> tuple[Coverage, ...]:
-    """Covered share of central intervals at nominal levels, mean over runs of one model, with intervals over groups."""
-    found = [cells(run, target) for run in runs]
-    return tuple(_covered(level, [of.central(level) for of in found], resamples) for level in levels)
+    """Measures the covered share of central intervals at nominal levels, mean over runs of one model, with intervals
+    over groups."""
+    ranks = [cells(run, target) for run in runs]
+    return tuple(_covered(level, [of.central(level) for of in ranks], resamples) for level in levels)
 
 
 def _covered(level: float, shares: list[Array], resamples: Resamples) -> Coverage:
@@ -129,15 +131,16 @@ def _covered(level: float, shares: list[Array], resamples: Resamples) -> Coverag
 
 
 def rank_histogram(runs: tuple[Predictions, ...], target: str, *, bins: int = BINS) -> RankHistogram:
-    """Ranks of the truths among the draws in `bins` bins, mean over runs of one model, with a calibrated model's band.
+    """Counts the ranks of the truths among the draws in `bins` bins (simulation-based calibration), mean over runs of
+    one model, with a calibrated model's band.
 
     A cell that reaches over an edge counts in both bins by its shares, so s + 1 need not be a multiple of the bins.
     """
     if bins < 2:
-        raise InputError(f"{bins} bins", where="bins", fix="give at least 2")
+        raise InputError(f"{bins} bins are too few", where="bins", fix="give at least 2")
     edges = np.linspace(0, 1, bins + 1)
-    found = [cells(run, target) for run in runs]
-    below = np.mean([[of.below(float(edge)) for edge in edges] for of in found], axis=0)
+    ranks = [cells(run, target) for run in runs]
+    below = np.mean([[of.below(float(edge)) for edge in edges] for of in ranks], axis=0)
     _, index, size = np.unique(runs[0].group, return_inverse=True, return_counts=True)
     groups = len(size)
     low, high = binom.interval(BAND, groups, 1 / bins)
@@ -156,7 +159,7 @@ def tarp(
     generator: np.random.Generator,
     levels: tuple[float, ...] = CURVE,
 ) -> tuple[Coverage, ...]:
-    """Expected coverage of all targets together by tests of accuracy with random points, mean over runs of one model.
+    """Tests expected coverage of all targets together with random points (TARP), mean over runs of one model.
 
     Each clip gets a reference point, uniform over the box of all truths and independent of the clip. The ball around it
     that reaches to the truth holds a share of the draws; if the distributions are calibrated, that share is uniform.
@@ -173,12 +176,12 @@ def tarp(
         InputError: no samples, or a target that is the same in all clips.
     """
     reference = generator.uniform(size=runs[0].truth.shape)
-    found = [_ball(run, reference) for run in runs]
-    return tuple(_covered(level, [of.below(level) for of in found], resamples) for level in levels)
+    ranks = [_ball(run, reference) for run in runs]
+    return tuple(_covered(level, [of.below(level) for of in ranks], resamples) for level in levels)
 
 
 def _ball(predictions: Predictions, reference: Array) -> Cells:
-    """The rank of the truth's distance from the reference (n, t) among the draws'."""
+    """Ranks the truth's distance from the reference (n, t) among the draws'."""
     draws = _draws(predictions).astype(np.float64)
     low, high = predictions.truth.min(axis=0), predictions.truth.max(axis=0)
     if not (high > low).all():

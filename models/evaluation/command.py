@@ -115,7 +115,7 @@ def evaluate(chosen: Evaluating) -> None:
     folder = chosen.cache if chosen.cache is not None else beside(lake_place(chosen.lake), ".inputs")
     workers = chosen.workers or os.cpu_count() or 1
     desk = _Desk(source, chosen.dataset, chosen.at, folder, workers, chosen.seed, chosen.area_weight)
-    found = desk.evaluation(
+    evaluation = desk.evaluation(
         chosen.models,
         side=chosen.side,
         reference=chosen.reference,
@@ -124,18 +124,18 @@ def evaluate(chosen: Evaluating) -> None:
         frames=chosen.frames,
         linear=chosen.linear,
     )
-    page, text, data = report.write(found, chosen.out, name=chosen.name)
+    page, text, data = report.write(evaluation, chosen.out, name=chosen.name)
     if chosen.as_json:
-        document("evaluation", as_document(found))
+        document("evaluation", as_document(evaluation))
     else:
-        echo_lines(report.markdown(found))
+        echo_lines(report.markdown(evaluation))
         for written in (page, text, data):
             say(str(written))
 
 
 def refuse_learned(catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: str, side: str) -> None:
-    """Make sure that no clip that is to be judged is of a sequence or session that a network learned from, or was
-    selected by, in whatever data set. The training side is judged as what it is.
+    """Refuses clips of a sequence or session that a network learned from, or was selected by, in whatever data set. The
+    training side is judged as what it is.
 
     Args:
         catalog: rows of the lake.
@@ -149,11 +149,11 @@ def refuse_learned(catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: s
     from flagdata.dataset.splits import ExplicitSplit
     from models.training.recipe import DataSpec
 
-    judged = {f"{side} of {dataset}": DataSpec(datasets=(dataset,)).where(side)}
+    evaluated = {f"{side} of {dataset}": DataSpec(datasets=(dataset,)).where(side)}
     for datasets in {data.datasets for data in learned}:
         data = DataSpec(datasets=datasets)
-        before = {f"{own} of {', '.join(datasets)}": data.where(own) for own in _BEFORE[side]}
-        explicit_sides(catalog, ExplicitSplit(where={**judged, **before}))
+        before = {f"{side_before} of {', '.join(datasets)}": data.where(side_before) for side_before in _BEFORE[side]}
+        explicit_sides(catalog, ExplicitSplit(where={**evaluated, **before}))
 
 
 class _Desk:
@@ -208,7 +208,7 @@ class _Desk:
         if handmade:
             evaluated += self._handmade(side)
         evaluated = evaluated or [predictions for _, predictions in learned]
-        data = f"{self._dataset}, {side} side, at {self._at or 'head'}{self._stated}"
+        data = f"{self._dataset}, {side} side, at {self._at or 'head'}{self._statement_text}"
         return scored(
             evaluated,
             data=data,
@@ -228,19 +228,19 @@ class _Desk:
 
         lake = self._source.lake
         rows = lake.rows({"kind": Kind.NETWORK}, at=self._at, columns=COLUMNS).to_pylist()
-        found: list[tuple[Artifact | None, Estimator]] = []
+        chosen: list[tuple[Artifact | None, Estimator]] = []
         for name in names:
             if name == "shipped" or name.startswith("shipped/"):
                 ours = estimator.shipped(name.partition("/")[2] or estimator.DEFAULT)
-                found.append((None, replace(ours, name=f"{ours.name}, as shipped")))  # beside its seeds, if they are
+                chosen.append((None, replace(ours, name=f"{ours.name}, as shipped")))  # beside its seeds, if they are
                 continue
             same = [row["artifact"] for row in meant(rows, name)]
             if not same:
                 raise UnknownNameError.of("network", name, sorted({row["name"] for row in rows} | {"shipped"}))
             for artifact in sorted(same):
                 row = lake.artifact(artifact, at=self._at)
-                found.append((row, estimator.load(lake.object_path(str(row.object)))))
-        return found
+                chosen.append((row, estimator.load(lake.object_path(str(row.object)))))
+        return chosen
 
     def _side(self, side: str) -> Pairs:
         from models.training.recipe import DataSpec
@@ -287,7 +287,7 @@ class _Desk:
         )
 
     def _triplets(self, chosen: Sequence[Estimator], frames: Sequence[int], side: str) -> list[FramesPoint]:
-        """Triplet accuracies of the networks on maps, by label, for clips of so many frames."""
+        """Computes triplet accuracies of the networks on maps, by label, for clips of so many frames."""
         from models.evaluation.embeddings import takes_any_length, triplet_accuracies
         from models.training.inputs import film_rows, prepare_films
 
@@ -310,7 +310,9 @@ class _Desk:
                 labels.setdefault(estimator.name, []).append(estimator)
         if frames and not labels:
             raise InputError(
-                "no network on maps", where="--frames", fix="name one, such as wave or sdn, or leave --frames out"
+                "none of the networks is one on maps",
+                where="--frames",
+                fix="name one, such as wave or sdn, or leave --frames out",
             )
         return [point for runs in labels.values() for point in triplet_accuracies(runs, frames, films, seed=self._seed)]
 
@@ -320,15 +322,15 @@ class _Desk:
         return readouts(evaluated, self._side(side).table.parameter_columns(), data=data, seed=self._seed)
 
     @property
-    def _stated(self) -> str:
-        """What is stated about all clips, in words."""
+    def _statement_text(self) -> str:
+        """Describes in words what the user stated about all clips."""
         return "".join(
-            f", area weight given as {stated.text} kg/m² (which only distributions use)"
-            for stated in self._known.values()
+            f", area weight given as {statement.text} kg/m² (which only distributions use)"
+            for statement in self._known.values()
         )
 
     def _sequences(self, data: DataSpec) -> int:
-        """How many a model of these data sets was trained on."""
+        """Counts the sequences that a model of these data sets was trained on."""
         return len(set(self._of(data, "train").table.seed.tolist()))
 
     def _handmade(self, side: str) -> list[Predictions]:
@@ -358,7 +360,7 @@ def _note(estimator: Estimator) -> str:
 
 
 def _points(learned: Sequence[tuple[int, Predictions]]) -> list[LearningPoint]:
-    """RMSE of wind against the number of sequences, of each run."""
+    """Computes the RMSE of wind against the number of sequences, of each run."""
     from flagdata.rng import stream
     from models.evaluation.bootstrap import Resamples, estimate
     from models.evaluation.curves import LearningPoint
@@ -366,10 +368,10 @@ def _points(learned: Sequence[tuple[int, Predictions]]) -> list[LearningPoint]:
     from models.evaluation.scores import SCORES
 
     points = []
-    for sequences, own in sorted(learned, key=lambda point: (point[1].label, point[0])):
-        resamples = Resamples.of(own.group, generator=stream(0, "learning"))
-        found = estimate(SCORES["rmse"].values(own, WIND, resamples), clips=len(own.group), groups=resamples.groups)
+    for sequences, run in sorted(learned, key=lambda point: (point[1].label, point[0])):
+        resamples = Resamples.of(run.group, generator=stream(0, "learning"))
+        rmse = estimate(SCORES["rmse"].values(run, WIND, resamples), clips=len(run.group), groups=resamples.groups)
         points.append(
-            LearningPoint(label=own.label, sequences=sequences, rmse=found.value, interval=(found.low, found.high))
+            LearningPoint(label=run.label, sequences=sequences, rmse=rmse.value, interval=(rmse.low, rmse.high))
         )
     return points

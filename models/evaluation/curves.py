@@ -33,14 +33,16 @@ class FramesPoint:
         where = f"triplet accuracy of {self.label!r} against frames"
         _check(where, self.frames, "frames", self.accuracy, self.interval)
         if self.accuracy > 1:
-            raise InputError(f"a triplet accuracy of {self.accuracy:g}", where=where, fix="give a share, not per cent")
+            raise InputError(
+                f"the triplet accuracy is {self.accuracy:g}, above 1", where=where, fix="give a share, not per cent"
+            )
 
 
 def _check(where: str, size: int, noun: str, value: float, interval: tuple[float, float]) -> None:
     low, high = interval
     if size < 1 or not 0 <= value < float("inf") or not low <= high:
         raise InputError(
-            f"{value:g} [{low:g}, {high:g}] at {size} {noun}",
+            f"{value:g} [{low:g}, {high:g}] at {size} {noun} is no score with its interval",
             where=where,
             fix=f"give a positive number of {noun}, a finite score and the lower end of the interval first",
         )

@@ -29,7 +29,7 @@ Films = Callable[[FrontEnd, Cropping], Prepared]
 def triplet_accuracies(
     runs: Sequence[Estimator], frames: Sequence[int], films: Films, *, seed: int
 ) -> list[FramesPoint]:
-    """Triplet accuracy of one network's embedding, given so many frames of each film from a random one on.
+    """Computes the triplet accuracy of one network's embedding, given so many frames of each film from a random one on.
 
     A network on maps takes clips of any length, as the maps' size does not depend on it. It is not trained anew: the
     result shows what its distance is worth on clips shorter or longer than the training clips.
@@ -48,22 +48,24 @@ def triplet_accuracies(
         resamples = Resamples.of(clips.sequence, generator=stream(seed, "evaluation", "bootstrap"))
         chosen = triplets.draw(clips.sequence, seed=seed)
         values = [triplets.accuracy_values(embedded(run.learners[0], clips), chosen, resamples) for run in runs]
-        found = estimate(np.mean(values, axis=0), clips=len(clips), groups=resamples.groups)
+        accuracy = estimate(np.mean(values, axis=0), clips=len(clips), groups=resamples.groups)
         points.append(
-            FramesPoint(label=first.name, frames=count, accuracy=found.value, interval=(found.low, found.high))
+            FramesPoint(label=first.name, frames=count, accuracy=accuracy.value, interval=(accuracy.low, accuracy.high))
         )
     return points
 
 
 def takes_any_length(estimator: Estimator) -> bool:
-    """Whether a network can be given clips of other lengths than those it learned from, and has an embedding."""
+    """Returns whether a network can be given clips of other lengths than those it learned from, and has an
+    embedding."""
     return estimator.front_end.maps in ("spectral-maps", "wave-maps", "flow-maps", "flow-maps-3")
 
 
 def readouts(
     predictions: Sequence[Predictions], parameters: Mapping[str, NDArray[np.float64]], *, data: str, seed: int
 ) -> list[Read]:
-    """The protocol of Bouman et al. 2013 on the embedding of each model's first run, one simulation left out at a time.
+    """Follows the protocol of Bouman et al. 2013 on the embedding of each model's first run, one simulation left out at
+    a time.
 
     Read out are the logarithms of the area weight [kg/m²] and of the stiffness, the geometric mean of the 15 bending
     coefficients [N·m].
@@ -77,9 +79,9 @@ def readouts(
     density, bending = truth(parameters, ("density", "bending_scale")).T
     quantities = {"density": density, "stiffness": 10**bending}
     reads: dict[str, Read] = {}
-    for own in predictions:
-        if own.embedding is not None and own.label not in reads:
-            generator = stream(seed, "evaluation", "readout", own.label)
-            readout = bouman(own.embedding, quantities, group=own.group, generator=generator)
-            reads[own.label] = Read(label=own.label, data=data, readout=readout)
+    for run in predictions:
+        if run.embedding is not None and run.label not in reads:
+            generator = stream(seed, "evaluation", "readout", run.label)
+            readout = bouman(run.embedding, quantities, group=run.group, generator=generator)
+            reads[run.label] = Read(label=run.label, data=data, readout=readout)
     return list(reads.values())

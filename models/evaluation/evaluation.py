@@ -18,7 +18,7 @@ from models.evaluation.curves import FramesPoint, LearningPoint
 from models.evaluation.linear import Readout
 from models.evaluation.predictions import WIND, Predictions
 from models.evaluation.scores import BinError, error_against
-from models.evaluation.tsne import Layout, layout
+from models.evaluation.tsne import TsneLayout, layout
 
 SCHEMA = "flagdata.evaluation/1"
 _LEVELS = tuple(sorted({*CURVE, *LEVELS}))
@@ -34,7 +34,7 @@ class WindError:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Calibration:
+class CalibrationCurve:
     """How far a model's distributions of one target are to be believed."""
 
     label: str
@@ -87,12 +87,12 @@ class Evaluation:
     reference: str | None
     differences: tuple[table.Difference, ...]
     wind_errors: tuple[WindError, ...]
-    calibrations: tuple[Calibration, ...]
+    calibrations: tuple[CalibrationCurve, ...]
     expected: tuple[Expected, ...]
     learning: tuple[LearningPoint, ...]
     frames: tuple[FramesPoint, ...]
     reads: tuple[Read, ...]
-    layout: Layout | None
+    layout: TsneLayout | None
     findings: tuple[Finding, ...]
 
 
@@ -108,7 +108,7 @@ def evaluate(
     reads: Sequence[Read] = (),
     tsne_of: str | None = None,
 ) -> Evaluation:
-    """Score models that were tested on the same clips.
+    """Scores models that were tested on the same clips.
 
     Args:
         predictions: of each model; several of one label are its runs with other seeds.
@@ -137,9 +137,9 @@ def evaluate(
             _warning("no-triplets", "no sequence has two clips beside another's: there is no triplet accuracy")
         )
     if resamples.groups < 20:
-        what = f"intervals rest on {resamples.groups} sequences; below 20 a percentile interval is too narrow"
-        findings.append(_warning("few-sequences", what))
-    runs = {label: [table.metric_values(own, resamples, chosen) for own in of] for label, of in models.items()}
+        text = f"intervals rest on {resamples.groups} sequences; below 20 a percentile interval is too narrow"
+        findings.append(_warning("few-sequences", text))
+    runs = {label: [table.metric_values(run, resamples, chosen) for run in of] for label, of in models.items()}
     values = {label: table.mean_values(of) for label, of in runs.items()}
     with_wind = {label: of for label, of in models.items() if WIND in of[0].targets}
     with_samples = {label: of for label, of in models.items() if of[0].samples is not None}
@@ -166,7 +166,7 @@ def evaluate(
             WindError(label=label, bins=error_against(of, WIND, resamples)) for label, of in with_wind.items()
         ),
         calibrations=tuple(
-            Calibration(
+            CalibrationCurve(
                 label=label,
                 target=target,
                 curve=coverage(of, target, resamples, levels=_LEVELS),
@@ -190,22 +190,22 @@ def evaluate(
     )
 
 
-def _warning(kind: str, what: str) -> Finding:
-    return Finding(kind=kind, severity=Severity.WARNING, what=what)
+def _warning(kind: str, text: str) -> Finding:
+    return Finding(kind=kind, severity=Severity.WARNING, what=text)
 
 
-def as_document(found: Evaluation) -> dict[str, Any]:
-    """The evaluation as JSON values with its schema tag; null for what is not known."""
+def as_document(evaluation: Evaluation) -> dict[str, Any]:
+    """Returns the evaluation as JSON values with its schema tag; null for what is not known."""
     return {
         "schema": SCHEMA,
-        "data": found.data,
-        "seed": found.seed,
-        "clips": found.clips,
-        "groups": found.groups,
-        "models": [row.as_dict() for row in found.rows],
-        "targets": [row.as_dict() for row in found.targets],
-        "reference": found.reference,
-        "differences": [one.as_dict() for one in found.differences],
+        "data": evaluation.data,
+        "seed": evaluation.seed,
+        "clips": evaluation.clips,
+        "groups": evaluation.groups,
+        "models": [row.as_dict() for row in evaluation.rows],
+        "targets": [row.as_dict() for row in evaluation.targets],
+        "reference": evaluation.reference,
+        "differences": [difference.as_dict() for difference in evaluation.differences],
         "wind_errors": [
             {
                 "label": of.label,
@@ -213,15 +213,15 @@ def as_document(found: Evaluation) -> dict[str, Any]:
                     {"low": b.low, "high": b.high, "rmse": b.rmse.as_dict(), "bias": b.bias.as_dict()} for b in of.bins
                 ],
             }
-            for of in found.wind_errors
+            for of in evaluation.wind_errors
         ],
         "calibration": [
             {"label": of.label, "target": of.target, "coverage": _curve(of.curve), "ranks": asdict(of.ranks)}
-            for of in found.calibrations
+            for of in evaluation.calibrations
         ],
-        "tarp": [{"label": of.label, "coverage": _curve(of.curve)} for of in found.expected],
-        "learning": [asdict(point) for point in found.learning],
-        "frames": [asdict(point) for point in found.frames],
+        "tarp": [{"label": of.label, "coverage": _curve(of.curve)} for of in evaluation.expected],
+        "learning": [asdict(point) for point in evaluation.learning],
+        "frames": [asdict(point) for point in evaluation.frames],
         "linear": [
             {
                 "label": of.label,
@@ -231,21 +231,21 @@ def as_document(found: Evaluation) -> dict[str, Any]:
                     target: r.as_dict() for target, r in zip(of.readout.targets, of.readout.pearson, strict=True)
                 },
             }
-            for of in found.reads
+            for of in evaluation.reads
         ],
         "t_sne": None
-        if found.layout is None
+        if evaluation.layout is None
         else {
-            "label": found.layout.label,
-            "places": found.layout.places.tolist(),
-            "wind": found.layout.wind.tolist(),
+            "label": evaluation.layout.label,
+            "places": evaluation.layout.places.tolist(),
+            "wind": evaluation.layout.wind.tolist(),
         },
         "paper": {
             "warning": paper.WARNING,
             "flagsim": [{**asdict(row), "bound": row.bound, "breaks_bound": row.breaks_bound} for row in paper.FLAGSIM],
             "triplets": [{"frames": frames, "accuracy": accuracy} for frames, accuracy in paper.TRIPLETS],
         },
-        "findings": [finding.as_dict() for finding in found.findings],
+        "findings": [finding.as_dict() for finding in evaluation.findings],
     }
 
 

@@ -44,27 +44,27 @@ class Fitted:
 
 
 def fitted(train: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars) -> Fitted:
-    """Ridge and gradient boosting, fitted on crops of the training side's films."""
+    """Fits ridge and gradient boosting on crops of the training side's films."""
     with bars(len(set(train.table.recording.tolist())), "hand-made features to fit on", "film") as advance:
-        known = prepare_films(
+        inputs = prepare_films(
             train, _FRONT_END, _CROPPING, variants=_VARIANTS, folder=cache, workers=workers, advance=advance
         )
-    x, y = _table(known, _VARIANTS), np.tile(known.truth(TARGETS), (_VARIANTS, 1))
-    group = np.tile(known.sequence, _VARIANTS)
+    x, y = _table(inputs, _VARIANTS), np.tile(inputs.truth(TARGETS), (_VARIANTS, 1))
+    group = np.tile(inputs.sequence, _VARIANTS)
     return Fitted(
         ridge=fit_ridge(x, y, group=group), boosting=fit_boosting(x, y, seed=child_seed(seed, "boosting") % 2**32)
     )
 
 
-def predictions(train: Pairs, judged: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars) -> list[Predictions]:
-    """What both say of the clips of another side."""
+def predictions(train: Pairs, pairs: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars) -> list[Predictions]:
+    """Predicts the targets of another side's clips by both models."""
     models = fitted(train, cache=cache, workers=workers, seed=seed, bars=bars)
     ridge, boosting = models.ridge, models.boosting
-    with bars(len(judged), "hand-made features to judge", "clip") as advance:
-        asked = prepare_clips(judged, _FRONT_END, _CROPPING, folder=cache, workers=workers, advance=advance)
-    wanted, truth = _table(asked, 1), asked.truth(TARGETS)
-    spent = milliseconds(lambda clip: _features(clip[0]), judged)
-    common = {"targets": TARGETS, "truth": truth, "group": asked.sequence, "embedding": None}
+    with bars(len(pairs), "hand-made features to judge", "clip") as advance:
+        inputs = prepare_clips(pairs, _FRONT_END, _CROPPING, folder=cache, workers=workers, advance=advance)
+    wanted, truth = _table(inputs, 1), inputs.truth(TARGETS)
+    spent = milliseconds(lambda clip: _features(clip[0]), pairs)
+    common = {"targets": TARGETS, "truth": truth, "group": inputs.sequence, "embedding": None}
     note = f"{len(FEATURES)} hand-made features, {_VARIANTS} crops of each film"
     return [
         Predictions(
@@ -89,7 +89,7 @@ def predictions(train: Pairs, judged: Pairs, *, cache: Path, workers: int, seed:
 
 
 def _features(film: NDArray[np.uint8]) -> Tensor:
-    """(1, feature) of a clip."""
+    """Computes (1, feature) of a clip."""
     cut = _CROPPING.cut(film, _CROPPING.whole((film.shape[0], film.shape[1], film.shape[2])))
     return features(cut[None].float(), rate=_FRONT_END.rate)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding
-from models.evaluation.bootstrap import Estimate, Resamples, estimate
+from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate
 from models.evaluation.scores import SCORES
 
 COMPONENTS = 50
@@ -38,7 +38,7 @@ class Readout:
     targets: tuple[str, ...]
     truth: Array
     predicted: Array
-    pearson: tuple[Estimate, ...]
+    pearson: tuple[ScoreEstimate, ...]
     components: int
     findings: tuple[Finding, ...]
 
@@ -51,7 +51,8 @@ def bouman(
     generator: np.random.Generator,
     components: int = COMPONENTS,
 ) -> Readout:
-    """The protocol on logarithms of positive quantities, usually stiffness and density.
+    """Reads quantities out of an embedding by the protocol on logarithms of positive quantities, usually stiffness and
+    density.
 
     Args:
         embedding: (n, d).
@@ -77,8 +78,8 @@ def bouman(
                 f"{name} is the same in all clips", where="the quantities", fix="a correlation needs cloths that differ"
             )
     truth = np.log(np.column_stack(list(quantities.values())))
-    kept, findings = _admissible(embedding, group, components)
-    predicted = leave_one_group_out(embedding, truth, group=group, components=kept)
+    used, findings = _admissible(embedding, group, components)
+    predicted = leave_one_group_out(embedding, truth, group=group, components=used)
     resamples = Resamples.of(group, generator=generator)
     pearson = tuple(
         estimate(
@@ -93,7 +94,7 @@ def bouman(
         truth=truth,
         predicted=predicted,
         pearson=pearson,
-        components=kept,
+        components=used,
         findings=findings,
     )
 
@@ -101,7 +102,8 @@ def bouman(
 def _admissible(
     embedding: NDArray[np.floating], group: NDArray[np.int64], components: int
 ) -> tuple[int, tuple[Finding, ...]]:
-    """At most three fifths of a fold's degrees of freedom, which admits the paper's 50 components of 90 clips."""
+    """Limits components to three fifths of a fold's degrees of freedom, which admits the paper's 50 components of 90
+    clips."""
     clips, dimension = embedding.shape
     size = np.unique(group, return_counts=True)[1]
     if clips < 4 or len(size) < 3:
@@ -111,20 +113,20 @@ def _admissible(
             fix="give at least four clips and three groups",
         )
     if components < 1:
-        raise InputError(f"{components} components", where="components", fix="give at least 1")
+        raise InputError(f"{components} components are too few", where="components", fix="give at least 1")
     training = clips - int(size.max())
     most = max(1, min(dimension, 3 * (training - 1) // 5))
     if components <= most:
         return components, ()
     reason = f"the embedding has {dimension} dimensions" if most == dimension else f"{training} clips train a fold"
-    what = f"{most} principal components are kept, not {components}: {reason}"
-    return most, (Finding.of("fewer-components", what, value=float(most)),)
+    text = f"{most} principal components are kept, not {components}: {reason}"
+    return most, (Finding.of("fewer-components", text, value=float(most)),)
 
 
 def leave_one_group_out(
     embedding: NDArray[np.floating], truth: Array, *, group: NDArray[np.int64], components: int
 ) -> Array:
-    """Predictions (n, t) for each group by principal component regression on all others.
+    """Predicts (n, t) for each group by principal component regression on all others.
 
     PCA and regression are both fitted without the group. The other groups' scatter and cross moments are the whole's
     less the group's own (a closed form, exact), so a fold costs one eigenvalue problem of min(n - 1, d) rows.
@@ -137,23 +139,23 @@ def leave_one_group_out(
         components: of the PCA; directions without variance in a fold are not used.
     """
     centred = embedding.astype(np.float64) - embedding.mean(axis=0, dtype=np.float64)
-    left, singular, _ = np.linalg.svd(centred, full_matrices=False)
+    coordinates, singular, _ = np.linalg.svd(centred, full_matrices=False)
     rank = max(1, int((singular > singular[0] * 1e-10).sum())) if singular.size else 0
-    points = left[:, :rank] * singular[:rank]
+    points = coordinates[:, :rank] * singular[:rank]
     offset = truth.mean(axis=0)
     values = truth - offset
     scatter, cross = points.T @ points, points.T @ values
     predicted = np.empty_like(truth)
     for label in np.unique(group):
         inside = group == label
-        own, others = points[inside], len(points) - int(inside.sum())
-        mean, level = -own.sum(axis=0) / others, -values[inside].sum(axis=0) / others
-        fold = scatter - own.T @ own - others * np.outer(mean, mean)
-        moments = cross - own.T @ values[inside] - others * np.outer(mean, level)
+        left_out, count = points[inside], len(points) - int(inside.sum())
+        mean, level = -left_out.sum(axis=0) / count, -values[inside].sum(axis=0) / count
+        fold = scatter - left_out.T @ left_out - count * np.outer(mean, mean)
+        moments = cross - left_out.T @ values[inside] - count * np.outer(mean, level)
         variance, directions = np.linalg.eigh(fold)
         used = slice(max(0, rank - components), rank)
         enough = variance[used] > variance[-1] * 1e-10
         axes = directions[:, used][:, enough]
         slope = (axes.T @ moments) / variance[used][enough][:, None]
-        predicted[inside] = offset + level + (own - mean) @ axes @ slope
+        predicted[inside] = offset + level + (left_out - mean) @ axes @ slope
     return predicted

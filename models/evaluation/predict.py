@@ -38,7 +38,7 @@ def predict(
     fitted_on: Prepared | None = None,
     known: Mapping[str, Stated] | None = None,
 ) -> Predictions:
-    """Predictions of a model for prepared clips.
+    """Predicts the targets of prepared clips by a model.
 
     Args:
         note: what tables say beside the model; clips whose truth lies beyond the model's ranges are added to it.
@@ -66,7 +66,7 @@ def predict(
         samples=samples,
         embedding=embedding,
         group=prepared.sequence,
-        parameters=sum(w.numel() for one in estimator.learners for w in one.network.parameters()),
+        parameters=sum(w.numel() for member in estimator.learners for w in member.network.parameters()),
         milliseconds=milliseconds,
         note=note,
     )
@@ -80,11 +80,13 @@ def _predicted(
     for first in range(0, len(prepared), _TOGETHER):
         inputs = _batch(prepared, first).to(estimator.device)
         if learner.objective is Loss.POSTERIOR:
-            given = [Known.everywhere(name, stated, count=len(inputs)) for name, stated in (known or {}).items()]
-            found = estimator.estimate(inputs, seed=child_seed(seed, "clips", first), draws=DRAWS, known=given)
-            draws.append(found.draws)
-            means.append(found.mean)
-            embeddings.append(found.summary)
+            statements = [
+                Known.everywhere(name, statement, count=len(inputs)) for name, statement in (known or {}).items()
+            ]
+            estimates = estimator.estimate(inputs, seed=child_seed(seed, "clips", first), draws=DRAWS, known=statements)
+            draws.append(estimates.draws)
+            means.append(estimates.mean)
+            embeddings.append(estimates.summary)
             continue
         with torch.no_grad():
             embedding = learner.network(inputs)
@@ -95,7 +97,7 @@ def _predicted(
 
 @torch.no_grad()
 def embedded(learner: Learner, prepared: Prepared) -> np.ndarray:
-    """(n, dimension) float32 embeddings of the first variant of each entry."""
+    """Computes (n, dimension) float32 embeddings of the first variant of each entry."""
     device = next(learner.parameters()).device
     parts = [
         learner.network(_batch(prepared, first).to(device)).float().cpu().numpy()
@@ -107,13 +109,13 @@ def embedded(learner: Learner, prepared: Prepared) -> np.ndarray:
 def _read(
     embedding: np.ndarray, prepared: Prepared, fitted_on: Prepared, learner: Learner, targets: tuple[str, ...]
 ) -> np.ndarray:
-    """(n, target): ridge regression on the embeddings of `fitted_on`."""
-    known = embedded(learner, fitted_on).astype(np.float64)
+    """Predicts (n, target) by ridge regression on the embeddings of `fitted_on`."""
+    fitted = embedded(learner, fitted_on).astype(np.float64)
     truth = fitted_on.truth(targets)
-    centre, level = known.mean(axis=0), truth.mean(axis=0)
-    gram = (known - centre).T @ (known - centre)
+    centre, level = fitted.mean(axis=0), truth.mean(axis=0)
+    gram = (fitted - centre).T @ (fitted - centre)
     gram += _RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
-    weights = np.linalg.solve(gram, (known - centre).T @ (truth - level))
+    weights = np.linalg.solve(gram, (fitted - centre).T @ (truth - level))
     return (embedding.astype(np.float64) - centre) @ weights + level
 
 
@@ -135,16 +137,16 @@ def time_a_clip(estimator: Estimator, pairs: Pairs) -> float:
 
 
 def milliseconds(work: Callable[[NDArray[np.uint8]], object], pairs: Pairs) -> float:
-    """What one clip (1, frames, height, width) costs on one core: the median of some, decoded before [ms]."""
+    """Times what one clip (1, frames, height, width) costs on one core: the median of some, decoded before [ms]."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     clips = [pairs[index].clip.numpy() for index in range(min(_TIMED, len(pairs)))]
-    found = []
+    times = []
     try:
         for clip in clips:
             begun = time.perf_counter()
             work(clip)
-            found.append(time.perf_counter() - begun)
+            times.append(time.perf_counter() - begun)
     finally:
         torch.set_num_threads(threads)
-    return 1e3 * float(np.median(found))
+    return 1e3 * float(np.median(times))

@@ -74,7 +74,7 @@ class Predictions:
                 raise InputError("the embedding has no dimension", where=where, fix="give None for a model without")
         if self.parameters < 0 or not math.isfinite(self.milliseconds) or self.milliseconds < 0:
             raise InputError(
-                f"{self.parameters} parameters and {self.milliseconds} ms a clip",
+                f"the model has {self.parameters} parameters and takes {self.milliseconds} ms a clip",
                 where=where,
                 fix="give what was counted",
             )
@@ -105,7 +105,7 @@ class Predictions:
         return len(np.unique(self.group))
 
     def column(self, target: str) -> int:
-        """Place of a target in `truth`, `mean` and `samples`.
+        """Returns the column of a target in `truth`, `mean` and `samples`.
 
         Raises:
             UnknownNameError: the model does not give it.
@@ -116,7 +116,7 @@ class Predictions:
 
 
 def save(predictions: Predictions, path: Path) -> None:
-    """Write the predictions as a compressed .npz of plain arrays to exactly `path`."""
+    """Writes the predictions as a compressed .npz of plain arrays to exactly `path`."""
     content: dict[str, NDArray] = {
         "schema": np.array(SCHEMA),
         "label": np.array(predictions.label),
@@ -137,22 +137,22 @@ def save(predictions: Predictions, path: Path) -> None:
 
 
 def load(path: Path) -> Predictions:
-    """Read what `save` wrote.
+    """Reads what `save` wrote.
 
     Raises:
-        NotFoundError: no such file.
+        NotFoundError: the file does not exist.
         InputError: it is truncated, is no predictions file or holds other types; pickled objects are refused.
     """
     fix = "write it with models.evaluation.predictions.save, or copy it again"
     try:
         content = read_arrays(path, what="a file of predictions", fix=fix)
     except FileNotFoundError:
-        raise NotFoundError("no such file", where=str(path), fix="check the path") from None
+        raise NotFoundError("the file does not exist", where=str(path), fix="check the path") from None
     except CorruptError as cause:
         raise InputError(f"cannot be read as predictions: {cause.what}", where=str(path), fix=fix) from None
     tag = str(content.pop("schema", "none"))
     if tag != SCHEMA:
-        raise InputError(f"schema {tag!r}, not {SCHEMA!r}", where=str(path), fix=fix)
+        raise InputError(f"the schema is {tag!r}, not {SCHEMA!r}", where=str(path), fix=fix)
     try:
         return Predictions(
             label=str(content["label"]),

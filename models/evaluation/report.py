@@ -30,14 +30,14 @@ from models.evaluation import paper, table
 from models.evaluation.bootstrap import LEVEL
 from models.evaluation.calibration import BAND, CURVE, LEVELS, Coverage
 from models.evaluation.curves import FramesPoint, LearningPoint
-from models.evaluation.evaluation import Calibration, Evaluation, Expected, WindError, as_document
-from models.evaluation.tsne import Layout
+from models.evaluation.evaluation import CalibrationCurve, Evaluation, Expected, WindError, as_document
+from models.evaluation.tsne import TsneLayout
 
 _INK, _QUIET, _RULE = "#1c2326", "#56646b", "#d5dbde"
 _SERIES = ("#1f6f9c", "#b4531a", "#7a4a9a", "#2f8068", "#97700d", "#a8402d", "#5b6fb8", "#a84a7e", "#58702a", "#6b5848")
 _MARKERS = "osD^vPX<>h"
 _THEME = {_INK: "--ink", _QUIET: "--quiet", _RULE: "--rule"} | {
-    colour: f"--series-{place}" for place, colour in enumerate(_SERIES)
+    colour: f"--series-{number}" for number, colour in enumerate(_SERIES)
 }
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -63,7 +63,7 @@ _WIDTH = 9.2  # inches, 72 units each
 
 
 def _svg(figure: Figure, name: str) -> Markup:
-    """The figure as an inline element whose ids start with `name`, so that several fit into one page."""
+    """Renders the figure as an inline element whose ids start with `name`, so that several fit into one page."""
     target = io.StringIO()
     figure.savefig(target, format="svg", transparent=True, metadata={"Date": None})
     text = target.getvalue()
@@ -94,7 +94,7 @@ class Look:
 
 
 def _look(labels: Iterable[str]) -> dict[str, Look]:
-    """A colour and a marker for each label."""
+    """Assigns a colour and a marker to each label."""
     return {
         label: Look(colour=_SERIES[i % len(_SERIES)], marker=_MARKERS[(i + i // len(_SERIES)) % len(_MARKERS)])
         for i, label in enumerate(dict.fromkeys(labels))
@@ -115,39 +115,42 @@ def _interval_line(
 
 
 def error_against_wind(errors: Sequence[WindError]) -> Markup:
-    """RMSE and bias over the true wind, one line a model, with intervals over sequences."""
+    """Draws RMSE and bias over the true wind, one line a model, with intervals over sequences."""
     with mpl.rc_context(_STYLE):
-        figure, (left, right) = _panels(2, 3.6)
-        look = _look(one.label for one in errors)
-        for one in errors:
-            middle = [(b.low + b.high) / 2 for b in one.bins]
-            for axes, scores in ((left, [b.rmse for b in one.bins]), (right, [b.bias for b in one.bins])):
+        figure, (rmse_panel, bias_panel) = _panels(2, 3.6)
+        look = _look(model.label for model in errors)
+        for model in errors:
+            middle = [(b.low + b.high) / 2 for b in model.bins]
+            for axes, scores in (
+                (rmse_panel, [b.rmse for b in model.bins]),
+                (bias_panel, [b.bias for b in model.bins]),
+            ):
                 ends = [(s.low, s.high) for s in scores]
-                _interval_line(axes, middle, [s.value for s in scores], ends, one.label, look[one.label])
-        left.set(xlabel="true wind speed [m/s]", ylabel="RMSE [m/s]", ylim=(0, None))
-        right.axhline(0, color=_QUIET, linewidth=0.8)
-        right.set(xlabel="true wind speed [m/s]", ylabel="bias [m/s]")
-        _legend(figure, left)
+                _interval_line(axes, middle, [s.value for s in scores], ends, model.label, look[model.label])
+        rmse_panel.set(xlabel="true wind speed [m/s]", ylabel="RMSE [m/s]", ylim=(0, None))
+        bias_panel.axhline(0, color=_QUIET, linewidth=0.8)
+        bias_panel.set(xlabel="true wind speed [m/s]", ylabel="bias [m/s]")
+        _legend(figure, rmse_panel)
         return _svg(figure, "wind")
 
 
-def calibration(curves: Sequence[Calibration], expected: Sequence[Expected]) -> Markup:
-    """Covered over nominal: a panel a target, and one for all targets together."""
-    targets = list(dict.fromkeys(one.target for one in curves))
-    look = _look(one.label for one in curves)
+def calibration(curves: Sequence[CalibrationCurve], expected: Sequence[Expected]) -> Markup:
+    """Draws covered over nominal shares: a panel a target, and one for all targets together."""
+    targets = list(dict.fromkeys(curve.target for curve in curves))
+    look = _look(curve.label for curve in curves)
     with mpl.rc_context(_STYLE):
         columns = min(3, len(targets) + 1)
         lines = -(-(len(targets) + 1) // columns)
         figure = Figure(figsize=(_WIDTH, 3.1 * lines + 0.4), layout="constrained")
         panels = list(figure.subplots(lines, columns, squeeze=False).flat)
         for axes, target in zip(panels, targets, strict=False):
-            for one in curves:
-                if one.target == target:
-                    _coverage(axes, one.label, one.curve, look[one.label])
+            for curve in curves:
+                if curve.target == target:
+                    _coverage(axes, curve.label, curve.curve, look[curve.label])
             axes.set(title=target, xlabel="nominal level of the central interval", ylabel="share covered")
         joint = panels[len(targets)]
-        for one in expected:
-            _coverage(joint, one.label, one.curve, look[one.label])
+        for curve in expected:
+            _coverage(joint, curve.label, curve.curve, look[curve.label])
         joint.set(title="all targets together (TARP)", xlabel="nominal level", ylabel="expected coverage")
         for axes in panels[: len(targets) + 1]:
             axes.plot([0, 1], [0, 1], color=_QUIET, linewidth=0.9, linestyle="--")
@@ -175,24 +178,24 @@ def _coverage(axes: Axes, label: str, curve: tuple[Coverage, ...], look: Look) -
     )
 
 
-def ranks(curves: Sequence[Calibration]) -> Markup:
-    """Rank histograms, a row a model, a panel a target, with the band of a calibrated model."""
-    labels = list(dict.fromkeys(one.label for one in curves))
-    columns = max(sum(one.label == label for one in curves) for label in labels)
+def ranks(curves: Sequence[CalibrationCurve]) -> Markup:
+    """Draws rank histograms, a row a model, a panel a target, with the band of a calibrated model."""
+    labels = list(dict.fromkeys(curve.label for curve in curves))
+    columns = max(sum(curve.label == label for curve in curves) for label in labels)
     look = _look(labels)
-    top = 1.15 * max(max(*one.ranks.share, one.ranks.high) for one in curves)
+    top = 1.15 * max(max(*curve.ranks.share, curve.ranks.high) for curve in curves)
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(_WIDTH, 1.8 * len(labels) + 0.3), layout="constrained")
         grid = figure.subplots(len(labels), columns, squeeze=False, sharey=True)
         for line, label in zip(grid, labels, strict=True):
-            own = [one for one in curves if one.label == label]
-            for axes, one in zip(line, own, strict=False):
-                edges = np.linspace(0, 1, len(one.ranks.share) + 1)
-                axes.axhspan(one.ranks.low, one.ranks.high, color=_QUIET, alpha=0.18, linewidth=0)
-                axes.stairs(one.ranks.share, edges, color=look[label].colour, linewidth=1.4)
-                axes.set(title=f"{label}: {one.target}", xlim=(0, 1), ylim=(0, top))
+            of_model = [curve for curve in curves if curve.label == label]
+            for axes, curve in zip(line, of_model, strict=False):
+                edges = np.linspace(0, 1, len(curve.ranks.share) + 1)
+                axes.axhspan(curve.ranks.low, curve.ranks.high, color=_QUIET, alpha=0.18, linewidth=0)
+                axes.stairs(curve.ranks.share, edges, color=look[label].colour, linewidth=1.4)
+                axes.set(title=f"{label}: {curve.target}", xlim=(0, 1), ylim=(0, top))
             line[0].set_ylabel("share of clips")
-            for axes in line[len(own) :]:
+            for axes in line[len(of_model) :]:
                 axes.set_axis_off()
         for axes in grid[-1]:
             axes.set_xlabel("rank of the truth / (draws + 1)")
@@ -200,14 +203,14 @@ def ranks(curves: Sequence[Calibration]) -> Markup:
 
 
 def learning(points: Sequence[LearningPoint]) -> Markup:
-    """RMSE over the number of sequences trained on, logarithmic both."""
+    """Draws RMSE over the number of sequences trained on, logarithmic both."""
     with mpl.rc_context(_STYLE):
         figure, (axes,) = _panels(1, 3.6)
         look = _look(point.label for point in points)
         for label in look:
-            own = sorted((point for point in points if point.label == label), key=lambda point: point.sequences)
-            ends = [point.interval for point in own]
-            _interval_line(axes, [p.sequences for p in own], [p.rmse for p in own], ends, label, look[label])
+            of_label = sorted((point for point in points if point.label == label), key=lambda point: point.sequences)
+            ends = [point.interval for point in of_label]
+            _interval_line(axes, [p.sequences for p in of_label], [p.rmse for p in of_label], ends, label, look[label])
         axes.set(xscale="log", yscale="log", xlabel="sequences trained on", ylabel="wind RMSE [m/s]")
         for axis, ticks in (
             (axes.xaxis, sorted({point.sequences for point in points})),
@@ -220,7 +223,7 @@ def learning(points: Sequence[LearningPoint]) -> Markup:
 
 
 def _round_ticks(points: Sequence[LearningPoint]) -> list[float]:
-    """1, 2, 3 and 5 times powers of ten that span the intervals."""
+    """Chooses ticks: 1, 2, 3 and 5 times powers of ten that span the intervals."""
     low, high = min(p.interval[0] for p in points), max(p.interval[1] for p in points)
     all_ticks = [digit * 10.0**power for power in range(-3, 2) for digit in (1, 2, 3, 5)]
     inside = [tick for tick in all_ticks if low / 1.6 <= tick <= high * 1.6]
@@ -228,14 +231,14 @@ def _round_ticks(points: Sequence[LearningPoint]) -> list[float]:
 
 
 def frames(points: Sequence[FramesPoint]) -> Markup:
-    """Triplet accuracy over the frames a model sees, beside the paper's."""
+    """Draws triplet accuracy over the frames a model sees, beside the paper's."""
     with mpl.rc_context(_STYLE):
         figure, (axes,) = _panels(1, 3.2)
         look = _look(point.label for point in points)
         for label in look:
-            own = sorted((point for point in points if point.label == label), key=lambda point: point.frames)
-            ends = [point.interval for point in own]
-            _interval_line(axes, [p.frames for p in own], [p.accuracy for p in own], ends, label, look[label])
+            of_label = sorted((point for point in points if point.label == label), key=lambda point: point.frames)
+            ends = [point.interval for point in of_label]
+            _interval_line(axes, [p.frames for p in of_label], [p.accuracy for p in of_label], ends, label, look[label])
         size, accuracy = zip(*paper.TRIPLETS, strict=True)
         axes.plot(size, accuracy, color=_QUIET, linestyle="--", linewidth=1.1, label="SDN, quoted from the paper")
         axes.set(xlabel="frames", ylabel="triplet accuracy", ylim=(None, 1))
@@ -243,8 +246,8 @@ def frames(points: Sequence[FramesPoint]) -> Markup:
         return _svg(figure, "frames")
 
 
-def t_sne(layout: Layout) -> Markup:
-    """The embedding in the plane with the true wind as colour."""
+def t_sne(layout: TsneLayout) -> Markup:
+    """Draws the embedding in the plane with the true wind as colour."""
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(6.2, 5.0), layout="constrained", dpi=150)
         axes = figure.subplots()
@@ -259,7 +262,7 @@ _COMMAND = "evaluate"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class TableLine:
     """A row of a table for people: cells as lines, the value first; `run` marks one run of the model above."""
 
     cells: tuple[tuple[str, ...], ...]
@@ -271,7 +274,7 @@ class Grid:
     """A table for people."""
 
     head: tuple[str, ...]
-    body: tuple[Line, ...]
+    body: tuple[TableLine, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -284,21 +287,23 @@ class Picture:
     square: bool = False
 
 
-def write(found: Evaluation, folder: Path, *, name: str = "evaluation") -> tuple[Path, Path, Path]:
-    """Write NAME.html, NAME.json and NAME.md into `folder`, which is made; returns their paths.
+def write(evaluation: Evaluation, folder: Path, *, name: str = "evaluation") -> tuple[Path, Path, Path]:
+    """Writes NAME.html, NAME.json and NAME.md into `folder`, which is made; returns their paths.
 
     Raises:
         ConflictError: one of them is there and was not written by an evaluation, or was changed since.
     """
-    document = json.dumps(as_document(found), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    document = json.dumps(as_document(evaluation), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
     names = _names(name)
-    write_files(folder, dict(zip(names, (page(found), document, markdown(found)), strict=True)), command=_COMMAND)
-    page_path, document_path, text_path = (folder / each for each in names)
+    write_files(
+        folder, dict(zip(names, (page(evaluation), document, markdown(evaluation)), strict=True)), command=_COMMAND
+    )
+    page_path, document_path, text_path = (folder / file for file in names)
     return page_path, document_path, text_path
 
 
 def check(folder: Path, *, name: str) -> None:
-    """Refuse a folder in which `write` cannot write, before anything is evaluated; raises as `write`.
+    """Refuses a folder in which `write` cannot write, before anything is evaluated; raises as `write`.
 
     Raises:
         UsageError: a name that is more than the name of a file.
@@ -312,68 +317,75 @@ def _names(name: str) -> tuple[str, str, str]:
     return f"{name}.html", f"{name}.json", f"{name}.md"
 
 
-def page(found: Evaluation) -> str:
-    """The page, HTML."""
+def page(evaluation: Evaluation) -> str:
+    """Renders the page, HTML."""
     values = {
-        "found": found,
-        "counts": _counts(found),
+        "found": evaluation,
+        "counts": _counts(evaluation),
         "legend": table.LEGEND,
         "warning": paper.WARNING,
-        "tables": {title: make(found) for title, make in _TABLES.items()},
-        "figures": _pictures(found),
+        "tables": {title: make(evaluation) for title, make in _TABLES.items()},
+        "figures": _pictures(evaluation),
         "version": f"flagdata {code_version()}",
     }
     return render("models.evaluation", "page.html.j2", values)
 
 
-def markdown(found: Evaluation) -> str:
-    """The tables and their warnings as Markdown, names of models and data sets as text; the charts are the page's."""
-    parts = [f"# Models compared on {plain(found.data)}", _counts(found)]
+def markdown(evaluation: Evaluation) -> str:
+    """Renders the tables and their warnings as Markdown, names of models and data sets as text; the charts are the
+    page's."""
+    parts = [f"# Models compared on {plain(evaluation.data)}", _counts(evaluation)]
     parts += [
         f"**Warning:** {plain(f'{finding.where}: {finding.what}' if finding.where else finding.what)}."
-        for finding in found.findings
+        for finding in evaluation.findings
     ]
-    parts += [_grid(_models(found)), table.LEGEND, "## What the paper printed", paper.WARNING, _grid(_paper(found))]
-    for title, made in (
-        (f"## Against {plain(found.reference or '')}, pair by pair", _differences(found)),
-        ("## Every target", _targets(found)),
-        ("## Linear readout of the embedding", _linear(found)),
-        ("## Learning curve", _learning(found)),
-        ("## Triplet accuracy against frames", _frames(found)),
+    parts += [
+        _grid(_models(evaluation)),
+        table.LEGEND,
+        "## What the paper printed",
+        paper.WARNING,
+        _grid(_paper(evaluation)),
+    ]
+    for title, grid in (
+        (f"## Against {plain(evaluation.reference or '')}, pair by pair", _differences(evaluation)),
+        ("## Every target", _targets(evaluation)),
+        ("## Linear readout of the embedding", _linear(evaluation)),
+        ("## Learning curve", _learning(evaluation)),
+        ("## Triplet accuracy against frames", _frames(evaluation)),
     ):
-        if made is not None:
-            parts += [title, _grid(made)]
-    parts.append(f"flagdata {code_version()}, seed {found.seed}.")
+        if grid is not None:
+            parts += [title, _grid(grid)]
+    parts.append(f"flagdata {code_version()}, seed {evaluation.seed}.")
     return "\n\n".join(parts) + "\n"
 
 
-def _grid(made: Grid) -> str:
-    return markdown_table(made.head, (line.cells for line in made.body))
+def _grid(grid: Grid) -> str:
+    return markdown_table(grid.head, (line.cells for line in grid.body))
 
 
-def _counts(found: Evaluation) -> str:
+def _counts(evaluation: Evaluation) -> str:
     return (
-        f"{found.clips:,} clips of {found.groups:,} sequences that no model was trained on; intervals are of "
+        f"{evaluation.clips:,} clips of {evaluation.groups:,} sequences that no model was trained on; intervals are of "
         f"{100 * LEVEL:.0f} % over sequences."
     )
 
 
-def _models(found: Evaluation) -> Grid:
+def _models(evaluation: Evaluation) -> Grid:
     return Grid(
         head=tuple(column.heading for column in table.COLUMNS),
         body=tuple(
-            Line(cells=tuple(column.cell(row) for column in table.COLUMNS), run=row.run is not None)
-            for row in found.rows
+            TableLine(cells=tuple(column.cell(row) for column in table.COLUMNS), run=row.run is not None)
+            for row in evaluation.rows
         ),
     )
 
 
-def _paper(found: Evaluation) -> Grid:
-    del found
+def _paper(evaluation: Evaluation) -> Grid:
+    del evaluation
     return Grid(
         head=("model, quoted", "input", "RMSE", "bound", "Acc@0.5", ""),
         body=tuple(
-            Line(
+            TableLine(
                 cells=(
                     (row.model,),
                     (row.input_size,),
@@ -403,12 +415,12 @@ _SCORES = {
 }
 
 
-def _differences(found: Evaluation) -> Grid | None:
-    if not found.differences:
+def _differences(evaluation: Evaluation) -> Grid | None:
+    if not evaluation.differences:
         return None
     by_model = {
-        label: {one.metric: one for one in found.differences if one.label == label}
-        for label in dict.fromkeys(one.label for one in found.differences)
+        label: {difference.metric: difference for difference in evaluation.differences if difference.label == label}
+        for label in dict.fromkeys(difference.label for difference in evaluation.differences)
     }
     metrics = [name for name in _METRICS if any(name in of for of in by_model.values())]
 
@@ -420,54 +432,60 @@ def _differences(found: Evaluation) -> Grid | None:
 
     return Grid(
         head=("model", *(_METRICS[name] for name in metrics)),
-        body=tuple(Line(cells=((label,), *(cell(of, name) for name in metrics))) for label, of in by_model.items()),
+        body=tuple(
+            TableLine(cells=((label,), *(cell(of, name) for name in metrics))) for label, of in by_model.items()
+        ),
     )
 
 
-def _targets(found: Evaluation) -> Grid:
-    ordered = sorted(found.targets, key=lambda row: [r.target for r in found.targets].index(row.target))
+def _targets(evaluation: Evaluation) -> Grid:
+    ordered = sorted(evaluation.targets, key=lambda row: [r.target for r in evaluation.targets].index(row.target))
 
     def cells(row: table.TargetRow) -> tuple[tuple[str, ...], ...]:
-        own = table.digits(row.scores["rmse"].value)
-        return tuple(table.cell(row.scores[name], own if name in ("rmse", "bias") else 3) for name in _SCORES)
+        decimals = table.digits(row.scores["rmse"].value)
+        return tuple(table.cell(row.scores[name], decimals if name in ("rmse", "bias") else 3) for name in _SCORES)
 
     return Grid(
         head=("target", "model", *_SCORES.values()),
-        body=tuple(Line(cells=((row.target,), (row.label,), *cells(row))) for row in ordered),
+        body=tuple(TableLine(cells=((row.target,), (row.label,), *cells(row))) for row in ordered),
     )
 
 
-def _linear(found: Evaluation) -> Grid | None:
-    if not found.reads:
+def _linear(evaluation: Evaluation) -> Grid | None:
+    if not evaluation.reads:
         return None
     return Grid(
         head=("model", "data", "components", "quantity", "Pearson r"),
         body=tuple(
-            Line(cells=((of.label,), (of.data,), (str(of.readout.components),), (target,), table.cell(r, 3)))
-            for of in found.reads
+            TableLine(cells=((of.label,), (of.data,), (str(of.readout.components),), (target,), table.cell(r, 3)))
+            for of in evaluation.reads
             for target, r in zip(of.readout.targets, of.readout.pearson, strict=True)
         ),
     )
 
 
-def _learning(found: Evaluation) -> Grid | None:
-    if not found.learning:
+def _learning(evaluation: Evaluation) -> Grid | None:
+    if not evaluation.learning:
         return None
     return Grid(
         head=("model", "sequences", "wind RMSE [m/s]"),
-        body=tuple(Line(cells=((p.label,), (f"{p.sequences:,}",), _ends(p.rmse, p.interval))) for p in found.learning),
+        body=tuple(
+            TableLine(cells=((p.label,), (f"{p.sequences:,}",), _ends(p.rmse, p.interval))) for p in evaluation.learning
+        ),
     )
 
 
-def _frames(found: Evaluation) -> Grid | None:
-    if not found.frames:
+def _frames(evaluation: Evaluation) -> Grid | None:
+    if not evaluation.frames:
         return None
     quoted = tuple(
-        Line(cells=(("SDN, quoted from the paper",), (str(size),), (f"{accuracy:.3f}",)))
+        TableLine(cells=(("SDN, quoted from the paper",), (str(size),), (f"{accuracy:.3f}",)))
         for size, accuracy in paper.TRIPLETS
     )
-    own = tuple(Line(cells=((p.label,), (str(p.frames),), _ends(p.accuracy, p.interval))) for p in found.frames)
-    return Grid(head=("model", "frames", "triplet accuracy"), body=(*own, *quoted))
+    ours = tuple(
+        TableLine(cells=((p.label,), (str(p.frames),), _ends(p.accuracy, p.interval))) for p in evaluation.frames
+    )
+    return Grid(head=("model", "frames", "triplet accuracy"), body=(*ours, *quoted))
 
 
 def _ends(value: float, interval: tuple[float, float]) -> tuple[str, ...]:
@@ -483,58 +501,58 @@ _TABLES: dict[str, Callable[[Evaluation], Grid | None]] = {
 }
 
 
-def _pictures(found: Evaluation) -> list[Picture]:
-    made = []
-    if found.wind_errors:
-        made.append(
+def _pictures(evaluation: Evaluation) -> list[Picture]:
+    pictures = []
+    if evaluation.wind_errors:
+        pictures.append(
             Picture(
                 title="Error against wind",
-                svg=error_against_wind(found.wind_errors),
+                svg=error_against_wind(evaluation.wind_errors),
                 caption="Clips by true wind in bins of 1 m/s; means over runs. Shaded: intervals over sequences, none "
                 "where a bin has one sequence only.",
             )
         )
-    if found.calibrations:
-        made += [
+    if evaluation.calibrations:
+        pictures += [
             Picture(
                 title="Calibration",
-                svg=calibration(found.calibrations, found.expected),
+                svg=calibration(evaluation.calibrations, evaluation.expected),
                 caption="Share of truths inside central intervals, over their nominal level. Below the dashed line "
                 "distributions are too narrow or biased, above it too wide. TARP (Lemos et al. 2023) tests all targets "
                 "together.",
             ),
             Picture(
                 title="Ranks of the truth among the draws",
-                svg=ranks(found.calibrations),
+                svg=ranks(evaluation.calibrations),
                 caption="Flat if calibrated (Talts et al. 2018); a hump is too wide, a trough too narrow, a slope "
                 f"biased. Shaded: where at least {100 * BAND:.0f} % of the shares of a calibrated model lie, bin by "
                 "bin, sequences being independent and clips of one sequence not.",
             ),
         ]
-    if found.learning:
-        made.append(
+    if evaluation.learning:
+        pictures.append(
             Picture(
                 title="Learning curve",
-                svg=learning(found.learning),
+                svg=learning(evaluation.learning),
                 caption="Error on the same test sequences after training on more of them; both axes are logarithmic.",
             )
         )
-    if found.frames:
-        made.append(
+    if evaluation.frames:
+        pictures.append(
             Picture(
                 title="Triplet accuracy against frames",
-                svg=frames(found.frames),
+                svg=frames(evaluation.frames),
                 caption="How often a clip lies nearer to one of its own simulation than to one of another.",
             )
         )
-    if found.layout is not None:
-        made.append(
+    if evaluation.layout is not None:
+        pictures.append(
             Picture(
-                title=f"t-SNE of the embedding of {found.layout.label}",
-                svg=t_sne(found.layout),
-                caption=f"{len(found.layout.wind):,} of {found.layout.clips:,} clips. Distances between clusters and "
-                "their sizes mean nothing.",
+                title=f"t-SNE of the embedding of {evaluation.layout.label}",
+                svg=t_sne(evaluation.layout),
+                caption=f"{len(evaluation.layout.wind):,} of {evaluation.layout.clips:,} clips. Distances between "
+                "clusters and their sizes mean nothing.",
                 square=True,
             )
         )
-    return made
+    return pictures

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from models.evaluation.bootstrap import Estimate, Resamples, estimate, ratio
+from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate, ratio
 from models.evaluation.predictions import Predictions
 
 TOLERANCE = 0.5
@@ -37,13 +37,13 @@ class Score:
     value: Callable[[Array], Array]
 
     def __call__(self, truth: Array, mean: Array) -> float:
-        """The score of clips themselves."""
+        """Computes the score of clips themselves."""
         return float(self.value(self.terms(truth, mean).sum(axis=0, keepdims=True))[0])
 
     def values(self, predictions: Predictions, target: str, resamples: Resamples) -> Array:
-        """(1 + draws,): the score of the data, then of each draw."""
-        place = predictions.column(target)
-        return self.value(resamples.sums(self.terms(predictions.truth[:, place], predictions.mean[:, place])))
+        """Computes (1 + draws,): the score of the data, then of each draw."""
+        column = predictions.column(target)
+        return self.value(resamples.sums(self.terms(predictions.truth[:, column], predictions.mean[:, column])))
 
 
 def _errors(truth: Array, mean: Array) -> Array:
@@ -52,13 +52,14 @@ def _errors(truth: Array, mean: Array) -> Array:
 
 
 def _moments(truth: Array, mean: Array) -> Array:
-    """1, y, y², e², m, m², ym with y and m less their means, on which no score of them depends."""
+    """Tabulates the moments 1, y, y², e², m, m², ym with y and m less their means, on which no score of them
+    depends."""
     y, m, error = truth - truth.mean(), mean - mean.mean(), mean - truth
     return np.column_stack([np.ones_like(y), y, y**2, error**2, m, m**2, y * m])
 
 
 def _variance(sums: Array, first: int, second: int) -> Array:
-    """n times the variance, 0 where rounding makes it less than 1e-12 of the sum of squares."""
+    """Computes n times the variance, 0 where rounding makes it less than 1e-12 of the sum of squares."""
     scatter = sums[:, second] - sums[:, first] ** 2 / sums[:, 0]
     return np.where(scatter > 1e-12 * sums[:, second], scatter, 0.0)
 
@@ -86,7 +87,7 @@ is 1 for a constant prediction of their mean, and equals √(1 - R²)."""
 
 
 def rmse_bound(accuracy: float) -> float:
-    """The least RMSE [m/s] that goes with an Acc@0.5: RMSE ≥ 0.5 √(1 - A).
+    """Bounds from below the RMSE [m/s] that goes with an Acc@0.5: RMSE ≥ 0.5 √(1 - A).
 
     Proof. Let e be the errors of n clips and A the share of those with |e| ≤ 0.5. The other (1 - A) n clips have
     e² > 0.25, and no square is negative, so n RMSE² = Σ e² ≥ 0.25 (1 - A) n. Equality is approached by errors of 0 and
@@ -96,7 +97,7 @@ def rmse_bound(accuracy: float) -> float:
         InputError: the accuracy is no share.
     """
     if not 0 <= accuracy <= 1:
-        raise InputError(f"an accuracy of {accuracy:g}", where="accuracy", fix="give a share between 0 and 1")
+        raise InputError(f"the accuracy {accuracy:g} is no share", where="accuracy", fix="give a share between 0 and 1")
     return TOLERANCE * math.sqrt(1 - accuracy)
 
 
@@ -106,28 +107,29 @@ class BinError:
 
     low: float
     high: float
-    rmse: Estimate
-    bias: Estimate
+    rmse: ScoreEstimate
+    bias: ScoreEstimate
 
 
 def error_against(
     predictions: tuple[Predictions, ...], target: str, resamples: Resamples, *, width: float = BIN
 ) -> tuple[BinError, ...]:
-    """RMSE and bias by the truth's bin, means over runs of one model on the same clips; empty bins are left out."""
+    """Computes RMSE and bias by the truth's bin, means over runs of one model on the same clips; empty bins are left
+    out."""
     truth = predictions[0].truth[:, predictions[0].column(target)]
     first = math.floor(truth.min() / width)
     count = max(1, math.ceil(truth.max() / width) - first)
-    place = np.clip(np.floor(truth / width).astype(np.int64) - first, 0, count - 1)
-    found = []
-    for number in np.unique(place):
-        inside = place == number
+    bins = np.clip(np.floor(truth / width).astype(np.int64) - first, 0, count - 1)
+    errors = []
+    for number in np.unique(bins):
+        inside = bins == number
         clips, groups = int(inside.sum()), len(np.unique(resamples.index[inside]))
         sums = [
             resamples.sums(_errors(truth, run.mean[:, run.column(target)]) * inside[:, None]) for run in predictions
         ]
         rmse = np.mean([np.sqrt(ratio(s[:, 2], s[:, 0])) for s in sums], axis=0)
         bias = np.mean([ratio(s[:, 1], s[:, 0]) for s in sums], axis=0)
-        found.append(
+        errors.append(
             BinError(
                 low=float((first + number) * width),
                 high=float((first + number + 1) * width),
@@ -135,4 +137,4 @@ def error_against(
                 bias=estimate(bias, clips=clips, groups=groups),
             )
         )
-    return tuple(found)
+    return tuple(errors)

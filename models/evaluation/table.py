@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from models.evaluation.bootstrap import LEVEL, Estimate, Resamples, estimate
+from models.evaluation.bootstrap import LEVEL, Resamples, ScoreEstimate, estimate
 from models.evaluation.calibration import LEVELS, coverage_values
 from models.evaluation.predictions import DENSITY, WIND, Predictions
 from models.evaluation.scores import SCORES, rmse_bound
@@ -45,7 +45,7 @@ class Row:
     label: str
     run: int | None
     runs: int
-    scores: dict[str, Estimate]
+    scores: dict[str, ScoreEstimate]
     spread: dict[str, tuple[float, float]]
     bound: float | None
     parameters: int
@@ -53,7 +53,7 @@ class Row:
     note: str
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "label": self.label,
             "run": self.run,
@@ -73,10 +73,10 @@ class TargetRow:
 
     label: str
     target: str
-    scores: dict[str, Estimate]
+    scores: dict[str, ScoreEstimate]
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         scores = {name: score.as_dict() for name, score in self.scores.items()}
         return {"label": self.label, "target": self.target, "scores": scores}
 
@@ -88,15 +88,15 @@ class Difference:
     label: str
     reference: str
     metric: str
-    difference: Estimate
+    difference: ScoreEstimate
 
     @property
     def apart(self) -> bool:
-        """Whether the interval of the difference leaves out zero."""
-        return self.difference.known and not self.difference.low <= 0 <= self.difference.high
+        """Returns whether the interval of the difference leaves out zero."""
+        return self.difference.has_interval and not self.difference.low <= 0 <= self.difference.high
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "label": self.label,
             "reference": self.reference,
@@ -107,56 +107,56 @@ class Difference:
 
 
 def models(predictions: Sequence[Predictions]) -> dict[str, tuple[Predictions, ...]]:
-    """The runs of each label, in the order given, all on the same clips.
+    """Groups the runs by label, in the order given, all on the same clips.
 
     Raises:
         InputError: no predictions; clips, sequences or truths that differ; runs of one label that are not one model.
     """
     if not predictions:
         raise InputError("there are no predictions", where="the table", fix="give those of at least one model")
-    for one, other in combinations(predictions, 2):
-        check_same_clips(one, other)
-    found: dict[str, tuple[Predictions, ...]] = {}
-    for own in predictions:
-        first = found.get(own.label, (own,))[0]
+    for former, second in combinations(predictions, 2):
+        check_same_clips(former, second)
+    models_of: dict[str, tuple[Predictions, ...]] = {}
+    for run in predictions:
+        first = models_of.get(run.label, (run,))[0]
         same = (first.targets, first.parameters, first.samples is None, first.embedding is None)
-        if same != (own.targets, own.parameters, own.samples is None, own.embedding is None):
+        if same != (run.targets, run.parameters, run.samples is None, run.embedding is None):
             raise InputError(
                 "two runs of it differ in targets, parameters, samples or embedding",
-                where=f"model {own.label!r}",
+                where=f"model {run.label!r}",
                 fix="give different models different labels",
             )
-        found[own.label] = (*found.get(own.label, ()), own)
-    return found
+        models_of[run.label] = (*models_of.get(run.label, ()), run)
+    return models_of
 
 
-def check_same_clips(one: Predictions, other: Predictions) -> None:
-    """Refuse two predictions that are not of the same clips in the same order.
+def check_same_clips(first: Predictions, second: Predictions) -> None:
+    """Refuses two predictions that are not of the same clips in the same order.
 
     Raises:
         InputError: another number of clips, other sequences, or another truth of a target that both have.
     """
-    where = f"{one.label!r} and {other.label!r}"
+    where = f"{first.label!r} and {second.label!r}"
     fix = "evaluate all models on the same clips of the same split, in the same order"
-    if not np.array_equal(one.group, other.group):
+    if not np.array_equal(first.group, second.group):
         raise InputError("the models were not tested on the same sequences", where=where, fix=fix)
-    for target in set(one.targets) & set(other.targets):
-        if not np.array_equal(one.truth[:, one.column(target)], other.truth[:, other.column(target)]):
+    for target in set(first.targets) & set(second.targets):
+        if not np.array_equal(first.truth[:, first.column(target)], second.truth[:, second.column(target)]):
             raise InputError(f"the models were not tested on the same truth of {target}", where=where, fix=fix)
 
 
-def metric_values(own: Predictions, resamples: Resamples, triplets: NDArray[np.int64] | None) -> Values:
-    """Every metric of the table that these predictions have an output for."""
+def metric_values(predictions: Predictions, resamples: Resamples, triplets: NDArray[np.int64] | None) -> Values:
+    """Computes every metric of the table that these predictions have an output for."""
     values = {}
-    if WIND in own.targets:
-        values = {name: SCORES[name].values(own, WIND, resamples) for name in ("rmse", "accuracy", "bias")}
-    if DENSITY in own.targets:
-        values["density_error"] = SCORES["relative_error"].values(own, DENSITY, resamples)
-    if own.samples is not None and WIND in own.targets:
+    if WIND in predictions.targets:
+        values = {name: SCORES[name].values(predictions, WIND, resamples) for name in ("rmse", "accuracy", "bias")}
+    if DENSITY in predictions.targets:
+        values["density_error"] = SCORES["relative_error"].values(predictions, DENSITY, resamples)
+    if predictions.samples is not None and WIND in predictions.targets:
         for level in LEVELS:
-            values[_covered(level)] = coverage_values(own, WIND, level, resamples)
-    if own.embedding is not None and triplets is not None:
-        values["triplets"] = accuracy_values(own.embedding, triplets, resamples)
+            values[_covered(level)] = coverage_values(predictions, WIND, level, resamples)
+    if predictions.embedding is not None and triplets is not None:
+        values["triplets"] = accuracy_values(predictions.embedding, triplets, resamples)
     return values
 
 
@@ -170,17 +170,26 @@ def mean_values(runs: Sequence[Values]) -> Values:
 
 
 def rows(runs: tuple[Predictions, ...], values: Sequence[Values], resamples: Resamples) -> tuple[Row, ...]:
-    """The model's row and, below it, its runs' if there are several."""
+    """Returns the model's row and, below it, its runs' if there are several."""
     first = runs[0]
     single = tuple(
-        _row(own, resamples, run=number, runs=1, values=found, spread={}, bound=_bound(found), speed=own.milliseconds)
-        for number, (own, found) in enumerate(zip(runs, values, strict=True), start=1)
+        _row(
+            predictions,
+            resamples,
+            run=number,
+            runs=1,
+            values=scores,
+            spread={},
+            bound=_bound(scores),
+            speed=predictions.milliseconds,
+        )
+        for number, (predictions, scores) in enumerate(zip(runs, values, strict=True), start=1)
     )
     spread: dict[str, tuple[float, float]] = {}
     if len(runs) > 1:
-        spread = {name: _ends([float(found[name][0]) for found in values]) for name in values[0]}
+        spread = {name: _ends([float(scores[name][0]) for scores in values]) for name in values[0]}
     bounds = [row.bound for row in single if row.bound is not None]
-    whole = _row(
+    mean_row = _row(
         first,
         resamples,
         run=None,
@@ -188,15 +197,15 @@ def rows(runs: tuple[Predictions, ...], values: Sequence[Values], resamples: Res
         values=mean_values(values),
         spread=spread,
         bound=float(np.mean(bounds)) if bounds else None,
-        speed=float(np.mean([own.milliseconds for own in runs])),
+        speed=float(np.mean([predictions.milliseconds for predictions in runs])),
     )
-    notes = "; ".join(dict.fromkeys(own.note for own in runs if own.note))
-    whole = replace(whole, note=notes)
-    return (whole, *single) if len(runs) > 1 else (whole,)
+    notes = "; ".join(dict.fromkeys(predictions.note for predictions in runs if predictions.note))
+    mean_row = replace(mean_row, note=notes)
+    return (mean_row, *single) if len(runs) > 1 else (mean_row,)
 
 
 def _row(
-    own: Predictions,
+    predictions: Predictions,
     resamples: Resamples,
     *,
     run: int | None,
@@ -207,15 +216,17 @@ def _row(
     speed: float,
 ) -> Row:
     return Row(
-        label=own.label,
+        label=predictions.label,
         run=run,
         runs=runs,
-        scores={name: estimate(found, clips=own.clips, groups=resamples.groups) for name, found in values.items()},
+        scores={
+            name: estimate(draws, clips=predictions.clips, groups=resamples.groups) for name, draws in values.items()
+        },
         spread=spread,
         bound=bound,
-        parameters=own.parameters,
+        parameters=predictions.parameters,
         milliseconds=speed,
-        note=own.note,
+        note=predictions.note,
     )
 
 
@@ -228,22 +239,24 @@ def _ends(values: list[float]) -> tuple[float, float]:
 
 
 def target_rows(runs: tuple[Predictions, ...], resamples: Resamples) -> tuple[TargetRow, ...]:
-    """Scores of every target of a model, means over its runs."""
-    found = []
+    """Scores every target of a model, means over its runs."""
+    scored = []
     for target in runs[0].targets:
-        values = {name: [SCORES[name].values(own, target, resamples) for own in runs] for name in OF_TARGETS}
+        values = {
+            name: [SCORES[name].values(predictions, target, resamples) for predictions in runs] for name in OF_TARGETS
+        }
         scores = {
             name: estimate(np.mean(of, axis=0), clips=runs[0].clips, groups=resamples.groups)
             for name, of in values.items()
         }
-        found.append(TargetRow(label=runs[0].label, target=target, scores=scores))
-    return tuple(found)
+        scored.append(TargetRow(label=runs[0].label, target=target, scores=scores))
+    return tuple(scored)
 
 
 def differences(
     values: Mapping[str, Values], reference: str, *, clips: int, groups: int, metrics: Sequence[str]
 ) -> tuple[Difference, ...]:
-    """Paired differences of every other model against `reference`, for the metrics that both have.
+    """Computes paired differences of every other model against `reference`, for the metrics that both have.
 
     Args:
         values: of each label, means over its runs, all of the same resamples.
@@ -253,17 +266,17 @@ def differences(
             label=label,
             reference=reference,
             metric=metric,
-            difference=estimate(own[metric] - values[reference][metric], clips=clips, groups=groups),
+            difference=estimate(scores[metric] - values[reference][metric], clips=clips, groups=groups),
         )
-        for label, own in values.items()
+        for label, scores in values.items()
         if label != reference
         for metric in metrics
-        if metric in own and metric in values[reference]
+        if metric in scores and metric in values[reference]
     )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
+class TableColumn:
     """A column of the table: its heading, and its cell of a row as lines: the value first, what belongs to it below."""
 
     heading: str
@@ -271,7 +284,7 @@ class Column:
 
 
 def number(value: float, digits: int) -> str:
-    """A number for people; a dash where it is undefined."""
+    """Formats a number for people; a dash where it is undefined."""
     return f"{value:.{digits}f}".replace("-", "−") if np.isfinite(value) else _NONE
 
 
@@ -280,22 +293,22 @@ def digits(error: float) -> int:
     return max(3, 2 - math.floor(math.log10(error))) if error > 0 else 3
 
 
-def cell(score: Estimate | None, digits: int) -> tuple[str, ...]:
-    """Value, and its interval where it has one."""
+def cell(score: ScoreEstimate | None, digits: int) -> tuple[str, ...]:
+    """Formats a value, and its interval where it has one."""
     if score is None:
         return (_NONE,)
-    if not score.known:
+    if not score.has_interval:
         return (number(score.value, digits), "no interval: one sequence")
     return (number(score.value, digits), f"[{number(score.low, digits)}, {number(score.high, digits)}]")
 
 
 def _scored(metric: str, digits: int) -> Callable[[Row], tuple[str, ...]]:
     def lines(row: Row) -> tuple[str, ...]:
-        found = cell(row.scores.get(metric), digits)
+        texts = cell(row.scores.get(metric), digits)
         if metric not in row.spread:
-            return found
+            return texts
         low, high = row.spread[metric]
-        return (*found, f"runs {number(low, digits)} to {number(high, digits)}")
+        return (*texts, f"runs {number(low, digits)} to {number(high, digits)}")
 
     return lines
 
@@ -307,26 +320,26 @@ def _model(row: Row) -> tuple[str, ...]:
 
 
 def _coverage(row: Row) -> tuple[str, ...]:
-    found = [row.scores.get(_covered(level)) for level in LEVELS]
-    if any(score is None for score in found):
+    scores = [row.scores.get(_covered(level)) for level in LEVELS]
+    if any(score is None for score in scores):
         return (_NONE,)
-    values = " / ".join(number(100 * score.value, 0) for score in found if score is not None)
-    ends = [f"{number(100 * s.low, 0)}–{number(100 * s.high, 0)}" for s in found if s is not None and s.known]
+    values = " / ".join(number(100 * score.value, 0) for score in scores if score is not None)
+    ends = [f"{number(100 * s.low, 0)}–{number(100 * s.high, 0)}" for s in scores if s is not None and s.has_interval]
     return (values, f"[{', '.join(ends)}]") if ends else (values,)
 
 
 COLUMNS = (
-    Column(heading="model", cell=_model),
-    Column(heading="wind RMSE [m/s]", cell=_scored("rmse", 3)),
-    Column(heading="bound", cell=lambda row: (_NONE if row.bound is None else f"≥ {number(row.bound, 3)}",)),
-    Column(heading="Acc@0.5", cell=_scored("accuracy", 3)),
-    Column(heading="wind bias [m/s]", cell=_scored("bias", 3)),
-    Column(heading="area weight error / spread", cell=_scored("density_error", 3)),
-    Column(heading="wind covered [%] at 50 / 80 / 90", cell=_coverage),
-    Column(heading="triplet accuracy", cell=_scored("triplets", 3)),
-    Column(heading="parameters", cell=lambda row: (f"{row.parameters:,}",)),
-    Column(heading="ms a clip", cell=lambda row: (number(row.milliseconds, 1),)),
-    Column(heading="note", cell=lambda row: (row.note or _NONE,)),
+    TableColumn(heading="model", cell=_model),
+    TableColumn(heading="wind RMSE [m/s]", cell=_scored("rmse", 3)),
+    TableColumn(heading="bound", cell=lambda row: (_NONE if row.bound is None else f"≥ {number(row.bound, 3)}",)),
+    TableColumn(heading="Acc@0.5", cell=_scored("accuracy", 3)),
+    TableColumn(heading="wind bias [m/s]", cell=_scored("bias", 3)),
+    TableColumn(heading="area weight error / spread", cell=_scored("density_error", 3)),
+    TableColumn(heading="wind covered [%] at 50 / 80 / 90", cell=_coverage),
+    TableColumn(heading="triplet accuracy", cell=_scored("triplets", 3)),
+    TableColumn(heading="parameters", cell=lambda row: (f"{row.parameters:,}",)),
+    TableColumn(heading="ms a clip", cell=lambda row: (number(row.milliseconds, 1),)),
+    TableColumn(heading="note", cell=lambda row: (row.note or _NONE,)),
 )
 LEGEND = (
     f"Brackets: {100 * LEVEL:.0f} % intervals, sequences drawn with replacement; of several runs they are the mean's "

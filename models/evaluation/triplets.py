@@ -18,13 +18,13 @@ COUNT = 3500
 
 
 def possible(group: NDArray[np.int64]) -> bool:
-    """Whether clips (n,) of these groups have any triplet: two groups, one of them with two clips."""
+    """Returns whether clips (n,) of these groups have any triplet: two groups, one of them with two clips."""
     size = np.unique(group, return_counts=True)[1]
     return len(size) > 1 and bool((size > 1).any())
 
 
 def draw(group: NDArray[np.int64], *, seed: int, count: int = COUNT) -> NDArray[np.int64]:
-    """Triplets (count, 3) of clips: anchor, positive, negative; the same for one seed.
+    """Draws triplets (count, 3) of clips: anchor, positive, negative; the same for one seed.
 
     The anchor is uniform among clips that share their group with another, the positive among those others, the negative
     among clips of other groups.
@@ -34,23 +34,23 @@ def draw(group: NDArray[np.int64], *, seed: int, count: int = COUNT) -> NDArray[
     """
     _check(group)
     if count < 1:
-        raise InputError(f"{count} triplets", where="count", fix="give at least 1")
+        raise InputError(f"{count} triplets are too few", where="count", fix="give at least 1")
     generator = rng.stream(seed, "evaluation", "triplets")
     order = np.argsort(group, kind="stable")
     _, start, size = np.unique(group[order], return_index=True, return_counts=True)
     of = np.repeat(np.arange(len(size)), size)
     anchor = generator.choice(np.flatnonzero(size[of] > 1), size=count)
-    first, own = start[of[anchor]], size[of[anchor]]
-    positive = first + (anchor - first + 1 + generator.integers(0, own - 1)) % own
-    negative = generator.integers(0, len(group) - own)
-    negative = np.where(negative < first, negative, negative + own)
+    first, members = start[of[anchor]], size[of[anchor]]
+    positive = first + (anchor - first + 1 + generator.integers(0, members - 1)) % members
+    negative = generator.integers(0, len(group) - members)
+    negative = np.where(negative < first, negative, negative + members)
     return order[np.column_stack([anchor, positive, negative])]
 
 
 def accuracy_values(
     embedding: NDArray[np.floating], triplets: NDArray[np.int64], resamples: Resamples
 ) -> NDArray[np.float64]:
-    """(1 + draws,): triplet accuracy in the data and in each draw of groups.
+    """Computes (1 + draws,) triplet accuracies in the data and in each draw of groups.
 
     A triplet rests on two sequences; in a draw it counts as often as the product of their occurrences.
 
@@ -61,12 +61,12 @@ def accuracy_values(
     """
     points = embedding.astype(np.float64)
     anchor, positive, negative = triplets.T
-    near = ((points[anchor] - points[positive]) ** 2).sum(axis=1)
-    far = ((points[anchor] - points[negative]) ** 2).sum(axis=1)
+    to_positive = ((points[anchor] - points[positive]) ** 2).sum(axis=1)
+    to_negative = ((points[anchor] - points[negative]) ** 2).sum(axis=1)
     hits, of = (np.zeros((resamples.groups, resamples.groups)) for _ in range(2))
-    place = (resamples.index[anchor], resamples.index[negative])
-    np.add.at(hits, place, (near < far) + 0.5 * (near == far))
-    np.add.at(of, place, 1.0)
+    groups = (resamples.index[anchor], resamples.index[negative])
+    np.add.at(hits, groups, (to_positive < to_negative) + 0.5 * (to_positive == to_negative))
+    np.add.at(of, groups, 1.0)
     return resamples.pair_ratio(hits, of)
 
 

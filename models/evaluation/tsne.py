@@ -22,7 +22,7 @@ CLIPS = 2000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Layout:
+class TsneLayout:
     """Places (n, 2) of clips in the plane and their true wind (n,) [m/s], of `clips` that were tested."""
 
     label: str
@@ -31,8 +31,8 @@ class Layout:
     clips: int
 
 
-def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXITY, most: int = CLIPS) -> Layout:
-    """Lay out the embedding of a model; the same for one seed.
+def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXITY, most: int = CLIPS) -> TsneLayout:
+    """Lays out the embedding of a model; the same for one seed.
 
     Args:
         predictions: with an embedding and the wind among its targets.
@@ -59,7 +59,7 @@ def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXIT
         )
     if len(chosen) <= perplexity:
         raise InputError(
-            f"{len(chosen)} clips and a perplexity of {perplexity:g}",
+            f"{len(chosen)} clips do not admit a perplexity of {perplexity:g}",
             where=where,
             fix="lay out more clips, or lower it",
         )
@@ -72,4 +72,4 @@ def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXIT
         random_state=rng.child_seed(seed, "evaluation", "t-sne", "optimiser") % 2**32,
     )
     places = optimiser.fit_transform(predictions.embedding[chosen]).astype(np.float64)
-    return Layout(label=predictions.label, places=places, wind=wind[chosen], clips=predictions.clips)
+    return TsneLayout(label=predictions.label, places=places, wind=wind[chosen], clips=predictions.clips)

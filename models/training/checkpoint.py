@@ -24,7 +24,7 @@ from flagdata.lake.durable import flush_file
 from flagdata.locks import LOCK
 from models.learner import Learner
 from models.storage import CARD, WEIGHTS, read_card, read_tensors, write_card, write_tensors
-from models.training.progress import Course
+from models.training.progress import LossCourse
 
 _LOG = logging.getLogger("flagdata")
 _ANEW = "restore the folder from a copy, or delete all checkpoints beside it to train from the beginning"
@@ -50,13 +50,13 @@ class Standing:
     learner: Learner
     best: dict[str, Tensor] | None
     optimiser: torch.optim.Optimizer
-    course: Course
+    course: LossCourse
     batches: dict[str, Any]
     running: tuple[float, int] = (0.0, 0)
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse a folder in which checkpoints would be kept beside, or in place of, anything else.
+    """Refuses a folder in which checkpoints would be kept beside, or in place of, anything else.
 
     Raises:
         ConflictError: it holds something that no training wrote.
@@ -64,9 +64,9 @@ def check_folder(folder: Path) -> None:
     files = {Path(LOCK)} | {
         Path(part) / name for part in (_LAST, _NEXT, _BEFORE) for name in (WEIGHTS, _BEST, _MOMENTS, CARD, SUMS)
     }
-    known = files | {file.parent for file in files}
+    expected = files | {file.parent for file in files}
     for path in sorted(folder.rglob("*")):
-        if path.relative_to(folder) not in known or path.is_symlink():
+        if path.relative_to(folder) not in expected or path.is_symlink():
             raise ConflictError(
                 "the run folder has files that no training wrote",
                 where=str(path),
@@ -75,7 +75,7 @@ def check_folder(folder: Path) -> None:
 
 
 def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
-    """Take a checkpoint in `folder`; the one before it is kept beside it.
+    """Takes a checkpoint in `folder`; the one before it is kept beside it.
 
     Raises:
         FlagdataError: the disk refuses it; the last checkpoint is as it was.
@@ -111,7 +111,7 @@ def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
 
 
 def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bool:
-    """Bring `standing` to where the last sound checkpoint in `folder` was taken; False where there is none at all.
+    """Brings `standing` to where the last sound checkpoint in `folder` was taken; False where there is none at all.
 
     A damaged last one is passed over with a warning for the one before it, from which the same steps are taken again.
 
@@ -119,9 +119,9 @@ def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bo
         RefusedError: it is of another recipe or of other data.
         CorruptError: all are damaged, or do not fit the recipe.
     """
-    found = [path for path in (folder / _LAST, folder / _BEFORE) if path.exists()]
+    checkpoints = [path for path in (folder / _LAST, folder / _BEFORE) if path.exists()]
     damage: CorruptError | None = None
-    for checkpoint in found:
+    for checkpoint in checkpoints:
         try:
             check_sums(checkpoint, fix=_ANEW)
         except CorruptError as error:
@@ -142,13 +142,13 @@ def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bo
 
 
 def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
-    """Bring `standing` to where the checkpoint in `folder` itself, which is sound, was taken."""
+    """Brings `standing` to where the checkpoint in `folder` itself, which is sound, was taken."""
     card = read_card(folder)
     stored = json.loads(json.dumps(identity))
-    kept = card.get("identity")
-    if not isinstance(kept, dict):
+    trained_on = card.get("identity")
+    if not isinstance(trained_on, dict):
         raise CorruptError("the checkpoint does not state its training", where=str(folder), fix=_ANEW)
-    different = [name for name in stored if kept.get(name) != stored[name]]
+    different = [name for name in stored if trained_on.get(name) != stored[name]]
     if different:
         raise RefusedError(
             f"the checkpoint is of another training: {', '.join(different)} differ",
@@ -161,7 +161,7 @@ def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
         standing.best = read_tensors(folder / _BEST) if (folder / _BEST).exists() else None
         if standing.best is not None:
             copy.deepcopy(standing.learner).load_state_dict(standing.best)  # it is needed at the training's end
-        standing.course = Course.of(card["course"])
+        standing.course = LossCourse.of(card["course"])
         standing.batches = dict(card["batches"])
         standing.running = (float(card["running"][0]), int(card["running"][1]))
     except (KeyError, TypeError, ValueError, RuntimeError, IndexError, OverflowError, AttributeError) as error:
@@ -171,21 +171,21 @@ def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
 
 
 def _moments(standing: Standing) -> dict[str, Tensor]:
-    """Adam's state by parameter, "0.exp_avg" …"""
+    """Flattens Adam's state by parameter, "0.exp_avg" …."""
     state = standing.optimiser.state_dict()["state"]
     return {f"{index}.{kind}": values[kind] for index, values in state.items() for kind in _KINDS if kind in values}
 
 
 def _take_moments(standing: Standing, tensors: dict[str, Tensor]) -> None:
     state = standing.optimiser.state_dict()
-    shapes = {place: tuple(weights.shape) for place, weights in enumerate(standing.learner.parameters())}
-    found: dict[int, dict[str, Tensor]] = {}
+    shapes = {index: tuple(weights.shape) for index, weights in enumerate(standing.learner.parameters())}
+    moments: dict[int, dict[str, Tensor]] = {}
     for name, tensor in tensors.items():
         index, _, kind = name.partition(".")
-        found.setdefault(int(index), {})[kind] = tensor
-    for index, values in found.items():
+        moments.setdefault(int(index), {})[kind] = tensor
+    for index, values in moments.items():
         wanted = {kind: () if kind == "step" else shapes[index] for kind in _KINDS}
         if {kind: tuple(tensor.shape) for kind, tensor in values.items()} != wanted:
             raise ValueError(f"the moments of parameter {index} are of other kinds or shapes")
-    state["state"] = found
+    state["state"] = moments
     standing.optimiser.load_state_dict(state)

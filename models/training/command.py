@@ -37,7 +37,7 @@ PARENTS = 100
 
 
 def data_identity(lake: Lake, train: Pairs, validation: Pairs, *, at: str | None) -> dict[str, Any]:
-    """What a training learns from: the version of the lake and the pairs' fingerprints."""
+    """Identifies what a training learns from: the version of the lake and the pairs' fingerprints."""
     return {
         "at": at,
         "view": [f"{part.branch}@{part.version}" for part in lake.view(at)],
@@ -54,25 +54,25 @@ def recordings_of(train: Pairs, validation: Pairs) -> list[str]:
 def network_artifact(
     lake: Lake, recipe: TrainingRecipe, data: dict[str, Any], recordings: Sequence[str], *, branch: str
 ) -> Artifact:
-    """The row of a model without its result; its identity, hence, is what goes in: recipe, data and seed.
+    """Makes the row of a model without its result; its identity, hence, is what goes in: recipe, data and seed.
 
     Its parents are the first `PARENTS` of the recordings that the branch shows: of thousands, ids in order are a random
     sample. The fingerprints in its recipe state all data exactly.
     """
-    held = {
+    ingredients = {
         "recipe": recipe.identity(),
         "data": {key: data[key] for key in ("train", "validation")},
         "recordings": len(recordings),
     }
-    shown = lake.rows({"artifact": recordings}, at=branch, columns=["artifact"])["artifact"].to_pylist()
-    parents = sorted(shown)[:PARENTS]
-    return Artifact(kind=Kind.NETWORK, name=recipe.name, recipe=held, seed=recipe.seed, parents=parents)
+    visible = lake.rows({"artifact": recordings}, at=branch, columns=["artifact"])["artifact"].to_pylist()
+    parents = sorted(visible)[:PARENTS]
+    return Artifact(kind=Kind.NETWORK, name=recipe.name, recipe=ingredients, seed=recipe.seed, parents=parents)
 
 
 def card_of(
     recipe: TrainingRecipe, data: dict[str, Any], trained: Trained, *, batches: dict[str, Any]
 ) -> dict[str, Any]:
-    """The description of a model, as JSON."""
+    """Describes a model, as JSON."""
     learner = trained.learner
     best = trained.course.best
     return {
@@ -104,7 +104,7 @@ def publish(
     batches: dict[str, Any],
     branch: str,
 ) -> tuple[Artifact, dict[str, Any], Healing | None]:
-    """Commit a model and return its row and card; one that is there already is kept, unless its object is damaged or
+    """Commits a model and returns its row and card; one that is there already is kept, unless its object is damaged or
     missing: what was done about that is returned, too. A recording that was withdrawn
     from the branch since the training began is not among its parents.
 
@@ -229,7 +229,7 @@ def trained(
     branch: str,
     bars: Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]],
 ) -> dict[str, Any] | None:
-    """Prepare, train and publish; what the command reports, or None in all ranks but the first.
+    """Prepares, trains and publishes; returns what the command reports, or None in all ranks but the first.
 
     Raises:
         FlagdataError: see `models.training.steps.Training.complete`, `flagdata.dataset.Source.pairs`.
@@ -244,7 +244,7 @@ def trained(
     from models.storage import read_card
     from models.targets import Scaling
     from models.training.checkpoint import check_folder
-    from models.training.inputs import film_rows, prepare_clips, prepare_films, stated
+    from models.training.inputs import complete_truth, film_rows, prepare_clips, prepare_films
 
     # FOLD
     from models.training.steps import Training
@@ -259,10 +259,10 @@ def trained(
     recordings = recordings_of(train_pairs, validation_pairs)
     wanted = network_artifact(source.lake, recipe, data, recordings, branch=branch).id
     if source.lake.rows({"artifact": wanted}, at=branch, columns=["artifact"]).num_rows:
-        there = present(source.lake, source.lake.artifact(wanted, at=branch))
-        if there.whole is not None:
+        existing = present(source.lake, source.lake.artifact(wanted, at=branch))
+        if existing.whole is not None:
             say("this model was trained before")
-            return _report(there.whole, read_card(source.lake.object_path(str(there.whole.object))))
+            return _report(existing.whole, read_card(source.lake.object_path(str(existing.whole.object))))
         say("this model was trained before, but its object is damaged or missing: it is trained again")
     films = film_rows(train_pairs, sequences=recipe.data.sequences, seed=recipe.seed)
     if names := recipe.loss.targets:
@@ -270,17 +270,17 @@ def trained(
             ("training", train_pairs.table, films),
             ("validation", validation_pairs.table, slice(None)),
         ):
-            Scaling(names=names).check(stated(table.parameter_columns(rows), names), where=f"the {side} side")
+            Scaling(names=names).check(complete_truth(table.parameter_columns(rows), names), where=f"the {side} side")
     torch.set_num_threads(max(1, workers))
     several = "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
     if several:
         ranks.init_process_group("gloo" if device == "cpu" else "nccl")
     folder = run if run is not None else cache / f"run-{recipe.name}-{digest(wanted)[:12]}"
-    held = ExitStack()
+    locks = ExitStack()
     try:
         first = not several or ranks.get_rank() == 0
         if first:
-            held.enter_context(alone_in(folder, occupied=partial(_refuse, folder)))
+            locks.enter_context(alone_in(folder, occupied=partial(_refuse, folder)))
         if several and not first:
             ranks.barrier()  # the first prepares the inputs for all
         if first:
@@ -314,8 +314,8 @@ def trained(
         identity = {"recipe": recipe.identity(), "train": data["train"], "validation": data["validation"]}
         training = Training(
             recipe=recipe,
-            train=train_inputs.held(),
-            validation=validation_inputs.held(),
+            train=train_inputs.in_memory(),
+            validation=validation_inputs.in_memory(),
             identity=identity,
             run=folder,
             device=torch.device(device),
@@ -342,7 +342,7 @@ def trained(
         if healed is not None:
             say(said(row.id, healed))
     finally:
-        held.close()
+        locks.close()
         if several:
             ranks.destroy_process_group()
     return _report(row, card)
@@ -357,12 +357,23 @@ def _refuse(folder: Path) -> None:
 
 
 def _report(row: Artifact, card: Mapping[str, Any]) -> dict[str, Any]:
-    kept = ("name", "title", "seed", "parameters", "epochs", "best", "seconds", "data", "recipe_hash", "code_version")
-    return {"artifact": row.id, "object": row.object, **{key: card[key] for key in kept}}
+    reported = (
+        "name",
+        "title",
+        "seed",
+        "parameters",
+        "epochs",
+        "best",
+        "seconds",
+        "data",
+        "recipe_hash",
+        "code_version",
+    )
+    return {"artifact": row.id, "object": row.object, **{key: card[key] for key in reported}}
 
 
 def sides_of(source: Source, recipe: TrainingRecipe, side: str, *, at: str | None) -> Pairs:
-    """The pairs of one side of a recipe's data set.
+    """Reads the pairs of one side of a recipe's data set.
 
     Raises:
         UnknownNameError: the lake has no such data set.

@@ -37,18 +37,20 @@ class FitFilm:
     found: Conditioning
     frames: NDArray[np.uint8]
     times: NDArray[np.float64]
-    _interpolator: Interpolator = field(default_factory=lambda: Interpolator(kept=1000))
+    _interpolator: Interpolator = field(default_factory=lambda: Interpolator(capacity=1000))
 
     @classmethod
     def of(cls, film: NDArray[np.uint8], times: NDArray[np.float64], *, size: int = SIZE) -> FitFilm:
-        """A film (n, height, width) gray with the times of its frames [s], made fit."""
-        every = -(-len(film) // SAMPLE)
-        sample, instants = film[::every], times[::every]
-        found = conditioning_of(sample, times=instants, size=size)
-        if (flag := _nearest_to_the_middle(found)) != found.chosen:
-            found = conditioning_of(sample, times=instants, size=size, flag=flag + 1)
-        follower = Follower(found)
-        return cls(found=found, frames=np.stack([follower.show(frame) for frame in film]), times=times - times[0])
+        """Conditions a film (n, height, width) gray with the times of its frames [s]."""
+        stride = -(-len(film) // SAMPLE)
+        sample, instants = film[::stride], times[::stride]
+        conditioning = conditioning_of(sample, times=instants, size=size)
+        if (flag := _nearest_to_the_middle(conditioning)) != conditioning.chosen:
+            conditioning = conditioning_of(sample, times=instants, size=size, flag=flag + 1)
+        follower = Follower(conditioning)
+        return cls(
+            found=conditioning, frames=np.stack([follower.show(frame) for frame in film]), times=times - times[0]
+        )
 
     @property
     def weight(self) -> NDArray[np.float32]:
@@ -60,22 +62,23 @@ class FitFilm:
         return list(zip(self.times.tolist(), self.frames, strict=True))
 
     def starts(self, count: int, rate: float) -> NDArray[np.int64]:
-        """Frames on which clips of `count` frames at `rate` [Hz] may begin.
+        """Returns the frames on which clips of `count` frames at `rate` [Hz] may begin.
 
         Raises:
             InputError: the film is shorter than one, or slower than `LEAST_RATE` of the rate.
         """
-        own = (len(self.times) - 1) / max(float(self.times[-1]), 1e-9)
-        fits = np.flatnonzero(self.times + (count - 1) / rate <= self.times[-1] + 0.05 / own)
-        if own < LEAST_RATE * rate or not len(fits):
+        film_rate = (len(self.times) - 1) / max(float(self.times[-1]), 1e-9)
+        fits = np.flatnonzero(self.times + (count - 1) / rate <= self.times[-1] + 0.05 / film_rate)
+        if film_rate < LEAST_RATE * rate or not len(fits):
             raise InputError(
-                f"a film of {len(self.times)} frames at {own:.4g} Hz for clips of {count} at {rate:g} Hz",
+                f"the film of {len(self.times)} frames at {film_rate:.4g} Hz cannot give "
+                f"clips of {count} at {rate:g} Hz",
                 fix=f"give {(count - 1) / rate:.3g} s or more, of {LEAST_RATE * rate:.3g} Hz or more",
             )
         return fits
 
     def whole(self, rate: float) -> NDArray[np.uint8]:
-        """(m, size, size) all of the film at `rate` [Hz].
+        """Resamples all of the film at `rate` [Hz]: (m, size, size).
 
         Raises:
             InputError: the film is slower than `LEAST_RATE` of the rate.
@@ -84,16 +87,16 @@ class FitFilm:
         return self.clip(0, int(self.times[-1] * rate + 1e-6) + 1, rate)[0]
 
     def clip(self, first: int, count: int, rate: float) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-        """(count, size, size) pictures at `rate` [Hz] from a frame on, and their times [s]."""
+        """Resamples (count, size, size) pictures at `rate` [Hz] from a frame on, and returns their times [s]."""
         instants = self.times[first] + np.arange(count) / rate
         period = float(np.median(np.diff(self.times)))
         return at_instants(self._frames, instants, period=period, interpolator=self._interpolator)[0], instants
 
 
-def _nearest_to_the_middle(found: Conditioning) -> int:
-    """Place of a region among those found; the chosen one's where nothing moves."""
-    if len(found.regions) < 2:
-        return found.chosen
-    boxes = np.array([region.box for region in found.regions], dtype=np.float64)
-    middle = np.array(found.regions[0].mask.shape[::-1]) / 2
+def _nearest_to_the_middle(conditioning: Conditioning) -> int:
+    """Chooses the region nearest to the picture's middle; the chosen one's index where nothing moves."""
+    if len(conditioning.regions) < 2:
+        return conditioning.chosen
+    boxes = np.array([region.box for region in conditioning.regions], dtype=np.float64)
+    middle = np.array(conditioning.regions[0].mask.shape[::-1]) / 2
     return int(np.linalg.norm((boxes[:, :2] + boxes[:, 2:]) / 2 - middle, axis=1).argmin())

@@ -63,24 +63,24 @@ class Files:
     def __len__(self) -> int:
         return len(self.paths)
 
-    def __getitem__(self, place: tuple[NDArray[np.int64], NDArray[np.int64]]) -> NDArray[Any]:
-        """(len(entries), *shape).
+    def __getitem__(self, index: tuple[NDArray[np.int64], NDArray[np.int64]]) -> NDArray[Any]:
+        """Reads (len(entries), *shape) from the entries' files.
 
         Raises:
             CorruptError: a file that is cut off or gone.
         """
-        found = []
-        for entry, variant in zip(*place, strict=True):
+        arrays = []
+        for entry, variant in zip(*index, strict=True):
             path = self.paths[entry]
             try:
-                found.append(np.load(path, mmap_mode="r")[variant])
+                arrays.append(np.load(path, mmap_mode="r")[variant])
             except (OSError, ValueError, EOFError) as error:
                 raise CorruptError(
                     f"a prepared input cannot be read: {error}",
                     where=str(path),
                     fix="delete the file and give the command again: it is made anew",
                 ) from None
-        return np.stack(found)
+        return np.stack(arrays)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,8 +104,9 @@ class Prepared:
     def __len__(self) -> int:
         return len(self.maps)
 
-    def held(self) -> Prepared:
-        """The same in memory, if that leaves half of what is free; small random reads of files are slower than steps.
+    def in_memory(self) -> Prepared:
+        """Reads the inputs into memory, if that leaves half of what is free; small random reads of files are slower
+        than steps.
 
         Raises:
             CorruptError: a file that is cut off or gone.
@@ -124,37 +125,37 @@ class Prepared:
         return replace(self, maps=maps)
 
     def truth(self, names: Sequence[str]) -> NDArray[np.float64]:
-        """(n, target), as `models.targets.truth`.
+        """Returns (n, target), as `models.targets.truth`.
 
         Raises:
             InputError: a target that an entry does not state.
         """
-        return stated(self.parameters, names)
+        return complete_truth(self.parameters, names)
 
     def batch(self, entries: NDArray[np.int64], variant: NDArray[np.int64]) -> Tensor:
-        """(len(entries), *shape) float32."""
+        """Returns (len(entries), *shape) float32."""
         return as_input(torch.from_numpy(self.maps[entries, variant]))
 
 
-def stated(parameters: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -> NDArray[np.float64]:
-    """(n, target), as `models.targets.truth`, where every entry states all of them.
+def complete_truth(parameters: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -> NDArray[np.float64]:
+    """Returns (n, target), as `models.targets.truth`, where every entry states all of them.
 
     Raises:
         InputError: one that does not.
     """
-    found = targets.truth(parameters, names)
-    if not np.isfinite(found).all():
-        entry, column = (int(k) for k in np.argwhere(~np.isfinite(found))[0])
+    values = targets.truth(parameters, names)
+    if not np.isfinite(values).all():
+        entry, column = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
         raise InputError(
             f"entry {entry} does not state its {names[column]}",
             where="the training data",
             fix="select recordings that have ground truth, or leave the target out",
         )
-    return found
+    return values
 
 
 def as_input(stored: Tensor) -> Tensor:
-    """What was stored as a network takes it: maps as float32, frames standardised clip by clip."""
+    """Converts what was stored to what a network takes: maps as float32, frames standardised clip by clip."""
     if stored.dtype != torch.uint8:
         return stored.float()
     return torch.stack([standardised(clip) for clip in stored])
@@ -173,7 +174,7 @@ def prepare_films(
     sequences: int | None = None,
     seed: int = 0,
 ) -> Prepared:
-    """Random crops of whole films, for training: entries are films.
+    """Prepares random crops of whole films, for training: entries are films.
 
     The crops depend on the film and the number of the variant alone, not on a training's seed.
 
@@ -191,15 +192,15 @@ def prepare_films(
     disturbed = augment if augment is not None else Augment()
 
     def key(row: int) -> dict[str, Any]:
-        found = {"film": pairs.table.recording[row], "variants": variants, "crops": cropping.as_dict()}
+        key_parts = {"film": pairs.table.recording[row], "variants": variants, "crops": cropping.as_dict()}
         if not cropping.conditioned:
-            return found
-        found |= {"augment": disturbed.identity(), **_VERSION}
+            return key_parts
+        key_parts |= {"augment": disturbed.identity(), **_VERSION}
         if disturbed.happens("second-flag", str(pairs.table.recording[row])):
-            found["beside"] = pairs.table.recording[_beside(pairs, row)]
-        return found
+            key_parts["beside"] = pairs.table.recording[_row_of_second_film(pairs, row)]
+        return key_parts
 
-    def made(row: int) -> list[Tensor]:
+    def crops(row: int) -> list[Tensor]:
         if cropping.conditioned:
             return _conditioned_crops(pairs, row, front_end, cropping, variants=variants, augment=disturbed)
         film, recording = pairs.film(row), str(pairs.table.recording[row])
@@ -207,12 +208,12 @@ def prepare_films(
         return [cropping.cut(film, crop) for crop in drawn]
 
     return _prepared(
-        pairs, rows, front_end, key, made, variants, folder, workers, advance, conditioned=cropping.conditioned
+        pairs, rows, front_end, key, crops, variants, folder, workers, advance, conditioned=cropping.conditioned
     )
 
 
 def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> NDArray[np.int64]:
-    """A row of the table for each film, of all simulations or of the first of a random order of this seed.
+    """Selects a row of the table for each film, of all simulations or of the first of a random order of this seed.
 
     Raises:
         InputError: fewer simulations than are asked for.
@@ -224,7 +225,8 @@ def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> NDArray[np.i
 def prepare_clips(
     pairs: Pairs, front_end: FrontEnd, cropping: Cropping, *, folder: Path, workers: int, advance: Advance
 ) -> Prepared:
-    """The catalog's clips as they are, the largest square of each, for validation and tests: entries are clips.
+    """Prepares the catalog's clips as they are, the largest square of each, for validation and tests: entries are
+    clips.
 
     A conditioned clip is as long as the front end takes, from the first frame of the catalog's on, or from as early as
     its film has to be entered to be long enough.
@@ -235,10 +237,10 @@ def prepare_clips(
     """
 
     def key(row: int) -> dict[str, Any]:
-        found = {"clip": pairs.table.artifact[row], "size": cropping.size, "frames": cropping.frames}
-        return {**found, **_VERSION} if cropping.conditioned else found
+        key_parts = {"clip": pairs.table.artifact[row], "size": cropping.size, "frames": cropping.frames}
+        return {**key_parts, **_VERSION} if cropping.conditioned else key_parts
 
-    def made(row: int) -> list[Tensor]:
+    def crops(row: int) -> list[Tensor]:
         clip = _conditioned_clip(pairs, row, front_end) if cropping.conditioned else pairs[row].clip[0].numpy()
         return [cropping.cut(clip, cropping.whole(_shape(clip)))]
 
@@ -247,7 +249,7 @@ def prepare_clips(
         np.arange(len(pairs)),
         front_end,
         key,
-        made,
+        crops,
         1,
         folder,
         workers,
@@ -259,28 +261,30 @@ def prepare_clips(
 def _conditioned_crops(
     pairs: Pairs, row: int, front_end: FrontEnd, cropping: Cropping, *, variants: int, augment: Augment
 ) -> list[Tensor]:
-    """Random crops of a film that was disturbed and conditioned once; each starts on a frame of its own."""
+    """Crops a film at random that was disturbed and conditioned once; each crop starts on a frame of its own."""
     recording, times = str(pairs.table.recording[row]), pairs.film_times(row)
-    disturbed = augment.before(pairs.film(row), times, source=recording, other=lambda: pairs.film(_beside(pairs, row)))
+    disturbed = augment.before(
+        pairs.film(row), times, source=recording, other_film=lambda: pairs.film(_row_of_second_film(pairs, row))
+    )
     film = FitFilm.of(disturbed, times)
-    starts, found = film.starts(front_end.frames, front_end.rate), []
+    starts, crops = film.starts(front_end.frames, front_end.rate), []
     for variant in range(variants):
         rng = stream(0, "crop", recording, variant)
         clip, instants = film.clip(int(rng.choice(starts)), front_end.frames, front_end.rate)
         clip = augment.after(clip, instants, source=recording, variant=variant, weight=film.weight)
-        found.append(cropping.cut(clip, cropping.draw(rng, _shape(clip))))
-    return found
+        crops.append(cropping.cut(clip, cropping.draw(rng, _shape(clip))))
+    return crops
 
 
-def _beside(pairs: Pairs, row: int) -> int:
-    """A row of the film that a second flag is of: of all films in the order of their artifacts the next."""
+def _row_of_second_film(pairs: Pairs, row: int) -> int:
+    """Selects a row of the film that a second flag is of: of all films in the order of their artifacts the next."""
     recordings, first = np.unique(pairs.table.recording, return_index=True)
-    place = int(np.searchsorted(recordings, pairs.table.recording[row]))
-    return int(first[(place + 1) % len(recordings)])
+    row_of_film = int(np.searchsorted(recordings, pairs.table.recording[row]))
+    return int(first[(row_of_film + 1) % len(recordings)])
 
 
 def _conditioned_clip(pairs: Pairs, row: int, front_end: FrontEnd) -> NDArray[np.uint8]:
-    """(frames, size, size) the clip of a row, of its conditioned film."""
+    """Returns the clip of a row, of its conditioned film: (frames, size, size)."""
     film = FitFilm.of(pairs.film(row), pairs.film_times(row))
     starts = film.starts(front_end.frames, front_end.rate)
     return film.clip(min(int(pairs.table.frame_first[row]), int(starts[-1])), front_end.frames, front_end.rate)[0]
@@ -291,7 +295,7 @@ def _prepared(
     rows: NDArray[np.int64],
     front_end: FrontEnd,
     key: Callable[[int], dict[str, Any]],
-    made: Callable[[int], list[Tensor]],
+    compute: Callable[[int], list[Tensor]],
     variants: int,
     folder: Path,
     workers: int,
@@ -301,23 +305,23 @@ def _prepared(
 ) -> Prepared:
     if not conditioned:
         _check_rate(pairs, rows, front_end)
-    own = folder / f"{front_end.maps}-{front_end.hash}"
-    named = [_name(key(row), front_end, str(pairs.table.objects[pairs.table.object[row]])) for row in rows.tolist()]
-    paths = tuple(own / name[:2] / f"{name}.npy" for name in named)
+    subfolder = folder / f"{front_end.maps}-{front_end.hash}"
+    names = [_name(key(row), front_end, str(pairs.table.objects[pairs.table.object[row]])) for row in rows.tolist()]
+    paths = tuple(subfolder / name[:2] / f"{name}.npy" for name in names)
     try:
         missing = _unsound(list(zip(rows.tolist(), paths, strict=True)), workers)
         advance(len(rows) - len(missing))
         if missing:
             with alone_in(
-                own, occupied=lambda: _LOG.warning("flagdata: another process prepares inputs, waiting for it")
+                subfolder, occupied=lambda: _LOG.warning("flagdata: another process prepares inputs, waiting for it")
             ):
                 still = _unsound(missing, workers)
                 advance(len(missing) - len(still))
                 _warn_of_damage([path for _, path in still if path.exists()])
                 for row, path in still[:1]:  # an error common to all is reported by the first
-                    _write(path, made(row), front_end)
+                    _write(path, compute(row), front_end)
                     advance(1)
-                _fill(still[1:], made, front_end, workers, advance)
+                _fill(still[1:], compute, front_end, workers, advance)
     except OSError as error:
         raise FlagdataError(
             f"preparing the inputs failed: {error.strerror or error}",
@@ -329,13 +333,13 @@ def _prepared(
         maps=Files(paths=paths, shape=(len(rows), variants, *front_end.shape)),
         parameters=pairs.table.parameter_columns(rows),
         sequence=np.where(pairs.table.seeded[rows], pairs.table.seed[rows], alone),
-        fingerprint=digest("\n".join([pairs.fingerprint, *named])),
+        fingerprint=digest("\n".join([pairs.fingerprint, *names])),
         front_end=front_end,
     )
 
 
 def _check_rate(pairs: Pairs, rows: NDArray[np.int64], front_end: FrontEnd) -> None:
-    """Refuse clips of another frame rate than the front end's frequencies assume."""
+    """Refuses clips of another frame rate than the front end's frequencies assume."""
     table = pairs.table
     seconds = (table.end[rows] - table.start[rows]) / NANOSECONDS
     rate = (table.frame_count[rows] - 1) / np.maximum(seconds, 1e-9)
@@ -353,11 +357,11 @@ def _name(key: dict[str, Any], front_end: FrontEnd, content: str) -> str:
     return digest(canonical({"front_end": front_end.hash, "object": content, **key}))
 
 
-def _unsound(places: Sequence[tuple[int, Path]], workers: int) -> list[tuple[int, Path]]:
-    """Those of the rows and files whose file is not there, or not as it was written."""
+def _unsound(files: Sequence[tuple[int, Path]], workers: int) -> list[tuple[int, Path]]:
+    """Lists the rows and files whose file is missing, or not as it was written."""
     with ThreadPoolExecutor(workers, thread_name_prefix="inputs") as pool:
-        sound = pool.map(lambda place: place[1].exists() and is_sealed(place[1]), places)
-        return [place for place, good in zip(places, sound, strict=True) if not good]
+        sound = pool.map(lambda file: file[1].exists() and is_sealed(file[1]), files)
+        return [file for file, good in zip(files, sound, strict=True) if not good]
 
 
 def _warn_of_damage(paths: Sequence[Path]) -> None:
@@ -372,7 +376,7 @@ def _warn_of_damage(paths: Sequence[Path]) -> None:
 
 def _fill(
     missing: Sequence[tuple[int, Path]],
-    made: Callable[[int], list[Tensor]],
+    compute: Callable[[int], list[Tensor]],
     front_end: FrontEnd,
     workers: int,
     advance: Advance,
@@ -381,7 +385,9 @@ def _fill(
     torch.set_num_threads(1)
     pool = ThreadPoolExecutor(workers, thread_name_prefix="inputs")
     try:
-        todo = [pool.submit(lambda row, path: _write(path, made(row), front_end), row, path) for row, path in missing]
+        todo = [
+            pool.submit(lambda row, path: _write(path, compute(row), front_end), row, path) for row, path in missing
+        ]
         for finished in as_completed(todo):
             finished.result()
             advance(1)
@@ -391,7 +397,7 @@ def _fill(
 
 
 def _write(path: Path, clips: Sequence[Tensor], front_end: FrontEnd) -> None:
-    """The front end's output of some clips, with its checksum; a file is whole or not there."""
+    """Writes the front end's output of some clips, with its checksum; a file is whole or not there."""
     if front_end.maps == "frames":
         stored = np.stack([clip.round().to(torch.uint8).numpy() for clip in clips])
     else:
@@ -402,7 +408,7 @@ def _write(path: Path, clips: Sequence[Tensor], front_end: FrontEnd) -> None:
 
 
 def _first_sequences(pairs: Pairs, rows: NDArray[np.int64], *, count: int | None, seed: int) -> NDArray[np.bool_]:
-    """Which of the films belong to the first `count` simulations of an order that depends on the seed alone."""
+    """Masks the films that belong to the first `count` simulations of an order that depends on the seed alone."""
     if count is None:
         return np.ones(len(rows), dtype=np.bool_)
     seeds = np.unique(pairs.table.seed[rows])

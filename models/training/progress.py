@@ -37,7 +37,7 @@ _KINDS: dict[str, Callable[[Any], Any]] = {
 
 
 @dataclass(kw_only=True)
-class Course:
+class LossCourse:
     """Attributes:
     epochs: that were completed.
     """
@@ -50,7 +50,7 @@ class Course:
         return min(self.epochs, key=lambda epoch: epoch.validation, default=None)
 
     def stalled(self, patience: int) -> bool:
-        """Whether the last `patience` epochs were no better than the best before them."""
+        """Returns whether the last `patience` epochs were no better than the best before them."""
         best = self.best
         return best is not None and len(self.epochs) - 1 - best.number >= patience
 
@@ -58,8 +58,8 @@ class Course:
         return [asdict(epoch) for epoch in self.epochs]
 
     @classmethod
-    def of(cls, content: list[dict[str, Any]]) -> Course:
-        """From `as_list`.
+    def of(cls, content: list[dict[str, Any]]) -> LossCourse:
+        """Rebuilds a course from `as_list`.
 
         Raises:
             AttributeError, KeyError, OverflowError, TypeError, ValueError: it is not from there.
@@ -67,7 +67,7 @@ class Course:
         return cls(epochs=[Epoch(**{name: _KINDS[name](value) for name, value in entry.items()}) for entry in content])
 
     def picture(self) -> bytes:
-        """The losses and the learning rate against the epoch: a PNG."""
+        """Draws the losses and the learning rate against the epoch: a PNG."""
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(7, 3.6), dpi=110, layout="constrained")

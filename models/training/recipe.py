@@ -81,31 +81,31 @@ class DataSpec:
 
     @classmethod
     def of_identity(cls, entry: Mapping[str, Any]) -> DataSpec:
-        """What `identity` was made of, as a model's card keeps it."""
-        named = entry["dataset"]
-        return cls(datasets=(named,) if isinstance(named, str) else tuple(named), sequences=entry["sequences"])
+        """Rebuilds what `identity` was made of, as a model's card keeps it."""
+        datasets = entry["dataset"]
+        return cls(datasets=(datasets,) if isinstance(datasets, str) else tuple(datasets), sequences=entry["sequences"])
 
     def where(self, side: str) -> Values:
-        """What rows of the catalog that are of a side have in their columns."""
+        """Returns what rows of the catalog that are of a side have in their columns."""
         return {"dataset": self.datasets, "side": side}
 
     def split(self, *sides: str) -> ExplicitSplit:
-        """These sides of the data sets, by which pairs are read."""
+        """Splits the data sets into these sides, by which pairs are read."""
         return ExplicitSplit(where={side: self.where(side) for side in sides})
 
     def check(self, lake: Lake, *, at: str | None) -> None:
-        """Make sure that a lake has all of these data sets.
+        """Checks that a lake has all of these data sets.
 
         Raises:
             UnknownNameError: one that it has not; the nearest is named.
         """
-        known = set(lake.rows({"kind": Kind.CLIP}, at=at, columns=["dataset"])["dataset"].drop_null().to_pylist())
+        available = set(lake.rows({"kind": Kind.CLIP}, at=at, columns=["dataset"])["dataset"].drop_null().to_pylist())
         for dataset in self.datasets:
-            if dataset not in known:
-                raise UnknownNameError.of("data set", dataset, known, where=str(lake.path))
+            if dataset not in available:
+                raise UnknownNameError.of("data set", dataset, available, where=str(lake.path))
 
     def identity(self) -> dict[str, Any]:
-        """JSON values; one data set is named by itself."""
+        """Returns JSON values; one data set is named by itself."""
         dataset = self.datasets[0] if len(self.datasets) == 1 else list(self.datasets)
         return {"dataset": dataset, "sequences": self.sequences}
 
@@ -188,7 +188,7 @@ class TrainingRecipe:
     optimiser: OptimiserSpec
 
     def identity(self) -> dict[str, Any]:
-        """All that shapes the weights beside the data themselves, as JSON."""
+        """Returns all that shapes the weights beside the data themselves, as JSON."""
         return {
             "training": RECIPE_VERSION,
             "seed": self.seed,
@@ -203,7 +203,7 @@ class TrainingRecipe:
         }
 
     def learner(self) -> Learner:
-        """The network with its head, its weights drawn by torch's generator as it stands.
+        """Builds the network with its head, its weights drawn by torch's generator as it stands.
 
         Raises:
             InputError: options that the network does not take.
@@ -219,7 +219,7 @@ class TrainingRecipe:
         )
 
     def check(self) -> None:
-        """Make sure that the network takes what the front end gives, by shapes alone, before anything is prepared.
+        """Checks that the network takes what the front end gives, by shapes alone, before anything is prepared.
 
         Raises:
             InputError: options or clips that the network does not take.
@@ -242,15 +242,15 @@ class TrainingRecipe:
 
 
 def load(source: str) -> TrainingRecipe:
-    """The training recipe of that name in the catalog, or of a `.toml` file.
+    """Loads the training recipe of that name in the catalog, or of a `.toml` file.
 
     Raises:
         NotFoundError: no such file.
         UnknownNameError: no such recipe; a key, name or option that is not known.
         InputError, UsageError: a value that does not fit.
     """
-    found = TRAININGS.find(source)
-    return parse(found.text, name=found.name, where=found.where, folder=found.folder)
+    source_text = TRAININGS.find(source)
+    return parse(source_text.text, name=source_text.name, where=source_text.where, folder=source_text.folder)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -286,7 +286,7 @@ class _Input:
 
 
 def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> TrainingRecipe:
-    """A recipe from its text; raises as `load`."""
+    """Parses a recipe from its text; raises as `load`."""
     form = read(_Form, parsed(text, where=where), where=where)
     front_end, cropping = _input(form.input, where=f"{where} [input]")
     return TrainingRecipe(
@@ -315,28 +315,28 @@ def _data(data: _Data, *, where: str) -> DataSpec:
     return DataSpec(datasets=tuple(datasets), sequences=data.sequences)
 
 
-def _input(given: _Input, *, where: str) -> tuple[FrontEnd, Cropping]:
-    front_end = FrontEnd(maps=cast("Maps", given.maps), size=given.size, frames=given.frames, rate=given.rate)
-    if (values := given.variants * math.prod(front_end.shape)) > FILM_LIMIT:
+def _input(form: _Input, *, where: str) -> tuple[FrontEnd, Cropping]:
+    front_end = FrontEnd(maps=cast("Maps", form.maps), size=form.size, frames=form.frames, rate=form.rate)
+    if (values := form.variants * math.prod(front_end.shape)) > FILM_LIMIT:
         raise LimitError(
-            f"{given.variants} variants of {math.prod(front_end.shape)} values are {values:.3g} values of each film",
+            f"{form.variants} variants of {math.prod(front_end.shape)} values are {values:.3g} values of each film",
             where=where,
             fix=f"at most {FILM_LIMIT} are kept: give fewer variants or a smaller size",
         )
-    if given.augment and not given.conditioned:
+    if form.augment and not form.conditioned:
         raise UsageError(
-            "disturbances of films that are not conditioned",
+            "films that are not conditioned cannot be disturbed",
             where=f"{where} [augment]",
             fix="write conditioned = true in [input], or leave them out",
         )
-    scales = given.scales or Cropping.scales
+    scales = form.scales or Cropping.scales
     return front_end, Cropping(
-        frames=given.frames, size=given.size, scales=scales, mirror=given.mirror, conditioned=given.conditioned
+        frames=form.frames, size=form.size, scales=scales, mirror=form.mirror, conditioned=form.conditioned
     )
 
 
 def _network(content: Mapping[str, Any], front_end: FrontEnd, *, where: str) -> NetworkSpec:
-    name, options = content.get("name"), {key: each for key, each in content.items() if key != "name"}
+    name, options = content.get("name"), {key: entry for key, entry in content.items() if key != "name"}
     if not isinstance(name, str):
         raise InputError("no name is given", where=where, fix=f"add name, one of {', '.join(NETWORKS)}")
     takes = NETWORKS[name].takes

@@ -33,12 +33,12 @@ from models.learner import Learner, Loss
 from models.training import checkpoint
 from models.training.checkpoint import Standing
 from models.training.inputs import Prepared
-from models.training.progress import Course, Epoch
+from models.training.progress import Epoch, LossCourse
 from models.training.recipe import OptimiserSpec, Precision, Schedule, TrainingRecipe
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Batch:
+class TrainingBatch:
     """Attributes:
     inputs: (n, *shape) float32.
     entries: (n,) which.
@@ -75,7 +75,8 @@ class Batches:
     def __post_init__(self) -> None:
         if self.size % self.share[1]:
             raise UsageError(
-                f"batches of {self.size} for {self.share[1]} processes", fix="choose a multiple of their number"
+                f"batches of {self.size} cannot be shared by {self.share[1]} processes",
+                fix="choose a multiple of their number",
             )
         if len(self.prepared) < self.size:
             raise UsageError(
@@ -87,14 +88,14 @@ class Batches:
         """Batches of an epoch."""
         return len(self.prepared) // self.size
 
-    def __iter__(self) -> Iterator[Batch]:
-        """What is left of the epoch."""
+    def __iter__(self) -> Iterator[TrainingBatch]:
+        """Yields what is left of the epoch."""
         order, variant = self._order(self.epoch)
         part = self.size // self.share[1]
         while True:
             begin = self.cursor * self.size + self.share[0] * part
             entries = order[begin : begin + part]
-            batch = Batch(
+            batch = TrainingBatch(
                 inputs=self.prepared.batch(entries, variant[entries]),
                 entries=entries,
                 sequence=torch.from_numpy(self.prepared.sequence[entries]),
@@ -108,24 +109,25 @@ class Batches:
                 return
 
     def order_hash(self, epoch: int) -> str:
-        """SHA-256 of the entries, their variants and their order in an epoch, in hexadecimal: equal for any share."""
+        """Hashes the entries, their variants and their order in an epoch, SHA-256 in hexadecimal: equal for any
+        share."""
         order, variant = self._order(epoch)
         content = {name: value for name, value in self.state().items() if name not in ("epoch", "cursor")}
         return array_hash(content, [order.astype("<i8"), variant[order].astype("<i8")])
 
     def _order(self, epoch: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Entries in the epoch's order, and which variant of each entry it takes."""
+        """Returns entries in the epoch's order, and which variant of each entry it takes."""
         rng = stream(self.seed, "batches", epoch)
         if self.together:
-            sequences, place = np.unique(self.prepared.sequence, return_inverse=True)
-            order = np.argsort(rng.permutation(len(sequences))[place], kind="stable")
+            sequences, simulation = np.unique(self.prepared.sequence, return_inverse=True)
+            order = np.argsort(rng.permutation(len(sequences))[simulation], kind="stable")
         else:
             order = rng.permutation(len(self.prepared))
         start = stream(self.seed, "variants").integers(self._variants, size=len(self.prepared))
         return order, (start + epoch) % self._variants
 
     def state(self) -> dict[str, Any]:
-        """All that determines the batches to come."""
+        """Returns all that determines the batches to come."""
         return {
             "fingerprint": self.prepared.fingerprint,
             "front_end": self.prepared.front_end.hash,
@@ -139,18 +141,18 @@ class Batches:
         }
 
     def take_up(self, state: Mapping[str, Any]) -> None:
-        """Go to where `state` was taken.
+        """Goes to where `state` was taken.
 
         Raises:
             RefusedError: it is of other data or other batches.
             CorruptError: it names a batch that no epoch has.
         """
-        own = self.state()
-        different = [name for name in own if name not in ("epoch", "cursor") and state.get(name) != own[name]]
+        current = self.state()
+        different = [name for name in current if name not in ("epoch", "cursor") and state.get(name) != current[name]]
         if different:
-            named = "; ".join(f"{name} was {state.get(name)!r}, is {own[name]!r}" for name in different)
+            changes = "; ".join(f"{name} was {state.get(name)!r}, is {current[name]!r}" for name in different)
             raise RefusedError(
-                f"the checkpoint is of other batches: {named}",
+                f"the checkpoint is of other batches: {changes}",
                 where="the training data",
                 fix="train at the same tag with the same recipe, or begin anew in another folder",
             )
@@ -190,7 +192,7 @@ class Trained:
     """
 
     learner: Learner
-    course: Course
+    course: LossCourse
     seconds: float
 
 
@@ -218,7 +220,7 @@ class Training:
     checkpoint_seconds: float = CHECKPOINT_SECONDS
 
     def complete(self) -> Trained:
-        """Train from the beginning, or from the checkpoint, to the end.
+        """Trains from the beginning, or from the checkpoint, to the end.
 
         Raises:
             DivergedError: the loss is not finite.
@@ -230,7 +232,9 @@ class Training:
         values = self._values(self.train, learner)
         self._values(self.validation, learner)  # what cannot be learned is refused before the first step
         optimiser = torch.optim.Adam(learner.parameters(), lr=spec.rate, weight_decay=spec.decay)
-        standing = Standing(learner=learner, best=None, optimiser=optimiser, course=Course(), batches=batches.state())
+        standing = Standing(
+            learner=learner, best=None, optimiser=optimiser, course=LossCourse(), batches=batches.state()
+        )
         if checkpoint.restore(self.run, standing, identity=self.identity):
             batches.take_up(standing.batches)
         module = _Loss(learner)
@@ -243,7 +247,8 @@ class Training:
         return Trained(learner=learner.eval(), course=course, seconds=sum(epoch.seconds for epoch in course.epochs))
 
     def length(self) -> float:
-        """About how long all epochs take on this machine, validation left out, by a step that changes nothing [s]."""
+        """Predicts how long all epochs take on this machine, validation left out, by a step that changes nothing
+        [s]."""
         spec = self.recipe.optimiser
         with torch.random.fork_rng(devices=[]):
             learner = self._fresh().train()
@@ -279,15 +284,15 @@ class Training:
         return learner.to(self.device)
 
     def _values(self, prepared: Prepared, learner: Learner) -> Tensor:
-        """(n, target) of the entries.
+        """Returns (n, target) of the entries.
 
         Raises:
             InputError: some lie beyond the range of their target.
         """
         scaling = learner.scaling
-        found = prepared.truth(scaling.names) if scaling.names else np.empty((len(prepared), 0))
-        scaling.check(found, where="the training data")
-        return torch.from_numpy(found).to(self.device)
+        truth = prepared.truth(scaling.names) if scaling.names else np.empty((len(prepared), 0))
+        scaling.check(truth, where="the training data")
+        return torch.from_numpy(truth).to(self.device)
 
     def _epoch(self, standing: Standing, batches: Batches, stepped: nn.Module, values: Tensor) -> None:
         spec, number = self.recipe.optimiser, batches.epoch
@@ -322,8 +327,8 @@ class Training:
         standing.running, standing.batches = (0.0, 0), batches.state()
         self._save(standing)
 
-    def _step(self, standing: Standing, stepped: nn.Module, batch: Batch, values: Tensor, rate: float) -> float:
-        """One batch; returns its loss."""
+    def _step(self, standing: Standing, stepped: nn.Module, batch: TrainingBatch, values: Tensor, rate: float) -> float:
+        """Takes a step on one batch; returns its loss."""
         optimiser, spec = standing.optimiser, self.recipe.optimiser
         for group in optimiser.param_groups:
             group["lr"] = rate
@@ -347,7 +352,7 @@ class Training:
 
     @torch.no_grad()
     def _validate(self, learner: Learner) -> float:
-        """The mean loss over the validation side; a contrastive one over batches of whole sequences."""
+        """Computes the mean loss over the validation side; a contrastive one over batches of whole sequences."""
         learner.eval()
         values, sequence = self._values(self.validation, learner), torch.from_numpy(self.validation.sequence)
         order = np.argsort(self.validation.sequence, kind="stable")
@@ -378,7 +383,7 @@ class _Loss(nn.Module):
 
 
 def learning_rate(spec: OptimiserSpec, step: int, of_epoch: int) -> float:
-    """The rate of a step.
+    """Computes the rate of a step.
 
     Args:
         step: its number from the first of all.
@@ -402,7 +407,7 @@ def _computing(precision: Precision, device: torch.device) -> Iterator[None]:
 
 
 def _share() -> tuple[int, int]:
-    """(rank, ranks) of this process."""
+    """Returns (rank, ranks) of this process."""
     if ranks.is_initialized():
         return ranks.get_rank(), ranks.get_world_size()
     return 0, 1

@@ -113,7 +113,7 @@ class ArcsimScene:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.frame_time) and self.frame_time > 0 and self.frame_steps >= 1 and self.frames >= 1):
             raise InputError(
-                f"a run of {self.frames} frames of {self.frame_time!r} s, each in {self.frame_steps} steps",
+                f"the run has {self.frames} frames of {self.frame_time!r} s, each in {self.frame_steps} steps",
                 where="ArcSim scene",
                 fix="let it last at least one frame of at least one step",
             )
@@ -125,24 +125,24 @@ class ArcsimScene:
 
 
 def read_material(path: Path) -> Material:
-    """A material file: density, stretching (6 × 4) and bending (3 × 5). Its damping is 0, as ArcSim's.
+    """Reads a material file: density, stretching (6 × 4) and bending (3 × 5). Its damping is 0, as ArcSim's.
 
     Raises:
         NotFoundError: no such file.
         InputError: missing or unknown keys, impossible values.
     """
     content = read_json(path)
-    _known(content, {"density", "stretching", "bending"}, f"material {path}")
+    _check_keys(content, {"density", "stretching", "bending"}, f"material {path}")
     missing = sorted({"density", "stretching", "bending"} - set(content))
     if missing:
-        raise InputError(f"keys missing: {', '.join(missing)}", where=f"material {path}", fix="add them")
+        raise InputError(f"these keys are missing: {', '.join(missing)}", where=f"material {path}", fix="add them")
     return Material.from_mapping(
         {**content, "source": f"ArcSim material file {path.name}", "damping": 0.0}, name=path.stem
     )
 
 
 def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] = ()) -> ArcsimScene:
-    """A scene file with its mesh and material.
+    """Reads a scene file with its mesh and material.
 
     Args:
         root: folder that the mesh and material paths are relative to; the scene file's own if None.
@@ -161,8 +161,8 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
         if stage not in STAGES:
             raise UnknownNameError.of("ArcSim stage", str(stage), STAGES, where=where)
     left_out = _supported(content, where, frozenset(accept))
-    cloth = _one(content, "cloths", where)
-    entry = _one(cloth, "materials", where)
+    cloth = _single(content, "cloths", where)
+    entry = _single(cloth, "materials", where)
 
     shape = read_obj(folder / _text(cloth, "mesh", where))
     transform = cloth.get("transform", {})
@@ -173,7 +173,9 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
     nodes: list[int] = []
     for handle in _list(content, "handles", where):
         if handle.get("type", "node") != "node":
-            raise InputError(f"handle type {handle['type']!r}", where=where, fix="only node handles are supported")
+            raise InputError(
+                f"the handle's type is {handle['type']!r}", where=where, fix="only node handles are supported"
+            )
         nodes += [int(node) for node in handle.get("nodes", [])]
     scene = Scene(
         mesh=mesh,
@@ -204,20 +206,18 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
 
 
 def _frames(content: Mapping[str, Any], frame_time: float, where: str) -> int:
-    given = [key for key in ("end_time", "duration", "end_frame") if key in content]
-    if len(given) != 1:
-        raise InputError(
-            f"its end is given {len(given)} times", where=where, fix="give end_time, duration or end_frame"
-        )
-    value = _number(content, given[0], math.nan, where)
-    frames = value if given[0] == "end_frame" else value / frame_time
+    ends = [key for key in ("end_time", "duration", "end_frame") if key in content]
+    if len(ends) != 1:
+        raise InputError(f"its end is given {len(ends)} times", where=where, fix="give end_time, duration or end_frame")
+    value = _number(content, ends[0], math.nan, where)
+    frames = value if ends[0] == "end_frame" else value / frame_time
     if not (math.isfinite(frames) and frames >= 1):
-        raise InputError(f"{given[0]} is {value!r}", where=where, fix="let it last at least one frame")
+        raise InputError(f"{ends[0]} is {value!r}", where=where, fix="let it last at least one frame")
     return math.floor(frames + 1e-9)
 
 
 def _supported(content: Mapping[str, Any], where: str, accept: frozenset[str]) -> tuple[str, ...]:
-    """The stages that act and are left out.
+    """Lists the stages that act and are left out.
 
     Raises:
         InputError: keys, contents or stages that are not supported, all of them in one.
@@ -228,14 +228,14 @@ def _supported(content: Mapping[str, Any], where: str, accept: frozenset[str]) -
     left_out = tuple(stage for stage in acting if stage in accept)
     refused = [stage for stage in acting if stage not in (*accept, *SIMULATED)]
     reasons = [
-        f"{what} {', '.join(names)}"
-        for what, names in (("the keys", keys), ("the contents of", filled), ("the stages", refused))
+        f"{kind} {', '.join(names)}"
+        for kind, names in (("the keys", keys), ("the contents of", filled), ("the stages", refused))
         if names
     ]
     if reasons:
         fixes = ["remove what is not supported"] if keys or filled else []
         fixes += ['add the stages to the scene\'s "disable", or accept to leave them out'] if refused else []
-        raise InputError(f"not supported: {'; '.join(reasons)}", where=where, fix="; ".join(fixes))
+        raise InputError(f"these are not supported: {'; '.join(reasons)}", where=where, fix="; ".join(fixes))
     return left_out
 
 
@@ -259,32 +259,32 @@ def _contact(content: Mapping[str, Any], magic: Mapping[str, Any], where: str) -
 
 
 def _limits(entry: Mapping[str, Any], where: str) -> StrainLimits:
-    given = entry["strain_limits"]
-    if not isinstance(given, list) or len(given) != 2:
-        raise InputError(f"strain_limits is {given!r}", where=where, fix="give [low, high]")
-    low, high = (_number({"strain_limits": value}, "strain_limits", 0.0, where) for value in given)
+    limits = entry["strain_limits"]
+    if not isinstance(limits, list) or len(limits) != 2:
+        raise InputError(f"strain_limits is {limits!r}", where=where, fix="give [low, high]")
+    low, high = (_number({"strain_limits": value}, "strain_limits", 0.0, where) for value in limits)
     return StrainLimits(low=low, high=high, sweeps=SWEEPS)
 
 
-def _strange(content: Any, known: Mapping[str, Any], path: str, where: str) -> list[str]:
-    """Full names of the keys that are not known, at any depth.
+def _strange(content: Any, schema: Mapping[str, Any], path: str, where: str) -> list[str]:
+    """Lists full names of the keys that are not in the schema, at any depth.
 
     Raises:
         InputError: a value where a table or list belongs.
     """
     if not isinstance(content, Mapping):
         raise InputError(f"{path or 'the file'} is {content!r}", where=where, fix="give an object, {…}")
-    found: list[str] = []
+    unknown: list[str] = []
     for key, value in content.items():
         name = f"{path}.{key}" if path else str(key)
-        if key not in known:
-            found.append(name)
-        elif isinstance(known[key], Mapping):
-            found += _strange(value, known[key], name, where)
-        elif isinstance(known[key], list):
+        if key not in schema:
+            unknown.append(name)
+        elif isinstance(schema[key], Mapping):
+            unknown += _strange(value, schema[key], name, where)
+        elif isinstance(schema[key], list):
             for index, item in enumerate(_list(content, key, where)):
-                found += _strange(item, known[key][0], f"{name}[{index}]", where)
-    return found
+                unknown += _strange(item, schema[key][0], f"{name}[{index}]", where)
+    return unknown
 
 
 def _scaled(material: Material, entry: Mapping[str, Any], where: str) -> Material:
@@ -298,7 +298,7 @@ def _scaled(material: Material, entry: Mapping[str, Any], where: str) -> Materia
 
 
 def _placed(positions: NDArray[np.float64], transform: Mapping[str, Any], where: str) -> NDArray[np.float64]:
-    """Scaled, turned (angle in degrees about an axis), then moved."""
+    """Applies a transform: scaled, turned (angle in degrees about an axis), then moved."""
     placed = positions * _number(transform, "scale", 1.0, where)
     if "rotate" in transform:
         turn = transform["rotate"]
@@ -309,13 +309,13 @@ def _placed(positions: NDArray[np.float64], transform: Mapping[str, Any], where:
     return placed + np.array(_vector(transform, "translate", (0.0, 0.0, 0.0), where))
 
 
-def _known(content: Any, known: Collection[str], where: str) -> None:
+def _check_keys(content: Any, keys: Collection[str], where: str) -> None:
     if not isinstance(content, Mapping):
         raise InputError(f"{content!r} is not an object", where=where, fix="give {…}")
-    unknown = sorted(set(content) - set(known))
+    unknown = sorted(set(content) - set(keys))
     if unknown:
         raise InputError(
-            f"keys that are not supported: {', '.join(unknown)}", where=where, fix=f"known: {', '.join(sorted(known))}"
+            f"these keys are not supported: {', '.join(unknown)}", where=where, fix=f"known: {', '.join(sorted(keys))}"
         )
 
 
@@ -326,10 +326,10 @@ def _list(content: Mapping[str, Any], key: str, where: str) -> list[Any]:
     return value
 
 
-def _one(content: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
+def _single(content: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
     entries = _list(content, key, where)
     if len(entries) != 1:
-        raise InputError(f"{len(entries)} {key}", where=where, fix="one is supported")
+        raise InputError(f"the scene has {len(entries)} {key}", where=where, fix="one is supported")
     return entries[0]
 
 

@@ -23,7 +23,7 @@ from sim.tables import Evaluation
 
 
 def write_scene(file: ArcsimScene, folder: Path, *, name: str = "scene") -> Path:
-    """Write `name`.json with its mesh `name`.obj and its material, by which `sim.arcsim.read_scene` gives it back.
+    """Writes `name`.json with its mesh `name`.obj and its material, by which `sim.arcsim.read_scene` gives it back.
 
     ArcSim looks for the mesh and the material from where it is run: run it in the folder. Positions have nine
     significant digits, all else is exact.
@@ -55,7 +55,7 @@ def write_scene(file: ArcsimScene, folder: Path, *, name: str = "scene") -> Path
 
 
 def _expressible(scene: Scene) -> QuadraticNormal:
-    """The scene's wind force, where ArcSim's format can express it and all else."""
+    """Returns the scene's wind force, where ArcSim's format can express it and all else."""
     refused: list[str] = []
     if len(scene.handles.times) > 1 or any(any(offset) for offset in scene.handles.offsets):
         refused.append("moving handles")

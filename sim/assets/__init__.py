@@ -21,15 +21,15 @@ from sim.assets.photos import Photos
 PHOTO = "photo"
 
 
-class Kind(Protocol):
+class AssetKind(Protocol):
     """A family of pictures."""
 
     def draw(self, rng: np.random.Generator) -> str:
-        """The name of one member."""
+        """Draws the name of one member."""
         ...
 
     def image(self, member: str) -> NDArray[np.uint8]:
-        """A member's picture (height, width, 3), sRGB.
+        """Renders a member's picture (height, width, 3), sRGB.
 
         Raises:
             UnknownNameError: there is no such member.
@@ -76,7 +76,7 @@ class Assets:
             self._photos()
 
     def texture(self, name: str) -> NDArray[np.uint8]:
-        """A texture by name: (height, width, 3) sRGB, upper row first.
+        """Renders a texture by name: (height, width, 3) sRGB, upper row first.
 
         Raises:
             UnknownNameError: there is no such texture.
@@ -85,7 +85,7 @@ class Assets:
         return TEXTURES[kind].image(member)
 
     def background(self, name: str) -> NDArray[np.uint8]:
-        """A background by name: (height, width, 3) sRGB.
+        """Renders a background by name: (height, width, 3) sRGB.
 
         Raises:
             UnknownNameError: there is no such background.
@@ -97,7 +97,7 @@ class Assets:
         return BACKGROUNDS[kind].image(member)
 
     def draw_texture(self, kinds: Sequence[str], rng: np.random.Generator) -> str:
-        """The name of a texture of one of these kinds, each with equal chance.
+        """Draws the name of a texture of one of these kinds, each with equal chance.
 
         Raises:
             UnknownNameError: a kind that does not exist.
@@ -105,7 +105,7 @@ class Assets:
         return _draw(TEXTURES, kinds, rng)
 
     def draw_background(self, kinds: Sequence[str], rng: np.random.Generator) -> str:
-        """The name of a photograph where there is a folder of them, else of a background of one of these kinds.
+        """Draws the name of a photograph where there is a folder of them, else of a background of one of these kinds.
 
         Raises:
             UnknownNameError: a kind that does not exist.
@@ -128,6 +128,6 @@ def _split(name: str, noun: str, example: str) -> tuple[str, str]:
 
 
 def _draw(table: Registry, kinds: Sequence[str], rng: np.random.Generator) -> str:
-    made = [table[kind] for kind in kinds]
-    place = int(rng.integers(len(kinds)))
-    return f"{kinds[place]}/{made[place].draw(rng)}"
+    sources = [table[kind] for kind in kinds]
+    index = int(rng.integers(len(kinds)))
+    return f"{kinds[index]}/{sources[index].draw(rng)}"

@@ -38,7 +38,7 @@ _WALLS: tuple[Hue, ...] = (((0.0, 0.15), (0.0, 0.45), (0.3, 0.95)), ((0.5, 0.7),
 
 
 def _weather(rng: np.random.Generator) -> Picture:
-    """A sky from zenith to horizon, with clouds of some cover, or fog, or dusk."""
+    """Paints a sky from zenith to horizon, with clouds of some cover, or fog, or dusk."""
     kind = rng.choice(["clear", "clouds", "overcast", "dusk"], p=[0.2, 0.4, 0.25, 0.15])
     above, below = _SKIES[kind]
     zenith, horizon = hue(rng, *above), hue(rng, *below)
@@ -74,13 +74,13 @@ def _hills(rng: np.random.Generator) -> Picture:
     haze = picture[-1].mean(axis=0)
     layers = int(rng.integers(1, 6))
     for layer in range(layers):
-        near = (layer + 1) / layers
+        nearness = (layer + 1) / layers
         line = horizon * (1 - 0.75 * (layer / layers)) + rng.uniform(0.01, 0.08) * ridge(
             rng, _COLUMNS, slope=rng.uniform(0.9, 1.8)
         )
-        colour = hue(rng, (0.15, 0.45), (0.15, 0.6), (0.2, 0.5)) * (0.3 + 0.7 * near) + haze * 0.7 * (1 - near)
+        colour = hue(rng, (0.15, 0.45), (0.15, 0.6), (0.2, 0.5)) * (0.3 + 0.7 * nearness) + haze * 0.7 * (1 - nearness)
         grain = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.4, 1.2))
-        body = (1 + 0.18 * near * grain)[:, :, None] * colour
+        body = (1 + 0.18 * nearness * grain)[:, :, None] * colour
         picture = over(picture, body, smoothstep(-0.004, 0.004, line - _HEIGHT))
     floor = rng.uniform(0.0, horizon * 0.6)
     return over(picture, _ground(rng), smoothstep(-0.005, 0.005, floor - _HEIGHT))
@@ -97,7 +97,7 @@ def _foliage(rng: np.random.Generator) -> Picture:
 
 
 def _tree(rng: np.random.Generator, picture: Picture, season: tuple[float, float], floor: float) -> Picture:
-    """A crown of leaves on a trunk, lit from above, in front of a picture."""
+    """Paints a crown of leaves on a trunk, lit from above, in front of a picture."""
     x, z, size = rng.uniform(-0.1, 1.4), rng.uniform(floor + 0.15, 0.9), rng.uniform(0.15, 0.45)
     trunk = (np.abs(_X - x - 0.02 * np.sin(8 * _HEIGHT)) < 0.05 * size + 0.03 * size * (z - _HEIGHT)) & (z > _HEIGHT)
     bark = hue(rng, (0.04, 0.12), (0.1, 0.5), (0.1, 0.4))
@@ -115,14 +115,14 @@ def _buildings(rng: np.random.Generator) -> Picture:
     haze = picture[-1].mean(axis=0)
     count = int(rng.integers(3, 14))
     for index in range(count):
-        far = 0.6 * (1 - (index + 1) / count)
-        picture = _house(rng, picture, far, haze)
+        distance = 0.6 * (1 - (index + 1) / count)
+        picture = _house(rng, picture, distance, haze)
     return over(picture, _ground(rng), smoothstep(-0.004, 0.004, street - _HEIGHT))
 
 
-def _house(rng: np.random.Generator, picture: Picture, far: float, haze: NDArray[np.float64]) -> Picture:
-    """A façade with rows of windows, some lit, some mirroring the sky, in front of a picture."""
-    left, width, top = rng.uniform(-0.2, 1.2), rng.uniform(0.12, 0.6), rng.uniform(0.25, 1.05) * (1 - 0.4 * far)
+def _house(rng: np.random.Generator, picture: Picture, distance: float, haze: NDArray[np.float64]) -> Picture:
+    """Paints a façade with rows of windows, some lit, some mirroring the sky, in front of a picture."""
+    left, width, top = rng.uniform(-0.2, 1.2), rng.uniform(0.12, 0.6), rng.uniform(0.25, 1.05) * (1 - 0.4 * distance)
     first, last = np.searchsorted(_X[0], [left, left + width])
     highest = int(np.searchsorted(-_HEIGHT[:, 0], -top))
     part = (slice(highest, None), slice(int(first), int(last)))
@@ -146,12 +146,12 @@ def _house(rng: np.random.Generator, picture: Picture, far: float, haze: NDArray
     shade *= 1 - rng.uniform(0.0, 0.4) * (x > left + width * 0.97)
     front = over(shade[:, :, None] * wall, glass, pane.astype(np.float64))
     result = picture.copy()
-    result[part] = front * (1 - far) + haze * far
+    result[part] = front * (1 - distance) + haze * distance
     return result
 
 
 def _photographed(paint: Callable[[np.random.Generator], Picture]) -> Callable[[np.random.Generator], Picture]:
-    """A picture with a focus, a tint, a contrast and a side of its own."""
+    """Wraps a painter so that its picture gets a focus, a tint, a contrast and a side of its own."""
 
     def painted(rng: np.random.Generator) -> Picture:
         picture = np.clip(paint(rng), 0.0, 1.2)

@@ -13,12 +13,12 @@ _SIZE = 512  # px
 
 
 def _dyes(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-    """(count, 3) colours, from undyed to bright."""
+    """Draws (count, 3) colours, from undyed to bright."""
     return np.array([hue(rng, (0.0, 1.0), (0.0, 0.8), (0.15, 0.95)) for _ in range(count)])
 
 
 def _yarn(rng: np.random.Generator) -> NDArray[np.float64]:
-    """(row, column, 1) brightness of a plain weave with uneven yarns."""
+    """Draws (row, column, 1) brightness of a plain weave with uneven yarns."""
     period = rng.uniform(2.0, 4.0)
     x, y = np.meshgrid(np.arange(_SIZE), np.arange(_SIZE))
     over = np.sin(np.pi * x / period) * np.sin(np.pi * y / period)
@@ -31,7 +31,7 @@ def _weave(rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _bands(rng: np.random.Generator) -> NDArray[np.int64]:
-    """(512,) index of the colour along a repeat of uneven bands."""
+    """Draws (512,) index of the colour along a repeat of uneven bands."""
     count = int(rng.integers(2, 7))
     widths = rng.uniform(0.3, 1.0, count)
     repeats = int(rng.integers(2, 9))

@@ -14,22 +14,22 @@ Hue: TypeAlias = tuple[Band, Band, Band]
 
 
 def hue(rng: np.random.Generator, turn: Band, saturation: Band, brightness: Band) -> NDArray[np.float64]:
-    """(3,) encoded values of a colour, uniform in ranges of hue [turn], saturation and brightness."""
+    """Draws (3,) encoded values of a colour, uniform in ranges of hue [turn], saturation and brightness."""
     return np.array(colorsys.hsv_to_rgb(rng.uniform(*turn), rng.uniform(*saturation), rng.uniform(*brightness)))
 
 
 def of_hex(text: str) -> NDArray[np.float64]:
-    """(3,) encoded values of "#rrggbb"."""
+    """Converts "#rrggbb" to (3,) encoded values."""
     return np.array([int(text[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.float64) / 255
 
 
 def decoded(code: ArrayLike) -> NDArray[np.float64]:
-    """Encoded values as linear ones."""
+    """Converts encoded values to linear ones."""
     value = np.asarray(code, dtype=np.float64)
     return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
 
 
 def encoded(linear: ArrayLike) -> NDArray[np.float64]:
-    """Linear values as encoded ones."""
+    """Converts linear values to encoded ones."""
     value = np.asarray(linear, dtype=np.float64)
     return np.where(value <= 0.0031308, 12.92 * value, 1.055 * np.maximum(value, 0.0) ** (1 / 2.4) - 0.055)

@@ -23,7 +23,7 @@ _FINE = 4  # sub-samples of a pixel in each direction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sheet:
+class FlagSheet:
     """A drawing of height 1: x to the right and y downwards from the upper left corner.
 
     Attributes:
@@ -35,8 +35,8 @@ class Sheet:
     colours: list[str]
 
     @classmethod
-    def blank(cls, *, rows: int, columns: int, colour: str) -> Sheet:
-        """A sheet of one colour."""
+    def blank(cls, *, rows: int, columns: int, colour: str) -> FlagSheet:
+        """Makes a sheet of one colour."""
         return cls(fine=np.zeros((rows * _FINE, columns * _FINE), dtype=np.uint8), colours=[colour])
 
     @cached_property
@@ -57,16 +57,16 @@ class Sheet:
         self.where(self.in_disc(x, y, radius), colour)
 
     def in_disc(self, x: float, y: float, radius: float) -> NDArray[np.bool_]:
-        """(sub-rows, sub-columns) which samples a disc covers."""
+        """Masks samples (sub-rows, sub-columns) that a disc covers."""
         px, py = self._grid
         return (px - np.float32(x)) ** 2 + (py - np.float32(y)) ** 2 <= np.float32(radius**2)
 
     def polygon(self, corners: Sequence[tuple[float, float]], colour: str) -> None:
-        """A polygon, by the non-zero winding rule: a pentagram is filled."""
+        """Fills a polygon, by the non-zero winding rule: a pentagram is filled."""
         self.where(self.inside(corners), colour)
 
     def star(self, x: float, y: float, radius: float, colour: str, *, points_to: float = -math.pi / 2) -> None:
-        """A five-pointed star on a circle.
+        """Fills a five-pointed star on a circle.
 
         Args:
             points_to: direction of one point from the middle, from +x towards +y, so clockwise as seen [rad].
@@ -83,7 +83,7 @@ class Sheet:
         return np.asarray(dx * c + dy * s, dtype=np.float32), np.asarray(dy * c - dx * s, dtype=np.float32)
 
     def inside(self, corners: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
-        """(sub-rows, sub-columns) which samples a polygon covers, by the non-zero winding rule."""
+        """Masks samples (sub-rows, sub-columns) that a polygon covers, by the non-zero winding rule."""
         px, py = self._grid
         winding = np.zeros(self.fine.shape, dtype=np.int8)
         for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
@@ -98,7 +98,7 @@ class Sheet:
         self.fine[mask] = self._index(colour)
 
     def bytes(self) -> NDArray[np.uint8]:
-        """(rows, columns, 3) sRGB, sub-samples averaged in linear light."""
+        """Averages sub-samples in linear light: (rows, columns, 3) sRGB."""
         rows, columns = (n // _FINE for n in self.fine.shape)
         blocks = self.fine.reshape(rows, _FINE, columns, _FINE)
         mean = np.zeros((rows, columns, 3))
@@ -129,16 +129,16 @@ class NationalFlag:
 
     country: str
     source: str
-    draw: Callable[[Sheet], None]
+    draw: Callable[[FlagSheet], None]
 
 
-def _chile(sheet: Sheet) -> None:
+def _chile(sheet: FlagSheet) -> None:
     sheet.box(0, 0.5, 1.5, 0.5, "#d52b1e")
     sheet.box(0, 0, 0.5, 0.5, "#0039a6")
     sheet.star(0.25, 0.25, 0.125, _WHITE)
 
 
-def _china(sheet: Sheet) -> None:
+def _china(sheet: FlagSheet) -> None:
     unit = 1 / 20  # the upper hoist quarter is 15 by 10 units
     red, yellow = "#ee1c25", "#ffff00"
     sheet.fill(red)
@@ -148,16 +148,16 @@ def _china(sheet: Sheet) -> None:
         sheet.star(column * unit, row * unit, unit, yellow, points_to=towards)
 
 
-def _czechia(sheet: Sheet) -> None:
+def _czechia(sheet: FlagSheet) -> None:
     sheet.box(0, 0.5, 1.5, 0.5, "#d7141a")
     sheet.polygon([(0, 0), (0.75, 0.5), (0, 1)], "#11457e")
 
 
-def _france(sheet: Sheet) -> None:
+def _france(sheet: FlagSheet) -> None:
     _upright_thirds(sheet, "#000091", _WHITE, "#e1000f")
 
 
-def _greece(sheet: Sheet) -> None:
+def _greece(sheet: FlagSheet) -> None:
     blue, stripe = "#0d5eaf", 1 / 9
     for index in range(0, 9, 2):
         sheet.box(0, index * stripe, 1.5, stripe, blue)
@@ -166,20 +166,20 @@ def _greece(sheet: Sheet) -> None:
     sheet.box(2 * stripe, 0, stripe, 5 * stripe, _WHITE)
 
 
-def _italy(sheet: Sheet) -> None:
+def _italy(sheet: FlagSheet) -> None:
     _upright_thirds(sheet, "#008c45", "#f4f5f0", "#cd212a")
 
 
-def _japan(sheet: Sheet) -> None:
+def _japan(sheet: FlagSheet) -> None:
     sheet.disc(0.75, 0.5, 0.3, "#bc002d")
 
 
-def _netherlands(sheet: Sheet) -> None:
+def _netherlands(sheet: FlagSheet) -> None:
     sheet.box(0, 0, 1.5, 1 / 3, "#ae1c28")
     sheet.box(0, 2 / 3, 1.5, 1 / 3, "#21468b")
 
 
-def _south_africa(sheet: Sheet) -> None:
+def _south_africa(sheet: FlagSheet) -> None:
     triangle = [(0.0, 0.0), (0.75, 0.5), (0.0, 1.0)]
     sheet.box(0, 0, 1.5, 0.5, "#e03c31")
     sheet.box(0, 0.5, 1.5, 0.5, "#001489")
@@ -194,7 +194,8 @@ def _south_africa(sheet: Sheet) -> None:
 
 
 def _arm(half: float, mirrored: bool) -> list[tuple[float, float]]:
-    """One arm of the pall and its level part: half its width on either side of (0, 0), (0.75, 0.5), (1.5, 0.5)."""
+    """Outlines one arm of the pall and its level part: half its width on either side of (0, 0), (0.75, 0.5), (1.5,
+    0.5)."""
     length = math.hypot(0.75, 0.5)
     along, aside = (0.75 / length, 0.5 / length), (0.5 / length * half, -0.75 / length * half)
     corners = [(1.5, 0.5 - half), (1.5, 0.5 + half)]
@@ -206,7 +207,7 @@ def _arm(half: float, mirrored: bool) -> list[tuple[float, float]]:
     return [(x, 1 - y) for x, y in corners] if mirrored else corners
 
 
-def _south_korea(sheet: Sheet) -> None:
+def _south_korea(sheet: FlagSheet) -> None:
     red, blue, black = "#cd2e3a", "#0047a0", "#000000"
     diagonal = math.atan2(2, 3)
     to_upper_hoist = sheet.turned(0.75, 0.5, math.pi + diagonal)  # its x axis runs to that corner, y to the right of it
@@ -230,7 +231,7 @@ def _south_korea(sheet: Sheet) -> None:
             sheet.where(bar & (np.abs(across) >= (0.25 / 24 if gap else 0.0)), black)
 
 
-def _turkey(sheet: Sheet) -> None:
+def _turkey(sheet: FlagSheet) -> None:
     red = "#e30a17"
     sheet.fill(red)
     sheet.disc(0.5, 0.5, 0.25, _WHITE)
@@ -239,12 +240,12 @@ def _turkey(sheet: Sheet) -> None:
     sheet.star(inner_edge + 1 / 3 + 0.125, 0.5, 0.125, _WHITE, points_to=math.pi)
 
 
-def _ukraine(sheet: Sheet) -> None:
+def _ukraine(sheet: FlagSheet) -> None:
     sheet.fill("#0057b7")
     sheet.box(0, 0.5, 1.5, 0.5, "#ffd700")
 
 
-def _upright_thirds(sheet: Sheet, hoist: str, middle: str, fly: str) -> None:
+def _upright_thirds(sheet: FlagSheet, hoist: str, middle: str, fly: str) -> None:
     sheet.fill(middle)
     sheet.box(0, 0, 0.5, 1, hoist)
     sheet.box(1, 0, 0.5, 1, fly)
@@ -307,7 +308,7 @@ class _National:
 
 @functools.cache
 def _painted(name: str) -> NDArray[np.uint8]:
-    sheet = Sheet.blank(rows=ROWS, columns=ROWS * 3 // 2, colour=_WHITE)
+    sheet = FlagSheet.blank(rows=ROWS, columns=ROWS * 3 // 2, colour=_WHITE)
     FLAGS[name].draw(sheet)
     image = sheet.bytes()
     image.setflags(write=False)

@@ -13,7 +13,7 @@ Picture = NDArray[np.float64]
 
 
 def fractal(rng: np.random.Generator, rows: int, columns: int, *, slope: float, stretch: float = 1.0) -> Plane:
-    """A Gaussian field whose amplitude spectrum falls as f^−slope, scaled to mean 0 and standard deviation 1.
+    """Draws a Gaussian field whose amplitude spectrum falls as f^−slope, scaled to mean 0 and standard deviation 1.
 
     Photographs have slopes of about 1 (Field 1987, J. Opt. Soc. Am. A 4, 2379); clouds 1.5 to 2.
 
@@ -34,23 +34,23 @@ def fractal(rng: np.random.Generator, rows: int, columns: int, *, slope: float, 
 
 
 def ridge(rng: np.random.Generator, columns: int, *, slope: float) -> NDArray[np.float64]:
-    """(columns,) a random line with mean 0 and standard deviation 1, as `fractal`, not periodic."""
+    """Draws a random line (columns,) with mean 0 and standard deviation 1, as `fractal`, not periodic."""
     return fractal(rng, 2, 2 * columns, slope=slope)[0, :columns]
 
 
 def smoothstep(low: float, high: float, value: NDArray[np.float64]) -> NDArray[np.float64]:
-    """0 below `low`, 1 above `high`, a smooth cubic between."""
+    """Interpolates: 0 below `low`, 1 above `high`, a smooth cubic between."""
     t = np.clip((value - low) / (high - low), 0.0, 1.0)
     return t * t * (3 - 2 * t)
 
 
 def over(below: Picture, colour: NDArray[np.float64], share: Plane) -> Picture:
-    """A colour or picture laid over another one with the share (row, column) that it covers."""
+    """Lays a colour or picture over another one with the share (row, column) that it covers."""
     return below + share[:, :, None] * (colour - below)
 
 
 def defocused(picture: Picture, radius: float) -> Picture:
-    """A picture seen through a Gaussian of standard deviation `radius` [px], mirrored at its edges."""
+    """Blurs a picture by a Gaussian of standard deviation `radius` [px], mirrored at its edges."""
     from scipy.ndimage import gaussian_filter
 
     return gaussian_filter(picture, sigma=(radius, radius, 0.0), mode="reflect", truncate=3.0)

@@ -30,7 +30,7 @@ class Photos:
 
     @classmethod
     def of(cls, folder: Path) -> Photos:
-        """List a folder.
+        """Lists a folder.
 
         Raises:
             InputError: it is no folder, or holds no photographs.
@@ -41,7 +41,7 @@ class Photos:
         return self.members[int(rng.integers(len(self.members)))]
 
     def image(self, member: str) -> NDArray[np.uint8]:
-        """A photograph (height, width, 3), turned upright as its EXIF data say, at most 1024 px long.
+        """Reads a photograph (height, width, 3), turned upright as its EXIF data say, at most 1024 px long.
 
         Raises:
             UnknownNameError: it is not in the folder.
@@ -63,11 +63,11 @@ class Photos:
 def _listed(folder: Path) -> Photos:
     if not folder.is_dir():
         raise InputError("there is no such folder", where=str(folder), fix="name a folder of photographs")
-    found = sorted(
+    members = sorted(
         path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.suffix.lower() in _SUFFIXES
     )
-    if not found:
+    if not members:
         raise InputError(
             "no photographs are in this folder", where=str(folder), fix=f"put files {', '.join(_SUFFIXES)} there"
         )
-    return Photos(folder=folder, members=tuple(found))
+    return Photos(folder=folder, members=tuple(members))

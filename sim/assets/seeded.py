@@ -28,7 +28,7 @@ class Seeded:
         return str(int(rng.integers(2**31)))
 
     def image(self, member: str) -> NDArray[np.uint8]:
-        """The picture of a seed.
+        """Paints the picture of a seed.
 
         Raises:
             InputError: the member is no seed.

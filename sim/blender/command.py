@@ -44,13 +44,13 @@ def blender_setup(folder: Path | None, python: str | None, only_check: bool, as_
             fix="leave out --folder and --python",
         )
     if only_check:
-        made = environment.check(environment.find())
+        installed = environment.check(environment.find())
     else:
-        made = environment.create(folder or environment.default_folder(), python=python, say=say)
-    content = {"python": str(made.python), "blender": made.blender, "numpy": made.numpy}
+        installed = environment.create(folder or environment.default_folder(), python=python, say=say)
+    content = {"python": str(installed.python), "blender": installed.blender, "numpy": installed.numpy}
     if as_json:
-        document("blender", {**content, "python_version": made.python_version})
+        document("blender", {**content, "python_version": installed.python_version})
         return
-    echo(f"Blender {made.blender}, Python {made.python_version}, NumPy {made.numpy}: {made.python}")
+    echo(f"Blender {installed.blender}, Python {installed.python_version}, NumPy {installed.numpy}: {installed.python}")
     if folder:
-        say(f"set {environment.SETTING}={made.python.absolute()} to have it used")
+        say(f"set {environment.SETTING}={installed.python.absolute()} to have it used")

@@ -79,17 +79,17 @@ class Environment:
 
 
 def default_folder() -> Path:
-    """Where `flagdata blender-setup` makes the environment: `blender` in flagdata's cache folder."""
+    """Returns where `flagdata blender-setup` makes the environment: `blender` in flagdata's cache folder."""
     return user_cache() / "blender"
 
 
 def interpreter(folder: Path) -> Path:
-    """The Python of a virtual environment."""
+    """Returns the Python of a virtual environment."""
     return folder / "Scripts" / "python.exe" if os.name == "nt" else folder / "bin" / "python"
 
 
 def find() -> Path:
-    """The Python of Blender's environment: FLAGDATA_BLENDER, or that in the default folder.
+    """Finds the Python of Blender's environment: FLAGDATA_BLENDER, or that in the default folder.
 
     Raises:
         NotFoundError: there is none.
@@ -115,7 +115,7 @@ def find() -> Path:
 
 @functools.cache
 def check(python: Path) -> Environment:
-    """Import Blender with this Python, in a process of its own, and ask for its version.
+    """Imports Blender with this Python, in a process of its own, and asks for its version.
 
     Raises:
         BlenderError: it cannot be imported, or it is of another series than `SERIES`.
@@ -136,18 +136,20 @@ def check(python: Path) -> Environment:
         ) from None
     if done.returncode:
         raise _not_importable(python, done.stderr)
-    found = json.loads(done.stdout.splitlines()[-1])
-    if not found["blender"].startswith(f"{SERIES}."):
+    versions = json.loads(done.stdout.splitlines()[-1])
+    if not versions["blender"].startswith(f"{SERIES}."):
         raise BlenderError(
-            f"this is Blender {found['blender']}, and the worker is written for {SERIES}",
+            f"this is Blender {versions['blender']}, and the worker is written for {SERIES}",
             where=str(python),
             fix=f"run flagdata blender-setup, or name an environment with {REQUIREMENT} with {SETTING}",
         )
-    return Environment(python=python, blender=found["blender"], python_version=found["python"], numpy=found["numpy"])
+    return Environment(
+        python=python, blender=versions["blender"], python_version=versions["python"], numpy=versions["numpy"]
+    )
 
 
 def create(folder: Path, *, python: str | None = None, say: Callable[[str], None]) -> Environment:
-    """Make Blender's environment, or complete the one that is in the folder.
+    """Makes Blender's environment, or completes the one that is in the folder.
 
     Nothing but the folder is changed. pip's own settings (its index, its cache) apply.
 
@@ -186,26 +188,26 @@ def create(folder: Path, *, python: str | None = None, say: Callable[[str], None
 
 
 def _is_own(folder: Path) -> bool:
-    """Whether the environment in a folder is Blender's: marked so, or with Blender's module in it."""
+    """Returns whether the environment in a folder is Blender's: marked so, or with Blender's module in it."""
     return (folder / _MARK).is_file() or any(folder.glob("lib/python*/site-packages/bpy"))
 
 
-def _python_for_blender(named: str | None) -> str:
-    """The path of a Python of version `PYTHON`."""
-    for candidate in (named,) if named else (sys.executable, f"python{_dotted(PYTHON)}", "python3"):
+def _python_for_blender(requested: str | None) -> str:
+    """Finds the path of a Python of version `PYTHON`."""
+    for candidate in (requested,) if requested else (sys.executable, f"python{_dotted(PYTHON)}", "python3"):
         path = shutil.which(candidate)
         if path and _version(path) == PYTHON:
             return path
     raise NotFoundError(
-        f"{named or 'the running Python'} is not Python {_dotted(PYTHON)}, the only version that Blender {SERIES} "
-        "is built for" + ("" if named else f", and the search path has no python{_dotted(PYTHON)}"),
+        f"{requested or 'the running Python'} is not Python {_dotted(PYTHON)}, the only version that Blender {SERIES} "
+        "is built for" + ("" if requested else f", and the search path has no python{_dotted(PYTHON)}"),
         where="flagdata blender-setup",
         fix=f"install Python {_dotted(PYTHON)} and name it with --python",
     )
 
 
 def _version(python: str) -> tuple[int, ...] | None:
-    """Major and minor version; None where it does not run."""
+    """Asks a Python for its major and minor version; None where it does not run."""
     command = (python, "-I", "-c", "import sys; print(*sys.version_info[:2])")
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     return tuple(int(part) for part in done.stdout.split()) if done.returncode == 0 else None
@@ -218,13 +220,13 @@ def _dotted(version: tuple[int, ...]) -> str:
 def _run(command: Sequence[str], folder: Path, *, fix: str) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        said = (done.stdout + done.stderr).strip()[-_TAIL:]
-        raise BlenderError(f"{' '.join(command[1:4])} failed: {said}", where=str(folder), fix=fix)
+        output = (done.stdout + done.stderr).strip()[-_TAIL:]
+        raise BlenderError(f"{' '.join(command[1:4])} failed: {output}", where=str(folder), fix=fix)
 
 
-def _not_importable(python: Path, said: str) -> BlenderError:
-    """The error for a module that does not import, by the last line of what Python said."""
-    reason = said.strip().splitlines()[-1] if said.strip() else "it said nothing"
+def _not_importable(python: Path, output: str) -> BlenderError:
+    """Makes the error for a module that does not import, by the last line of what Python printed."""
+    reason = output.strip().splitlines()[-1] if output.strip() else "it said nothing"
     library = _MISSING_LIBRARY.search(reason)
     fix = "run flagdata blender-setup, which installs it"
     if library:

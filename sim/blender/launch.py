@@ -13,7 +13,7 @@ PACKAGES = ("flagdata", "sim")
 
 
 def expose(name: str, root: Path) -> None:
-    """Make the package that lies in a folder importable, without that folder's other packages.
+    """Makes the package that lies in a folder importable, without that folder's other packages.
 
     Raises:
         ImportError: it is not there.
@@ -21,17 +21,17 @@ def expose(name: str, root: Path) -> None:
     folder = root / name
     spec = spec_from_file_location(name, folder / "__init__.py", submodule_search_locations=[str(folder)])
     if spec is None or spec.loader is None:
-        raise ImportError(f"no package {name} in {root}")
+        raise ImportError(f"there is no package {name} in {root}")
     module = module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
 
 
 if __name__ == "__main__":
-    beside = Path(__file__).resolve().parents[2]
-    if beside.parent.name == "flagdata":  # installed: the packages lie inside it
-        expose("flagdata", beside.parents[1])
+    root_folder = Path(__file__).resolve().parents[2]
+    if root_folder.parent.name == "flagdata":  # installed: the packages lie inside it
+        expose("flagdata", root_folder.parents[1])
     else:
         for package in PACKAGES:
-            expose(package, beside)
+            expose(package, root_folder)
     import_module("sim.blender.worker").main()

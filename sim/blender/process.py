@@ -30,7 +30,7 @@ _LAUNCH = Path(__file__).with_name("launch.py")
 
 
 def blender_worker() -> tuple[str, ...]:
-    """How the worker is started: by the Python of Blender's environment, isolated from this one's settings.
+    """Returns how the worker is started: by the Python of Blender's environment, isolated from this one's settings.
 
     Raises:
         NotFoundError: Blender is not installed.
@@ -114,7 +114,7 @@ class WorkerProcess:
         return answers
 
     def close(self) -> None:
-        """End the worker; it may be asked again afterwards, and is then started anew."""
+        """Ends the worker; it may be asked again afterwards, and is then started anew."""
         process = self._process
         if process is None:
             return
@@ -138,7 +138,7 @@ class WorkerProcess:
         self._answer(START_TIMEOUT)  # it says when it is ready
 
     def _exchange(self, message: Message, timeout: float) -> Message:
-        """Send one message and wait for its answer."""
+        """Sends one message and waits for its answer."""
         process = self._running()
         out = _pipe(process.stdin).fileno()
         data, sent, deadline = encode(message), 0, time.monotonic() + timeout
@@ -146,7 +146,7 @@ class WorkerProcess:
             ready.register(out, selectors.EVENT_WRITE)
             while sent < len(data):
                 if not ready.select(max(0.0, deadline - time.monotonic())):
-                    raise _LostError(f"it took no message for {timeout:g} s")
+                    raise _LostError(f"it did not take a message for {timeout:g} s")
                 try:
                     sent += os.write(out, data[sent : sent + _CHUNK])
                 except OSError:
@@ -179,19 +179,19 @@ class WorkerProcess:
             return decode(read)
 
     def _last_words(self) -> str:
-        """Why the worker is gone, with the end of what it printed."""
+        """Describes why the worker is gone, with the end of what it printed."""
         process = self._running()
         try:
             code = process.wait(EXIT_TIMEOUT)
         except subprocess.TimeoutExpired:
             return "it closed its pipe"
-        said = ""
+        output = ""
         if self._log is not None:
             size = self._log.seek(0, os.SEEK_END)
             self._log.seek(max(0, size - _LOG_TAIL))
-            said = self._log.read().decode(errors="replace").strip()
+            output = self._log.read().decode(errors="replace").strip()
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
-        return f"it ended with {how}" + (f"; its last words: {said}" if said else "")
+        return f"it ended with {how}" + (f"; its last words: {output}" if output else "")
 
     def _running(self) -> subprocess.Popen[bytes]:
         if self._process is None:
@@ -217,7 +217,7 @@ class WorkerProcess:
 
 
 def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
-    """The pipe, which `Popen` made since it was asked to."""
+    """Returns the pipe, which `Popen` made since it was asked to."""
     if pipe is None:
         raise _LostError("it has no pipe")
     return pipe

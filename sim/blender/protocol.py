@@ -44,7 +44,7 @@ class Message:
 
 
 def encode(message: Message) -> bytes:
-    """The bytes of a message."""
+    """Encodes a message."""
     arrays = {name: np.ascontiguousarray(values) for name, values in message.arrays.items()}
     head = json.dumps(
         {
@@ -58,7 +58,7 @@ def encode(message: Message) -> bytes:
 
 
 def decode(read: Read) -> Message:
-    """The next message of a stream.
+    """Reads the next message of a stream.
 
     Raises:
         EOFError: the stream ended.
@@ -88,9 +88,9 @@ def decode(read: Read) -> Message:
     return Message(kind=kind, fields=fields, arrays=arrays)
 
 
-def _broken(what: str) -> CorruptError:
+def _broken(content: str) -> CorruptError:
     return CorruptError(
-        f"the render worker's stream holds {what}",
+        f"the render worker's stream holds {content}",
         where="render worker",
         fix="use one installation of flagdata for both sides",
     )

@@ -69,7 +69,7 @@ class Studio:
         self._faces: dict[str, NDArray[np.int32]] = {}
 
     def set_scene(self, message: Message) -> None:
-        """Camera, light, engine and materials."""
+        """Sets camera, light, engine and materials."""
         fields, scene = message.fields, self._scene
         render = scene.render
         render.engine = fields["engine"]
@@ -131,23 +131,23 @@ class Studio:
             self._scene.collection.objects.link(self._objects[name])
 
     def _material(self, described: Mapping[str, Any], texture: NDArray[np.uint8] | None) -> Any:
-        """A diffuse sheet that reflects the share 1 − t of its albedo and transmits t."""
+        """Makes a diffuse sheet that reflects the share 1 − t of its albedo and transmits t."""
         material = self._bpy.data.materials.new(described["name"])
         material.use_nodes = True
         tree = material.node_tree
         tree.nodes.clear()
         kinds = ("BsdfDiffuse", "BsdfTranslucent", "MixShader", "OutputMaterial")
-        near, far, both, output = (tree.nodes.new(f"ShaderNode{kind}") for kind in kinds)
-        both.inputs["Fac"].default_value = described["translucency"]
-        tree.links.new(near.outputs["BSDF"], both.inputs[1])
-        tree.links.new(far.outputs["BSDF"], both.inputs[2])
-        tree.links.new(both.outputs["Shader"], output.inputs["Surface"])
-        for side in (near, far):
+        diffuse, translucent, mix, output = (tree.nodes.new(f"ShaderNode{kind}") for kind in kinds)
+        mix.inputs["Fac"].default_value = described["translucency"]
+        tree.links.new(diffuse.outputs["BSDF"], mix.inputs[1])
+        tree.links.new(translucent.outputs["BSDF"], mix.inputs[2])
+        tree.links.new(mix.outputs["Shader"], output.inputs["Surface"])
+        for side in (diffuse, translucent):
             side.inputs["Color"].default_value = (*described["albedo"], 1.0)
         if texture is not None:
             sampled = tree.nodes.new("ShaderNodeTexImage")
             sampled.image, sampled.extension = self._image(described["name"], texture), "EXTEND"
-            for side in (near, far):
+            for side in (diffuse, translucent):
                 tree.links.new(sampled.outputs["Color"], side.inputs["Color"])
             tree.nodes.active = sampled
         return material
@@ -162,7 +162,7 @@ class Studio:
         return image
 
     def picture(self, message: Message) -> NDArray[np.float32]:
-        """(height, width, 4) of the meshes of a "frame" message."""
+        """Renders the meshes of a "frame" message, (height, width, 4)."""
         for name, thing in self._objects.items():
             arrays = message.arrays
             self._shape(name, thing, arrays[f"positions/{name}"], arrays[f"faces/{name}"], arrays[f"uv/{name}"])
@@ -188,7 +188,7 @@ class Studio:
         thing.update_tag()
 
     def _read(self) -> NDArray[np.float32]:
-        """The picture that was written; Blender gives the pixels of a render only by way of a file."""
+        """Reads the picture that was written; Blender gives the pixels of a render only by way of a file."""
         image = self._bpy.data.images.load(str(self._picture))
         try:
             image.colorspace_settings.name = "Non-Color"
@@ -201,7 +201,7 @@ class Studio:
 
 
 def serve(bpy: Any, source: int, sink: int) -> None:
-    """Answer messages from one file descriptor on another until the stream ends or says so."""
+    """Answers messages from one file descriptor on another until the stream ends or says so."""
 
     def read(count: int) -> bytes:
         parts: list[bytes] = []

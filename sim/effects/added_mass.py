@@ -40,7 +40,7 @@ class AddedMass(ForceEffect):
     mass: MassPerArea = 0.0
 
     def added_mass(self, cloth: Cloth) -> Tensor:
-        """(vertex, batch) [kg]."""
+        """Computes the added mass, (vertex, batch) [kg]."""
         return (rest_areas(cloth)[:, None] * self.mass).expand_as(cloth.mass)
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:

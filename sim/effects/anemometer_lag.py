@@ -40,7 +40,7 @@ class AnemometerLag(AnemometerEffect):
         lag = self.distance / speed.mean(0).abs().clamp(min=_TINY)
         step = torch.diff(time)[:, None]
         slope = torch.diff(speed, dim=0) / step
-        kept = torch.exp(-step / lag.clamp(min=_TINY))
+        memory = torch.exp(-step / lag.clamp(min=_TINY))
         # m₁ = u₁ − τ s + (m₀ − u₀ + τ s) e^(−h/τ) for the difference e = m − u: e₁ = e₀ k − τ s (1 − k).
-        behind = decayed(kept, -lag * slope * (1 - kept))
+        behind = decayed(memory, -lag * slope * (1 - memory))
         return speed + torch.cat([torch.zeros_like(speed[:1]), behind])

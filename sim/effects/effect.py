@@ -35,19 +35,19 @@ class Effect(Parametrised, ABC):
 
     @abstractmethod
     def apply(self, system: System, state: State) -> tuple[System, State]:
-        """The batch with this effect, and its start.
+        """Returns the batch with this effect, and its start.
 
         Raises:
             UsageError: the effect does not fit the system.
         """
 
     def given(self, cloth: Cloth) -> Given:
-        """What its C++ reads, if there is any beside its class: its parameters, in order."""
+        """Lists what its C++ reads, if there is any beside its class: its parameters, in order."""
         return Given(of=type(self), numbers=tuple(getattr(self, name) for name in self.parameters()))
 
 
 def apply(effects: Iterable[Effect], system: System, state: State) -> tuple[System, State]:
-    """The batch with these effects, in order, and its start. Effects at their null value leave it as it is.
+    """Applies these effects to a batch, in order, and to its start. Effects at their null value leave it as it is.
 
     Raises:
         UsageError: parameters for another number of members, or an effect that does not fit the system.
@@ -64,7 +64,7 @@ class ForceEffect(Effect):
 
     @abstractmethod
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N], for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+        """Computes forces (vertex, 3, batch) [N], for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         return replace(system, effects=(*system.effects, self)), state
@@ -75,7 +75,7 @@ class PressureEffect(Effect):
 
     @abstractmethod
     def factor(self, density: float, across: Tensor) -> Tensor:
-        """A factor that broadcasts to (face, 1, batch).
+        """Computes a factor that broadcasts to (face, 1, batch).
 
         Args:
             density: ρ of the base model's force ρ a |w_n| w_n [kg/m³].
@@ -89,7 +89,7 @@ class PressureEffect(Effect):
 
 
 def pressing(effect: Effect, air: AirForce) -> QuadraticNormal:
-    """The normal force of the base model's air, which an effect changes.
+    """Returns the normal force of the base model's air, which an effect changes.
 
     Raises:
         UsageError: the air has none.
@@ -123,17 +123,17 @@ class FactoredNormal:
         return self.effects
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
         return self.base.force(cloth, position, velocity, wind) + self.beyond(cloth, position, velocity, wind)
 
     def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """What the factors make more of it: (vertex, 3, batch) [N] for a wind as `force` has it."""
-        seen = face_wind(cloth, position, velocity, wind)
-        factor = torch.ones_like(seen.across)
+        """Computes what the factors add to the force: (vertex, 3, batch) [N] for a wind as `force` has it."""
+        relative = face_wind(cloth, position, velocity, wind)
+        factor = torch.ones_like(relative.across)
         for effect in self.effects:
-            factor = factor * effect.factor(self.base.density, seen.across)
+            factor = factor * effect.factor(self.base.density, relative.across)
         size = (cloth.areas / 3)[:, None, None] * self.base.density * (factor - 1)
-        return cloth.shared_out(size * seen.across.abs() * seen.across * seen.normal)
+        return cloth.shared_out(size * relative.across.abs() * relative.across * relative.normal)
 
 
 class WindEffect(Effect):
@@ -141,7 +141,7 @@ class WindEffect(Effect):
 
     @abstractmethod
     def velocity(self, time: float, wind: Tensor) -> Tensor:
-        """(3, batch) [m/s] at a time [s], for the wind (3, batch) so far."""
+        """Computes the wind (3, batch) [m/s] at a time [s], for the wind (3, batch) so far."""
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         return replace(system, wind=ChangedWind(base=system.wind, effect=self)), state
@@ -155,7 +155,7 @@ class ChangedWind:
     effect: WindEffect
 
     def velocity(self, time: float) -> Tensor:
-        """(3, batch) [m/s] at a time [s]."""
+        """Computes the wind (3, batch) [m/s] at a time [s]."""
         return self.effect.velocity(time, self.base.velocity(time))
 
 
@@ -164,7 +164,7 @@ class FlowEffect(Effect):
 
     @abstractmethod
     def field(self, time: float, offset: Tensor, wind: Tensor) -> Tensor:
-        """The air at the vertices: (vertex, 3, batch) [m/s].
+        """Computes the air at the vertices: (vertex, 3, batch) [m/s].
 
         Args:
             time: [s].
@@ -184,13 +184,13 @@ class PlacedFlow:
     origin: Tensor
 
     def field(self, time: float, position: Tensor, wind: Tensor) -> Tensor:
-        """The air at the vertices: (vertex, 3, batch) [m/s]."""
+        """Computes the air at the vertices: (vertex, 3, batch) [m/s]."""
         return self.effect.field(time, position - self.origin, wind)
 
     def given(self, cloth: Cloth) -> Given:
-        """What its C++ reads: the place, and the effect's parameters."""
-        given = self.effect.given(cloth)
-        return replace(given, numbers=(*self.origin, *given.numbers))
+        """Lists what its C++ reads: the origin, and the effect's parameters."""
+        parameters = self.effect.given(cloth)
+        return replace(parameters, numbers=(*self.origin, *parameters.numbers))
 
 
 class ClothEffect(Effect):
@@ -198,7 +198,7 @@ class ClothEffect(Effect):
 
     @abstractmethod
     def cloth(self, cloth: Cloth) -> Cloth:
-        """The changed cloth."""
+        """Changes the cloth."""
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         return replace(system, cloth=self.cloth(system.cloth)), state

@@ -34,7 +34,7 @@ class Flat:
     cloth: Cloth
 
     def _shares(self) -> tuple[Tensor, Tensor]:
-        """(vertex, 1, 1) each: of the width from the hoist, of the height from below."""
+        """Computes shares (vertex, 1, 1) each: of the width from the hoist, of the height from below."""
         rest = self.cloth.mesh.rest
         shares = torch.as_tensor((rest - rest.min(axis=0)) / (rest.max(axis=0) - rest.min(axis=0)))
         u, v = shares.to(dtype=self.cloth.dtype, device=self.cloth.device).unbind(1)
@@ -53,24 +53,25 @@ class Flat:
         return _LOCAL * math.sqrt(math.prod(self._extents))
 
     def _bumps(self, u: float | None, v: float | None) -> Tensor:
-        """exp(−d²/2) of the distance d to a place, a line of constant u or one of constant v, in local radii."""
+        """Computes exp(−d²/2) of the distance d to a point, a line of constant u or one of constant v, in local
+        radii."""
         square = torch.zeros_like(self.everywhere)
-        for share, place, extent in zip(self._shares(), (u, v), self._extents, strict=True):
-            if place is not None:
-                square = square + ((share - place) * (extent / self._radius)) ** 2
+        for share, centre, extent in zip(self._shares(), (u, v), self._extents, strict=True):
+            if centre is not None:
+                square = square + ((share - centre) * (extent / self._radius)) ** 2
         return torch.exp(-square / 2)
 
     def near(self, u: float, v: float) -> Tensor:
-        """exp(−d²/(2 s²)) of the distance d to the place at shares u of the width and v of the height; the local radius
-        s is a tenth of √(width × height)."""
+        """Computes exp(−d²/(2 s²)) of the distance d to the point at shares u of the width and v of the height; the
+        local radius s is a tenth of √(width × height)."""
         return self._bumps(u, v)
 
     def stripe(self, u: float) -> Tensor:
-        """The same of the distance to the line from bottom to top at a share u of the width."""
+        """Computes the same of the distance to the line from bottom to top at a share u of the width."""
         return self._bumps(u, None)
 
     def band(self, v: float) -> Tensor:
-        """The same of the distance to the line from hoist to fly at a share v of the height."""
+        """Computes the same of the distance to the line from hoist to fly at a share v of the height."""
         return self._bumps(None, v)
 
     def _wave(self, axis: int) -> Tensor:
@@ -276,10 +277,10 @@ class FieldEffect(Effect):
 
     @abstractmethod
     def acceleration(self, seen: Seen) -> Tensor:
-        """What broadcasts to (vertex, 3, batch) [m/s²]."""
+        """Computes an acceleration that broadcasts to (vertex, 3, batch) [m/s²]."""
 
     def cloth(self, cloth: Cloth) -> Cloth:
-        """The cloth on which it acts; by default the same."""
+        """Returns the cloth on which it acts; by default the same."""
         return cloth
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
@@ -288,7 +289,7 @@ class FieldEffect(Effect):
 
 
 def heavier(cloth: Cloth, share: Tensor) -> Cloth:
-    """The cloth with its mass multiplied by 1 + share: (vertex, 1, 1), or (vertex, 1, batch)."""
+    """Multiplies the cloth's mass by 1 + share: (vertex, 1, 1), or (vertex, 1, batch)."""
     return replace(cloth, mass=cloth.mass * (1 + share).squeeze(1))
 
 
@@ -300,6 +301,6 @@ class PlacedField:
     origin: Tensor
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N]; the time does not matter."""
-        seen = Seen(cloth=cloth, position=position, offset=position - self.origin, velocity=velocity, wind=wind)
-        return (cloth.mass.unsqueeze(1) * self.effect.acceleration(seen)).expand(position.shape)
+        """Computes forces (vertex, 3, batch) [N]; the time does not matter."""
+        state = Seen(cloth=cloth, position=position, offset=position - self.origin, velocity=velocity, wind=wind)
+        return (cloth.mass.unsqueeze(1) * self.effect.acceleration(state)).expand(position.shape)

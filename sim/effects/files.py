@@ -17,7 +17,7 @@ from sim.effects.effect import Effect
 
 
 def load(spec: str) -> type[Effect]:
-    """The effect class that `FILE.py:Class` names. The file is run as a module named after its content.
+    """Loads the effect class that `FILE.py:Class` names. The file is run as a module named after its content.
 
     Raises:
         UsageError: not of that form, a file that cannot be run, or a class that is no effect.
@@ -31,7 +31,9 @@ def load(spec: str) -> type[Effect]:
     module = _module(path)
     effect = getattr(module, attribute, None)
     if effect is None:
-        raise NotFoundError(f"no class {attribute!r}", where=text, fix="give the name of the effect's class")
+        raise NotFoundError(
+            f"the file has no class {attribute!r}", where=text, fix="give the name of the effect's class"
+        )
     if not (isinstance(effect, type) and issubclass(effect, Effect) and is_dataclass(effect) and effect.strengths()):
         raise UsageError(
             f"{attribute!r} is no effect with a strength",

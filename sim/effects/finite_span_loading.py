@@ -77,7 +77,7 @@ class FiniteSpanLoading(ForceEffect):
     density: AirDensity = AIR_DENSITY
 
     def added_mass(self, cloth: Cloth) -> Tensor:
-        """(vertex, batch) [kg]."""
+        """Computes the added mass, (vertex, batch) [kg]."""
         profile = torch.as_tensor(profile_over_height(cloth.mesh), dtype=cloth.dtype, device=cloth.device)
         mass = self._longest(cloth.mesh) * (rest_areas(cloth) * profile)[:, None]
         return mass.expand_as(cloth.mass)
@@ -103,46 +103,46 @@ class FiniteSpanLoading(ForceEffect):
         return super().apply(replace(system, loads=(*system.loads, self)), state)
 
     def given(self, cloth: Cloth) -> Given:
-        """What its C++ reads: the mass, those of the modes, and of each vertex the first cosines and √e."""
+        """Lists what its C++ reads: the mass, those of the modes, and of each vertex the first cosines and √e."""
         mesh = cloth.mesh
         along, over = angles(mesh)
-        own = np.stack([np.cos(along), np.cos(over), np.sqrt(profile_over_height(mesh))], axis=1)
-        of_vertex = torch.as_tensor(own, dtype=cloth.dtype, device=cloth.device)[..., None]
+        columns = np.stack([np.cos(along), np.cos(over), np.sqrt(profile_over_height(mesh))], axis=1)
+        of_vertex = torch.as_tensor(columns, dtype=cloth.dtype, device=cloth.device)[..., None]
         numbers = (self._longest(mesh), *(float(gain) for gain in relative_masses(mesh)))
         return Given(of=type(self), numbers=numbers, own=of_vertex.expand(-1, -1, cloth.batch).contiguous())
 
     def _longest(self, mesh: Mesh) -> Value:
-        """m(k₀) [kg/m²]."""
+        """Computes m(k₀) [kg/m²]."""
         length, height = extent(mesh)
         return self.share * self.density * strip_mass(np.pi / length, height)
 
 
 def strip_mass(wavenumber: float, height: float) -> float:
-    """m/ρ of potential flow for a wave [1/m] on a strip of a height [m], mean over it [m]."""
+    """Computes m/ρ of potential flow for a wave [1/m] on a strip of a height [m], mean over it [m]."""
     return ((wavenumber / 2) ** 1.5 + (4 / (np.pi * height)) ** 1.5) ** (-2 / 3)
 
 
 def extent(mesh: Mesh) -> tuple[float, float]:
-    """Length and height of the flat cloth [m]."""
+    """Computes length and height of the flat cloth [m]."""
     length, height = np.ptp(mesh.rest, axis=0)
     return float(length), float(height)
 
 
 def angles(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(vertex,) from 0 to π along the cloth and over its height."""
+    """Computes angles (vertex,) from 0 to π along the cloth and over its height."""
     along, over = (np.pi * (mesh.rest - mesh.rest.min(0)) / extent(mesh)).T
     return along, over
 
 
 def profile_over_height(mesh: Mesh) -> NDArray[np.float64]:
-    """(vertex,) e, nothing at the free edges, of mean 1 over the cloth."""
+    """Computes the profile e (vertex,), nothing at the free edges, of mean 1 over the cloth."""
     _, over = angles(mesh)
     shape = np.sqrt(np.clip(1 - (2 * over / np.pi - 1) ** 2, 0, None))
     return np.asarray(shape * mesh.vertex_areas.sum() / (shape * mesh.vertex_areas).sum())
 
 
 def cosines(mesh: Mesh) -> NDArray[np.float64]:
-    """(vertex, mode), those along the cloth innermost."""
+    """Computes (vertex, mode) cosines, those along the cloth innermost."""
     along, over = angles(mesh)
     first = np.cos(np.arange(_ALONG) * along[:, None])
     second = np.cos(np.arange(_ACROSS) * over[:, None])
@@ -150,13 +150,13 @@ def cosines(mesh: Mesh) -> NDArray[np.float64]:
 
 
 def relative_masses(mesh: Mesh) -> NDArray[np.float64]:
-    """(mode,) m(k)/m(k₀) over the mode's square integrated over the cloth [1/m²].
+    """Computes (mode,) m(k)/m(k₀) over the mode's square integrated over the cloth [1/m²].
 
     Nothing for modes that half a wave of the mesh's cells does not resolve.
     """
     length, height = extent(mesh)
     k = np.hypot(np.pi / length * np.arange(_ALONG), (np.pi / height * np.arange(_ACROSS))[:, None]).ravel()
-    masses = np.array([strip_mass(one, height) for one in k]) / strip_mass(np.pi / length, height)
+    masses = np.array([strip_mass(wavenumber, height) for wavenumber in k]) / strip_mass(np.pi / length, height)
     cell = np.sqrt(2 * mesh.areas.mean())
     squares = (cosines(mesh) ** 2 * mesh.vertex_areas[:, None]).sum(0)
     return np.where(k < np.pi / (2 * cell), masses / squares, 0.0)

@@ -37,7 +37,7 @@ class FrameJitter(CameraEffect):
     def sampled(self, sampling: Sampling) -> Sampling:
         if len(self.draws) < len(sampling.stamps):
             raise UsageError(
-                f"{len(self.draws)} draws for {len(sampling.stamps)} frames",
+                f"there are {len(self.draws)} draws for {len(sampling.stamps)} frames",
                 where="frame jitter",
                 fix="draw as many as there are frames",
             )

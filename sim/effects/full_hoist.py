@@ -75,22 +75,22 @@ class Lace:
     handles: Handles
 
     def springs(self, cloth: Cloth) -> Springs:
-        """All that it is."""
+        """Describes the lace as springs."""
         stiffness = self.strength.expand(-1, cloth.batch)
         return Springs(
             vertices=self.vertices, anchors=self.anchors, stiffness=stiffness, slack=0 * stiffness, share=1.0
         )
 
     def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N]."""
+        """Computes forces (vertex, 3, batch) [N]."""
         offset = torch.as_tensor(self.handles.offset(time), dtype=position.dtype, device=position.device)
         stretch = position[self.vertices] - self.anchors - offset[:, None]
         return torch.zeros_like(position).index_add(0, self.vertices, -self.strength.unsqueeze(1) * stretch)
 
     def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
-        """(vertex, batch) [N/m]."""
+        """Computes stiffnesses (vertex, batch) [N/m]."""
         return self.stiffest(cloth)
 
     def stiffest(self, cloth: Cloth) -> Tensor:
-        """(vertex, batch) [N/m]."""
+        """Computes stiffnesses (vertex, batch) [N/m]."""
         return torch.zeros_like(cloth.mass).index_add(0, self.vertices, self.strength.expand(-1, cloth.batch))

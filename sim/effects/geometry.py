@@ -20,18 +20,18 @@ def norm(vectors: Tensor, *, axis: int = 1) -> Tensor:
 
 
 def origin(system: System, state: State) -> Tensor:
-    """(3, batch) the middle of the attachments, or of the cloth where nothing holds it [m]."""
+    """Computes the middle of the attachments, or of the cloth where nothing holds it, (3, batch) [m]."""
     return (system.anchors if len(system.held) else state.position).mean(0)
 
 
 def horizontal(vectors: Tensor, *, axis: int) -> Tensor:
-    """The vectors with their part along z set to 0."""
+    """Sets the vectors' part along z to 0."""
     x, y, z = vectors.unbind(axis)
     return torch.stack([x, y, torch.zeros_like(z)], axis)
 
 
 def left_of(vectors: Tensor, *, axis: int) -> Tensor:
-    """z × the vectors: their horizontal part turned by 90° counter-clockwise seen from above."""
+    """Computes z × the vectors: their horizontal part turned by 90° counter-clockwise seen from above."""
     x, y, z = vectors.unbind(axis)
     return torch.stack([-y, x, torch.zeros_like(z)], axis)
 
@@ -49,21 +49,21 @@ def disturbed(wind: Tensor, relative: Tensor) -> Tensor:
 
 
 def boundary_edges(mesh: Mesh) -> NDArray[np.int64]:
-    """(edge, 2) vertices of the edges with one face, sorted."""
+    """Lists edges with one face, (edge, 2) vertices, sorted."""
     pairs = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
     unique, counts = np.unique(np.sort(pairs, axis=1), axis=0, return_counts=True)
     return unique[counts == 1]
 
 
 def hem_lengths(mesh: Mesh) -> NDArray[np.float64]:
-    """(vertex,) half the length of the boundary edges at each vertex [m]; their sum is the perimeter."""
+    """Computes half the length of the boundary edges at each vertex, (vertex,) [m]; their sum is the perimeter."""
     edges = boundary_edges(mesh)
     half = np.hypot(*(mesh.rest[edges[:, 1]] - mesh.rest[edges[:, 0]]).T) / 2
     return np.bincount(edges.ravel(), weights=np.repeat(half, 2), minlength=mesh.vertex_count).astype(np.float64)
 
 
 def edge_distances(mesh: Mesh) -> NDArray[np.float64]:
-    """(vertex,) distance to the nearest boundary edge in the flat cloth [m]."""
+    """Computes the distance to the nearest boundary edge in the flat cloth, (vertex,) [m]."""
     edges = boundary_edges(mesh)
     start, along = mesh.rest[edges[:, 0]], mesh.rest[edges[:, 1]] - mesh.rest[edges[:, 0]]
     offset = mesh.rest[:, None] - start

@@ -54,8 +54,12 @@ class Gusts(WindEffect):
 
     def velocity(self, time: float, wind: Tensor) -> Tensor:
         now = sampled.place(self.times, time, sampled.Beyond.REFUSE, where="gusts")
-        along, left, up = sampled.between(self.samples, *now)
-        relative = [self.intensity * along, self.intensity * self.lateral * left, self.intensity * self.vertical * up]
+        along, leftward, up = sampled.between(self.samples, *now)
+        relative = [
+            self.intensity * along,
+            self.intensity * self.lateral * leftward,
+            self.intensity * self.vertical * up,
+        ]
         return disturbed(wind, torch.stack(torch.broadcast_tensors(*relative)))
 
     def with_series(
@@ -68,7 +72,7 @@ class Gusts(WindEffect):
         duration: float = 60.0,
         rate: float = 10.0,
     ) -> Self:
-        """These gusts with a realisation for each member.
+        """Draws a realisation of these gusts for each member.
 
         The transverse parts take the same spectrum with half the length scale, as in isotropic turbulence.
 

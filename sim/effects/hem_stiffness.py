@@ -52,11 +52,11 @@ class HemStiffness(ClothEffect):
         return replace(cloth, stiffening=added if cloth.stiffening is None else cloth.stiffening + added)
 
     def _within(self, cloth: Cloth) -> Tensor:
-        """(hinge, batch or 1) share of the hinges' edges within the strip."""
+        """Computes the share of the hinges' edges within the strip, (hinge, batch or 1)."""
         distance = edge_distances(cloth.mesh)[cloth.mesh.hinges[:, :2]]
-        near = torch.as_tensor(distance.min(axis=1), dtype=cloth.dtype, device=cloth.device)[:, None]
+        nearest = torch.as_tensor(distance.min(axis=1), dtype=cloth.dtype, device=cloth.device)[:, None]
         span = torch.as_tensor(np.ptp(distance, axis=1), dtype=cloth.dtype, device=cloth.device)[:, None]
-        reach = torch.as_tensor(self.width, dtype=cloth.dtype, device=cloth.device) - near
+        reach = torch.as_tensor(self.width, dtype=cloth.dtype, device=cloth.device) - nearest
         level = span <= 0
         sloped = (reach / torch.where(level, 1.0, span)).clamp(0, 1)
         return torch.where(level, (reach > 0).to(cloth.dtype), sloped)

@@ -56,14 +56,15 @@ class Hysteresis(Effect):
     ] = 10.0
 
     def start(self, cloth: Cloth, position: Tensor) -> Tensor:
-        """z = 0, and the fold angles: (2, hinge, batch)."""
+        """Returns z = 0, and the fold angles: (2, hinge, batch)."""
         angle = bending.fold_angle(cloth, position)
         return torch.stack([torch.zeros_like(angle), angle])
 
     def update(
         self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor, elapsed: float
     ) -> Tensor:
-        """z and the fold angles after a step to a position (vertex, 3, batch), however long: (2, hinge, batch)."""
+        """Computes z and the fold angles after a step to a position (vertex, 3, batch), however long: (2, hinge,
+        batch)."""
         past, before = memory
         angle = bending.fold_angle(cloth, position)
         change = CURVATURE_SPACING * cloth.hinge_column[:, None] * (angle - before)
@@ -71,14 +72,14 @@ class Hysteresis(Effect):
         return torch.stack([goal + (past - goal) * torch.exp(-change.abs() / self.curvature), angle])
 
     def force(self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """−½ l H z ∇θ on every hinge, as the elastic couple −½ l k α ∇θ: (vertex, 3, batch) [N]."""
+        """Computes −½ l H z ∇θ on every hinge, as the elastic couple −½ l k α ∇θ: (vertex, 3, batch) [N]."""
         moment = (-_half_lengths(cloth)[:, None] * self.couple * memory[0]).unsqueeze(1)
         return gather_sum([moment * g for g in bending.fold(cloth, position).gradient], cloth.hinge_slots)
 
     def given(self, cloth: Cloth) -> Given:
-        """What its C++ reads: its parameters, and of each hinge its curvature per angle and half its length."""
-        own = torch.stack([CURVATURE_SPACING * cloth.hinge_column, _half_lengths(cloth)], dim=1)
-        return replace(super().given(cloth), own=own.unsqueeze(-1).expand(-1, -1, cloth.batch))
+        """Lists what its C++ reads: its parameters, and of each hinge its curvature per angle and half its length."""
+        columns = torch.stack([CURVATURE_SPACING * cloth.hinge_column, _half_lengths(cloth)], dim=1)
+        return replace(super().given(cloth), own=columns.unsqueeze(-1).expand(-1, -1, cloth.batch))
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         memory = (*state.memory, self.start(system.cloth, state.position))
@@ -86,5 +87,5 @@ class Hysteresis(Effect):
 
 
 def _half_lengths(cloth: Cloth) -> Tensor:
-    """(hinge,) [m]."""
+    """Computes half the hinges' lengths, (hinge,) [m]."""
     return torch.as_tensor(cloth.mesh.hinge_lengths, dtype=cloth.dtype, device=cloth.device) / 2

@@ -40,9 +40,9 @@ class Lift(ForceEffect):
     density: AirDensity = AIR_DENSITY
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        seen = face_wind(cloth, position, velocity, wind)
-        speed = norm(seen.relative)
-        direction = seen.relative / speed.clamp(min=torch.finfo(speed.dtype).tiny)
-        lift = seen.across * (speed * seen.normal - seen.across * direction)
+        relative = face_wind(cloth, position, velocity, wind)
+        speed = norm(relative.relative)
+        direction = relative.relative / speed.clamp(min=torch.finfo(speed.dtype).tiny)
+        lift = relative.across * (speed * relative.normal - relative.across * direction)
         push = (cloth.areas / 3)[:, None, None] * (0.5 * self.density * self.coefficient * lift)
         return cloth.shared_out(push)

@@ -48,7 +48,7 @@ class LoggedGusts(WindEffect):
 
     @classmethod
     def of(cls, time: ArrayLike, speed: ArrayLike, *, direction: ArrayLike | None = None, share: Value = 1.0) -> Self:
-        """From samples of a log.
+        """Makes gusts from samples of a log.
 
         Args:
             time: (n,) since the start of the run [s].
@@ -65,7 +65,7 @@ class LoggedGusts(WindEffect):
 
     @classmethod
     def from_log(cls, series: WindSeries, *, start: int, share: Value = 1.0) -> Self:
-        """From the usable samples of a log, with its direction where it has one.
+        """Makes gusts from the usable samples of a log, with its direction where it has one.
 
         Args:
             series: with the channel wind_speed.

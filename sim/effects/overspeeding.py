@@ -41,19 +41,19 @@ class Overspeeding(AnemometerEffect):
     ] = 30.0
 
     def read(self, time: Tensor, speed: Tensor) -> Tensor:
-        kept = torch.exp(-torch.diff(time)[:, None] / self.window).expand(-1, speed.shape[1])
-        weight = self._smoothed(torch.ones_like(speed), kept)
-        mean = self._smoothed(speed, kept) / weight
+        memory = torch.exp(-torch.diff(time)[:, None] / self.window).expand(-1, speed.shape[1])
+        weight = self._smoothed(torch.ones_like(speed), memory)
+        mean = self._smoothed(speed, memory) / weight
         # About the mean of all, so that the difference of squares loses no digits.
         middle = speed.mean(0)
-        square = self._smoothed((speed - middle) ** 2, kept) / weight
+        square = self._smoothed((speed - middle) ** 2, memory) / weight
         variance = (square - (mean - middle) ** 2).clamp(min=0)
         return speed * (1 + self.coefficient * variance / (mean**2).clamp(min=1e-12))
 
     @staticmethod
-    def _smoothed(values: Tensor, kept: Tensor) -> Tensor:
-        """Sums of values (n, batch) with weights that decay on both sides, by `kept` (n − 1, batch) a step."""
+    def _smoothed(values: Tensor, memory: Tensor) -> Tensor:
+        """Sums values (n, batch) with weights that decay on both sides, by `memory` (n − 1, batch) a step."""
         none = torch.zeros_like(values[:1])
-        before = decayed(torch.cat([none, kept]), values)
-        after = decayed(torch.cat([none, kept.flip(0)]), values.flip(0)).flip(0)
+        before = decayed(torch.cat([none, memory]), values)
+        after = decayed(torch.cat([none, memory.flip(0)]), values.flip(0)).flip(0)
         return before + after - values

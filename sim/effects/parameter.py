@@ -56,12 +56,12 @@ class Described:
     source: str
 
     def admits(self, value: float) -> bool:
-        """Whether a value makes sense at all."""
+        """Returns whether a value makes sense at all."""
         least, most = self.admissible
         return least <= value <= most
 
     def nearest(self, value: float) -> float:
-        """The admissible value that is nearest to one."""
+        """Returns the admissible value that is nearest to one."""
         return float(np.clip(value, *self.admissible))
 
 
@@ -72,20 +72,22 @@ class Parameter(Described):
     null: float
 
     def check(self, value: Value, *, where: str) -> None:
-        """Refuse what is not finite or not admissible.
+        """Refuses what is not finite or not admissible.
 
         Raises:
             InputError: with what is admissible.
         """
         values = torch.as_tensor(value).detach()
         if values.ndim > 1 or not values.numel():
-            raise InputError(f"a value of shape {tuple(values.shape)}", where=where, fix="give a number, or (batch,)")
+            raise InputError(
+                f"the value has the shape {tuple(values.shape)}", where=where, fix="give a number, or (batch,)"
+            )
         lowest, highest = (float(v) for v in torch.aminmax(values))
         least, most = self.admissible
         if not (math.isfinite(lowest) and math.isfinite(highest) and least <= lowest and highest <= most):
-            shown = f"{lowest:g}" if lowest == highest else f"{lowest:g} to {highest:g}"
+            range_text = f"{lowest:g}" if lowest == highest else f"{lowest:g} to {highest:g}"
             raise InputError(
-                f"{shown}{'' if self.unit == '1' else f' {self.unit}'} is not admissible",
+                f"{range_text}{'' if self.unit == '1' else f' {self.unit}'} is not admissible",
                 where=where,
                 fix=f"give a value from {least:g} to {most:g}; expected are {self.prior[0]:g} to {self.prior[1]:g}",
             )
@@ -114,7 +116,7 @@ class Parametrised:
 
     @classmethod
     def parameters(cls) -> Mapping[str, Parameter]:
-        """Name → description, in the order of the fields."""
+        """Returns name → description, in the order of the fields."""
         return _parameters(cls)
 
     @classmethod
@@ -132,7 +134,7 @@ class Parametrised:
         return True
 
     def for_batch(self, batch: int, *, dtype: torch.dtype, device: torch.device) -> Self:
-        """This effect with its tensors on a batch's device and of its type.
+        """Moves the effect's tensors to a batch's device and type.
 
         Raises:
             UsageError: values for another number of members.
@@ -144,7 +146,7 @@ class Parametrised:
                 continue
             if value.ndim and value.shape[-1] not in (1, batch):
                 raise UsageError(
-                    f"values for {value.shape[-1]} members in a batch of {batch}",
+                    f"the batch has {batch} members, and there are values for {value.shape[-1]}",
                     where=f"{type(self).__name__}.{entry.name}",
                     fix="give one value, or one for each member",
                 )
@@ -153,7 +155,7 @@ class Parametrised:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, *, batch: int) -> Self:
-        """One draw from the prior for each member of a batch: every parameter uniform in its range, float64."""
+        """Draws from the prior for each member of a batch: every parameter uniform in its range, float64."""
         return cls(**draw(cls.parameters(), rng, batch=batch))
 
 
@@ -165,11 +167,11 @@ def draw(parameters: Mapping[str, Parameter], rng: np.random.Generator, *, batch
 @functools.cache
 def _parameters(cls: type[Any]) -> Mapping[str, Parameter]:
     hints = get_type_hints(cls, include_extras=True)
-    found: dict[str, Parameter] = {}
+    parameters: dict[str, Parameter] = {}
     for entry in fields(cls):
         for note in getattr(hints[entry.name], "__metadata__", ()):
             if isinstance(note, Described):
-                found[entry.name] = Parameter(
+                parameters[entry.name] = Parameter(
                     role=note.role,
                     unit=note.unit,
                     prior=note.prior,
@@ -177,4 +179,4 @@ def _parameters(cls: type[Any]) -> Mapping[str, Parameter]:
                     source=note.source,
                     null=cast("float", entry.default),
                 )
-    return found
+    return parameters

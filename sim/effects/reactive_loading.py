@@ -61,7 +61,7 @@ class ReactiveLoading(ForceEffect):
 def momentum_rates(
     cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor, *, ends: Ends | None = None
 ) -> Tensor:
-    """A vertex's rest area times D V without the acceleration's term (see above): (vertex, 1, batch) [m³/s²].
+    """Computes a vertex's rest area times D V without the acceleration's term (see above): (vertex, 1, batch) [m³/s²].
 
     Args:
         ends: at which V and s are continued from within; None where they are the means over faces there too, which

@@ -6,11 +6,11 @@ import torch
 from torch import Tensor
 
 
-def decayed(kept: Tensor, given: Tensor) -> Tensor:
-    """e_i = kept_i e_{i−1} + given_i from e = 0, by doubling: (n, batch) each."""
+def decayed(memory: Tensor, addend: Tensor) -> Tensor:
+    """Computes e_i = memory_i e_{i−1} + addend_i from e = 0, by doubling: (n, batch) each."""
     shift = 1
-    while shift < len(given):
-        given = torch.cat([given[:shift], given[shift:] + kept[shift:] * given[:-shift]])
-        kept = torch.cat([kept[:shift], kept[shift:] * kept[:-shift]])
+    while shift < len(addend):
+        addend = torch.cat([addend[:shift], addend[shift:] + memory[shift:] * addend[:-shift]])
+        memory = torch.cat([memory[:shift], memory[shift:] * memory[:-shift]])
         shift *= 2
-    return given
+    return addend

@@ -42,7 +42,7 @@ class RestCurvature(Effect):
         return replace(system, effects=(*system.effects, curl)), state
 
     def rolled(self, cloth: Cloth) -> Tensor:
-        """The cloth on its cylinder: (vertex, 3, batch) [m]."""
+        """Rolls the cloth on its cylinder: (vertex, 3, batch) [m]."""
         rest = torch.tensor(cloth.mesh.rest, dtype=cloth.dtype, device=cloth.device)
         u, v = rest[:, :1], rest[:, 1:].expand(-1, cloth.batch)
         turn = (self.curvature * u / torch.pi).expand(-1, cloth.batch)
@@ -57,11 +57,11 @@ class Curl:
     angle: Tensor
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N]; time, velocity and wind do not matter."""
+        """Computes forces (vertex, 3, batch) [N]; time, velocity and wind do not matter."""
         f = bending.fold(cloth, position)
         moment = (bending.stiffness(cloth, f.angle) * self.angle).unsqueeze(1)
         return gather_sum([moment * gradient for gradient in f.gradient], cloth.hinge_slots)
 
     def given(self, cloth: Cloth) -> Given:
-        """What its C++ reads: the angle of each hinge."""
+        """Lists what its C++ reads: the angle of each hinge."""
         return Given(of=type(self), numbers=(), own=self.angle.unsqueeze(1))

@@ -21,7 +21,7 @@ class AnemometerEffect(Parametrised, ABC):
 
     @abstractmethod
     def read(self, time: Tensor, speed: Tensor) -> Tensor:
-        """(n, batch) readings [m/s].
+        """Computes readings (n, batch) [m/s].
 
         Args:
             time: (n,) increasing [s].
@@ -34,7 +34,7 @@ class ClockEffect(Parametrised, ABC):
 
     @abstractmethod
     def stamps(self, time: Tensor) -> Tensor:
-        """(n, batch) the clock's readings [s] at true times (n, batch) [s]."""
+        """Computes the clock's readings (n, batch) [s] at true times (n, batch) [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,7 @@ class Sampling:
         return cls(stamps=stamps, rows=rows, weights=stamps.new_ones(1), instants=stamps[:, None, None, None])
 
     def observe(self, time: Tensor, trajectory: Tensor) -> Tensor:
-        """What the camera sees of moving points, linear between samples: (frame, row, 3, batch) [m].
+        """Samples moving points as the camera does, linear between samples: (frame, row, 3, batch) [m].
 
         Args:
             time: (n,) increasing [s].
@@ -72,7 +72,8 @@ class Sampling:
         n, rows, axes, batch = trajectory.shape
         if n != len(time) or rows != len(self.rows) or axes != 3:
             raise InputError(
-                f"a trajectory of shape {tuple(trajectory.shape)} for {len(time)} times and {len(self.rows)} rows",
+                f"the trajectory has the shape {tuple(trajectory.shape)}, and there are {len(time)} "
+                f"times and {len(self.rows)} rows",
                 where="camera",
                 fix="give (time, row, 3, batch)",
             )
@@ -91,9 +92,9 @@ class Sampling:
         member = torch.arange(batch, device=time.device)
         # (frame, row, node, batch, 3): advanced indices come first.
         low, high = (trajectory.movedim(2, 3)[index, row, member] for index in (after - 1, after))
-        seen = torch.lerp(low, high, share.unsqueeze(-1)).movedim(-1, 2)
-        base = seen[:, :, :, 0]
-        return base + ((seen - base.unsqueeze(3)) * self.weights[:, None]).sum(3)
+        sampled = torch.lerp(low, high, share.unsqueeze(-1)).movedim(-1, 2)
+        base = sampled[:, :, :, 0]
+        return base + ((sampled - base.unsqueeze(3)) * self.weights[:, None]).sum(3)
 
 
 class CameraEffect(Parametrised, ABC):
@@ -101,4 +102,4 @@ class CameraEffect(Parametrised, ABC):
 
     @abstractmethod
     def sampled(self, sampling: Sampling) -> Sampling:
-        """The changed instants."""
+        """Returns the changed instants."""

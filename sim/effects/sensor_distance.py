@@ -30,7 +30,7 @@ class SensorDistance(AnemometerEffect):
 
     def read(self, time: Tensor, speed: Tensor) -> Tensor:
         delay = self.distance / speed.mean(0).abs().clamp(min=1e-12)
-        seen = (time[:, None] - delay).clamp(time[0], time[-1])
-        after = torch.searchsorted(time, seen.detach().contiguous(), right=True).clamp(1, len(time) - 1)
-        share = (seen - time[after - 1]) / (time[after] - time[after - 1])
+        delayed = (time[:, None] - delay).clamp(time[0], time[-1])
+        after = torch.searchsorted(time, delayed.detach().contiguous(), right=True).clamp(1, len(time) - 1)
+        share = (delayed - time[after - 1]) / (time[after] - time[after - 1])
         return torch.lerp(speed.gather(0, after - 1), speed.gather(0, after), share)

@@ -67,7 +67,7 @@ class Play:
     handles: Handles
 
     def springs(self, cloth: Cloth) -> Springs:
-        """All that it is."""
+        """Describes the play as springs."""
         slack = torch.as_tensor(self.length, dtype=cloth.dtype, device=cloth.device).expand(
             len(self.vertices), cloth.batch
         )
@@ -80,22 +80,22 @@ class Play:
         )
 
     def _stretch(self, time: float, position: Tensor) -> tuple[Tensor, Tensor]:
-        """d (held, 3, batch) [m], and the share of it that is slack (held, 1, batch)."""
+        """Computes d (held, 3, batch) [m], and the share of it that is slack (held, 1, batch)."""
         offset = torch.as_tensor(self.handles.offset(time), dtype=position.dtype, device=position.device)
         stretch = position[self.vertices] - self.anchors - offset[:, None]
         distance = norm(stretch).clamp(min=_SHORTEST)
         return stretch, (self.length / distance).clamp(max=1)
 
     def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N]."""
+        """Computes forces (vertex, 3, batch) [N]."""
         stretch, slack = self._stretch(time, position)
         return torch.zeros_like(position).index_add(0, self.vertices, self.handles.stiffness * slack * stretch)
 
     def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
-        """(vertex, batch) negative: less than the handles' [N/m]."""
+        """Computes stiffnesses (vertex, batch), negative: less than the handles' [N/m]."""
         _, slack = self._stretch(time, position)
         return torch.zeros_like(cloth.mass).index_add(0, self.vertices, -self.handles.stiffness * slack[:, 0])
 
     def stiffest(self, cloth: Cloth) -> Tensor:
-        """(vertex, batch) zero: nothing is added to the handles' [N/m]."""
+        """Returns zeros (vertex, batch): nothing is added to the handles' [N/m]."""
         return torch.zeros_like(cloth.mass)

@@ -51,7 +51,7 @@ class TiltedPole(Effect):
             raise UsageError("nothing holds the cloth", where="tilted pole", fix="give handles")
         if system.motion is not None:
             raise InapplicableError(
-                "a pole that tilts, where attachments are carried",
+                "a pole cannot tilt where attachments are carried",
                 where="tilted pole",
                 fix="leave it out: their ways are those that are given",
             )
@@ -76,7 +76,7 @@ class TiltedPole(Effect):
 
 
 def change(turn: Tensor, vectors: Tensor) -> Tensor:
-    """(R − I) applied to vectors (n, 3, batch), for the rotation vector (3, batch); exactly 0 for none.
+    """Applies R − I to vectors (n, 3, batch), for the rotation vector (3, batch); exactly 0 for none.
 
     Rodrigues: R − I = sin α/α [ω]× + (1 − cos α)/α² [ω]×², without the division.
     """

@@ -78,36 +78,36 @@ class HeldBack:
     density: float
 
     def start(self, cloth: Cloth, position: Tensor) -> Tensor:
-        """zᵢ = 0: (2, face, batch) [Pa]."""
+        """Returns zᵢ = 0: (2, face, batch) [Pa]."""
         return position.new_zeros((len(JONES), len(cloth.faces), position.shape[-1]))
 
     def update(
         self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor, elapsed: float
     ) -> Tensor:
-        """zᵢ after a step of `elapsed` [s] with F as at its end, exactly: (2, face, batch) [Pa]."""
-        seen = face_wind(cloth, position, velocity, wind)
-        load, half_chords = self._load(seen), 2 / _length(cloth) * elapsed * norm(seen.relative)[:, 0]
+        """Computes zᵢ after a step of `elapsed` [s] with F as at its end, exactly: (2, face, batch) [Pa]."""
+        relative = face_wind(cloth, position, velocity, wind)
+        load, half_chords = self._load(relative), 2 / _length(cloth) * elapsed * norm(relative.relative)[:, 0]
         lags = zip(memory, JONES, strict=True)
         return torch.stack([load + (past - load) * torch.exp(-rate * half_chords) for past, (_, rate) in lags])
 
     def force(self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N]."""
-        seen = face_wind(cloth, position, velocity, wind)
-        load = self._load(seen)
+        """Computes forces (vertex, 3, batch) [N]."""
+        relative = face_wind(cloth, position, velocity, wind)
+        load = self._load(relative)
         lags = zip(memory, JONES, strict=True)
         lacking = torch.stack([amplitude * (load - past) for past, (amplitude, _) in lags]).sum(0)
         third = (cloth.areas / 3)[:, None, None]
-        return cloth.shared_out(third * (-self.effect.share * lacking).unsqueeze(1) * seen.normal)
+        return cloth.shared_out(third * (-self.effect.share * lacking).unsqueeze(1) * relative.normal)
 
     def given(self, cloth: Cloth) -> Given:
-        """What its C++ reads: s, half chords a metre, and ρ."""
+        """Lists what its C++ reads: s, half chords a metre, and ρ."""
         return Given(of=WagnerLag, numbers=(self.effect.share, 2 / _length(cloth), self.density))
 
-    def _load(self, seen: FaceWind) -> Tensor:
-        """F: (face, batch) [Pa]."""
-        return self.density * (seen.across.abs() * seen.across)[:, 0]
+    def _load(self, relative: FaceWind) -> Tensor:
+        """Computes F, (face, batch) [Pa]."""
+        return self.density * (relative.across.abs() * relative.across)[:, 0]
 
 
 def _length(cloth: Cloth) -> float:
-    """Of the flat cloth from hoist to fly [m]."""
+    """Computes the flat cloth's length from hoist to fly [m]."""
     return float(np.ptp(cloth.mesh.rest[:, 0]))

@@ -22,7 +22,7 @@ class Integrator(Protocol):
     """A method and its step."""
 
     def advance(self, system: System, state: State, duration: float) -> State:
-        """The state `duration` seconds later; a whole number of steps is taken."""
+        """Computes the state `duration` seconds later; a whole number of steps is taken."""
         ...
 
 

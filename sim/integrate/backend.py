@@ -27,7 +27,7 @@ class Backend(StrEnum):
 
 
 def kernel_for(system: System, state: State, backend: Backend, *, kind: str | None = None) -> Kernel | None:
-    """The compiled kernel where the backend allows it and it can run; None where torch is to do the work.
+    """Chooses the compiled kernel where the backend allows it and it can run; None where torch is to do the work.
 
     Args:
         kind: of its functions, see `Kernel.of`.
@@ -56,7 +56,7 @@ def kernel_for(system: System, state: State, backend: Backend, *, kind: str | No
 
 
 def warp_kernel_for(system: System, state: State) -> WarpKernel:
-    """The Warp kernel for a system.
+    """Makes the Warp kernel for a system.
 
     Raises:
         UsageError: it cannot run this system (see `WarpKernel.of`), or gradients are wanted from it.
@@ -83,7 +83,8 @@ def extra_force(
     *,
     memory: tuple[Tensor, ...],
 ) -> Tensor:
-    """`System.extra_force`, by the kernel of the system where that has all that acts: (vertex, 3, batch) [N]."""
+    """Computes `System.extra_force`, by the kernel of the system where that has all that acts: (vertex, 3, batch)
+    [N]."""
     if kernel is None or kernel.beside is None:
         return system.extra_force(drive, share, time, position, velocity, memory=memory)
     return kernel.extra(drive, share, position, velocity, velocity, memory=system.checked(memory))

@@ -61,14 +61,14 @@ class BackwardEuler:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.step) and self.step > 0):
-            raise UsageError(f"a step of {self.step!r} s", where="integrator implicit", fix="give a positive step")
+            raise UsageError(f"the step is {self.step!r} s", where="integrator implicit", fix="give a positive step")
         if not (0 < self.tolerance < 1):
             raise UsageError(
-                f"a tolerance of {self.tolerance!r}", where="integrator implicit", fix="give one between 0 and 1"
+                f"the tolerance is {self.tolerance!r}", where="integrator implicit", fix="give one between 0 and 1"
             )
 
     def advance(self, system: System, state: State, duration: float) -> State:
-        """The state `duration` seconds later."""
+        """Computes the state `duration` seconds later."""
         steps = max(1, math.ceil(duration / self.step - 1e-9))
         h = duration / steps
         kernel = self._kernel(system, state)
@@ -79,7 +79,7 @@ class BackwardEuler:
         return state
 
     def _kernel(self, system: System, state: State) -> Kernel | None:
-        """Where it can take the step."""
+        """Returns the kernel where it can take the step."""
         kernel = kernel_for(system, state, self.backend)
         lacking = kernel is None or (system.extra and kernel.beside is None) or system.contact is not None
         return None if lacking else kernel
@@ -104,7 +104,8 @@ class BackwardEuler:
         return h if self.air_shape is AirShape.PREVIOUS else 0.0
 
     def stepped(self, system: System, state: State, drive: Drive, h: float) -> State:
-        """The state one step of `h` [s] later, whatever `step` is, with what moves the cloth from outside meanwhile."""
+        """Computes the state one step of `h` [s] later, whatever `step` is, with what moves the cloth from outside
+        meanwhile."""
         cloth = system.cloth
         x, v, time = state.position, state.velocity, state.time
         if (kernel := self._kernel(system, state)) is not None:
@@ -124,8 +125,8 @@ class BackwardEuler:
         if system.clamped:
             v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)
         mass = cloth.mass.unsqueeze(1)
-        faces = membrane.Linearised.at(cloth, x)
-        folds = bending.Linearised.at(cloth, x) if len(cloth.hinges) else None
+        faces = membrane.LinearisedMembrane.at(cloth, x)
+        folds = bending.LinearisedBending.at(cloth, x) if len(cloth.hinges) else None
         factor = h * (h + cloth.damping)
         tied = system.tied(time, x)
         normals = mean_normals(cloth, x) if system.loads else None
@@ -151,8 +152,8 @@ class BackwardEuler:
             return product
 
         # The method's own update makes x − h v the positions one step ago.
-        seen = x - h * v if self.air_shape is AirShape.PREVIOUS else x
-        external = system.external(drive.wind[0], time, x, v, memory=state.memory, air_position=seen)
+        air_position = x - h * v if self.air_shape is AirShape.PREVIOUS else x
+        external = system.external(drive.wind[0], time, x, v, memory=state.memory, air_position=air_position)
         force = faces.force() + external
         diagonal = gather_sum(faces.diagonal(), cloth.face_slots)
         if folds is not None:
@@ -190,22 +191,22 @@ class BackwardEuler:
         return self._ended(system, state, drive, *system.limited(x + h * v, v, h), h)
 
     def _ended(self, system: System, state: State, drive: Drive, x: Tensor, v: Tensor, h: float) -> State:
-        """The end of a step from a state, with what forces remember of it in the wind of its start."""
+        """Computes the end of a step from a state, with what forces remember of it in the wind of its start."""
         memory = system.remembered(state.memory, drive.wind[0], state.time, x, v, elapsed=h)
         return State(position=x, velocity=v, time=state.time + h, memory=memory)
 
 
-def _contacts(system: System, position: Tensor, velocity: Tensor) -> contact.Linearised | None:
+def _contacts(system: System, position: Tensor, velocity: Tensor) -> contact.LinearisedContact | None:
     if system.contact is None:
         return None
     pairs = contact.candidates(system.cloth, system.contact, position, system.neighbours)
-    return contact.Linearised.at(system.cloth, system.contact, position, velocity, pairs)
+    return contact.LinearisedContact.at(system.cloth, system.contact, position, velocity, pairs)
 
 
 def conjugate_gradients(
     operator: Callable[[Tensor], Tensor], right: Tensor, diagonal: Tensor, *, tolerance: float, iterations: int
 ) -> Tensor:
-    """Solve operator(y) = right for every member of the batch by itself.
+    """Solves operator(y) = right for every member of the batch by itself.
 
     A member stops changing once its residual, in the norm of the diagonal preconditioner's inverse, has fallen by
     `tolerance`: what it gets does not depend on the others.

@@ -27,7 +27,7 @@ class _Winds:
     parts: tuple[Wind, ...]
 
     def velocity(self, time: float) -> Tensor:
-        """(3, batch) [m/s] at a time [s]."""
+        """Computes the wind (3, batch) [m/s] at a time [s]."""
         return torch.cat([part.velocity(time) for part in self.parts], dim=-1)
 
 
@@ -38,7 +38,7 @@ class _Motions:
     parts: tuple[AnchorMotion, ...]
 
     def displacement(self, time: float) -> Tensor:
-        """(held, 3, batch) [m] at a time [s]."""
+        """Computes displacements (held, 3, batch) [m] at a time [s]."""
         return torch.cat([part.displacement(time) for part in self.parts], dim=-1)
 
 
@@ -58,35 +58,35 @@ class _Loosening:
     batch: int
 
     def springs(self, cloth: Cloth) -> Springs:
-        """Those of the batch, without stiffness for all others."""
-        own = self.tie.springs(self.cloth)
-        anchors = own.anchors[..., :1].repeat(1, 1, self.batch)
-        anchors[..., self.members] = own.anchors
+        """Returns the springs of the batch, without stiffness for all others."""
+        of_tie = self.tie.springs(self.cloth)
+        anchors = of_tie.anchors[..., :1].repeat(1, 1, self.batch)
+        anchors[..., self.members] = of_tie.anchors
         return Springs(
-            vertices=own.vertices,
+            vertices=of_tie.vertices,
             anchors=anchors,
-            stiffness=self._widened(own.stiffness),
-            slack=self._widened(own.slack),
-            share=own.share,
+            stiffness=self._widened(of_tie.stiffness),
+            slack=self._widened(of_tie.slack),
+            share=of_tie.share,
         )
 
     def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
-        """(vertex, 3, batch) [N]."""
+        """Computes forces (vertex, 3, batch) [N]."""
         return self._widened(self.tie.force(self.cloth, time, position[..., self.members]))
 
     def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
-        """(vertex, batch) [N/m]."""
+        """Computes stiffnesses (vertex, batch) [N/m]."""
         return self._widened(self.tie.stiffness(self.cloth, time, position[..., self.members]))
 
     def stiffest(self, cloth: Cloth) -> Tensor:
-        """(vertex, batch) [N/m]."""
+        """Computes stiffnesses (vertex, batch) [N/m]."""
         return self._widened(self.tie.stiffest(self.cloth))
 
-    def _widened(self, own: Tensor) -> Tensor:
-        """(…, members of the batch) → (…, batch), 0 for all others."""
-        whole = own.new_zeros((*own.shape[:-1], self.batch))
-        whole[..., self.members] = own
-        return whole
+    def _widened(self, of_members: Tensor) -> Tensor:
+        """Widens (…, members of the batch) to (…, batch), 0 for all others."""
+        of_batch = of_members.new_zeros((*of_members.shape[:-1], self.batch))
+        of_batch[..., self.members] = of_members
+        return of_batch
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,7 +107,11 @@ class JointBatch:
             UsageError: none, or starts at different times.
         """
         if not batches or any(state.time != batches[0][1].time for _, state in batches):
-            raise UsageError("no batches, or of different times", where="joint batch", fix="start all of them at once")
+            raise UsageError(
+                "there are no batches, or they have different times",
+                where="joint batch",
+                fix="start all of them at once",
+            )
         return cls(systems=tuple(system for system, _ in batches)), _joined([state for _, state in batches])
 
     @cached_property
@@ -124,7 +128,7 @@ class JointBatch:
             shared = ("handles", "air", "contact", "limits")
             if not torch.equal(part.held, first.held) or any(getattr(part, s) != getattr(first, s) for s in shared):
                 raise UsageError(
-                    f"batches that differ in one of: {', '.join(shared)}",
+                    f"the batches differ in one of: {', '.join(shared)}",
                     where="joint batch",
                     fix="run them one by one",
                 )
@@ -136,7 +140,7 @@ class JointBatch:
         motions = [part.motion for part in parts if part.motion is not None]
         if motions and len(motions) < len(parts):
             raise UsageError(
-                "batches with anchors that move and anchors that do not", where="joint batch", fix="run them one by one"
+                "some batches have anchors that move and some do not", where="joint batch", fix="run them one by one"
             )
         return replace(
             first,
@@ -160,11 +164,11 @@ class JointBatch:
         return [slice(*pair) for pair in pairwise(ends)]
 
     def parts(self, state: State) -> Iterator[tuple[System, slice, State]]:
-        """For every batch what `plain` lacks of its system, its place among the members, and its state."""
+        """Yields, for every batch, what `plain` lacks of its system, its slice of the members, and its state."""
         memory = state.memory
         for system, members in zip(self.beside, self._members, strict=True):
-            own, memory = memory[: len(system.remembering)], memory[len(system.remembering) :]
-            yield system, members, replace(state.select(members), memory=own)
+            of_system, memory = memory[: len(system.remembering)], memory[len(system.remembering) :]
+            yield system, members, replace(state.select(members), memory=of_system)
 
 
 def _joined(states: Sequence[State]) -> State:

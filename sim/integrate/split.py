@@ -40,7 +40,7 @@ class SplitEuler:
     base: BackwardEuler = field(default_factory=lambda: BackwardEuler(tolerance=1e-4))
 
     def advance(self, system: System, state: State, duration: float) -> State:
-        """The state `duration` seconds later."""
+        """Computes the state `duration` seconds later."""
         plain, system = system.alone, system.beside
         if not (system.extra or system.loads or system.ties):
             return self.base.advance(plain, state, duration)
@@ -53,7 +53,7 @@ class SplitEuler:
         return state
 
     def advance_jointly(self, batches: JointBatch, state: State, duration: float) -> State:
-        """The same of several batches jointly: their members move as they do in batches of their own.
+        """Advances several batches jointly: their members move as they do in batches of their own.
 
         Raises:
             UsageError: batches that cannot be joined.
@@ -65,14 +65,14 @@ class SplitEuler:
         for drive in plain.drives(_times(state.time, h, steps)):
             parts = list(batches.parts(state))
             velocity = state.velocity.clone()
-            for system, members, own in parts:
+            for system, members, part_state in parts:
                 if system.extra or system.ties:
-                    velocity[..., members] = self._pushed(system, own, drive.select(members), h)
+                    velocity[..., members] = self._pushed(system, part_state, drive.select(members), h)
             after = self.base.stepped(plain, replace(state, velocity=velocity, memory=()), drive, h)
             memory: list[Tensor] = []
-            for system, members, own in parts:
+            for system, members, part_state in parts:
                 if system.loads or system.remembering:
-                    carried = _carried(system, own, after.select(members), drive.select(members), h)
+                    carried = _carried(system, part_state, after.select(members), drive.select(members), h)
                     after.position[..., members] = carried.position
                     after.velocity[..., members] = carried.velocity
                     memory += carried.memory
@@ -82,7 +82,8 @@ class SplitEuler:
     def _kernels(
         self, plain: System, systems: Sequence[System], state: State
     ) -> tuple[Kernel, tuple[Kernel, ...]] | None:
-        """Those of the base model of all and of the batches; None where one of them cannot take the steps."""
+        """Chooses the kernels of the base model of all and of the batches; None where one of them cannot take the
+        steps."""
         kernel = kernel_for(plain, state, self.base.backend)
         if kernel is None or plain.contact is not None or plain.limits is not None:
             return None
@@ -90,10 +91,10 @@ class SplitEuler:
             return None
         parts: list[Kernel] = []
         for system in systems:
-            own = kernel_for(system, state, self.base.backend, kind=kernel.kind)
-            if own is None or own.beside is None:
+            of_system = kernel_for(system, state, self.base.backend, kind=kernel.kind)
+            if of_system is None or of_system.beside is None:
                 return None
-            parts.append(own)
+            parts.append(of_system)
         return kernel, tuple(parts)
 
     def _at_once(
@@ -116,12 +117,12 @@ class SplitEuler:
         return State(position=x, velocity=v, time=times[-1], memory=memory)
 
     def _steps(self, duration: float) -> tuple[int, float]:
-        """How many, and how long each is [s]."""
+        """Returns how many steps are taken, and how long each is [s]."""
         steps = max(1, math.ceil(duration / self.base.step - 1e-9))
         return steps, duration / steps
 
     def _pushed(self, system: System, state: State, drive: Drive, h: float) -> Tensor:
-        """Velocity (vertex, 3, batch) [m/s] that the base model's step begins with."""
+        """Computes the velocity (vertex, 3, batch) [m/s] that the base model's step begins with."""
         x, v, time = state.position, state.velocity, state.time
         mass = system.cloth.mass.unsqueeze(1)
         kernel = kernel_for(system, state, self.base.backend)
@@ -134,13 +135,13 @@ class SplitEuler:
 
 
 def _times(start: float, h: float, steps: int) -> list[float]:
-    """Start and end of steps [s], added up as states are."""
+    """Returns start and end of steps [s], added up as states are."""
     return list(accumulate([h] * steps, initial=start))
 
 
 def _carried(system: System, before: State, after: State, drive: Drive, h: float) -> State:
-    """The end of a step, after the base model's: with air that moves along, and what forces remember of it in the wind
-    of its start."""
+    """Computes the end of a step, after the base model's: with air that moves along, and what forces remember of it in
+    the wind of its start."""
     if system.loads:
         x, v = before.position, before.velocity
         mass, normals = system.cloth.mass.unsqueeze(1), mean_normals(system.cloth, x)

@@ -34,7 +34,7 @@ _LIMITS: WeakKeyDictionary[System, float] = WeakKeyDictionary()
 
 
 def stiffest(system: System) -> Tensor:
-    """An upper estimate of the largest eigenvalue ω² of M⁻¹K: (batch,) [1/s²].
+    """Estimates from above the largest eigenvalue ω² of M⁻¹K: (batch,) [1/s²].
 
     Taken at the rest shape stretched by 15 %, with the largest entries of every table and handle springs; and, where
     there is contact, at the rest shape with the repulsion on top, if that is more: layers that lie on one another are
@@ -50,11 +50,11 @@ def stiffest(system: System) -> Tensor:
 
 
 def _stiffest_stretched(system: System, stretch: float) -> Tensor:
-    """The largest eigenvalue at the rest shape stretched by a factor, without contact: (batch,) [1/s²]."""
+    """Estimates the largest eigenvalue at the rest shape stretched by a factor, without contact: (batch,) [1/s²]."""
     cloth = system.cloth
     flat = torch.as_tensor(cloth.mesh.rest * stretch, dtype=cloth.dtype, device=cloth.device)
     position = torch.nn.functional.pad(flat, (0, 1)).unsqueeze(-1).repeat(1, 1, cloth.batch)
-    at = membrane.Linearised.at(cloth, position)
+    at = membrane.LinearisedMembrane.at(cloth, position)
     largest = cloth.samples.reshape(len(cloth.samples), -1, 4).amax(1)[cloth.table_of]
     k0, k1, k2, k3 = (largest[:, i].expand_as(k) for i, k in enumerate(at.k))
     area = cloth.areas[:, None]
@@ -65,7 +65,7 @@ def _stiffest_stretched(system: System, stretch: float) -> Tensor:
         tension_u=(area * (k0 * g00 + k1 * g11)).unsqueeze(1),
         tension_v=(area * (k2 * g11 + k1 * g00)).unsqueeze(1),
     )
-    folds = bending.Linearised.at(cloth, position)
+    folds = bending.LinearisedBending.at(cloth, position)
     bend = torch.tensor([float(m.bending.max()) for m in cloth.materials], dtype=cloth.dtype, device=cloth.device)
     bend = bend if cloth.stiffening is None else bend * (1 + cloth.stiffening)
     folds = replace(folds, k=(cloth.hinge_shape[:, None] / 2 * bend).expand_as(folds.k))
@@ -91,7 +91,7 @@ def _stiffest_stretched(system: System, stretch: float) -> Tensor:
 
 
 def stable_step(system: System) -> float:
-    """The largest step [s] at which leapfrog with lagged Kelvin–Voigt damping d is stable for the whole batch.
+    """Computes the largest step [s] at which leapfrog with lagged Kelvin–Voigt damping d is stable for the whole batch.
 
     The amplification matrix of one mode has determinant 1 − d ω² h and trace 2 − d ω² h − ω² h²; the Jury criterion
     gives ω² h² + 2 d ω² h < 4, that is h < −d + √(d² + 4/ω²).
@@ -116,7 +116,7 @@ def stable_step(system: System) -> float:
 
 
 def outer_limit(system: System, state: State, drive: Drive) -> float:
-    """The longest outer step [s] of what the base model lacks, for the whole batch, estimated at a state.
+    """Estimates the longest outer step [s] of what the base model lacks, for the whole batch, at a state.
 
     With r and ω² the largest changes of its acceleration with velocity and with position, by power iteration on
     differences, it is the smaller of 0.5/r and 1/ω. Air's damping 2 ρ w/σ is included as far as it is not the base's.
@@ -140,7 +140,7 @@ def outer_limit(system: System, state: State, drive: Drive) -> float:
 
 
 def _largest(difference: Callable[[Tensor], Tensor], like: Tensor, size: float) -> float:
-    """The largest factor of an operator, half of whose differences over ± a field of some size are given."""
+    """Estimates the largest factor of an operator, half of whose differences over ± a field of some size are given."""
     field = _start(like)
     value = torch.zeros_like(like[0, 0])
     for _ in range(_OUTER_ITERATIONS):
@@ -152,6 +152,6 @@ def _largest(difference: Callable[[Tensor], Tensor], like: Tensor, size: float) 
 
 
 def _start(like: Tensor) -> Tensor:
-    """A fixed field that has a part along every mode: no generator is needed, and results repeat."""
+    """Makes a fixed field that has a part along every mode: no generator is needed, and results repeat."""
     index = torch.arange(like[..., 0].numel(), dtype=like.dtype, device=like.device)
     return torch.sin(index * index).reshape(-1, 3, 1).expand_as(like)

@@ -61,15 +61,17 @@ class Symplectic:
     def __post_init__(self) -> None:
         if self.outer is not None and not (math.isfinite(self.outer) and self.outer > 0):
             raise UsageError(
-                f"an outer step of {self.outer!r} s", where="integrator symplectic", fix="give a positive one, or none"
+                f"the outer step is {self.outer!r} s", where="integrator symplectic", fix="give a positive one, or none"
             )
         if not 0 < self.safety < 1:
             raise UsageError(
-                f"{self.safety!r} of the stability limit", where="integrator symplectic", fix="give a share below 1"
+                f"the safety {self.safety!r} is no share of the stability limit",
+                where="integrator symplectic",
+                fix="give a share below 1",
             )
 
     def steps(self, system: System, duration: float) -> int:
-        """How many steps a duration [s] takes.
+        """Counts the steps that a duration [s] takes.
 
         Raises:
             UsageError: a forced step beyond the stability limit.
@@ -87,7 +89,7 @@ class Symplectic:
         return max(1, math.ceil(duration / self.step - 1e-9))
 
     def advance(self, system: System, state: State, duration: float) -> State:
-        """The state `duration` seconds later.
+        """Computes the state `duration` seconds later.
 
         Raises:
             UsageError: see `steps` and `advance`.
@@ -109,7 +111,7 @@ def advance(
     outer: int | None = None,
     backend: Backend = Backend.AUTO,
 ) -> State:
-    """`steps` equal leapfrog steps over `duration` seconds; wind and handles are linear in between.
+    """Takes `steps` equal leapfrog steps over `duration` seconds; wind and handles are linear in between.
 
     Args:
         outer: equal outer steps, each of the same number of steps; None for as many as there are steps.
@@ -163,7 +165,7 @@ def _base(
 def _each_step(
     system: System, drive: Drive, state: State, duration: float, *, steps: int, kernel: Kernel | None
 ) -> State:
-    """With what acts beside the base model by torch."""
+    """Takes the steps with what acts beside the base model by torch."""
     h = duration / steps
     x, v, memory = state.position, state.velocity, state.memory
     inverse_mass, acceleration = _inverse_mass(system), 0.0 * v
@@ -191,8 +193,8 @@ def _impulses(
     base, length = system.base, duration / outer
     _check_outer(system, state, drive, length)
     x, v, memory = state.position, state.velocity, state.memory
-    whole = kernel_for(system, state, backend)
-    kernel = None if whole is None else Kernel.of(base)
+    complete = kernel_for(system, state, backend)
+    kernel = None if complete is None else Kernel.of(base)
     inverse_mass, acceleration = _inverse_mass(system), 0.0 * v
     for index in range(outer + 1):
         share = index / outer
@@ -200,7 +202,7 @@ def _impulses(
         time = state.time + share * duration
         if index > 0:
             memory = system.remembered(memory, torch.lerp(*drive.wind, share), time, x, level, elapsed=length)
-        force = extra_force(whole, system, drive, share, time, x, level, memory=memory)
+        force = extra_force(complete, system, drive, share, time, x, level, memory=memory)
         acceleration = inverse_mass * system.effective(x, force)
         v = v + (length / 2 if index in (0, outer) else length) * acceleration
         if index < outer:
@@ -210,23 +212,23 @@ def _impulses(
 
 
 def _check_outer(system: System, state: State, drive: Drive, length: float) -> None:
-    """Refuse an outer step [s] beyond the limit, which is estimated anew where wind and cloth have become faster."""
+    """Refuses an outer step [s] beyond the limit, which is estimated anew where wind and cloth have become faster."""
     moving = (state.velocity**2).sum(1).mean(0).sqrt()
     healthy = moving[state.healthy()]
     speed = max(float(wind.norm(dim=0).max()) for wind in drive.wind) + float(healthy.max() if len(healthy) else 0)
-    known = _OUTER.get(system)
-    if known is None or speed > _RISEN * known[0]:
-        known = _OUTER[system] = (speed, outer_limit(system, state, drive))
-    if length > known[1]:
+    estimated = _OUTER.get(system)
+    if estimated is None or speed > _RISEN * estimated[0]:
+        estimated = _OUTER[system] = (speed, outer_limit(system, state, drive))
+    if length > estimated[1]:
         raise UsageError(
             f"an outer step of {length:.3g} s is too long: what acts beside the base model changes within "
-            f"{known[1]:.3g} s, the longest that is stable",
+            f"{estimated[1]:.3g} s, the longest that is stable",
             where="integrator symplectic",
             fix="give a shorter outer step, or none",
         )
 
 
 def _inverse_mass(system: System) -> Tensor:
-    """(vertex, 1, batch) [1/kg]: 0 where held rigidly."""
+    """Computes inverse masses (vertex, 1, batch) [1/kg]: 0 where held rigidly."""
     inverse = 1 / system.cloth.mass.unsqueeze(1)
     return inverse.index_fill(0, system.held, 0.0) if system.clamped else inverse

@@ -31,7 +31,7 @@ class Kind(IntEnum):
 _FORCES = (Kind.FACE_FORCE, Kind.SHEET_FORCE, Kind.HINGE_MOMENT)
 
 
-class Entry(ctypes.Structure):
+class ActingEntry(ctypes.Structure):
     """Mirrors `Effect` of problem.hpp field by field."""
 
     _fields_ = [
@@ -55,20 +55,20 @@ class Acting:
         tensors: what the entries point to, kept alive here.
     """
 
-    entries: Sequence[Entry]
+    entries: Sequence[ActingEntry]
     remembering: int
     tensors: list[Tensor] = field(repr=False)
 
-    def with_memory(self, memory: Sequence[Tensor]) -> ctypes.Array[Entry]:
-        """The entries with what forces remember, which is changed in place and must outlive the entries."""
-        array = (Entry * len(self.entries))(*self.entries)
+    def with_memory(self, memory: Sequence[Tensor]) -> ctypes.Array[ActingEntry]:
+        """Returns the entries with what forces remember, which is changed in place and must outlive the entries."""
+        array = (ActingEntry * len(self.entries))(*self.entries)
         for entry, past in zip(array[len(array) - self.remembering :], memory, strict=True):
             entry.memory = past.data_ptr()
         return array
 
 
 def acting(system: System, kind: str, pack: Callable[[Tensor], Tensor]) -> Acting | None:
-    """What acts beside the base model; None where any of it has no C++ beside it, or that cannot be built.
+    """Compiles what acts beside the base model; None where any of it has no C++ beside it, or that cannot be built.
 
     Args:
         kind: of the kernel's functions, by numbers and lanes.
@@ -77,28 +77,29 @@ def acting(system: System, kind: str, pack: Callable[[Tensor], Tensor]) -> Actin
     Raises:
         UsageError: C++ of a kind that does not fit where the effect enters the equations.
     """
-    entries: list[Entry] = []
+    entries: list[ActingEntry] = []
     tensors: list[Tensor] = []
     for part, fitting in _parts(system):
-        found = None if part is None else _compiled(part, system.cloth, kind, fitting)
-        if found is None:
+        built = None if part is None else _compiled(part, system.cloth, kind, fitting)
+        if built is None:
             return None
-        given, number, act = found
+        given, number, act = built
         cloth = system.cloth
         numbers = [torch.as_tensor(n, dtype=cloth.dtype).expand(cloth.batch) for n in given.numbers]
         numbers = pack(torch.stack(numbers) if numbers else cloth.mass[:0])
-        entry = Entry(kind=number, act=act, numbers=numbers.shape[1], number=numbers.data_ptr())
+        entry = ActingEntry(kind=number, act=act, numbers=numbers.shape[1], number=numbers.data_ptr())
         tensors.append(numbers)
         if given.own is not None:
-            own = pack(given.own)
-            entry.own, entry.of_element = own.shape[2], own.data_ptr()
-            tensors.append(own)
+            of_elements = pack(given.own)
+            entry.own, entry.of_element = of_elements.shape[2], of_elements.data_ptr()
+            tensors.append(of_elements)
         entries.append(entry)
     return Acting(entries=entries, remembering=len(system.remembering), tensors=tensors)
 
 
 def _parts(system: System) -> Iterator[tuple[Compilable | None, tuple[Kind, ...]]]:
-    """What acts beside the base model, None for what certainly has no C++; each with the kinds that it may be of."""
+    """Yields what acts beside the base model, None for what certainly has no C++; each with the kinds that it may be
+    of."""
     factors = system.air.factors
     placed: list[tuple[Sequence[Any], tuple[Kind, ...]]] = [
         ((None,) if factors is None else factors, (Kind.PRESSURE_FACTOR,)),
@@ -112,19 +113,19 @@ def _parts(system: System) -> Iterator[tuple[Compilable | None, tuple[Kind, ...]
 
 
 def _compiled(part: Compilable, cloth: Cloth, kind: str, fitting: Sequence[Kind]) -> tuple[Given, int, int] | None:
-    """What it hands over, with the kind and the place of its function."""
+    """Loads an effect's C++ function: what it reads, its kind and its address."""
     given = part.given(cloth)
-    beside = header(given.of)
-    code = None if beside is None else of_effect(beside)
-    place = None if code is None else getattr(code, f"{given.of.__name__}_{kind}", None)
-    if place is None:
+    source = header(given.of)
+    code = None if source is None else of_effect(source)
+    function = None if code is None else getattr(code, f"{given.of.__name__}_{kind}", None)
+    if function is None:
         return None
     number = Kind(getattr(code, f"{given.of.__name__}_kind")())
     if number not in fitting:
         raise UsageError(
-            f"C++ of the kind {number.name} for {given.of.__name__}",
-            where=str(beside),
+            f"the C++ of {given.of.__name__} is of the kind {number.name}",
+            where=str(source),
             fix=f"make it one of {', '.join(entry.name for entry in fitting)}",
         )
-    place.restype = ctypes.c_void_p
-    return given, number, place()
+    function.restype = ctypes.c_void_p
+    return given, number, function()

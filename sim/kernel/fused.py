@@ -17,7 +17,7 @@ from torch import Tensor
 from sim.cloth import Cloth
 from sim.compiler import library
 from sim.contact import Contact, layers
-from sim.kernel.acting import Acting, Entry, acting
+from sim.kernel.acting import Acting, ActingEntry, acting
 from sim.limits import chebyshev_weights
 from sim.system import Drive, System
 from sim.tables import Evaluation
@@ -100,7 +100,7 @@ class _Problem(ctypes.Structure):
         ("ends", _Ends),
         *((name, ctypes.c_void_p) for name in _BLOCKED),
         ("effects", ctypes.c_int64),
-        ("effect", ctypes.POINTER(Entry)),
+        ("effect", ctypes.POINTER(ActingEntry)),
     ]
 
 
@@ -155,8 +155,8 @@ class Kernel:
 
     @classmethod
     def of(cls, system: System, *, kind: str | None = None) -> Kernel | None:
-        """The kernel for a system, or for its base where effects have no C++ (see `beside`); None where there is none:
-        not a CPU, not float32 or 64, or it cannot be built.
+        """Builds the kernel for a system, or for its base where effects have no C++ (see `beside`); None where there is
+        none: not a CPU, not float32 or 64, or it cannot be built.
 
         Args:
             kind: of the functions, as that of another kernel which it is run beside; None for what its batch needs.
@@ -165,13 +165,13 @@ class Kernel:
         if cloth.device.type != "cpu" or cloth.dtype not in (torch.float32, torch.float64):
             return None
         kind = kind or _kind(system)
-        made = _KERNELS.setdefault(system, {})
-        if kind not in made:
+        by_kind = _KERNELS.setdefault(system, {})
+        if kind not in by_kind:
             code = library()
             if code is None:
                 return None
-            made[kind] = cls._build(system, code, kind)
-        return made[kind]
+            by_kind[kind] = cls._build(system, code, kind)
+        return by_kind[kind]
 
     @classmethod
     def _build(cls, system: System, code: ctypes.CDLL, kind: str) -> Kernel:
@@ -256,44 +256,48 @@ class Kernel:
         )
 
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
-        """The problem with wind and handles set; the tensors must outlive the call it is made for."""
-        given = {"wind": self._each(drive.wind), "targets": self._each(drive.targets), "rate": self.pack(drive.rate)}
+        """Sets wind and handles of the problem; the tensors must outlive the call it is made for."""
+        tensors = {
+            "wind": self._stacked(drive.wind),
+            "targets": self._stacked(drive.targets),
+            "rate": self.pack(drive.rate),
+        }
         if self.tied is not None:
             start, end = drive.offset
-            given["tie_targets"] = self._each((self.tied + start[:, None], self.tied + end[:, None]))
-            given["tie_rate"] = self.pack(drive.drift[:, None].expand(3, self.batch))
-        return self._given(**given)
+            tensors["tie_targets"] = self._stacked((self.tied + start[:, None], self.tied + end[:, None]))
+            tensors["tie_rate"] = self.pack(drive.drift[:, None].expand(3, self.batch))
+        return self._problem_with(**tensors)
 
     def _tie_targets(self, offsets: Sequence[Tensor]) -> dict[str, Tensor]:
-        """Where the ties' anchors are at displacements (3,) [m]; nothing where there are no ties."""
+        """Locates the ties' anchors at displacements (3,) [m]; nothing where there are no ties."""
         if self.tied is None:
             return {}
-        return {"tie_targets": self._each([self.tied + offset[:, None] for offset in offsets])}
+        return {"tie_targets": self._stacked([self.tied + offset[:, None] for offset in offsets])}
 
-    def _given(self, **tensors: Tensor) -> tuple[_Problem, list[Tensor]]:
-        """The problem with some tensors set, which must outlive the call it is made for."""
+    def _problem_with(self, **tensors: Tensor) -> tuple[_Problem, list[Tensor]]:
+        """Sets some tensors of the problem, which must outlive the call it is made for."""
         problem = _Problem.from_buffer_copy(self.problem)
         for name, tensor in tensors.items():
             setattr(problem, name, tensor.data_ptr())
         return problem, list(tensors.values())
 
-    def _each(self, parts: Sequence[Tensor]) -> Tensor:
-        """(…, batch) at several times → (time, block, …, lane)."""
+    def _stacked(self, parts: Sequence[Tensor]) -> Tensor:
+        """Stacks (…, batch) at several times to (time, block, …, lane)."""
         return _to_blocks(torch.stack(tuple(parts)), self.lanes, self.blocks).movedim(1, 0).contiguous()
 
     def pack(self, tensor: Tensor) -> Tensor:
-        """(…, batch) → (block, …, lane), contiguous and not shared with the argument."""
+        """Packs (…, batch) to (block, …, lane), contiguous and not shared with the argument."""
         return _to_blocks(tensor, self.lanes, self.blocks).clone(memory_format=torch.contiguous_format)
 
     def unpack(self, blocks: Tensor) -> Tensor:
-        """(block, …, lane) → (…, batch)."""
+        """Unpacks (block, …, lane) to (…, batch)."""
         return blocks.movedim(0, -2).flatten(-2)[..., : self.batch].contiguous()
 
     def advance(
         self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int, *, memory: Sequence[Tensor] = ()
     ) -> tuple[Tensor, Tensor, tuple[Tensor, ...]]:
-        """Leapfrog: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s], and what forces
-        remember. Where `beside` is None it is that of the base model."""
+        """Takes leapfrog steps: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s], and what
+        forces remember. Where `beside` is None it is that of the base model."""
         problem, alive = self._drive(drive)
         past = self._remember(problem, memory)
         xb, vb = self.pack(x), self.pack(v)
@@ -303,14 +307,14 @@ class Kernel:
         return self.unpack(xb), self.unpack(vb), tuple(map(self.unpack, past))
 
     def _remember(self, problem: _Problem, memory: Sequence[Tensor]) -> list[Tensor]:
-        """Set what acts beside the base model; returned is what forces remember, which a call changes."""
+        """Sets what acts beside the base model; returned is what forces remember, which a call changes."""
         past = [self.pack(tensor) for tensor in memory]
         if self.beside is not None:
             problem.effects, problem.effect = len(self.beside.entries), self.beside.with_memory(past)
         return past
 
     def forces(self, drive: Drive, share: float, x: Tensor, v: Tensor) -> Tensor:
-        """The base's forces (vertex, 3, batch) [N]: what `System.extra_force` leaves."""
+        """Computes the base's forces (vertex, 3, batch) [N]: what `System.extra_force` leaves."""
         problem, alive = self._drive(drive)
         xb, vb = self.pack(x), self.pack(v)
         out = torch.empty_like(xb)
@@ -321,12 +325,12 @@ class Kernel:
     def extra(
         self, drive: Drive, share: float, x: Tensor, v: Tensor, level: Tensor, *, memory: Sequence[Tensor] = ()
     ) -> Tensor:
-        """What `System.extra_force` is, where `beside` is not None: (vertex, 3, batch) [N].
+        """Computes what `System.extra_force` does, where `beside` is not None: (vertex, 3, batch) [N].
 
         Args:
             level: the velocity that effects see (vertex, 3, batch) [m/s].
         """
-        problem, alive = self._given(wind=self._each(drive.wind))
+        problem, alive = self._problem_with(wind=self._stacked(drive.wind))
         past = self._remember(problem, memory)
         xb, vb, lb = self.pack(x), self.pack(v), self.pack(level)
         out = torch.empty_like(xb)
@@ -348,7 +352,8 @@ class Kernel:
         offsets: Sequence[Tensor] = (),
         memory: Sequence[Tensor] = (),
     ) -> tuple[Tensor, Tensor]:
-        """Backward Euler steps of `h` [s] without contact and limits: positions and velocities (vertex, 3, batch).
+        """Takes backward Euler steps of `h` [s] without contact and limits: positions and velocities (vertex, 3,
+        batch).
 
         Args:
             winds: (3, batch) at the start of each step [m/s].
@@ -360,7 +365,9 @@ class Kernel:
         Returns:
             NaN for members whose solve did not converge.
         """
-        problem, alive = self._given(wind=self._each(winds), targets=self._each(targets), **self._tie_targets(offsets))
+        problem, alive = self._problem_with(
+            wind=self._stacked(winds), targets=self._stacked(targets), **self._tie_targets(offsets)
+        )
         past = self._remember(problem, memory)
         xb, vb = self.pack(x), self.pack(v)
         failed = torch.zeros((self.blocks, self.lanes), dtype=torch.int32)
@@ -384,8 +391,8 @@ class Kernel:
         offsets: Sequence[Tensor],
         memory: Sequence[Tensor] = (),
     ) -> tuple[Tensor, Tensor, tuple[Tensor, ...]]:
-        """Steps of `h` [s] of the splitting (see `sim.integrate.split`): positions, velocities (vertex, 3, batch), and
-        what forces remember.
+        """Takes steps of `h` [s] of the splitting (see `sim.integrate.split`): positions, velocities (vertex, 3,
+        batch), and what forces remember.
 
         Args:
             parts: of the batches, of this one's kind, whose members side by side are this one's; `beside` is none of
@@ -393,20 +400,22 @@ class Kernel:
             winds, targets, offsets, tolerance, iterations: as of `implicit`.
             memory: of the forces of all parts that remember, in order.
         """
-        problem, alive = self._given(wind=self._each(winds), targets=self._each(targets), **self._tie_targets(offsets))
+        problem, alive = self._problem_with(
+            wind=self._stacked(winds), targets=self._stacked(targets), **self._tie_targets(offsets)
+        )
         problems: list[_Problem] = []
         remembered: list[tuple[Kernel, Tensor]] = []
-        own, left = (_Part * len(parts))(), list(memory)
+        array, remaining = (_Part * len(parts))(), list(memory)
         first = 0
-        for place, part in enumerate(parts):
-            mine, kept = part._given(**part._tie_targets(offsets))
+        for index, part in enumerate(parts):
+            mine, tensors = part._problem_with(**part._tie_targets(offsets))
             count = 0 if part.beside is None else part.beside.remembering
-            past = part._remember(mine, left[:count])
-            own[place] = _Part(ctypes.pointer(mine), part.blocks, first, part.batch)
+            past = part._remember(mine, remaining[:count])
+            array[index] = _Part(ctypes.pointer(mine), part.blocks, first, part.batch)
             remembered += [(part, tensor) for tensor in past]
             problems.append(mine)
-            alive += kept
-            first, left = first + part.batch, left[count:]
+            alive += tensors
+            first, remaining = first + part.batch, remaining[count:]
         xb, vb = self.pack(x), self.pack(v)
         failed = torch.zeros((self.blocks, self.lanes), dtype=torch.int32)
         counts = (ctypes.c_int64(iterations), ctypes.c_int64(len(winds)))
@@ -419,7 +428,7 @@ class Kernel:
             ctypes.c_double(h),
             ctypes.c_double(tolerance),
             *counts,
-            own,
+            array,
             ctypes.c_int64(len(parts)),
         )
         del alive, problems
@@ -442,7 +451,7 @@ class Kernel:
 
 
 def _set_ends(settings: _Ends, cloth: Cloth) -> dict[str, Tensor]:
-    """Fill in the cloth's ends; the tensors that are pointed to are returned, to be kept alive."""
+    """Fills in the cloth's ends; the tensors that are pointed to are returned, to be kept alive."""
     ends = cloth.mesh.ends
     settings.count, settings.width = ends.within.shape
     tensors = {
@@ -456,12 +465,12 @@ def _set_ends(settings: _Ends, cloth: Cloth) -> dict[str, Tensor]:
 
 
 def _set_contact(settings: _Contact, system: System, contact: Contact, face: Tensor, width: int) -> dict[str, Tensor]:
-    """Fill in the contact's settings; the tensors it points to are returned, to be kept alive."""
+    """Fills in the contact's settings; the tensors it points to are returned, to be kept alive."""
     cloth = system.cloth
-    centre, apart = layers(cloth.mesh, contact)
+    centre, separation = layers(cloth.mesh, contact)
     group, block = _groups(cloth.mesh.rest, width), _groups(centre, width)
     rest = np.where(group < 0, np.nan, cloth.mesh.rest.T[:, group]).swapaxes(0, 1)  # (group, 2, width)
-    real = {"vertex_area": cloth.mesh.vertex_areas, "centre": centre, "apart": apart**2, "group_rest": rest}
+    real = {"vertex_area": cloth.mesh.vertex_areas, "centre": centre, "apart": separation**2, "group_rest": rest}
     tensors = {name: torch.tensor(np.ascontiguousarray(values), dtype=cloth.dtype) for name, values in real.items()}
     tensors |= {name: torch.tensor(values, dtype=torch.int32) for name, values in (("group", group), ("block", block))}
     settings.vertices, settings.faces = cloth.mesh.vertex_count, len(cloth.faces)
@@ -499,7 +508,7 @@ def _function(code: ctypes.CDLL, name: str, kind: str) -> Any:
 
 
 def _kind(system: System) -> str:
-    """Name of the kernel's functions by the type of the numbers, with narrow blocks where members are few.
+    """Names of the kernel's functions by the type of the numbers, with narrow blocks where members are few.
 
     Contact adds forces up in groups as wide as a block: with it, blocks are as wide for few members as for many, so
     that what one gets does not depend on their number.
@@ -510,7 +519,7 @@ def _kind(system: System) -> str:
 
 
 def _to_blocks(tensor: Tensor, lanes: int, blocks: int) -> Tensor:
-    """(…, batch) → (block, …, lane); spare lanes repeat the last member."""
+    """Packs (…, batch) to (block, …, lane); spare lanes repeat the last member."""
     spare = lanes * blocks - tensor.shape[-1]
     if spare:
         tensor = torch.cat([tensor, tensor[..., -1:].expand(*tensor.shape[:-1], spare)], dim=-1)

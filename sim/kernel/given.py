@@ -33,12 +33,12 @@ class Compilable(Protocol):
     """What may have C++ beside it."""
 
     def given(self, cloth: Cloth) -> Given:
-        """What it hands over for a batch."""
+        """Returns what it hands over for a batch."""
         ...
 
 
 def header(of: type) -> Path | None:
-    """The C++ beside the module that a class is from; None where there is none."""
+    """Finds the C++ beside the module that a class is from; None where there is none."""
     file = getattr(sys.modules.get(of.__module__), "__file__", None)
-    beside = None if file is None else Path(file).with_suffix(".hpp")
-    return beside if beside is not None and beside.is_file() else None
+    source = None if file is None else Path(file).with_suffix(".hpp")
+    return source if source is not None and source.is_file() else None

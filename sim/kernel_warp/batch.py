@@ -26,8 +26,8 @@ _WHERE = "backend warp"
 
 
 def lacking(system: System) -> list[str]:
-    """What acts in a system that the Warp kernel does not have, in words."""
-    found = {
+    """Lists, in words, what acts in a system that the Warp kernel does not have."""
+    acting = {
         "effects": system.effects,
         "effects on the wind": system.flows,
         "added mass": system.loads,
@@ -38,7 +38,7 @@ def lacking(system: System) -> list[str]:
         "bending stiffness that differs along the cloth": system.cloth.stiffening is not None,
         f"the wind force {type(system.air).__name__}": system.air is not system.air.plain,
     }
-    return [name for name, acts in found.items() if acts]
+    return [name for name, acts in acting.items() if acts]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,7 @@ class WarpKernel:
 
     @classmethod
     def of(cls, system: System) -> WarpKernel:
-        """The kernel for a system.
+        """Builds the kernel for a system.
 
         Raises:
             UsageError: warp-lang is not installed, or has no such device; numbers that are not float32; a mesh that is
@@ -71,18 +71,20 @@ class WarpKernel:
 
     @classmethod
     def _build(cls, system: System) -> WarpKernel:
-        if more := lacking(system):
+        if unsupported := lacking(system):
             raise UsageError(
-                f"the Warp kernel has only the base model, not {', '.join(more)}",
+                f"the Warp kernel has only the base model, not {', '.join(unsupported)}",
                 where=_WHERE,
                 fix="leave them out, or use another backend",
             )
         cloth = system.cloth
         if cloth.dtype != torch.float32:
-            raise UsageError(f"numbers of type {cloth.dtype}", where=_WHERE, fix="use float32, or another backend")
+            raise UsageError(
+                f"the numbers are of type {cloth.dtype}", where=_WHERE, fix="use float32, or another backend"
+            )
         if len(cloth.faces) > FACES_LIMIT:
             raise UsageError(
-                f"a mesh of {len(cloth.faces)} faces",
+                f"the mesh has {len(cloth.faces)} faces",
                 where=_WHERE,
                 fix=f"have at most {FACES_LIMIT}, or use another backend",
             )
@@ -121,12 +123,12 @@ class WarpKernel:
         return cls(code=code, system=system, sheet=sheet, members=members, alive=tuple(alive))
 
     def advance(self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int) -> tuple[Tensor, Tensor]:
-        """Leapfrog: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s]."""
+        """Takes leapfrog steps: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s]."""
         wp, mesh = self.code.wp, self.system.cloth.mesh
-        given = [torch.stack(drive.wind), torch.stack(drive.targets), drive.rate.contiguous()]
+        tensors = [torch.stack(drive.wind), torch.stack(drive.targets), drive.rate.contiguous()]
         after = (x.clone(memory_format=torch.contiguous_format), v.clone(memory_format=torch.contiguous_format))
         motion = self.code.Motion()
-        motion.wind, motion.targets, motion.rate = (wp.from_torch(tensor) for tensor in given)
+        motion.wind, motion.targets, motion.rate = (wp.from_torch(tensor) for tensor in tensors)
         where = wp.device_from_torch(x.device)
         with _LAUNCHING:
             kernel = self.code.kernel(mesh.vertex_count, len(mesh.faces), len(mesh.hinges))
@@ -146,7 +148,7 @@ _KERNELS: weakref.WeakKeyDictionary[System, WarpKernel] = weakref.WeakKeyDiction
 
 
 def _code(device: torch.device) -> ModuleType:
-    """The kernel's module.
+    """Imports the kernel's module.
 
     Raises:
         UsageError: warp-lang is not installed, or does not know the device.
@@ -159,11 +161,11 @@ def _code(device: torch.device) -> ModuleType:
         raise UsageError(
             "warp-lang is not installed", where=_WHERE, fix="pip install 'flagdata[gpu]', or use another backend"
         ) from None
-    known = [str(device) for device in code.wp.get_devices()]
+    devices = [str(device) for device in code.wp.get_devices()]
     name = "cpu" if device.type == "cpu" else f"{device.type}:{device.index or 0}"
-    if name not in known:
+    if name not in devices:
         raise UsageError(
-            f"Warp has no device {name!r}, only {', '.join(known)}",
+            f"Warp has no device {name!r}, only {', '.join(devices)}",
             where=_WHERE,
             fix="install the driver of the graphics processor, or use one of these",
         )
@@ -171,7 +173,7 @@ def _code(device: torch.device) -> ModuleType:
 
 
 def _check_room(mesh: Mesh, room: int) -> None:
-    """Whether a flag's state fits the shared memory of a thread block [bytes].
+    """Checks that a flag's state fits the shared memory of a thread block [bytes].
 
     Raises:
         UsageError: it does not.
@@ -186,7 +188,7 @@ def _check_room(mesh: Mesh, room: int) -> None:
 
 
 def _sheet(mesh: Mesh, held: Tensor) -> dict[str, NDArray[np.int64]]:
-    """The index arrays of `leapfrog.Sheet`."""
+    """Computes the index arrays of `leapfrog.Sheet`."""
     faces, hinges = mesh.faces, mesh.hinges
     place_of = {  # directed edge → face and the corner opposite
         (int(face[(c + 1) % 3]), int(face[(c + 2) % 3])): (e, c) for e, face in enumerate(faces) for c in range(3)

@@ -135,7 +135,7 @@ def upper(pair: int):
 
 @wp.func
 def located(place: float, count: int):
-    """Cell and share of a coordinate of the stretching grid."""
+    """Finds cell and share of a coordinate of the stretching grid."""
     inside = wp.clamp(place, 0.0, float(count - 1))
     cell = wp.clamp(int(inside), 0, count - 2)
     return cell, inside - float(cell)
@@ -143,7 +143,7 @@ def located(place: float, count: int):
 
 @wp.func
 def node(members: Members, at: int):
-    """k0 to k3 of a node."""
+    """Returns k0 to k3 of a node."""
     first = wp.cast(members.samples[2 * at], wp.vec2)
     last = wp.cast(members.samples[2 * at + 1], wp.vec2)
     return wp.vec4(first[0], first[1], last[0], last[1])
@@ -151,7 +151,7 @@ def node(members: Members, at: int):
 
 @wp.func
 def stretching(members: Members, first: int, g00: float, g11: float, g01: float):
-    """k0 to k3 at a strain."""
+    """Interpolates k0 to k3 at a strain."""
     c0, w0 = located((g00 - members.origin) * members.fineness, members.counts[0])
     c1, w1 = located((g11 - members.origin) * members.fineness, members.counts[1])
     c2, w2 = located(wp.abs(g01) * members.fineness, members.counts[2])
@@ -172,7 +172,7 @@ def stretching(members: Members, first: int, g00: float, g11: float, g01: float)
 
 @wp.func
 def chosen(each: wp.vec3, index: int):
-    """A component."""
+    """Selects a component."""
     value = wp.where(index == 1, each[1], each[0])
     return wp.where(index == 2, each[2], value)
 

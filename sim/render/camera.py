@@ -43,7 +43,7 @@ class Camera:
         height: int,
         frame_offset: tuple[float, float] = (0.0, 0.0),
     ) -> Camera:
-        """A level camera (its right axis is horizontal) that aims at a point.
+        """Places a level camera (its right axis is horizontal) that aims at a point.
 
         Args:
             view_angle: of the frame's longer side [rad].
@@ -80,7 +80,7 @@ class Camera:
         )
 
     def project(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """Image places and depths of points in the world.
+        """Projects points in the world to image places and depths.
 
         Image x grows to the right and y downwards; (0, 0) is the upper left corner of the image, and pixel (i, j) has
         its centre at (j + 0.5, i + 0.5).

@@ -36,13 +36,13 @@ class Triangles:
 
     @classmethod
     def of(cls, places: Tensor, corners: Tensor) -> Triangles:
-        """From places (vertex, 2) in pixels and corners (face, 3)."""
+        """Makes triangles from places (vertex, 2) in pixels and corners (face, 3)."""
         steps = (places.double() * GRID).round().clamp(-REACH, REACH).long()
         p = steps[corners]
         area = _cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         turned = torch.where((area < 0)[:, None], corners[:, [0, 2, 1]], corners)
-        kept = torch.nonzero(area != 0).flatten()
-        return cls(face=kept, corners=turned[kept], places=steps[turned[kept]], area=area[kept].abs())
+        faces = torch.nonzero(area != 0).flatten()
+        return cls(face=faces, corners=turned[faces], places=steps[turned[faces]], area=area[faces].abs())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,8 @@ class Fragments:
 
 
 def fragments(triangles: Triangles, *, width: int, height: int) -> list[Fragments]:
-    """What the triangles cover of the samples at the middles of an image's pixels: one part or more, maybe empty."""
+    """Computes what the triangles cover of the samples at the middles of an image's pixels: one part or more, maybe
+    empty."""
     low, high = triangles.places.amin(dim=1), triangles.places.amax(dim=1)
     half, size = GRID // 2, triangles.places.new_tensor([width, height])
     first = torch.div(low - half + GRID - 1, GRID, rounding_mode="floor").clamp_min(0)
@@ -69,14 +70,14 @@ def fragments(triangles: Triangles, *, width: int, height: int) -> list[Fragment
     span = (last - first + 1).clamp_min(0)
     counts = span.prod(dim=1)
     ends = counts.cumsum(0)
-    found: list[Fragments] = []
+    parts: list[Fragments] = []
     begin = 0
-    while begin < len(counts) or not found:
+    while begin < len(counts) or not parts:
         done = int(ends[begin - 1]) if begin else 0
         end = min(len(counts), max(begin + 1, int(torch.searchsorted(ends, done + _FRAGMENTS, right=True))))
-        found.append(_covered(triangles, begin, end, first, span, counts, width=width))
+        parts.append(_covered(triangles, begin, end, first, span, counts, width=width))
         begin = end
-    return found
+    return parts
 
 
 def _covered(
@@ -84,10 +85,10 @@ def _covered(
 ) -> Fragments:
     part = counts[begin:end]
     triangle = torch.repeat_interleave(torch.arange(begin, end, device=part.device), part)
-    place = torch.arange(len(triangle), device=part.device) - torch.repeat_interleave(part.cumsum(0) - part, part)
+    cell = torch.arange(len(triangle), device=part.device) - torch.repeat_interleave(part.cumsum(0) - part, part)
     across = span[triangle, 0]
-    column = first[triangle, 0] + place % across
-    row = first[triangle, 1] + place // across
+    column = first[triangle, 0] + cell % across
+    row = first[triangle, 1] + cell // across
     sample = torch.stack([column, row], dim=1) * GRID + GRID // 2
     p = triangles.places[triangle]
     edges = torch.stack([_edge(p[:, i], p[:, (i + 1) % 3], sample) for i in range(3)], dim=1)
@@ -98,10 +99,10 @@ def _covered(
 
 
 def _edge(a: Tensor, b: Tensor, sample: Tensor) -> Tensor:
-    """Twice the area of (a, b, sample), less 1 where samples on the edge belong to the neighbour."""
+    """Computes twice the area of (a, b, sample), less 1 where samples on the edge belong to the neighbour."""
     along = b - a
-    own = (along[:, 1] > 0) | ((along[:, 1] == 0) & (along[:, 0] > 0))
-    return _cross(along, sample - a) - (~own).long()
+    owned = (along[:, 1] > 0) | ((along[:, 1] == 0) & (along[:, 0] > 0))
+    return _cross(along, sample - a) - (~owned).long()
 
 
 def _cross(a: Tensor, b: Tensor) -> Tensor:

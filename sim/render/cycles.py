@@ -62,7 +62,7 @@ class Cycles:
         self.close()
 
     def close(self) -> None:
-        """End the worker; rendering again starts another."""
+        """Ends the worker; rendering again starts another."""
         self.worker.close()
 
     def render(self, meshes: Meshes, parameters: RenderParameters) -> Tensor:
@@ -86,7 +86,7 @@ class Cycles:
         return develop(scene, behind, gain=parameters.gain).to(meshes.device)
 
     def _pictures(self, meshes: Meshes, zeta: RenderParameters, camera: Camera) -> int:
-        """How many pictures make one exposure."""
+        """Counts the pictures that make one exposure."""
         half = zeta.exposure_time / 2
         first, last = (camera.project(moved(meshes, offset).positions)[0] for offset in (-half, half))
         return min(_MOST_PICTURES, max(1, math.ceil(float((last - first).norm(dim=-1).max()))))
@@ -126,7 +126,7 @@ class Workbench(Cycles):
 
 
 def _frames(meshes: Meshes, placed: Stage, zeta: RenderParameters, pictures: int) -> Iterator[list[Message]]:
-    """The pictures of each frame: the meshes at instants that share out its exposure."""
+    """Yields the pictures of each frame: the meshes at instants that share out its exposure."""
     shift = torch.tensor(placed.shift, dtype=torch.float32)
     pole = {
         "positions/pole": placed.pole_positions.cpu().numpy(),

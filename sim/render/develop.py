@@ -24,19 +24,19 @@ def _decoding() -> NDArray[np.float32]:
 
 
 def to_linear(image: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """sRGB bytes of any shape as linear values in [0, 1] (IEC 61966-2-1)."""
+    """Converts sRGB bytes of any shape to linear values in [0, 1] (IEC 61966-2-1)."""
     return _decoding()[image]
 
 
 def to_bytes(linear: Tensor) -> Tensor:
-    """Linear values of any shape, clipped to [0, 1], as sRGB bytes (IEC 61966-2-1), rounded to nearest."""
+    """Converts linear values of any shape, clipped to [0, 1], to sRGB bytes (IEC 61966-2-1), rounded to nearest."""
     value = linear.clamp(0.0, 1.0)
     code = torch.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
     return (code * 255 + 0.5).to(torch.uint8)
 
 
 def plate(image: NDArray[np.uint8], parameters: RenderParameters) -> NDArray[np.float32]:
-    """The background as it appears in the frame.
+    """Resamples the background as it appears in the frame.
 
     At `background_scale` 0.6 the image's shorter side is as long as the frame's longer one; larger scales enlarge it
     about its middle. What lies outside of the image is its reflection.
@@ -58,12 +58,12 @@ def plate(image: NDArray[np.uint8], parameters: RenderParameters) -> NDArray[np.
     margin = max(0, *(math.ceil(v) + 1 for v in (-left, -top, right - columns, bottom - rows)))
     padded = np.pad(image, ((margin, margin), (margin, margin), (0, 0)), mode="symmetric")
     box = (left + margin, top + margin, right + margin, bottom + margin)
-    shown = Image.fromarray(padded).resize((zeta.width, zeta.height), Image.Resampling.BICUBIC, box=box)
-    return to_linear(np.asarray(shown))
+    resized = Image.fromarray(padded).resize((zeta.width, zeta.height), Image.Resampling.BICUBIC, box=box)
+    return to_linear(np.asarray(resized))
 
 
 def develop(scene: Tensor, behind: Tensor, *, gain: float) -> Tensor:
-    """The scene over its background, as bytes.
+    """Composes the scene over its background, as bytes.
 
     Args:
         scene: (frame, height, width, 4) linear radiance times coverage [W/(m² sr)], and coverage in [0, 1].

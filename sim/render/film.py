@@ -27,16 +27,16 @@ def rendered(
     photos: Path | None,
     seed: int,
 ) -> Frames:
-    """A film of a moving cloth.
+    """Renders a film of a moving cloth.
 
     Raises:
         FlagdataError: see `flagdata.render`.
     """
     if cloth not in ("flag", "hanging-cloth"):
-        raise UsageError(f"cloth {cloth!r}", where="cloth", fix="give 'flag' or 'hanging-cloth'")
+        raise UsageError(f"the cloth {cloth!r} is unknown", where="cloth", fix="give 'flag' or 'hanging-cloth'")
     if isinstance(sequence, Simulated):
         raise UsageError(
-            f"a simulation of {len(sequence)} cloths",
+            f"the simulation has {len(sequence)} cloths",
             where="sequence",
             fix="give one of its members, as in simulated[0]",
         )
@@ -52,6 +52,6 @@ def rendered(
 
 
 def _toward(sequence: MeshSequence | RaggedMeshSequence) -> float:
-    """Where the air goes to, as a simulated sequence states it [rad]; +x for any other."""
-    stated = sequence.attributes.get("parameters")
-    return float(stated.get("wind_toward", 0.0)) if isinstance(stated, Mapping) else 0.0
+    """Returns where the air goes to, as a simulated sequence states it [rad]; +x for any other."""
+    parameters = sequence.attributes.get("parameters")
+    return float(parameters.get("wind_toward", 0.0)) if isinstance(parameters, Mapping) else 0.0

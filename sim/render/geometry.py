@@ -44,24 +44,24 @@ class Geometry:
 
     @classmethod
     def of(cls, meshes: Meshes, placed: Stage) -> Geometry:
-        """The meshes on their stage."""
+        """Joins the meshes and their stage."""
         device, pole = meshes.device, len(meshes.positions)
         vertex_offset, offset = (torch.tensor(o, device=device) for o in (meshes.vertex_offset, meshes.face_offset))
         poles = len(placed.pole_faces)
         corners = []
         for i in range(len(meshes)):
-            own = meshes.faces[meshes.face_offset[i] : meshes.face_offset[i + 1]] + meshes.vertex_offset[i]
-            corners += [own, placed.pole_faces + pole]
-        each = torch.arange(len(meshes), device=device)
-        frame = torch.repeat_interleave(each, offset.diff() + poles)
+            faces = meshes.faces[meshes.face_offset[i] : meshes.face_offset[i + 1]] + meshes.vertex_offset[i]
+            corners += [faces, placed.pole_faces + pole]
+        index = torch.arange(len(meshes), device=device)
+        frame = torch.repeat_interleave(index, offset.diff() + poles)
         face_offset = offset + poles * torch.arange(len(offset), device=device)
-        place = torch.arange(len(frame), device=device) - face_offset[frame]
+        face = torch.arange(len(frame), device=device) - face_offset[frame]
         return cls(
             positions=torch.cat([meshes.positions + meshes.positions.new_tensor(placed.shift), placed.pole_positions]),
             uv=torch.cat([meshes.uv, meshes.uv.new_zeros((len(placed.pole_positions), 2))]),
             corners=torch.cat(corners),
             frame=frame,
-            cloth=place < offset.diff()[frame],
+            cloth=face < offset.diff()[frame],
             vertex_offset=vertex_offset,
             face_offset=face_offset,
             cloth_faces=offset.diff(),
@@ -69,12 +69,12 @@ class Geometry:
         )
 
     def at(self, positions: Tensor) -> Geometry:
-        """The same with the cloth's vertices elsewhere: (all vertices, 3), as the meshes have them [m]."""
+        """Replaces the positions of the cloth's vertices: (all vertices, 3), as the meshes have them [m]."""
         cloth = positions + positions.new_tensor(self.shift)
         return replace(self, positions=torch.cat([cloth, self.positions[len(cloth) :]]))
 
     def normals(self) -> Tensor:
-        """(vertex, 3) float32 unit normals: the mean of the faces around a vertex, weighted by their areas."""
+        """Computes float32 unit normals (vertex, 3): the mean of the faces around a vertex, weighted by their areas."""
         a, b, c = (self.positions[self.corners[:, k]].double() for k in range(3))
         face = torch.linalg.cross(b - a, c - a)
         total = torch.zeros((len(self.positions), 3), dtype=torch.float64, device=self.positions.device)
@@ -84,7 +84,7 @@ class Geometry:
 
 
 def check_in_front(positions: Tensor, meshes: Meshes, placed: Stage) -> None:
-    """Make sure that the cloth is in front of the camera.
+    """Checks that the cloth is in front of the camera.
 
     Args:
         positions: (all vertices, 3) of the cloth at some instant of each frame, as the meshes have them [m].

@@ -30,7 +30,7 @@ class Light:
 
     @classmethod
     def of(cls, parameters: RenderParameters, samples: Samples, index: int) -> Light:
-        """What one of the samples sees."""
+        """Selects the light of one of the samples."""
         points = samples.to_sun[index].tolist()
         return cls(
             to_sun=tuple((x, y, z) for x, y, z in points),

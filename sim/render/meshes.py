@@ -59,7 +59,7 @@ class Meshes:
             if values.ndim != 2 or values.shape[1] != width:
                 raise _wrong(f"{name} have shape {tuple(values.shape)}", f"(rows, {width})")
         if len(self.uv) != len(self.positions):
-            raise _wrong(f"{len(self.uv)} texture places for {len(self.positions)} vertices", "one for each")
+            raise _wrong(f"there are {len(self.uv)} texture places for {len(self.positions)} vertices", "one for each")
         for name, values, dtype in (
             ("positions", self.positions, torch.float32),
             ("faces", self.faces, torch.int64),
@@ -75,7 +75,7 @@ class Meshes:
             if len(offset) < 2 or offset[0] != 0 or offset[-1] != total or not rising:
                 raise _wrong(f"{name} does not fit {total} rows", "from 0 to the rows, rising, at least one frame")
         if len(self.vertex_offset) != len(self.face_offset):
-            raise _wrong("offsets of different numbers of frames", "one more than frames, for both")
+            raise _wrong("the offsets are of different numbers of frames", "one more than frames, for both")
         if not (bool(self.positions.isfinite().all()) and bool(self.uv.isfinite().all())):
             raise _wrong("a position or texture place is not finite", "finite ones; cut a sequence where it blew up")
         finite = all(math.isfinite(v) for v in (*self.anchor, self.heading, self.rate))
@@ -113,7 +113,7 @@ class Meshes:
         return bool((faces == faces[:1]).all()) and bool((uv == uv[:1]).all())
 
     def frame(self, index: int) -> Frame:
-        """The mesh of one frame; negative indices count from the end."""
+        """Returns the mesh of one frame; negative indices count from the end."""
         i = range(len(self))[index]
         vertices = slice(self.vertex_offset[i], self.vertex_offset[i + 1])
         faces = slice(self.face_offset[i], self.face_offset[i + 1])
@@ -167,7 +167,7 @@ class Meshes:
     def flag(
         cls, sequence: MeshSequence | RaggedMeshSequence, *, heading: float, device: torch.device | str = "cpu"
     ) -> Meshes:
-        """A stored flag: hoist at the least u; its upper corner in the first frame is the anchor.
+        """Makes meshes of a stored flag: hoist at the least u; its upper corner in the first frame is the anchor.
 
         Args:
             heading: where the air goes to, counter-clockwise from +x [rad].
@@ -181,7 +181,8 @@ class Meshes:
     def hanging(
         cls, sequence: MeshSequence | RaggedMeshSequence, *, heading: float = 0.0, device: torch.device | str = "cpu"
     ) -> Meshes:
-        """A stored hanging cloth: the middle of its upper edge (greatest v) in the first frame is the anchor.
+        """Makes meshes of a stored hanging cloth: the middle of its upper edge (greatest v) in the first frame is the
+        anchor.
 
         Args:
             heading: the cloth's normal, counter-clockwise from +x [rad].
@@ -204,7 +205,7 @@ class Meshes:
         rest = np.asarray(sequence.rest, dtype=np.float64)
         low, span = rest.min(axis=0), np.ptp(rest, axis=0)
         if not (span > 0).all():
-            raise _wrong("rest coordinates without extent", "material coordinates in metres")
+            raise _wrong("the rest coordinates have no extent", "material coordinates in metres")
         uv = torch.from_numpy((rest - low) / span).to(device, torch.float32)
         x, y, z = (float(v) for v in np.asarray(anchor))
         rate = NANOSECONDS / float(np.median(np.diff(sequence.time))) if len(sequence) > 1 else 25.0
@@ -223,5 +224,5 @@ class Meshes:
         )
 
 
-def _wrong(what: str, wanted: str) -> InputError:
-    return InputError(what, where="meshes", fix=f"give {wanted}")
+def _wrong(message: str, wanted: str) -> InputError:
+    return InputError(message, where="meshes", fix=f"give {wanted}")

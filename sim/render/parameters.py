@@ -17,7 +17,7 @@ from flagdata.schema import FRAME_SIZE
 
 
 @dataclass(frozen=True, kw_only=True)
-class Described:
+class RenderQuantity:
     """A parameter's unit, and the least and the greatest value that make sense at all."""
 
     unit: str
@@ -26,7 +26,7 @@ class Described:
 
 
 _POSITIVE = 1e-6
-_TURN = Described(unit="rad", least=-2 * math.pi, most=2 * math.pi)
+_TURN = RenderQuantity(unit="rad", least=-2 * math.pi, most=2 * math.pi)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,40 +69,40 @@ class RenderParameters:
     """
 
     background: str
-    background_offset_x: Annotated[float, Described(unit="px", least=-1000.0, most=1000.0)] = 0.0
-    background_offset_y: Annotated[float, Described(unit="px", least=-1000.0, most=1000.0)] = 0.0
-    background_scale: Annotated[float, Described(unit="1", least=0.1, most=10.0)] = 0.8
-    sun_height: Annotated[float, Described(unit="m", least=_POSITIVE, most=1e6)] = 7.0
-    sun_radius: Annotated[float, Described(unit="m", least=0.0, most=1e6)] = 2.5
+    background_offset_x: Annotated[float, RenderQuantity(unit="px", least=-1000.0, most=1000.0)] = 0.0
+    background_offset_y: Annotated[float, RenderQuantity(unit="px", least=-1000.0, most=1000.0)] = 0.0
+    background_scale: Annotated[float, RenderQuantity(unit="1", least=0.1, most=10.0)] = 0.8
+    sun_height: Annotated[float, RenderQuantity(unit="m", least=_POSITIVE, most=1e6)] = 7.0
+    sun_radius: Annotated[float, RenderQuantity(unit="m", least=0.0, most=1e6)] = 2.5
     sun_azimuth: Annotated[float, _TURN] = 0.0
-    sun_strength: Annotated[float, Described(unit="W/m²", least=0.0, most=1e4)] = 6.0
-    sun_softness: Annotated[float, Described(unit="1", least=0.0, most=100.0)] = 6.0
-    sky_strength: Annotated[float, Described(unit="W/(m² sr)", least=0.0, most=1e4)] = 0.5
-    exposure_bias: Annotated[float, Described(unit="EV", least=-10.0, most=10.0)] = 0.0
-    camera_height: Annotated[float, Described(unit="m", least=-1000.0, most=1000.0)] = 1.6
-    camera_radius: Annotated[float, Described(unit="m", least=0.05, most=1e4)] = 5.0
+    sun_strength: Annotated[float, RenderQuantity(unit="W/m²", least=0.0, most=1e4)] = 6.0
+    sun_softness: Annotated[float, RenderQuantity(unit="1", least=0.0, most=100.0)] = 6.0
+    sky_strength: Annotated[float, RenderQuantity(unit="W/(m² sr)", least=0.0, most=1e4)] = 0.5
+    exposure_bias: Annotated[float, RenderQuantity(unit="EV", least=-10.0, most=10.0)] = 0.0
+    camera_height: Annotated[float, RenderQuantity(unit="m", least=-1000.0, most=1000.0)] = 1.6
+    camera_radius: Annotated[float, RenderQuantity(unit="m", least=0.05, most=1e4)] = 5.0
     camera_angle: Annotated[float, _TURN] = math.pi / 2
-    view_angle: Annotated[float, Described(unit="rad", least=1e-3, most=0.95 * math.pi)] = math.radians(27.0)
-    frame_offset_x: Annotated[float, Described(unit="1", least=-1.0, most=1.0)] = 0.0
-    frame_offset_y: Annotated[float, Described(unit="1", least=-1.0, most=1.0)] = 0.0
-    exposure_time: Annotated[float, Described(unit="s", least=0.0, most=1.0)] = 0.0
-    mesh_height: Annotated[float, Described(unit="m", least=-1000.0, most=1000.0)] = 4.6
+    view_angle: Annotated[float, RenderQuantity(unit="rad", least=1e-3, most=0.95 * math.pi)] = math.radians(27.0)
+    frame_offset_x: Annotated[float, RenderQuantity(unit="1", least=-1.0, most=1.0)] = 0.0
+    frame_offset_y: Annotated[float, RenderQuantity(unit="1", least=-1.0, most=1.0)] = 0.0
+    exposure_time: Annotated[float, RenderQuantity(unit="s", least=0.0, most=1.0)] = 0.0
+    mesh_height: Annotated[float, RenderQuantity(unit="m", least=-1000.0, most=1000.0)] = 4.6
     texture: str
-    translucency: Annotated[float, Described(unit="1", least=0.0, most=1.0)] = 0.0
-    pole_radius: Annotated[float, Described(unit="m", least=0.0, most=1.0)] = 0.03
-    width: Annotated[int, Described(unit="px", least=1, most=8192)] = FRAME_SIZE
-    height: Annotated[int, Described(unit="px", least=1, most=8192)] = FRAME_SIZE
-    cycles_samples: Annotated[int, Described(unit="1", least=1, most=65536)] = 50
-    cycles_bounces: Annotated[int, Described(unit="1", least=0, most=1024)] = 6
-    raster_samples: Annotated[int, Described(unit="1", least=1, most=1024)] = 8
+    translucency: Annotated[float, RenderQuantity(unit="1", least=0.0, most=1.0)] = 0.0
+    pole_radius: Annotated[float, RenderQuantity(unit="m", least=0.0, most=1.0)] = 0.03
+    width: Annotated[int, RenderQuantity(unit="px", least=1, most=8192)] = FRAME_SIZE
+    height: Annotated[int, RenderQuantity(unit="px", least=1, most=8192)] = FRAME_SIZE
+    cycles_samples: Annotated[int, RenderQuantity(unit="1", least=1, most=65536)] = 50
+    cycles_bounces: Annotated[int, RenderQuantity(unit="1", least=0, most=1024)] = 6
+    raster_samples: Annotated[int, RenderQuantity(unit="1", least=1, most=1024)] = 8
 
     def __post_init__(self) -> None:
         for name, entry in self.described().items():
             value = getattr(self, name)
-            whole = self._types()[name] is int
-            typed = isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
+            is_integer = self._types()[name] is int
+            typed = isinstance(value, int if is_integer else (int, float)) and not isinstance(value, bool)
             if not typed or not entry.least <= value <= entry.most:
-                noun = "a whole number" if whole else "a number"
+                noun = "a whole number" if is_integer else "a number"
                 unit = "" if entry.unit == "1" else f" {entry.unit}"
                 raise InputError(
                     f"{name} is {value!r}",
@@ -125,8 +125,8 @@ class RenderParameters:
         return math.atan(self.sun_softness)
 
     @classmethod
-    def described(cls) -> Mapping[str, Described]:
-        """Name → unit and bounds of every number, in the order of the fields."""
+    def described(cls) -> Mapping[str, RenderQuantity]:
+        """Names → unit and bounds of every number, in the order of the fields."""
         return _described(cls)
 
     @classmethod
@@ -139,10 +139,10 @@ class RenderParameters:
 
 
 @functools.cache
-def _described(cls: type[Any]) -> Mapping[str, Described]:
+def _described(cls: type[Any]) -> Mapping[str, RenderQuantity]:
     hints = get_type_hints(cls, include_extras=True)
     notes = {entry.name: getattr(hints[entry.name], "__metadata__", ()) for entry in fields(cls)}
-    return {name: note for name, found in notes.items() for note in found if isinstance(note, Described)}
+    return {name: note for name, described in notes.items() for note in described if isinstance(note, RenderQuantity)}
 
 
 @functools.cache

@@ -50,7 +50,7 @@ class RenderPrior:
             low, high = ends(quantity)
             if low < described[name].least or high > described[name].most:
                 raise InputError(
-                    f"{name} from {low:g} to {high:g} {described[name].unit}",
+                    f"{name} ranges from {low:g} to {high:g} {described[name].unit}",
                     where=where,
                     fix=f"stay within {described[name].least:g} to {described[name].most:g}",
                 )
@@ -65,10 +65,10 @@ class RenderPrior:
             )
         for noun, kinds in (("textures", self.textures), ("backgrounds", self.backgrounds)):
             if not kinds:
-                raise InputError(f"no {noun}", where=where, fix="name at least one kind")
+                raise InputError(f"the prior has no {noun}", where=where, fix="name at least one kind")
 
     def draw(self, seed: int, assets: Assets) -> RenderParameters:
-        """One ζ. Each parameter has a stream of its own, so that changing one range moves no other parameter.
+        """Draws one ζ. Each parameter has a stream of its own, so that changing one range moves no other parameter.
 
         Raises:
             UnknownNameError: a kind of texture or background that the assets do not have.
@@ -79,8 +79,8 @@ class RenderPrior:
             value = _at(quantity, rng.random())
             while name == "camera_angle" and _to_line(value) < self.least_angle and isinstance(quantity, Range):
                 value = _at(quantity, rng.random())
-            whole = isinstance(getattr(RenderParameters, name), int)
-            numbers[name] = round(value) if whole else value
+            is_integer = isinstance(getattr(RenderParameters, name), int)
+            numbers[name] = round(value) if is_integer else value
         texture, background = stream(seed, "render", "texture"), stream(seed, "render", "background")
         return RenderParameters(
             texture=assets.draw_texture(self.textures, texture),
@@ -89,7 +89,7 @@ class RenderPrior:
         )
 
     def with_quantities(self, changes: Mapping[str, Quantity], *, source: str) -> RenderPrior:
-        """This prior with some quantities replaced, and where the new ones are from.
+        """Replaces some quantities of this prior, and where the new ones are from.
 
         Raises:
             InputError, UnknownNameError: as the class.
@@ -99,7 +99,7 @@ class RenderPrior:
         )
 
     def identity(self) -> dict[str, Any]:
-        """All that shapes a draw beside its seed and the assets, as JSON."""
+        """Returns all that shapes a draw beside its seed and the assets, as JSON."""
         return {
             "quantities": {name: plain(quantity) for name, quantity in self.quantities.items()},
             "textures": list(self.textures),
@@ -109,25 +109,25 @@ class RenderPrior:
 
 
 def named(name: str) -> RenderPrior:
-    """A render prior of the catalog.
+    """Reads a render prior of the catalog.
 
     Raises:
         UnknownNameError: with the nearest name that is there.
     """
-    found = PRIORS.named(name)
-    return read(parsed(found.text, where=found.where), name=name)
+    entry = PRIORS.named(name)
+    return read(parsed(entry.text, where=entry.where), name=name)
 
 
 def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:
-    """A prior from a parsed file: `title`, `least-angle-deg`, `textures`, `backgrounds`, and any number of tables of
-    quantities, each with the `source` of its ranges. Keys are ζ's names in kebab-case; angles end in `-deg`.
+    """Makes a prior from a parsed file: `title`, `least-angle-deg`, `textures`, `backgrounds`, and any number of tables
+    of quantities, each with the `source` of its ranges. Keys are ζ's names in kebab-case; angles end in `-deg`.
 
     Raises:
         InputError: missing, unknown or ill-typed entries, or a parameter that is given twice.
     """
     where = f"render prior {name!r}"
-    sections = {key: each for key, each in content.items() if key not in _GENERAL}
-    general = entries(_GENERAL, {key: each for key, each in content.items() if key in _GENERAL}, where=where)
+    sections = {key: section for key, section in content.items() if key not in _GENERAL}
+    general = entries(_GENERAL, {key: value for key, value in content.items() if key in _GENERAL}, where=where)
     described = RenderParameters.described()
     keys = {key: key.replace("_", "-") + (DEGREES if entry.unit == "rad" else "") for key, entry in described.items()}
     quantities: dict[str, Quantity] = {}
@@ -164,5 +164,5 @@ def _at(quantity: Quantity, share: float) -> float:
 
 
 def _to_line(angle: float) -> float:
-    """The angle to the nearest multiple of π, in [0, π/2]."""
+    """Computes the angle to the nearest multiple of π, in [0, π/2]."""
     return abs(math.remainder(angle, math.pi))

@@ -17,10 +17,10 @@ from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
 from sim.render.raster_kernel import library
 from sim.render.sampling import Samples
-from sim.render.shutter import Motion
+from sim.render.shutter import VertexMotion
 from sim.render.staging import Stage, stage
 from sim.render.texture import Pyramid
-from sim.render.view import View
+from sim.render.view import RasterView
 
 _TOGETHER = 32  # frames; bounds the memory
 
@@ -39,7 +39,7 @@ class Raster:
     assets: Assets = field(default_factory=Assets)
 
     def render(self, meshes: Meshes, parameters: RenderParameters) -> Tensor:
-        """See `Renderer.render`.
+        """Renders the frames, see `Renderer.render`.
 
         Raises:
             InputError: cloth behind the camera, or assets that cannot be read.
@@ -59,7 +59,7 @@ class Raster:
         behind = torch.from_numpy(plate(self.assets.background(zeta.background), zeta)).to(device)
         placed = stage(meshes, zeta)
         samples = Samples.of(zeta, to_sun=placed.to_sun)
-        motion = Motion.of(meshes) if zeta.exposure_time > 0 else None
+        motion = VertexMotion.of(meshes) if zeta.exposure_time > 0 else None
         for instant in (samples.time.min(), samples.time.max()):
             check_in_front(meshes.positions if motion is None else motion.at(float(instant)), meshes, placed)
         film = []
@@ -72,16 +72,21 @@ class Raster:
 
 
 def _exposed(
-    meshes: Meshes, motion: Motion | None, placed: Stage, samples: Samples, zeta: RenderParameters, pyramid: Pyramid
+    meshes: Meshes,
+    motion: VertexMotion | None,
+    placed: Stage,
+    samples: Samples,
+    zeta: RenderParameters,
+    pyramid: Pyramid,
 ) -> Tensor:
-    """(frame, height, width, 4) linear radiance times coverage, and coverage."""
+    """Accumulates linear radiance times coverage, and coverage, over the samples: (frame, height, width, 4)."""
     out = torch.zeros((len(meshes), zeta.height, zeta.width, 4), device=meshes.device)
     geometry = Geometry.of(meshes, placed)
     code = _code(meshes.device)
     for index in range(zeta.raster_samples):
         now = geometry if motion is None else geometry.at(motion.at(float(samples.time[index])))
         x, y = samples.jitter[index].tolist()
-        view = View(camera=placed.camera, jitter=(x, y), samples=zeta.raster_samples)
+        view = RasterView(camera=placed.camera, jitter=(x, y), samples=zeta.raster_samples)
         light = Light.of(zeta, samples, index)
         if code is None:
             raster_torch.add_sample(out, now, view=view, light=light, pyramid=pyramid)
@@ -96,5 +101,5 @@ def _developed(scene: Tensor, behind: Tensor, *, gain: float) -> Tensor:
 
 
 def _code(device: torch.device) -> ctypes.CDLL | None:
-    """The kernel, which is for CPUs."""
+    """Returns the kernel, which is for CPUs."""
     return library() if device.type == "cpu" else None

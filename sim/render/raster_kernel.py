@@ -14,7 +14,7 @@ from sim.render.light import Light
 from sim.render.shadow import SIZE, basis
 from sim.render.staging import POLE_ALBEDO
 from sim.render.texture import Pyramid
-from sim.render.view import View
+from sim.render.view import RasterView
 
 _COUNTS = ("frames", "width", "height", "vertices", "pole_start", "levels", "suns", "map")
 _POINTERS = (
@@ -60,14 +60,14 @@ class _Film(ctypes.Structure):
 
 @functools.cache
 def library() -> ctypes.CDLL | None:
-    """The compiled kernel; None, with one warning, where it cannot be built."""
+    """Compiles the kernel; None, with one warning, where it cannot be built."""
     return compiled("sim.render", ("raster.cpp",), without="the raster renderer runs as plain torch, many times slower")
 
 
 def add_sample(
-    code: ctypes.CDLL, out: Tensor, geometry: Geometry, *, view: View, light: Light, pyramid: Pyramid
+    code: ctypes.CDLL, out: Tensor, geometry: Geometry, *, view: RasterView, light: Light, pyramid: Pyramid
 ) -> None:
-    """`raster_torch.add_sample` on the CPU."""
+    """Adds a sample as `raster_torch.add_sample`, on the CPU."""
     places, depth = view.project(geometry.positions)
     frames, height, width, _ = out.shape
     suns = torch.tensor([basis(direction) for direction in light.to_sun], dtype=torch.float32)
@@ -110,7 +110,7 @@ def add_sample(
 
 
 def develop(code: ctypes.CDLL, scene: Tensor, behind: Tensor, *, gain: float) -> Tensor:
-    """`develop.develop` on the CPU."""
+    """Develops as `develop.develop`, on the CPU."""
     frames, height, width, _ = scene.shape
     out = torch.empty((frames, height, width, 3), dtype=torch.uint8)
     film = _Film(

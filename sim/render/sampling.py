@@ -41,9 +41,9 @@ class Samples:
 
     @classmethod
     def of(cls, parameters: RenderParameters, *, to_sun: tuple[float, float, float]) -> Samples:
-        """The samples for ζ, with the middle of the sun in direction `to_sun`."""
+        """Draws the samples for ζ, with the middle of the sun in direction `to_sun`."""
         count, radius = parameters.raster_samples, parameters.sun_angular_radius
-        jitter = _apart(count)
+        jitter = _spread_out(count)
         time = _dealt((np.arange(count) + 0.5)[:, None] / count, jitter, "time")
         sun = _cone(_hammersley(count * SUNS), to_sun, radius)
         sun = _dealt(sun.reshape(count, SUNS * 3), np.concatenate([jitter, time], axis=1), "sun")
@@ -56,7 +56,7 @@ class Samples:
 
 
 def _hammersley(count: int) -> NDArray[np.float64]:
-    """(count, 2) points in (0, 1)², each coordinate once in the middle of each of `count` equal parts."""
+    """Computes (count, 2) points in (0, 1)², each coordinate once in the middle of each of `count` equal parts."""
     index, mirrored = np.arange(count), np.zeros(count)
     for bit in range(count.bit_length()):
         mirrored += (index >> bit & 1) * 0.5 ** (bit + 1)
@@ -64,13 +64,13 @@ def _hammersley(count: int) -> NDArray[np.float64]:
 
 
 @functools.cache
-def _apart(count: int) -> NDArray[np.float64]:
-    """(count, 2) points as of `_hammersley`; few ones in that one of some orders that keeps them farthest apart, taken
-    as a pattern that repeats, and on no diagonal."""
+def _spread_out(count: int) -> NDArray[np.float64]:
+    """Spreads (count, 2) points as of `_hammersley`; few ones in that one of some orders that keeps them farthest
+    apart, taken as a pattern that repeats, and on no diagonal."""
     points = _hammersley(count)
     if not 3 <= count <= _FEW:
         return points
-    rng, best, found = stream(0, "render", "samples", "places"), -math.inf, points
+    rng, best, pattern = stream(0, "render", "samples", "places"), -math.inf, points
     for _ in range(_ORDERS):
         tried = np.stack([points[:, 0], (rng.permutation(count) + 0.5) / count], axis=1)
         gap = np.abs(tried[:, None] - tried)
@@ -78,25 +78,26 @@ def _apart(count: int) -> NDArray[np.float64]:
         correlation = np.asarray(np.corrcoef(tried.T))[0, 1]
         score = round(float(gap.min() * math.sqrt(count)) - abs(float(correlation)), 9)
         if score > best:
-            best, found = score, tried
-    return found
+            best, pattern = score, tried
+    return pattern
 
 
-def _dealt(values: NDArray[np.float64], given: NDArray[np.float64], name: str) -> NDArray[np.float64]:
-    """The rows of `values` in that one of some orders in which their columns correlate least with those of `given`."""
+def _dealt(values: NDArray[np.float64], reference: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    """Orders the rows of `values` so that, among some orders, their columns correlate least with those of
+    `reference`."""
     count, rng = len(values), stream(0, "render", "samples", name)
     if count < 3:
         return values
     orders = [rng.permutation(count) for _ in range(_ORDERS)]
-    spread = [np.linalg.norm(part - part.mean(axis=0), axis=0) for part in (values, given)]
+    spread = [np.linalg.norm(part - part.mean(axis=0), axis=0) for part in (values, reference)]
     scale = np.maximum(spread[0][:, None] * spread[1], 1e-9)
-    offset = given - given.mean(axis=0)
+    offset = reference - reference.mean(axis=0)
     worst = [np.abs(values[order].T @ offset / scale).max() for order in orders]
     return values[orders[int(np.argmin(np.round(worst, 9)))]]
 
 
 def _cone(points: NDArray[np.float64], middle: tuple[float, float, float], radius: float) -> NDArray[np.float64]:
-    """(point, 3) directions, equally dense in solid angle, within an angular radius [rad] of a middle.
+    """Spreads directions (point, 3), equally dense in solid angle, within an angular radius [rad] of a middle.
 
     A disc of uniform radiance L gives a surface that faces its middle E = π L sin² radius; a share 1/n of its solid
     angle, 2π (1 − cos radius)/n, gives a surface that faces it 2 E/(n (1 + cos radius)).
@@ -104,8 +105,8 @@ def _cone(points: NDArray[np.float64], middle: tuple[float, float, float], radiu
     axis = np.array(middle)
     aside = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.7 else [0.0, 1.0, 0.0])
     aside /= np.linalg.norm(aside)
-    other = np.cross(axis, aside)
+    binormal = np.cross(axis, aside)
     height = 1 - points[:, :1] * (1 - math.cos(radius))
     turn = 2 * math.pi * points[:, 1:]
     across = np.sqrt(np.maximum(0.0, 1 - height**2))
-    return height * axis + across * (np.cos(turn) * aside + np.sin(turn) * other)
+    return height * axis + across * (np.cos(turn) * aside + np.sin(turn) * binormal)

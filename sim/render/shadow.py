@@ -21,7 +21,7 @@ _BIAS = 0.3  # texels that a surface may be nearer to the sun and still not shad
 
 
 def basis(direction: Direction) -> tuple[Direction, Direction, Direction]:
-    """Two unit vectors across a direction and each other, and the direction."""
+    """Returns two unit vectors across a direction and each other, and the direction."""
     x, y, z = direction
     if abs(z) < 0.9:
         length = (x * x + y * y) ** 0.5
@@ -51,20 +51,20 @@ class ShadowMaps:
 
     @classmethod
     def of(cls, geometry: Geometry, direction: Direction) -> Self:
-        """The maps for light from a direction (unit vector towards it)."""
+        """Renders the maps for light from a direction (unit vector towards it)."""
         x = geometry.positions
         across = torch.tensor(basis(direction), dtype=x.dtype, device=x.device)
-        seen = x @ across.T
+        in_light = x @ across.T
         offset = geometry.vertex_offset.tolist()
-        bounds = [torch.aminmax(seen[a:b, :2], dim=0) for a, b in itertools.pairwise(offset)]
+        bounds = [torch.aminmax(in_light[a:b, :2], dim=0) for a, b in itertools.pairwise(offset)]
         low, high = (torch.stack([getattr(bound, end) for bound in bounds]) for end in ("min", "max"))
         middle, texel = (low + high) / 2, (high - low).amax(dim=1).clamp_min(1e-6) / (SIZE - 2 * _MARGIN)
         nearest = torch.full((len(bounds) * SIZE * SIZE,), -torch.inf, dtype=x.dtype, device=x.device)
         corners, frame = geometry.corners, geometry.frame
-        places = (seen[corners, :2] - middle[frame, None]) / texel[frame, None, None] + SIZE / 2
-        each = torch.arange(3 * len(corners), device=x.device).unflatten(0, (-1, 3))
-        triangles = Triangles.of(places.flatten(0, 1), each)
-        height = seen[corners, 2].flatten()
+        places = (in_light[corners, :2] - middle[frame, None]) / texel[frame, None, None] + SIZE / 2
+        index = torch.arange(3 * len(corners), device=x.device).unflatten(0, (-1, 3))
+        triangles = Triangles.of(places.flatten(0, 1), index)
+        height = in_light[corners, 2].flatten()
         for part in fragments(triangles, width=SIZE, height=SIZE):
             h = height[triangles.corners[part.triangle]]
             value = h[:, 0] + part.shares[:, 0] * (h[:, 1] - h[:, 0]) + part.shares[:, 1] * (h[:, 2] - h[:, 0])
@@ -73,7 +73,7 @@ class ShadowMaps:
         return cls(basis=across, middle=middle, texel=texel, nearest=nearest.unflatten(0, (-1, SIZE, SIZE)))
 
     def lit(self, points: Tensor, normals: Tensor, frame: Tensor) -> Tensor:
-        """(point,) share of the light that reaches points (point, 3) on surfaces with normals (point, 3).
+        """Computes the share of the light that reaches points (point, 3) on surfaces with normals (point, 3): (point,).
 
         Bilinear over the four nearest texels' answers; 1 outside of the map.
         """
@@ -81,13 +81,13 @@ class ShadowMaps:
         sine = (1 - cosine * cosine).clamp_min(0.0).sqrt()
         texel = self.texel[frame]
         away = torch.where(cosine < 0, -_AWAY, _AWAY) * sine * texel
-        seen = (points + away[:, None] * normals) @ self.basis.T
-        place = (seen[:, :2] - self.middle[frame]) / texel[:, None] + (SIZE / 2 - 0.5)
-        within = ((place >= 0) & (place < SIZE - 1)).all(dim=1)
-        corner = place.clamp(0, SIZE - 2).floor()
-        s, t = (place - corner).clamp(0.0, 1.0).unbind(dim=1)
+        in_light = (points + away[:, None] * normals) @ self.basis.T
+        texels = (in_light[:, :2] - self.middle[frame]) / texel[:, None] + (SIZE / 2 - 0.5)
+        within = ((texels >= 0) & (texels < SIZE - 1)).all(dim=1)
+        corner = texels.clamp(0, SIZE - 2).floor()
+        s, t = (texels - corner).clamp(0.0, 1.0).unbind(dim=1)
         column, row = corner.long().unbind(dim=1)
-        limit = seen[:, 2] + _BIAS * texel
+        limit = in_light[:, 2] + _BIAS * texel
         flat, index = self.nearest.flatten(), (frame * SIZE + row) * SIZE + column
         free = [(flat[index + step] <= limit).float() for step in (0, 1, SIZE, SIZE + 1)]
         upper, lower = free[0] + s * (free[1] - free[0]), free[2] + s * (free[3] - free[2])

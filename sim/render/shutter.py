@@ -15,7 +15,7 @@ _INWARD = 1e-5  # share by which a material point on the very edge is moved towa
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class VertexMotion:
     """Where vertices are around the instants of their frames.
 
     Positions are linear in time between frames, and go on at the same velocity before the first and after the last one;
@@ -34,8 +34,8 @@ class Motion:
     back: Tensor
 
     @classmethod
-    def of(cls, meshes: Meshes) -> Motion:
-        """The motion of a sequence.
+    def of(cls, meshes: Meshes) -> VertexMotion:
+        """Estimates the motion of a sequence.
 
         Raises:
             InputError: texture places of one frame that are not covered by the next one's faces.
@@ -51,39 +51,41 @@ class Motion:
             back = torch.cat([_step(meshes, i, i - 1 if i > 0 else 1) for i in range(n)])
         return cls(positions=x, rate=meshes.rate, forth=forth, back=back)
 
-    def part(self, first: int, last: int) -> Motion:
-        """The motion of some vertices, by their place among all."""
+    def part(self, first: int, last: int) -> VertexMotion:
+        """Selects the motion of some vertices, by their range among all."""
         rows = slice(first, last)
         return replace(self, positions=self.positions[rows], forth=self.forth[rows], back=self.back[rows])
 
     def at(self, offset: float) -> Tensor:
-        """(all vertices, 3) positions `offset` seconds after each frame's instant, within a frame's time of it."""
+        """Moves all vertices to `offset` seconds after each frame's instant, within a frame's time of it: (all
+        vertices, 3)."""
         share = offset * self.rate
         return self.positions + share * (self.forth if share > 0 else self.back) if share else self.positions
 
 
 def moved(meshes: Meshes, offset: float) -> Meshes:
-    """The meshes with every frame `offset` seconds later than its instant, see `Motion`."""
-    return replace(meshes, positions=Motion.of(meshes).at(offset)) if offset else meshes
+    """Moves every frame of the meshes to `offset` seconds later than its instant, see `VertexMotion`."""
+    return replace(meshes, positions=VertexMotion.of(meshes).at(offset)) if offset else meshes
 
 
-def _step(meshes: Meshes, index: int, other: int) -> Tensor:
-    """How far a frame's vertices move in a frame's time, from where they are in another frame, one earlier or later."""
-    here = meshes.frame(index)
-    there = _looked_up(meshes.frame(other), here.uv, where=f"frames {index} and {other}")
-    return (there - here.positions) * (other - index)
+def _step(meshes: Meshes, index: int, other_index: int) -> Tensor:
+    """Computes how far a frame's vertices move in a frame's time, from where they are in another frame, one earlier or
+    later."""
+    frame = meshes.frame(index)
+    positions = _looked_up(meshes.frame(other_index), frame.uv, where=f"frames {index} and {other_index}")
+    return (positions - frame.positions) * (other_index - index)
 
 
 def _looked_up(frame: Frame, uv: Tensor, *, where: str) -> Tensor:
-    """Positions (point, 3) of texture places (point, 2) in a frame."""
+    """Looks up positions (point, 3) of texture places (point, 2) in a frame."""
     from matplotlib.tri import Triangulation
 
-    own, faces = frame.uv.double().cpu().numpy(), frame.faces.cpu().numpy()
+    places, faces = frame.uv.double().cpu().numpy(), frame.faces.cpu().numpy()
     points = uv.double().cpu().numpy().copy()
-    finder = Triangulation(own[:, 0], own[:, 1], faces).get_trifinder()
+    finder = Triangulation(places[:, 0], places[:, 1], faces).get_trifinder()
     face = np.array(finder(points[:, 0], points[:, 1]))
     edge = face < 0
-    points[edge] += _INWARD * (own.mean(axis=0) - points[edge])
+    points[edge] += _INWARD * (places.mean(axis=0) - points[edge])
     face[edge] = finder(points[edge, 0], points[edge, 1])
     if (face < 0).any():
         raise InputError(
@@ -91,7 +93,7 @@ def _looked_up(frame: Frame, uv: Tensor, *, where: str) -> Tensor:
             where=where,
             fix="give frames whose texture places cover the same cloth, or no exposure time",
         )
-    a, b, c = (own[faces[face, k]] for k in range(3))
+    a, b, c = (places[faces[face, k]] for k in range(3))
     weights = np.linalg.solve(np.stack([b - a, c - a], axis=2), (points - a)[:, :, None])[:, :, 0]
     weights = np.concatenate([1 - weights.sum(axis=1, keepdims=True), weights], axis=1)
     corners = frame.positions[frame.faces[torch.from_numpy(face).to(uv.device).long()]]

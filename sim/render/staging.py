@@ -37,7 +37,7 @@ class Stage:
 
 
 def stage(meshes: Meshes, parameters: RenderParameters) -> Stage:
-    """Place everything.
+    """Places everything.
 
     The camera aims at the middle of the cloth's bounding box over all frames, from `camera_radius` away horizontally.
     The pole is a vertical cylinder from the ground to a little above the anchor; it touches the anchor from the side
@@ -84,7 +84,7 @@ def stage(meshes: Meshes, parameters: RenderParameters) -> Stage:
 
 
 def _pole(*, radius: float, top: float, heading: float, device: torch.device) -> tuple[Tensor, Tensor]:
-    """A closed upright cylinder: a ring on the ground, a ring at the top, and the middle of its lid."""
+    """Makes a closed upright cylinder: a ring on the ground, a ring at the top, and the middle of its lid."""
     if radius == 0 or top <= 0:
         return torch.zeros((0, 3), device=device), torch.zeros((0, 3), dtype=torch.int64, device=device)
     n = _POLE_SIDES

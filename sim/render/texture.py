@@ -29,7 +29,8 @@ class Pyramid:
 
     @classmethod
     def of(cls, image: NDArray[np.uint8], *, device: torch.device) -> Pyramid:
-        """From an sRGB image (height, width, 3); halved in linear light, odd last rows and columns dropped."""
+        """Makes the pyramid of an sRGB image (height, width, 3); halved in linear light, odd last rows and columns
+        dropped."""
         levels = [torch.from_numpy(to_linear(image)).to(device)]
         while min(levels[-1].shape[:2]) > 1:
             level = levels[-1]
@@ -54,7 +55,7 @@ class Pyramid:
         return len(self.start)
 
     def level(self, uv_area: Tensor, pixel_area: Tensor, samples: int) -> Tensor:
-        """The level whose texels are about as large as the distance of a pixel's samples.
+        """Selects the level whose texels are about as large as the distance of a pixel's samples.
 
         Args:
             uv_area: share of the texture that a face takes.
@@ -69,7 +70,8 @@ class Pyramid:
         return (0.5 * spacing.log2() + 0.5).round().long().clamp(0, len(self) - 1)
 
     def at(self, uv: Tensor, level: Tensor) -> Tensor:
-        """Linear colours (point, 3) at texture places (point, 2), bilinear within a level; edges are continued."""
+        """Interpolates linear colours (point, 3) at texture places (point, 2), bilinear within a level; edges are
+        continued."""
         width, height, start = self.width[level], self.height[level], self.start[level]
         x = (uv[:, 0] * width - 0.5).clamp_min(0.0)
         y = ((1 - uv[:, 1]) * height - 0.5).clamp_min(0.0)

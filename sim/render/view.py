@@ -10,7 +10,7 @@ from sim.render.camera import Camera
 
 
 @dataclass(frozen=True, kw_only=True)
-class View:
+class RasterView:
     """A camera whose pixels look through one point each.
 
     Attributes:

@@ -21,7 +21,7 @@ from measure.demo import TrackedRecipe, make_tracks
 from measure.nulls import NullBatch
 from measure.nulls.bank import build
 from measure.observe import Experiment, load
-from measure.propose import Decision, Outcome
+from measure.propose import Decision, ProposalOutcome
 from measure.propose.proposal_log import entries
 from measure.verdict import Conclusion, Estimate, Parameter, Verdict
 from sim.mesh import grid
@@ -131,8 +131,8 @@ class RisingLower(ForceEffect):
 """
 
 
-def nothing_taken() -> Outcome:
-    return Outcome(
+def nothing_taken() -> ProposalOutcome:
+    return ProposalOutcome(
         decision=Decision.REJECTED,
         reason="no term stands out",
         steps=(),
@@ -152,7 +152,7 @@ def nothing_taken() -> Outcome:
 def test_every_command_of_proposing_runs(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[tuple[Sequence[object], dict[str, Any]]] = []
 
-    def instead(experiment: Experiment, tried: Sequence[object], **given: Any) -> Outcome:
+    def instead(experiment: Experiment, tried: Sequence[object], **given: Any) -> ProposalOutcome:
         calls.append((tried, given))
         return nothing_taken()
 

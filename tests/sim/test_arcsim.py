@@ -233,7 +233,7 @@ def test_impossible_scenes_are_refused(write: Write) -> None:
         (cloth(transform=3), InputError, "transform is 3"),
         ({"handles": []}, InputError, "not held"),
         ({"handles": [{"nodes": [9]}]}, InputError, "held vertex 9"),
-        ({"handles": [{"nodes": [0], "type": "circle"}]}, InputError, "handle type"),
+        ({"handles": [{"nodes": [0], "type": "circle"}]}, InputError, "handle's type"),
         ({"gravity": [0, 0]}, InputError, "gravity"),
         ({"wind": {"velocity": "north"}}, InputError, "velocity"),
         ({"frame_steps": 2.5}, InputError, "frame_steps"),
@@ -267,7 +267,7 @@ def test_a_material_file_is_complete_and_says_no_more(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not supported: colour"):
         read_material(path)
     path.write_text(json.dumps({"density": 0.2}))
-    with pytest.raises(InputError, match="keys missing: bending, stretching"):
+    with pytest.raises(InputError, match="these keys are missing: bending, stretching"):
         read_material(path)
     path.write_text("[]")
     with pytest.raises(InputError, match="no JSON object"):

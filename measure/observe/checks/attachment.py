@@ -22,7 +22,7 @@ _ELSEWHERE = 0.02  # of the cloth's size: pins of two recordings further apart a
 
 
 def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Refuse pins that move with the cloth, and report those that move a little.
+    """Refuses pins that move with the cloth, and reports those that move a little.
 
     Raises:
         InputError: a pin among the markers moves by more than three tenths of what the median marker does, or one
@@ -38,12 +38,12 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
     if moved[worst] <= max(_LOOSE * usual, _STILL * size, 3 * recording.noise):
         return ()
     u, v = seats[worst]
-    what = f"the cloth moves by {1e3 * moved[worst]:.3g} mm at the pin (u, v) = ({u:.3g}, {v:.3g}) m"
+    motion = f"the cloth moves by {1e3 * moved[worst]:.3g} mm at the pin (u, v) = ({u:.3g}, {v:.3g}) m"
     still = _still_points(recording)
     reach = cloth.hull(recording.markers, where=where)
     away = 0.0 if cloth.inside(reach, seats[worst][None])[0] else cloth.distance_to(reach, seats[worst])
-    seen = away <= _SEEN * size
-    if not seen and moved[worst] <= usual:
+    covered = away <= _SEEN * size
+    if not covered and moved[worst] <= usual:
         return (
             Finding.of(
                 "pins-not-observed",
@@ -54,16 +54,16 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
                 fix="track a point at each pin",
             ),
         )
-    if not seen or moved[worst] > max(_FREE * usual, 3 * recording.noise):
+    if not covered or moved[worst] > max(_FREE * usual, 3 * recording.noise):
         raise InputError(
-            f"{what}, against {1e3 * usual:.3g} mm at the median marker: it is not held there",
+            f"{motion}, against {1e3 * usual:.3g} mm at the median marker: it is not held there",
             where=where,
             fix=f"name the pins where it is held; it moves least at (u, v) = {still} m",
         )
     return (
         Finding.of(
             "pins-move",
-            f"{what}: is it held there? It moves least at (u, v) = {still} m",
+            f"{motion}: is it held there? It moves least at (u, v) = {still} m",
             where=where,
             value=float(moved[worst]),
             count=len(moved),
@@ -73,26 +73,27 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
 
 
 def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Report markers away from the pins that stand as still as these: the cloth may be held there too."""
+    """Reports markers away from the pins that stand as still as these: the cloth may be held there too."""
     still, away = _still(recording, specimen)
-    others = np.flatnonzero(still & (away > 0))
-    if not len(others) or still.mean() > 0.5:
+    still_markers = np.flatnonzero(still & (away > 0))
+    if not len(still_markers) or still.mean() > 0.5:
         return ()
-    u, v = recording.markers[others[int(away[others].argmax())]]
+    u, v = recording.markers[still_markers[int(away[still_markers].argmax())]]
     return (
         Finding.of(
             "still-away-from-pins",
-            f"{len(others)} markers away from the pins stand as still as these, one at (u, v) = ({u:.3g}, {v:.3g}) m",
+            f"{len(still_markers)} markers away from the pins stand as still as these, one at (u, v) = ({u:.3g}, "
+            f"{v:.3g}) m",
             where=f"recording {recording.name!r}",
-            count=len(others),
+            count=len(still_markers),
             fix="if the cloth is held there, name it with the pins",
         ),
     )
 
 
 def hoist_stands_still(experiment: Experiment) -> bool:
-    """Whether in every recording the markers of the hoist away from the pins stand as still as these, three of them or
-    more, and no others do: the cloth is attached along its hoist."""
+    """Returns whether in every recording the markers of the hoist away from the pins stand as still as these, three of
+    them or more, and no others do: the cloth is attached along its hoist."""
     specimen = experiment.specimen
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())
     hoist = float(specimen.mesh.rest[:, 0].min()) + _SEEN * size
@@ -105,7 +106,8 @@ def hoist_stands_still(experiment: Experiment) -> bool:
 
 
 def _still(recording: Trajectory, specimen: Specimen) -> tuple[NDArray[np.bool_], Floats]:
-    """(marker,) which stand still, and how far each is from the nearest pin [m], 0 of one that is beside it."""
+    """Masks the markers that stand still, (marker,), and measures how far each is from the nearest pin [m], 0 of one
+    that is beside it."""
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())
     still = _motion(recording.positions, recording.noise) <= max(_STILL * size, recording.noise)
     seats = specimen.mesh.rest[list(specimen.held)]
@@ -114,7 +116,7 @@ def _still(recording: Trajectory, specimen: Specimen) -> tuple[NDArray[np.bool_]
 
 
 def check_places(recordings: Sequence[Trajectory], specimen: Specimen) -> None:
-    """Refuse recordings whose pins are not in one place.
+    """Refuses recordings whose pins are not at the same points.
 
     Raises:
         InputError: the pins of a recording are elsewhere than those of the first.
@@ -122,36 +124,36 @@ def check_places(recordings: Sequence[Trajectory], specimen: Specimen) -> None:
     seats = specimen.mesh.rest[list(specimen.held)]
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())
     first = _tracks(recordings[0], seats).mean(axis=0)
-    for other in recordings[1:]:
-        places = _tracks(other, seats).mean(axis=0)
+    for recording in recordings[1:]:
+        places = _tracks(recording, seats).mean(axis=0)
         away = np.linalg.norm(places - first, axis=1)
         if away.max() > _ELSEWHERE * size:
             x, y, z = (places - first).mean(axis=0)
             raise InputError(
                 f"its pins are up to {away.max():.3g} m from those of {recordings[0].name!r}; on the average "
                 f"({x:.3g}, {y:.3g}, {z:.3g}) m",
-                where=f"recording {other.name!r}",
+                where=f"recording {recording.name!r}",
                 fix="bring the recordings to one frame of coordinates, the wind along with them",
             )
 
 
 def centre_of_pins(recording: Trajectory, specimen: Specimen) -> Floats:
-    """(3,) their mean position [m]."""
+    """Computes the pins' mean position, (3,) [m]."""
     return _tracks(recording, specimen.mesh.rest[list(specimen.held)]).mean(axis=(0, 1))
 
 
 def _tracks(recording: Trajectory, seats: Floats) -> Floats:
-    """(frame, seat, 3) [m]."""
+    """Tracks points of the cloth, (frame, seat, 3) [m]."""
     return np.einsum("sm,fmi->fsi", onto(recording.markers, seats), recording.positions)
 
 
 def _motion(positions: Floats, sigma: float | Floats) -> Floats:
-    """(point,) root-mean-square distance from its mean place, without the noise's part [m]."""
+    """Computes the root-mean-square distance of each point from its mean, without the noise's part, (point,) [m]."""
     return np.sqrt(np.maximum(positions.var(axis=0).sum(axis=1) - 3 * sigma**2, 0.0))
 
 
 def _still_points(recording: Trajectory) -> str:
-    """The two markers that move least and are not neighbours, as text."""
+    """Names the two markers that move least and are not neighbours, as text."""
     moved = _motion(recording.positions, recording.noise)
     size = float(np.ptp(recording.markers, axis=0).max())
     first = int(moved.argmin())

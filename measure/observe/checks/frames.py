@@ -31,31 +31,31 @@ _JUMP = 1.7  # of the mean of the steps on either side: a frame is missing in be
 _STILL = 1e-3  # of the cloth's size, and three times the noise: what moves less on the average stands still
 
 
-def even(seen: Observation) -> Observation:
-    """The recording with its frames evenly spaced: where some are missing, NaN stands for them.
+def even(observation: Observation) -> Observation:
+    """Spaces the recording's frames evenly: where some are missing, NaN stands for them.
 
     Raises:
         InputError: too few frames, or times that are not of a constant rate.
     """
-    where = f"recording {seen.name!r}"
-    count = len(seen.times)
-    span = float(seen.times[-1] - seen.times[0]) if count else 0.0
+    where = f"recording {observation.name!r}"
+    count = len(observation.times)
+    span = float(observation.times[-1] - observation.times[0]) if count else 0.0
     if count < FEWEST or span < SHORTEST * (1 - 1e-9):
         raise InputError(
-            f"{count} frames over {span:.3g} s",
+            f"the recording has {count} frames over {span:.3g} s",
             where=where,
             fix=f"record at least {SHORTEST:g} s and {FEWEST} frames: with less, effects cannot be distinguished",
         )
-    step = float(np.median(np.diff(seen.times)))
+    step = float(np.median(np.diff(observation.times)))
     if not _SLOWEST <= 1 / step <= _FASTEST:
         raise InputError(
-            f"{1 / step:.4g} frames a second",
+            f"the recording has {1 / step:.4g} frames a second",
             where=where,
             fix=f"give {_SLOWEST:g} to {_FASTEST:g} Hz: cloth moves on too far between rarer frames",
         )
-    index = np.concatenate([[0], np.cumsum(np.rint(np.diff(seen.times) / step).astype(np.int64))])
-    step, first = np.polyfit(index, seen.times, 1).tolist()  # the median of rounded times is a rounded step
-    off = np.abs(seen.times - first - index * step)
+    index = np.concatenate([[0], np.cumsum(np.rint(np.diff(observation.times) / step).astype(np.int64))])
+    step, first = np.polyfit(index, observation.times, 1).tolist()  # the median of rounded times is a rounded step
+    off = np.abs(observation.times - first - index * step)
     if off.max() > _JITTER * step or (np.diff(index) < 1).any():
         frame = int(off.argmax())
         raise InputError(
@@ -66,7 +66,7 @@ def even(seen: Observation) -> Observation:
     times = np.arange(index[-1] + 1) * step
     lost = len(times) - count
     if not lost:
-        return replace(seen, times=times)
+        return replace(observation, times=times)
     longest = int(np.diff(index).max()) - 1
     gap = int(index[np.argmax(np.diff(index) > 1)]) + 1
     if longest > frames_of(LONGEST, step):
@@ -75,19 +75,19 @@ def even(seen: Observation) -> Observation:
             where=f"{where}, frame {gap}",
             fix="cut the recording there and give its parts as recordings of their own",
         )
-    positions = np.full((len(times), *seen.positions.shape[1:]), np.nan)
-    positions[index] = seen.positions
-    found = Finding.of(
+    positions = np.full((len(times), *observation.positions.shape[1:]), np.nan)
+    positions[index] = observation.positions
+    finding = Finding.of(
         "frames-missing",
         f"{lost} frames are missing between others and are interpolated",
         where=f"{where}, frame {gap}",
         count=lost,
     )
-    return replace(seen, times=times, positions=positions, findings=(*seen.findings, found))
+    return replace(observation, times=times, positions=positions, findings=(*observation.findings, finding))
 
 
-def without_repeats(seen: Observation, sigma: float) -> Observation:
-    """The recording with NaN for frames that only repeat the one before, as recorders fill in lost ones.
+def without_repeats(observation: Observation, sigma: float) -> Observation:
+    """Sets frames to NaN that only repeat the one before, as recorders fill in lost ones.
 
     Args:
         sigma: standard deviation of a coordinate's noise [m].
@@ -95,75 +95,79 @@ def without_repeats(seen: Observation, sigma: float) -> Observation:
     Raises:
         InputError: a fifth of the frames or more are repeats, or nearly all.
     """
-    where = f"recording {seen.name!r}"
-    steps = _steps(seen.positions)
+    where = f"recording {observation.name!r}"
+    steps = _steps(observation.positions)
     if (steps == 0).mean() > _FROZEN:
         raise InputError(
             "no motion is found: nearly all frames are the same", where=where, fix="record the cloth in a wind"
         )
     square = steps - 6 * sigma**2
     usual = _neighbourhood(square)
-    repeat = np.zeros(len(seen.positions), dtype=bool)
+    repeat = np.zeros(len(observation.positions), dtype=bool)
     repeat[1:] = (steps == 0) | ((square < _REPEATED * usual) & (usual > 6 * sigma**2))
     count = int(repeat.sum())
     if not count:
-        return seen
+        return observation
     if count >= _MANY * len(repeat):
-        rate = (len(repeat) - count) / (len(repeat) - 1) / float(seen.times[1] - seen.times[0])
+        rate = (len(repeat) - count) / (len(repeat) - 1) / float(observation.times[1] - observation.times[0])
         raise InputError(
             f"{count} of {len(repeat)} frames repeat the one before",
             where=f"{where}, frame {int(repeat.argmax())}",
             fix=f"it may have been tracked at about {rate:.4g} Hz: drop the repeats and give that rate",
         )
-    positions = np.array(seen.positions)
+    positions = np.array(observation.positions)
     positions[repeat] = np.nan
-    found = Finding.of(
+    finding = Finding.of(
         "repeated-frames",
         f"{count} frames repeat the one before; they are interpolated",
         where=f"{where}, frame {int(repeat.argmax())}",
         count=count,
         fix="find out whether the camera or the tracker lost frames there",
     )
-    return replace(seen, positions=positions, findings=(*seen.findings, found))
+    return replace(observation, positions=positions, findings=(*observation.findings, finding))
 
 
-def without_stuck_markers(seen: Observation) -> Observation:
-    """The recording with NaN where trackers write something else for a marker they lost.
+def without_stuck_markers(observation: Observation) -> Observation:
+    """Sets positions to NaN where trackers write something else for a marker they lost.
 
     That is its last position while its neighbours move on, or exactly (0, 0, 0) where it never is otherwise. A marker
     that mostly stands still is a pin, and left alone.
     """
-    step = np.abs(np.diff(seen.positions, axis=0)).max(axis=2)
-    near = KDTree(seen.markers).query(seen.markers, k=min(_NEIGHBOURS + 1, len(seen.markers)))[1]
-    around = np.median(step[:, np.asarray(near)[:, 1:]], axis=2)  # NaN where a neighbour was not tracked
+    step = np.abs(np.diff(observation.positions, axis=0)).max(axis=2)
+    neighbours = KDTree(observation.markers).query(
+        observation.markers, k=min(_NEIGHBOURS + 1, len(observation.markers))
+    )[1]
+    around = np.median(step[:, np.asarray(neighbours)[:, 1:]], axis=2)  # NaN where a neighbour was not tracked
     units = step[step > 0]
     resolution = float(np.quantile(units, 0.01)) if len(units) else 0.0
-    stuck = np.zeros(seen.positions.shape[:2], dtype=bool)
+    stuck = np.zeros(observation.positions.shape[:2], dtype=bool)
     stuck[1:] = (step == 0) & (around > _MOVED_ON * resolution)
     stuck &= (step == 0).mean(axis=0) < _PINNED
-    tracked = np.isfinite(seen.positions).all(axis=2)
-    zero = (seen.positions == 0).all(axis=2)
-    other = np.where((tracked & ~zero)[:, :, None], np.linalg.norm(seen.positions, axis=2, keepdims=True), np.inf)
-    nearest = other[:, :, 0].min(axis=0)  # to the origin, when not at it; infinite for one that always is
-    stuck |= zero & np.isfinite(nearest) & (nearest > _FAR * float(np.ptp(seen.markers, axis=0).max()))
+    tracked = np.isfinite(observation.positions).all(axis=2)
+    zero = (observation.positions == 0).all(axis=2)
+    distances = np.where(
+        (tracked & ~zero)[:, :, None], np.linalg.norm(observation.positions, axis=2, keepdims=True), np.inf
+    )
+    nearest = distances[:, :, 0].min(axis=0)  # to the origin, when not at it; infinite for one that always is
+    stuck |= zero & np.isfinite(nearest) & (nearest > _FAR * float(np.ptp(observation.markers, axis=0).max()))
     count = int(stuck.sum())
     if not count:
-        return seen
-    positions = np.array(seen.positions)
+        return observation
+    positions = np.array(observation.positions)
     positions[stuck] = np.nan
     frame, marker = np.argwhere(stuck)[0]
-    found = Finding.of(
+    finding = Finding.of(
         "positions-stuck",
         f"{count} positions are exactly those of the frame before while the markers around move on, or are "
         "(0, 0, 0): not tracked",
         count=count,
-        where=f"recording {seen.name!r}, frame {int(frame)}, marker {int(marker)}",
+        where=f"recording {observation.name!r}, frame {int(frame)}, marker {int(marker)}",
     )
-    return replace(seen, positions=positions, findings=(*seen.findings, found))
+    return replace(observation, positions=positions, findings=(*observation.findings, finding))
 
 
 def check_motion(positions: Floats, sigma: float, size: float, *, where: str) -> None:
-    """Refuse a cloth that stands still.
+    """Refuses a cloth that stands still.
 
     Args:
         positions: (frame, marker, 3) without gaps [m].
@@ -212,19 +216,20 @@ def lost_frames(positions: Floats, *, where: str) -> tuple[Finding, ...]:
 
 
 def _steps(positions: Floats) -> Floats:
-    """(frame − 1,) mean squared step of the tracked markers [m²]; NaN where none is tracked on both sides."""
+    """Computes the mean squared step of the tracked markers (frame − 1,) [m²]; NaN where none is tracked on both
+    sides."""
     square = (np.diff(positions, axis=0) ** 2).sum(axis=2)
-    there = np.isfinite(square)
-    count = there.sum(axis=1)
-    total = np.where(there, square, 0.0).sum(axis=1)
+    tracked = np.isfinite(square)
+    count = tracked.sum(axis=1)
+    total = np.where(tracked, square, 0.0).sum(axis=1)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _neighbourhood(values: Floats) -> Floats:
-    """(n,) median of the values around each, itself left out."""
+    """Computes the median of the values around each, itself left out, (n,)."""
     usual = np.empty_like(values)
     for k in range(len(values)):
         around = np.concatenate([values[max(0, k - _AROUND) : k], values[k + 1 : k + 1 + _AROUND]])
-        there = around[np.isfinite(around)]
-        usual[k] = np.median(there) if len(there) else np.nan
+        finite = around[np.isfinite(around)]
+        usual[k] = np.median(finite) if len(finite) else np.nan
     return usual

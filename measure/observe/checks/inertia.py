@@ -33,7 +33,7 @@ _CALM = 0.5  # m/s
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class MarkerMotion:
     """The model's mesh as the markers show it, between the frames on either side.
 
     Attributes:
@@ -49,8 +49,8 @@ class Motion:
     mass: Floats
 
     @classmethod
-    def of(cls, recording: Trajectory, specimen: Specimen) -> Motion:
-        """By central differences over about `_PERIOD`."""
+    def of(cls, recording: Trajectory, specimen: Specimen) -> MarkerMotion:
+        """Differentiates by central differences over about `_PERIOD`."""
         stride = max(1, int(recording.rate * _PERIOD))
         step = stride / recording.rate
         at = onto(recording.markers, specimen.mesh.rest) @ recording.positions[::stride]
@@ -64,7 +64,7 @@ class Motion:
 
 
 def check_inertia(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Report a wind or a clock with which the cloth's inertia does not fit."""
+    """Reports a wind or a clock with which the cloth's inertia does not fit."""
     if recording.wind.speed < _CALM:
         return _check_swing(recording, specimen)
     factor = wind_shown(recording, specimen)
@@ -85,7 +85,8 @@ def check_inertia(recording: Trajectory, specimen: Specimen) -> tuple[Finding, .
 
 
 def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
-    """The wind's speed that balances the moments about the pins, over the one given; None where they say nothing.
+    """Estimates the wind's speed that balances the moments about the pins, over the one given; None where they say
+    nothing.
 
     That is, the factor q of least ‖M_a − M_g − M_w(q U)‖² over all frames, each less its mean, where M are the moments
     of the accelerations, of gravity and of the base model's wind force.
@@ -94,7 +95,7 @@ def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
     if axis is None:
         return None
     origin, direction = axis
-    motion, mesh = Motion.of(recording, specimen), specimen.mesh
+    motion, mesh = MarkerMotion.of(recording, specimen), specimen.mesh
     arms = motion.position - origin
     needed = motion.mass[:, None] * (motion.acceleration - np.array(specimen.gravity))
     moment = _centred((np.cross(arms, needed) @ direction).sum(axis=1))
@@ -102,29 +103,35 @@ def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), np.finfo(np.float64).tiny)
     lever = np.cross(sum(arms[:, mesh.faces[:, c]] for c in range(3)) / 3, normal) @ direction
-    own = (normal * motion.velocity[:, mesh.faces].mean(axis=2)).sum(axis=2)
+    along_normal = (normal * motion.velocity[:, mesh.faces].mean(axis=2)).sum(axis=2)
     blown = (normal * recording.wind.at(motion.times)[:, None]).sum(axis=2)
     weight = lever * mesh.areas * specimen.air.plain.density
-    left = np.array(
+    residuals = np.array(
         [
-            ((moment - _centred((weight * np.abs(q * blown - own) * (q * blown - own)).sum(axis=1))) ** 2).sum()
+            (
+                (
+                    moment
+                    - _centred((weight * np.abs(q * blown - along_normal) * (q * blown - along_normal)).sum(axis=1))
+                )
+                ** 2
+            ).sum()
             for q in _FACTORS
         ]
     )
     total = float((moment**2).sum())
-    best = int(left.argmin())
-    if total == 0 or left[best] > (1 - _EXPLAINED) * total or best in (0, len(_FACTORS) - 1):
+    best = int(residuals.argmin())
+    if total == 0 or residuals[best] > (1 - _EXPLAINED) * total or best in (0, len(_FACTORS) - 1):
         return None
     return float(_FACTORS[best])
 
 
 def swing(recording: Trajectory, specimen: Specimen) -> float | None:
-    """Growth of the energy of motion over loss of height, by least squares in time; None where neither determines the
-    other.
+    """Estimates growth of the energy of motion over loss of height, by least squares in time; None where neither
+    determines the other.
 
     It is 1 less what friction takes, and goes with the square of the frame rate.
     """
-    motion = Motion.of(recording, specimen)
+    motion = MarkerMotion.of(recording, specimen)
     step = float(motion.times[1] - motion.times[0])
     kinetic = (motion.mass[:, None] * motion.velocity**2).sum(axis=(1, 2)) / 2
     height = -np.einsum("v,fvi,i->f", motion.mass, motion.position, np.array(specimen.gravity))
@@ -154,7 +161,8 @@ def _check_swing(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ..
 
 
 def _axis(recording: Trajectory, specimen: Specimen) -> tuple[Floats, Floats] | None:
-    """A point of the line through the pins and its direction; the vertical through a single one; None if no line."""
+    """Fits the line through the pins, a point of it and its direction; the vertical through a single one; None if no
+    line."""
     seats = onto(recording.markers, specimen.mesh.rest[list(specimen.held)])
     pins = seats @ recording.positions.mean(axis=0)
     origin = pins.mean(axis=0)

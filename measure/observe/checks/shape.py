@@ -43,27 +43,27 @@ class Edges:
 
     @classmethod
     def between(cls, markers: Floats, *, where: str) -> Edges:
-        """Edges of the Delaunay triangulation of the flat cloth, those along its hollows left out.
+        """Finds the edges of the Delaunay triangulation of the flat cloth, those along its hollows left out.
 
         Raises:
             InputError: fewer than `FEWEST` markers, two in one place, or all on a line.
         """
         if len(markers) < FEWEST:
             raise InputError(
-                f"{len(markers)} markers",
+                f"the recording has {len(markers)} markers",
                 where=where,
                 fix=f"track at least {FEWEST}, spread over the cloth: fewer do not show how it bends",
             )
         if not np.isfinite(markers).all():
             raise InputError("a rest coordinate is not finite", where=where, fix="give u and v of every marker")
-        found = KDTree(markers).query(markers, k=2)
-        apart, other = np.asarray(found[0]), np.asarray(found[1])
+        query = KDTree(markers).query(markers, k=2)
+        distances, neighbours = np.asarray(query[0]), np.asarray(query[1])
         size = float(np.ptp(markers, axis=0).max())
-        if apart[:, 1].min() <= 1e-6 * size:
-            first = int(apart[:, 1].argmin())
+        if distances[:, 1].min() <= 1e-6 * size:
+            first = int(distances[:, 1].argmin())
             raise InputError(
-                "two markers in one place of the cloth",
-                where=f"{where}, markers {first} and {int(other[first, 1])}",
+                "two markers are at the same point of the cloth",
+                where=f"{where}, markers {first} and {int(neighbours[first, 1])}",
                 fix="correct their u and v, or keep one of them",
             )
         try:
@@ -79,29 +79,29 @@ class Edges:
         return cls(ends=pairs[short].astype(np.int64), rest=rest[short])
 
     def lengths(self, positions: Floats) -> Floats:
-        """(frame, edge) [m]; NaN where an end was not tracked."""
+        """Computes the edges' lengths (frame, edge) [m]; NaN where an end was not tracked."""
         return np.linalg.norm(positions[:, self.ends[:, 0]] - positions[:, self.ends[:, 1]], axis=2)
 
 
-def check_scale(seen: Observation, edges: Edges, sigma: float) -> tuple[Finding, ...]:
-    """Refuse positions that are not of this rest shape in metres.
+def check_scale(observation: Observation, edges: Edges, sigma: float) -> tuple[Finding, ...]:
+    """Refuses positions that are not of this rest shape in metres.
 
     Raises:
         InputError: lengths that are off by a factor, or differently along u and v; or nothing to measure them by.
     """
-    where = f"recording {seen.name!r}"
-    taut, there = _taut(edges.lengths(seen.positions), sigma)
-    if not there.any():
+    where = f"recording {observation.name!r}"
+    taut, measured = _taut(edges.lengths(observation.positions), sigma)
+    if not measured.any():
         raise InputError(
             "no two neighbouring markers are tracked together", where=where, fix="check the columns of the positions"
         )
-    ratio = taut[there] / edges.rest[there]
-    whole = float(np.median(ratio))
-    if not _SHORT <= whole <= _TOO_LONG:
+    ratio = taut[measured] / edges.rest[measured]
+    scale = float(np.median(ratio))
+    if not _SHORT <= scale <= _TOO_LONG:
         raise InputError(
-            f"taut, neighbouring markers are {whole:.4g} times as far apart as at rest", where=where, fix=_advice(whole)
+            f"taut, neighbouring markers are {scale:.4g} times as far apart as at rest", where=where, fix=_advice(scale)
         )
-    arms = np.abs(seen.markers[edges.ends[there, 0]] - seen.markers[edges.ends[there, 1]])
+    arms = np.abs(observation.markers[edges.ends[measured, 0]] - observation.markers[edges.ends[measured, 1]])
     along = [ratio[arms[:, axis] > 2 * arms[:, 1 - axis]] for axis in (0, 1)]
     if min(map(len, along)) >= 5:
         u, v = (float(np.median(part)) for part in along)
@@ -111,48 +111,48 @@ def check_scale(seen: Observation, edges: Edges, sigma: float) -> tuple[Finding,
                 where=where,
                 fix="the rest shape does not fit: check its width and height, and that u and v are not exchanged",
             )
-    if whole <= _LONG:
+    if scale <= _LONG:
         return ()
     return (
         Finding.of(
             "cloth-longer-than-rest",
-            f"taut, the cloth is {100 * (whole - 1):.1f} % longer than at rest, more than wind stretches it",
+            f"taut, the cloth is {100 * (scale - 1):.1f} % longer than at rest, more than wind stretches it",
             where=where,
-            value=whole,
+            value=scale,
             fix="measure its width and height again",
         ),
     )
 
 
-def without_strays(seen: Observation, edges: Edges, sigma: float) -> Observation:
-    """The recording with NaN where a marker is much further from most of its neighbours than the cloth allows: lost and
+def without_strays(observation: Observation, edges: Edges, sigma: float) -> Observation:
+    """Sets positions to NaN where a marker is much further from most of its neighbours than the cloth allows: lost and
     found elsewhere, or exchanged with another."""
     reach = _TORN * edges.rest + 6 * sigma
-    far = edges.lengths(seen.positions) > reach  # false where NaN
-    torn = np.zeros(seen.positions.shape[:2])
-    degree = np.bincount(edges.ends.ravel(), minlength=len(seen.markers))
+    stretched = edges.lengths(observation.positions) > reach  # false where NaN
+    torn = np.zeros(observation.positions.shape[:2])
+    degree = np.bincount(edges.ends.ravel(), minlength=len(observation.markers))
     for end in (0, 1):
-        np.add.at(torn.T, edges.ends[:, end], far.T)
+        np.add.at(torn.T, edges.ends[:, end], stretched.T)
     stray = torn > 0.5 * degree
     # The neighbours of a stray have one bad edge each; strays that are neighbours of strays are found as well.
     count = int(stray.sum())
     if not count:
-        return seen
-    positions = np.array(seen.positions)
+        return observation
+    positions = np.array(observation.positions)
     positions[stray] = np.nan
     frame, marker = np.argwhere(stray)[0]
-    found = Finding.of(
+    finding = Finding.of(
         "markers-astray",
         f"{count} positions are further from the markers around than cloth can stretch; they are left out",
         count=count,
-        where=f"recording {seen.name!r}, frame {int(frame)}, marker {int(marker)}",
+        where=f"recording {observation.name!r}, frame {int(frame)}, marker {int(marker)}",
         fix="look at the track there: was the marker exchanged with another?",
     )
-    return replace(seen, positions=positions, findings=(*seen.findings, found))
+    return replace(observation, positions=positions, findings=(*observation.findings, finding))
 
 
 def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Finding, ...]:
-    """Report parts of the cloth that are far from any marker.
+    """Reports parts of the cloth that are far from any marker.
 
     Args:
         corners: (corner, 2) of its outline.
@@ -178,24 +178,25 @@ def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Findin
 
 
 def _taut(lengths: Floats, sigma: float) -> tuple[Floats, NDArray[np.bool_]]:
-    """(edge,) upper decile of each length over its frames without the noise's part, and where there is one.
+    """Computes the upper decile of each length over its frames without the noise's part, (edge,), and masks the edges
+    that have one.
 
     Noise of σ a coordinate lies along the edge with variance 2 σ², which widens the upper half of a distribution as of
     a normal one, and across it with 4 σ², which adds as much to the mean square.
     """
     tracked = np.isfinite(lengths)
-    there = tracked.sum(axis=0) >= 10
+    measured = tracked.sum(axis=0) >= 10
     taut = np.zeros(lengths.shape[1])
-    if there.any():
-        middle, upper = np.nanquantile(lengths[:, there], [0.5, _TAUT], axis=0)
+    if measured.any():
+        middle, upper = np.nanquantile(lengths[:, measured], [0.5, _TAUT], axis=0)
         wide = np.maximum((upper - middle) ** 2 - (_NORMAL * np.sqrt(2) * sigma) ** 2, 0.0)
-        taut[there] = np.sqrt(np.maximum(middle**2 - 4 * sigma**2, 0.0)) + np.sqrt(wide)
-    return taut, there
+        taut[measured] = np.sqrt(np.maximum(middle**2 - 4 * sigma**2, 0.0)) + np.sqrt(wide)
+    return taut, measured
 
 
 def _advice(ratio: float) -> str:
     for units, factor in _UNITS.items():
-        for value, said in ((factor, units), (1 / factor, " for ".join(reversed(units.split(" for "))))):
+        for value, conversion in ((factor, units), (1 / factor, " for ".join(reversed(units.split(" for "))))):
             if abs(ratio / value - 1) < 0.06:
-                return f"the positions seem to be {said}: name their unit"
+                return f"the positions seem to be {conversion}: name their unit"
     return "the rest shape does not fit: check width and height, the unit, and that both are of this cloth"

@@ -24,7 +24,7 @@ _CALM, _FLAT, _STRONG, _LIMP = 0.1, 0.5, 10.0, 0.25
 
 
 def check_overlap(recording: Trajectory) -> None:
-    """Refuse a log that does not cover the recording. A constant wind covers all.
+    """Refuses a log that does not cover the recording. A constant wind covers all.
 
     Raises:
         InputError: it covers less than 98 % of it.
@@ -45,7 +45,7 @@ def check_overlap(recording: Trajectory) -> None:
 
 
 def check_up(recording: Trajectory, specimen: Specimen) -> None:
-    """Refuse a cloth that lies above its pins, or sags sideways: z is not up.
+    """Refuses a cloth that lies above its pins, or sags sideways: z is not up.
 
     Raises:
         InputError: so it does.
@@ -75,7 +75,7 @@ def check_up(recording: Trajectory, specimen: Specimen) -> None:
 
 
 def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Refuse a cloth that flies upwind, and report one that flies far aside.
+    """Refuses a cloth that flies upwind, and reports one that flies far aside.
 
     Raises:
         InputError: on the average it streams against the wind as it was given.
@@ -84,17 +84,17 @@ def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding,
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())
     offset = (_centre(recording) - centre_of_pins(recording, specimen))[:2]
     wind = recording.wind.at(recording.times).mean(axis=0)[:2]
-    far, speed = float(np.hypot(*offset)), float(np.hypot(*wind))
-    if far < _FLIES * size or _ratio(specimen, recording.wind) < _BLOWS or speed == 0:
+    distance, speed = float(np.hypot(*offset)), float(np.hypot(*wind))
+    if distance < _FLIES * size or _ratio(specimen, recording.wind) < _BLOWS or speed == 0:
         return ()
-    angle = math.acos(float(np.clip(offset @ wind / (far * speed), -1, 1)))
+    angle = math.acos(float(np.clip(offset @ wind / (distance * speed), -1, 1)))
     heading, blown = (math.degrees(math.atan2(y, x)) for x, y in (offset, wind))
-    what = (
+    directions = (
         f"the cloth streams towards {heading:.0f}°, the wind as given blows towards {blown:.0f}° (from +x towards +y)"
     )
     if angle > _UPWIND:
         raise InputError(
-            f"the cloth streams upwind: {what}",
+            f"the cloth streams upwind: {directions}",
             where=where,
             fix="wind velocities say where the air goes to; turn a direction it comes from, and check the axes",
         )
@@ -102,13 +102,17 @@ def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding,
         return ()
     return (
         Finding.of(
-            "flies-aside", what, where=where, value=angle, fix="check the direction of the wind in the recording's axes"
+            "flies-aside",
+            directions,
+            where=where,
+            value=angle,
+            fix="check the direction of the wind in the recording's axes",
         ),
     )
 
 
 def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Report a cloth that hangs in a strong wind or flies in none: wrong units, or not the wind at the flag."""
+    """Reports a cloth that hangs in a strong wind or flies in none: wrong units, or not the wind at the flag."""
     ratio = _ratio(specimen, recording.wind)
     pins = centre_of_pins(recording, specimen)
     seats = specimen.mesh.rest[list(specimen.held)].mean(axis=0)
@@ -132,7 +136,7 @@ def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, 
 
 
 def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
-    """Report rest coordinates whose v runs downward: top and bottom, and the two faces, are exchanged."""
+    """Reports rest coordinates whose v runs downward: top and bottom, and the two faces, are exchanged."""
     design = np.concatenate([recording.markers, np.ones((len(recording.markers), 1))], axis=1)
     slope = np.linalg.lstsq(design, recording.positions.mean(axis=0), rcond=None)[0]
     if slope[1, 2] > -_DOWNWARD:
@@ -149,7 +153,7 @@ def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
 
 
 def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
-    """Refuse accelerations far from what gravity and the wind's force give: another frame rate, or another unit.
+    """Refuses accelerations far from what gravity and the wind's force give: another frame rate, or another unit.
 
     Raises:
         InputError: their root mean square is beyond 0.01 to 30 times g + ρU²/m, or below a fiftieth of what a
@@ -181,23 +185,23 @@ def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
 
 
 def _centre(recording: Trajectory) -> Floats:
-    """(3,) mean position of the markers over all frames [m]."""
+    """Averages the markers' positions over all frames, (3,) [m]."""
     return recording.positions.mean(axis=(0, 1))
 
 
 def _pressure(specimen: Specimen, wind: WindTrack) -> float:
-    """ρU² [N/m²] of the base model's force."""
+    """Computes ρU² [N/m²] of the base model's force."""
     return specimen.air.plain.density * float((wind.velocity**2).sum(axis=1).mean())
 
 
 def _ratio(specimen: Specimen, wind: WindTrack) -> float:
-    """ρU²/(m g); infinite without gravity."""
+    """Computes ρU²/(m g); infinite without gravity."""
     weight = specimen.material.density * float(np.linalg.norm(specimen.gravity))
     return _pressure(specimen, wind) / weight if weight else math.inf
 
 
 def _sagging(offset: Floats, size: float, wind: WindTrack) -> str:
-    """Advice: the axis against which the cloth is off its pins, the wind's left aside."""
+    """Advises on the vertical: the axis against which the cloth is off its pins, the wind's left aside."""
     blown = np.abs(wind.velocity.mean(axis=0))
     candidates = np.abs(offset) / size - 2.0 * (blown > 0.5 * blown.max()) * (blown.max() > 0)
     axis = int(candidates.argmax())

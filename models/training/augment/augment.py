@@ -108,7 +108,7 @@ class Augment:
 
     def __post_init__(self) -> None:
         for name, strength in self.strengths.items():
-            limits: Disturbance = _known(name)
+            limits: Disturbance = _disturbance(name)
             ordered = limits.least <= strength.low <= strength.high <= limits.most
             if not (0 <= strength.share <= 1 and ordered):
                 raise InputError(
@@ -123,24 +123,24 @@ class Augment:
         return {name: vars(strength).copy() for name, strength in sorted(self.strengths.items())}
 
     def happens(self, name: str, *source: str | int) -> bool:
-        """Whether a disturbance happens to a film, or to a variant of it."""
+        """Decides whether a disturbance happens to a film, or to a variant of it."""
         strength = self.strengths.get(name)
         return strength is not None and self._stream(name, source).random() < strength.share
 
-    def before(self, film: Film, times: NDArray[np.float64], *, source: str, other: Callable[[], Film]) -> Film:
-        """A film as it was taken, disturbed.
+    def before(self, film: Film, times: NDArray[np.float64], *, source: str, other_film: Callable[[], Film]) -> Film:
+        """Disturbs a film as it was taken.
 
         Args:
             source: the recording, after which its streams are named.
-            other: see `Drawn`.
+            other_film: see `Drawn`.
         """
         everywhere = np.ones(film.shape[1:], dtype=np.float32)
-        return self._applied(BEFORE, film, times, (source,), other, everywhere)
+        return self._applied(BEFORE, film, times, (source,), other_film, everywhere)
 
     def after(
         self, clip: Film, times: NDArray[np.float64], *, source: str, variant: int, weight: NDArray[np.float32]
     ) -> Film:
-        """A conditioned clip, disturbed by what conditioning leaves."""
+        """Disturbs a conditioned clip by what conditioning leaves."""
 
         def none() -> Film:
             raise TypeError("what happens after conditioning takes no other film")
@@ -149,14 +149,14 @@ class Augment:
 
     def _applied(
         self,
-        known: Registry,
+        disturbances: Registry,
         film: Film,
         times: NDArray[np.float64],
         source: tuple[str | int, ...],
-        other: Callable[[], Film],
+        other_film: Callable[[], Film],
         weight: NDArray[np.float32],
     ) -> Film:
-        for name in known:
+        for name in disturbances:
             if self.happens(name, *source):
                 rng, strength = self._stream(name, (*source, "drawn")), self.strengths[name]
                 drawn = Drawn(
@@ -164,10 +164,10 @@ class Augment:
                     times=times,
                     strength=rng.uniform(strength.low, strength.high),
                     rng=rng,
-                    other=other,
+                    other=other_film,
                     weight=weight,
                 )
-                film = known[name].apply(drawn)
+                film = disturbances[name].apply(drawn)
         return film
 
     @staticmethod
@@ -175,7 +175,7 @@ class Augment:
         return stream(0, "augment", name, *source)
 
 
-def _known(name: str) -> Disturbance:
+def _disturbance(name: str) -> Disturbance:
     if name not in DISTURBANCES:
         raise UnknownNameError.of("disturbance", name, DISTURBANCES)
     return BEFORE[name] if name in BEFORE else AFTER[name]

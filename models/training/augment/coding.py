@@ -11,7 +11,8 @@ _PRESET = "superfast"
 
 
 def _coded(drawn: Drawn) -> Film:
-    """The strength is x264's constant rate factor; of an odd side the last row or column is left out."""
+    """Encodes and decodes the film; the strength is x264's constant rate factor; of an odd side the last row or column
+    is left out."""
     film = drawn.film[:, : drawn.film.shape[1] // 2 * 2, : drawn.film.shape[2] // 2 * 2]
     encoder = VideoEncoder(
         height=film.shape[1], width=film.shape[2], rate_factor=round(drawn.strength, 1), preset=_PRESET

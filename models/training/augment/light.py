@@ -10,14 +10,14 @@ from models.training.augment.augment import Disturbance, Drawn, Film
 
 
 def _blur(drawn: Drawn) -> Film:
-    """Out of focus; the strength is the standard deviation of a Gaussian [px]."""
+    """Blurs the film as out of focus; the strength is the standard deviation of a Gaussian [px]."""
     if drawn.strength == 0:
         return drawn.film
     return np.stack([cv2.GaussianBlur(frame, (0, 0), drawn.strength) for frame in drawn.film])
 
 
 def _gamma(drawn: Drawn) -> Film:
-    """Another tone curve; the strength is the power that gray levels are raised to."""
+    """Applies another tone curve; the strength is the power that gray levels are raised to."""
     curve = 255 * (np.arange(256) / 255) ** drawn.strength
     return np.rint(curve).astype(np.uint8)[drawn.film]
 
@@ -28,7 +28,7 @@ def _dusk(drawn: Drawn) -> Film:
 
 
 def _noise(drawn: Drawn) -> Film:
-    """A sensor's noise; the strength is its standard deviation [gray levels]."""
+    """Adds a sensor's noise; the strength is its standard deviation [gray levels]."""
     noise: NDArray[np.float32] = drawn.rng.standard_normal(drawn.film.shape, dtype=np.float32)
     return np.clip(np.rint(drawn.film + np.float32(drawn.strength) * noise), 0, 255).astype(np.uint8)
 

@@ -19,7 +19,7 @@ _TURN = 0.002
 
 
 def course(rng: np.random.Generator, times: NDArray[np.float64], axes: int) -> NDArray[np.float64]:
-    """(n, axes) of mean 0 and root mean square 1: waves of random frequencies, the slower the larger."""
+    """Draws paths (n, axes) of mean 0 and root mean square 1: waves of random frequencies, the slower the larger."""
     frequency = np.geomspace(_SLOWEST_TURN, _FASTEST_TURN, _WAVES) * rng.uniform(0.8, 1.25, (axes, _WAVES))
     phase = rng.uniform(0, 2 * np.pi, (axes, _WAVES))
     waves = np.sin(2 * np.pi * frequency * times[:, None, None] + phase) / np.sqrt(frequency)
@@ -29,17 +29,17 @@ def course(rng: np.random.Generator, times: NDArray[np.float64], axes: int) -> N
 
 
 def _shake(drawn: Drawn) -> Film:
-    """The strength is the root mean square shift along each axis [px]."""
+    """Shakes the camera; the strength is the root mean square shift along each axis [px]."""
     height, width = drawn.film.shape[1:]
     path = drawn.strength * course(drawn.rng, drawn.times, 3)
-    shown = []
+    shaken = []
     for frame, (x, y, turn) in zip(drawn.film, path, strict=True):
         matrix = cv2.getRotationMatrix2D((width / 2, height / 2), np.degrees(_TURN * turn), 1.0)
         matrix[:, 2] += (x, y)
-        shown.append(
+        shaken.append(
             cv2.warpAffine(frame, matrix, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
         )
-    return np.stack(shown)
+    return np.stack(shaken)
 
 
 SHAKE = Disturbance(apply=_shake, unit="px", most=30.0)
@@ -50,13 +50,14 @@ _SLOWEST, _FASTEST = 0.4, 3.0
 
 
 def _left_over_shake(drawn: Drawn) -> Film:
-    """A camera's motion that was not removed; the strength is its root mean square along each axis [px]."""
+    """Moves the film by a camera's motion that was not removed; the strength is its root mean square along each axis
+    [px]."""
     path = drawn.strength * course(drawn.rng, drawn.times, 2)
     return _moved(drawn, path, np.ones(drawn.film.shape[1:], dtype=np.float32))
 
 
 def _pole_sway(drawn: Drawn) -> Film:
-    """The pole sways, and the cloth with it: to the sides, the more the higher; the strength is the amplitude at the
+    """Sways the pole, and the cloth with it: to the sides, the more the higher; the strength is the amplitude at the
     top of the picture [px]."""
     height, width = drawn.film.shape[1:]
     frequency = np.exp(drawn.rng.uniform(np.log(_SLOWEST), np.log(_FASTEST)))
@@ -66,13 +67,13 @@ def _pole_sway(drawn: Drawn) -> Film:
 
 
 def _moved(drawn: Drawn, path: NDArray[np.float64], share: NDArray[np.float32]) -> Film:
-    """Each frame moved by its place of the path times `share`, where it is not frozen."""
+    """Moves each frame by its row of the path times `share`, where it is not frozen."""
     rows, columns = np.indices(drawn.film.shape[1:], dtype=np.float32)
     share = share * drawn.weight
     moved = np.empty_like(drawn.film)
-    for place, (x, y) in enumerate(path.astype(np.float32)):
-        moved[place] = cv2.remap(
-            drawn.film[place], columns - share * x, rows - share * y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    for index, (x, y) in enumerate(path.astype(np.float32)):
+        moved[index] = cv2.remap(
+            drawn.film[index], columns - share * x, rows - share * y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
     return moved
 

@@ -47,19 +47,19 @@ def _tree(drawn: Drawn) -> Film:
 
 
 def _second_flag(drawn: Drawn) -> Film:
-    """Another film's picture, small, at a corner; the strength is its side, in sides of the picture."""
-    rng, film, other = drawn.rng, drawn.film.copy(), drawn.other()
+    """Pastes another film's picture, small, at a corner; the strength is its side, in sides of the picture."""
+    rng, film, other_film = drawn.rng, drawn.film.copy(), drawn.other()
     height, width = film.shape[1:]
     side = max(8, round(drawn.strength * min(height, width)))
-    there_and_back = np.concatenate([np.arange(len(other)), np.arange(len(other))[-2:0:-1]])
+    there_and_back = np.concatenate([np.arange(len(other_film)), np.arange(len(other_film))[-2:0:-1]])
     first = int(rng.integers(len(there_and_back)))
     feather = max(1, round(_FEATHER * width))
     ramp = np.minimum(np.arange(1, side + 1), np.arange(side, 0, -1)) / feather
     cover = np.clip(np.minimum(ramp[:, None], ramp[None]), 0, 1).astype(np.float32)
     top = 0 if rng.random() < 0.5 else height - side
     left = 0 if rng.random() < 0.5 else width - side
-    for place, frame in enumerate(film):
-        picture = other[there_and_back[(first + place) % len(there_and_back)]]
+    for index, frame in enumerate(film):
+        picture = other_film[there_and_back[(first + index) % len(there_and_back)]]
         small = cv2.resize(picture, (side, side), interpolation=cv2.INTER_AREA).astype(np.float32)
         part = frame[top : top + side, left : left + side]
         part[:] = np.rint(part + cover * (small - part))
@@ -67,7 +67,7 @@ def _second_flag(drawn: Drawn) -> Film:
 
 
 def _fields(rng: np.random.Generator, shape: tuple[int, int, int], length: float) -> NDArray[np.float32]:
-    """Smooth random fields of variance 1 and a correlation length [px]."""
+    """Draws smooth random fields of variance 1 and a correlation length [px]."""
     fields = []
     for white in rng.standard_normal(shape, dtype=np.float32):
         smooth = cv2.GaussianBlur(white, (0, 0), length)

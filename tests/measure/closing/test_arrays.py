@@ -12,7 +12,7 @@ import flagdata
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake import MeshSequence
 from measure.closing import arrays
-from measure.loop import Options
+from measure.loop import LoopOptions
 from measure.observe import Experiment
 from measure.verdict import Conclusion, Verdict
 from tests.measure.report.verdicts import verdict
@@ -32,11 +32,11 @@ def swaying(frames: int = 80) -> NDArray[np.float64]:
 
 
 @pytest.fixture
-def judged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Experiment, Options]]:
+def judged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Experiment, LoopOptions]]:
     """The experiments that a verdict was asked of, each answered by one that names lift."""
-    asked: list[tuple[Experiment, Options]] = []
+    asked: list[tuple[Experiment, LoopOptions]] = []
 
-    def close(experiment: Experiment, options: Options) -> Verdict:
+    def close(experiment: Experiment, options: LoopOptions) -> Verdict:
         asked.append((experiment, options))
         return verdict(Conclusion.EFFECT)
 
@@ -45,7 +45,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Experiment, Options]]:
 
 
 def test_arrays_become_an_experiment_and_a_verdict_its_answer(
-    judged: list[tuple[Experiment, Options]], tmp_path: Path
+    judged: list[tuple[Experiment, LoopOptions]], tmp_path: Path
 ) -> None:
     positions = swaying()
     found = flagdata.close_loop(
@@ -64,7 +64,7 @@ def test_arrays_become_an_experiment_and_a_verdict_its_answer(
     assert found.named[0] in found._repr_html_()
 
 
-def test_a_mesh_sequence_states_its_own_rate_and_rest_coordinates(judged: list[tuple[Experiment, Options]]) -> None:
+def test_a_mesh_sequence_states_its_own_rate_and_rest_coordinates(judged: list[tuple[Experiment, LoopOptions]]) -> None:
     positions = swaying().astype(np.float32)
     corner = np.arange(35).reshape(5, 7)
     squares = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(-1, 4)
@@ -88,7 +88,7 @@ def test_a_mesh_sequence_states_its_own_rate_and_rest_coordinates(judged: list[t
     ],
 )
 def test_what_cannot_be_judged_is_refused_before_any_work(
-    judged: list[tuple[Experiment, Options]], change: dict, error: type[Exception], match: str
+    judged: list[tuple[Experiment, LoopOptions]], change: dict, error: type[Exception], match: str
 ) -> None:
     given = {"rest": REST, "rate": RATE, "wind": 1.0} | change
     with pytest.raises(error, match=match):

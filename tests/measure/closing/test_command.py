@@ -17,7 +17,7 @@ from flagdata.errors import NotFoundError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest import MarkerOptions, ingest_markers
 from flagdata.lake import Lake
-from measure.closing import Reading
+from measure.closing import SourceOptions
 from measure.closing.sources import read
 from measure.commands import CloseLoopCommand
 from measure.commands.close_loop import _setup as setup_of
@@ -47,7 +47,7 @@ def said(arguments: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[
     ("arguments", "code", "what"),
     [
         ([], 2, "no recordings"),
-        (["nowhere.csv"], 1, "no such file"),
+        (["nowhere.csv"], 1, "does not exist"),
         (["nowhere.csv", "nowhere.toml"], 1, "no such recipe"),
         (["nowhere.csv", "--nulls", "100"], 2, "100 nulls"),
         (["nowhere.csv", "--nulls", "200", "--bank", "."], 2, "both --nulls and --bank"),
@@ -93,7 +93,7 @@ def test_a_log_is_read_as_its_sensor_and_zone_say(table: Path, tmp_path: Path) -
     """Its first frame at the log's second sample, whose speed is 5."""
     log = tmp_path / "log.csv"
     log.write_text("time,wind_speed\n2026-05-14 09:30:00,4\n2026-05-14 09:30:01,5\n2026-05-14 09:30:02,6\n")
-    reading = Reading(rate=RATE, offset=1.0, sensor="generic-csv", zone="+02:00")
+    reading = SourceOptions(rate=RATE, offset=1.0, sensor="generic-csv", zone="+02:00")
     calm, _ = read([str(table)], [str(log)], reading, None)
     assert calm.wind is not None
     np.testing.assert_allclose(calm.wind.at(np.array([0.0, 0.5])), [[5, 0, 0], [5.5, 0, 0]])
@@ -196,7 +196,7 @@ def test_data_that_are_no_cloth_end_it_with_the_reason(table: Path, capsys: pyte
 
 
 def test_each_recording_of_a_table_has_its_wind(table: Path) -> None:
-    reading = Reading(rate=RATE, noise=1e-3, axis=(0.0, 2.0, 0.0))
+    reading = SourceOptions(rate=RATE, noise=1e-3, axis=(0.0, 2.0, 0.0))
     calm, brisk = read([str(table)], ["3", "7"], reading, None)
     assert (calm.name, brisk.name) == ("calm", "brisk")
     assert calm.noise == 1e-3
@@ -209,8 +209,8 @@ def test_each_recording_of_a_table_has_its_wind(table: Path) -> None:
 def test_markers_of_a_lake_and_of_a_file_are_the_same(table: Path, tmp_path: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
     kept = ingest_markers(lake, table, MarkerOptions(rate=RATE))
-    from_file = read([str(table)], ["4"], Reading(rate=RATE, up=Up.Y), lake)
-    from_lake = read([result.artifact.id for result in kept], ["4"], Reading(up=Up.Y), lake)
+    from_file = read([str(table)], ["4"], SourceOptions(rate=RATE, up=Up.Y), lake)
+    from_lake = read([result.artifact.id for result in kept], ["4"], SourceOptions(up=Up.Y), lake)
     for one, other, result in zip(from_file, from_lake, kept, strict=True):
         np.testing.assert_array_equal(one.positions, other.positions)
         assert one.wind is not None
@@ -219,15 +219,15 @@ def test_markers_of_a_lake_and_of_a_file_are_the_same(table: Path, tmp_path: Pat
 
 
 def test_a_speed_needs_an_axis_and_a_source_a_place(table: Path) -> None:
-    north = Reading(rate=RATE, axis=None, north=math.radians(30))
+    north = SourceOptions(rate=RATE, axis=None, north=math.radians(30))
     with pytest.raises(UsageError, match="direction"):
         read([str(table)], ["4"], north, None)
     with pytest.raises(NotFoundError, match="nowhere"):
-        read(["nowhere"], [], Reading(), None)
+        read(["nowhere"], [], SourceOptions(), None)
 
 
 def test_recordings_of_one_name_get_names_that_differ(table: Path) -> None:
-    names = [seen.name for seen in read([str(table), str(table)], ["4"], Reading(rate=RATE), None)]
+    names = [seen.name for seen in read([str(table), str(table)], ["4"], SourceOptions(rate=RATE), None)]
     assert len(set(names)) == 4
 
 
@@ -242,8 +242,8 @@ def test_recordings_of_a_bucket_are_those_of_their_table(table: Path, bucket_fol
     lake = Lake.create(bucket_folder)
     taken = ingest_markers(lake, table, MarkerOptions(rate=RATE))
     shutil.rmtree(tmp_path / "cache")
-    found = read([result.artifact.id for result in taken], ["4"], Reading(), Lake.open(bucket_folder))
-    expected = read([str(table)], ["4"], Reading(rate=RATE), None)
+    found = read([result.artifact.id for result in taken], ["4"], SourceOptions(), Lake.open(bucket_folder))
+    expected = read([str(table)], ["4"], SourceOptions(rate=RATE), None)
     assert [one.source for one in found] == [result.artifact.id for result in taken]
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_array_equal(one.positions, other.positions)

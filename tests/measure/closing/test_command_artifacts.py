@@ -17,10 +17,10 @@ from flagdata.cli import main
 from flagdata.errors import CorruptError, InputError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
-from measure.closing import Answer, acting, answer_of, output
+from measure.closing import VerdictAnswer, acting, answer_of, output
 from measure.closing.artifacts import fingerprint, keep, read
 from measure.closing.models import models
-from measure.loop import Options
+from measure.loop import LoopOptions
 from measure.observe import Experiment, Specimen, Trajectory, WindTrack
 from measure.verdict import Conclusion, Estimate, Parameter, Verdict
 from sim.material import named
@@ -65,12 +65,12 @@ def experiment(specimen: Specimen, *, source: str = "", name: str = "a", speed: 
     return Experiment(specimen=specimen, recordings=(recording,))
 
 
-def closed(observed: Experiment, conclusion: Conclusion = Conclusion.EFFECT) -> Answer:
+def closed(observed: Experiment, conclusion: Conclusion = Conclusion.EFFECT) -> VerdictAnswer:
     found = concluded(conclusion)
     return answer_of(
         found,
         observed,
-        Options(seed=3),
+        LoopOptions(seed=3),
         name="tracks",
         findings=(),
         models=models(found, observed, name="tracks", seed=3),

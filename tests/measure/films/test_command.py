@@ -17,7 +17,7 @@ from measure.calibrate import OBSERVED
 from measure.commands.close_loop import close_loop
 from measure.films import films_among, simulations_of
 from measure.forecasting import strengths
-from measure.loop import Options as LoopOptions
+from measure.loop import LoopOptions
 from measure.observables import WINDOW
 from measure.observe import Experiment
 from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict

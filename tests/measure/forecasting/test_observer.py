@@ -194,7 +194,7 @@ def test_batches_that_are_not_of_one_cloth_are_not_joined(forecaster: Forecaster
     finer = replace(system.cloth, gradients=2 * system.cloth.gradients)
     with pytest.raises(UsageError, match="differ in mesh"):
         _ = JointBatch.of([(system, state), (replace(system, cloth=finer), state)])[0].plain
-    with pytest.raises(UsageError, match="different times"):
+    with pytest.raises(UsageError, match="have different times"):
         JointBatch.of([(system, state), (system, replace(state, time=1.0))])
 
 

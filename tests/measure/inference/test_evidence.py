@@ -92,7 +92,7 @@ def test_coefficients_that_nothing_was_taken_along_are_found_by_the_other_column
     own = world.draw(np.zeros((3, COLUMNS)), recordings=3, numerics=np.zeros(3), speeds=speeds)
     beside = world.rng.normal(size=(len(own.r), COLUMNS, 2))
     moved = replace(own, r=own.r + beside @ strengths)
-    evidence = Evidence.of(moved, speeds[own.recording], null, beside=beside)
+    evidence = Evidence.of(moved, speeds[own.recording], null, further=beside)
     assert not {COLUMNS, COLUMNS + 1} & set(evidence.nuisance)
     fit = evidence.fit([COLUMNS, COLUMNS + 1])
     for place, strength in enumerate(strengths):
@@ -231,9 +231,9 @@ def test_drops_of_nulls_follow_a_chi_square_of_one(worlds: list[tuple[World, Nul
 
 def test_drops_are_those_of_fits(world: World, null: NullModel) -> None:
     evidence = world.data(null, effect(0.5))
-    without, with_it = evidence.fit(()).left, evidence.fit([5]).left
+    without, with_it = evidence.fit(()).remainder, evidence.fit([5]).remainder
     assert evidence.drops()[5] == pytest.approx(without - with_it, rel=1e-6)
-    beside = evidence.fit([4]).left - evidence.fit([4, 5]).left
+    beside = evidence.fit([4]).remainder - evidence.fit([4, 5]).remainder
     assert evidence.drops([4])[5] == pytest.approx(beside, rel=1e-6)
 
 
@@ -262,7 +262,7 @@ def test_an_unobserved_column_carries_no_information() -> None:
 
 def test_moments_of_nulls_or_data_alone_are_refused(world: World, null: NullModel) -> None:
     own = world.draw(np.zeros((3, COLUMNS)), recordings=3, numerics=np.zeros(3), speeds=np.full(3, 5.0))
-    with pytest.raises(UsageError, match="moments of the nulls or of the data alone"):
+    with pytest.raises(UsageError, match="only the nulls or only the data have moments"):
         Evidence.of(replace(own, turning=own), np.full(3 * SEGMENTS, 5.0), null)
 
 
@@ -331,7 +331,7 @@ def test_what_is_left_beside_a_free_coefficient_is_that_of_a_coefficient_for_eve
     assert len(right) == len(nuisance) + count
     left = energy - right @ np.linalg.solve(curvature, right)
     freed = evidence.freed(5)
-    assert freed.fit(()).left == pytest.approx(left, rel=1e-9)
+    assert freed.fit(()).remainder == pytest.approx(left, rel=1e-9)
     assert freed.drops()[5] == 0
     assert fluctuation(freed, 5).likelihood == pytest.approx(0, abs=1e-9)
 

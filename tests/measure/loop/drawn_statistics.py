@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flagdata.rng import stream
 from measure.forecasting import PRIOR, THETA, EffectColumn, columns, names
 from measure.inference import Evidence, NullModel, Nulls
-from measure.loop import GUST_COLUMN, Judgement, judge
+from measure.loop import GUST_COLUMN, LibraryJudgement, judge
 from measure.nulls import GUSTS, NullBank, Reference
 from measure.probes import REDUCED, Course, Statistics
 
@@ -146,9 +146,9 @@ def judged(
     gusts: float = 0.0,
     line: float = 0.0,
     seed: int = 2,
-) -> Judgement:
+) -> LibraryJudgement:
     return judge(seen(null, acting, gusts=gusts, line=line, seed=seed), reference, level=0.02)
 
 
-def named(judgement: Judgement) -> list[str]:
+def named(judgement: LibraryJudgement) -> list[str]:
     return ["gusts" if column == GUST_COLUMN else names()[column] for column in judgement.named]

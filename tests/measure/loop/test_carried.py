@@ -14,7 +14,7 @@ from flagdata.cli import main
 from flagdata.errors import InputError
 from measure.closing import close_loop
 from measure.forecasting import Calibration, Setting
-from measure.loop import Options
+from measure.loop import LoopOptions
 from measure.nulls import SETTLE, NullBatch, plan
 from measure.nulls import bank as banks
 from measure.observe import (
@@ -115,7 +115,7 @@ def bank(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_carried_cloths_without_effects_are_accepted_by_the_count_of_kinds(bank: Path) -> None:
     """Twelve kinds of numerics reject at 1/13: two or more of four by chance in 3 of 100 such draws."""
-    verdicts = [close_loop(experiment(seed=seed), Options(bank=bank, level=LEVEL)) for seed in (5, 9, 11, 20)]
+    verdicts = [close_loop(experiment(seed=seed), LoopOptions(bank=bank, level=LEVEL)) for seed in (5, 9, 11, 20)]
     accepted = [verdict for verdict in verdicts if verdict.conclusion in NOT_REJECTED]
     assert len(accepted) >= 3
     for verdict in verdicts:
@@ -130,7 +130,7 @@ def test_carried_cloths_without_effects_are_accepted_by_the_count_of_kinds(bank:
 
 
 def test_a_strong_effect_on_a_carried_cloth_is_found_and_named(bank: Path) -> None:
-    verdict = close_loop(experiment(DRAG, seed=77), Options(bank=bank, level=LEVEL))
+    verdict = close_loop(experiment(DRAG, seed=77), LoopOptions(bank=bank, level=LEVEL))
     assert verdict.test.p_value.value == pytest.approx(1 / (KINDS + 1))
     assert verdict.named[:1] == ("tangential-linear-drag",)
     strength = verdict.ranking[0].strength

@@ -82,7 +82,7 @@ def test_a_fit_begins_where_across_the_prior_least_is_left(monkeypatch: pytest.M
 
     class Whitened:
         def of(self, errors: torch.Tensor) -> Whitened:
-            self.left = abs(np.log(float(errors) / 17_000))
+            self.remainder = abs(np.log(float(errors) / 17_000))
             return self
 
         def fit(self, chosen: tuple[int, ...]) -> Whitened:

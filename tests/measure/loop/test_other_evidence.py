@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.errors import UsageError
 from measure.inference import NullModel
-from measure.loop import GUST_COLUMN, Judgement, judge
+from measure.loop import GUST_COLUMN, LibraryJudgement, judge
 from measure.nulls import NullBank, Reference
 from measure.verdict import NOT_REJECTED, Conclusion
 from tests.measure.loop.drawn_statistics import SEGMENTS, SHED, Acting, judged, made, named, pulses, seen, slow
@@ -20,7 +20,7 @@ def test_what_moments_alone_show_rejects_and_counts_in_what_an_effect_leaves() -
     null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
     drag, lift = {"tangential-quadratic-drag.coefficient": 1.0}, {"lift.coefficient": 1.0}
 
-    def found(acting: Acting, moments: Acting) -> Judgement:
+    def found(acting: Acting, moments: Acting) -> LibraryJudgement:
         return judge(seen(null, acting, moments=moments), reference, level=0.02)
 
     assert found({}, {}).conclusion in NOT_REJECTED
@@ -109,7 +109,7 @@ def test_what_recordings_settle_at_rejects_alone_and_counts_in_what_is_left() ->
     bank = made(seed=9, settled=True)
     null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
 
-    def found(off: float) -> Judgement:
+    def found(off: float) -> LibraryJudgement:
         evidence = seen(null, {})
         return judge(replace(evidence, settled=np.full((12, 2), [0.0, off])), reference, level=0.02)
 

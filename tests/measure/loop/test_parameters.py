@@ -20,7 +20,7 @@ def estimated(calibration: Calibration, errors: dict[str, float], *, weighed: fl
     fitted: Any = SimpleNamespace(
         model=SimpleNamespace(calibration=calibration), errors=np.array([errors[name] for name, _, _ in THETA])
     )
-    return {one.name: one for one in parameters(fitted, None, np.full(len(THETA), REACH), weighed=weighed)}
+    return {one.name: one for one in parameters(fitted, None, np.full(len(THETA), REACH), density_uncertainty=weighed)}
 
 
 def test_scatter_and_spread_among_codes_add_in_quadrature() -> None:

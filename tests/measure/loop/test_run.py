@@ -17,8 +17,8 @@ from torch import Tensor
 from flagdata.errors import InputError, UsageError
 from measure.closing import close_loop
 from measure.forecasting import Calibration, Design, Setting, Suspicion, columns, fields, on_markers
-from measure.inference import Fit, WhitenedMisfit
-from measure.loop import Options, run
+from measure.inference import CoefficientFit, WhitenedMisfit
+from measure.loop import LoopOptions, run
 from measure.loop.corrective_field import corrective_field
 from measure.nulls import NullBatch
 from measure.nulls import bank as banks
@@ -95,7 +95,7 @@ def pulled(specimen: Specimen) -> Experiment:
 
 @pytest.fixture(scope="module")
 def dragged(pulled: Experiment, bank: Path) -> Verdict:
-    return close_loop(pulled, Options(bank=bank, level=0.1))
+    return close_loop(pulled, LoopOptions(bank=bank, level=0.1))
 
 
 def test_a_stored_bank_says_what_its_nulls_were_made_with(specimen: Specimen, bank: Path) -> None:
@@ -115,7 +115,7 @@ def test_a_stored_bank_says_what_its_nulls_were_made_with(specimen: Specimen, ba
 
 
 def test_a_null_needs_no_effect(plain: Experiment, bank: Path) -> None:
-    verdict = close_loop(plain, Options(bank=bank, level=0.1))
+    verdict = close_loop(plain, LoopOptions(bank=bank, level=0.1))
     assert verdict.conclusion in NOT_REJECTED
     assert not verdict.named
     assert not verdict.comparisons
@@ -125,7 +125,7 @@ def test_a_null_needs_no_effect(plain: Experiment, bank: Path) -> None:
 
 def test_a_suspicion_is_tested_alone_and_said_to_have_been_stated_before(plain: Experiment, bank: Path) -> None:
     suspicion = Suspicion.parse("lift", on_markers())
-    verdict = close_loop(plain, Options(bank=bank, level=0.1, suspected=suspicion))
+    verdict = close_loop(plain, LoopOptions(bank=bank, level=0.1, suspected=suspicion))
     assert (verdict.test.suspected, verdict.conclusion in NOT_REJECTED) == ("lift+", True)
     assert [one.effect for one in verdict.power] == ["lift"]
     assert "along lift+ alone, suspected before the recordings were looked at" in " ".join(words(verdict).split())
@@ -158,7 +158,7 @@ def test_a_hoist_that_is_attached_is_as_stiff_as_a_bound_and_the_bound_holds(spe
     """From some stiffness on nothing changes, and a fit ends anywhere."""
     true = 17_000.0
     attached = recorded(specimen, EFFECTS["full-hoist"](stiffness=true), seed=77)
-    verdict = close_loop(attached, Options(bank=bank, level=0.1))
+    verdict = close_loop(attached, LoopOptions(bank=bank, level=0.1))
     assert "full-hoist" in verdict.named
     (found,) = [c for c in verdict.ranking if c.effect == "full-hoist"]
     assert (found.strength.bound, found.strength.level) == ("at-least", 0.95)
@@ -183,7 +183,7 @@ def test_a_verdict_that_rests_on_few_kinds_says_that_another_draw_could_decide_o
 
 
 def test_the_same_data_and_seed_give_the_same_verdict(pulled: Experiment, bank: Path, dragged: Verdict) -> None:
-    again = close_loop(pulled, Options(bank=bank, level=0.1, workers=2))
+    again = close_loop(pulled, LoopOptions(bank=bank, level=0.1, workers=2))
     assert replace(again, seconds=0.0) == replace(dragged, seconds=0.0)
 
 
@@ -192,7 +192,9 @@ def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: P
     nominal = [setting.calibration] * len(setting.segments)
     found, projection = projected(setting.forecaster, setting.segments, nominal, columns())
     null = banks.load(bank, words="made").model(setting.design)
-    whitened = WhitenedMisfit(found=found, projection=projection, null=null, speeds=setting.speeds[setting.recording])
+    whitened = WhitenedMisfit(
+        statistics=found, projection=projection, null=null, speeds=setting.speeds[setting.recording]
+    )
     modes = corrective_field(setting, whitened)
     assert [mode.column for mode in modes] == list(fields())
     across = next(mode for mode in modes if mode.column.name == "field.y.00")
@@ -203,7 +205,7 @@ def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: P
     segments, forecaster = setting.segments, setting.forecaster
     errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
     change = forecaster.sensitivities([across.column], segments, nominal, errors)[-1]
-    rest = corrective_field(setting, whitened, left=errors - across.value * change)
+    rest = corrective_field(setting, whitened, errors=errors - across.value * change)
     unmoved = next(mode for mode in rest if mode.column == across.column)
     assert abs(unmoved.value) < across.error
 
@@ -232,7 +234,7 @@ def test_turning_the_world_changes_nothing_of_what_is_judged(specimen: Specimen,
 
 def test_a_level_that_the_bank_cannot_test_is_reported(pulled: Experiment, bank: Path) -> None:
     """Nine kinds of numerics: no p is below 1/10."""
-    verdict = close_loop(pulled, Options(bank=bank))
+    verdict = close_loop(pulled, LoopOptions(bank=bank))
     assert verdict.conclusion is Conclusion.UNTESTED
     assert verdict.test.p_value.value >= 1 / 10
     assert "cannot be tested at level 0.05" in verdict.words
@@ -245,19 +247,19 @@ def test_a_level_that_the_bank_cannot_test_is_reported(pulled: Experiment, bank:
 def test_a_bank_of_other_segments_is_refused(specimen: Specimen, plain: Experiment, bank: Path) -> None:
     short = tuple(replace(r, positions=r.positions[:60]) for r in plain.recordings)
     with pytest.raises(InputError, match="segments last"):
-        close_loop(Experiment(specimen=specimen, recordings=short), Options(bank=bank, level=0.1))
+        close_loop(Experiment(specimen=specimen, recordings=short), LoopOptions(bank=bank, level=0.1))
 
 
 def test_a_bank_with_anchors_known_in_another_way_is_refused(specimen: Specimen, plain: Experiment, bank: Path) -> None:
     data = replace(plain, specimen=replace(specimen, anchors_given=False))
     with pytest.raises(InputError, match="anchors were given, those of the recordings are taken from where"):
-        close_loop(data, Options(bank=bank, level=0.1))
+        close_loop(data, LoopOptions(bank=bank, level=0.1))
 
 
 @pytest.mark.parametrize("wrong", [{"level": 0.0}, {"level": 1.5}, {"level": 0.01}, {"nulls": 10}, {"workers": 0}])
 def test_options_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(UsageError):
-        Options(**wrong)  # pyright: ignore[reportArgumentType]
+        LoopOptions(**wrong)  # pyright: ignore[reportArgumentType]
 
 
 @dataclass(frozen=True)
@@ -275,9 +277,9 @@ def test_the_base_model_is_led_on_only_to_where_less_is_left(
 ) -> None:
     """Each step doubles the bending. The first look is that of the nominal cloth, at most four follow."""
 
-    def fitted(setting: At, fits: object) -> Fit:
+    def fitted(setting: At, fits: object) -> CoefficientFit:
         place = round(math.log2(setting.calibration.bending))
-        return Fit(
+        return CoefficientFit(
             active=(0, 1, 2), value=np.array([0.0, math.log(2), 0.0]), covariance=1e-2 * np.eye(3), left=left[place]
         )
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, UnknownNameError
-from measure.forecasting import Suspicion, every, names, on_markers
+from measure.forecasting import Suspicion, all_strengths, names, on_markers
 from measure.inference import Evidence, NullModel
 from measure.loop import judge
 from measure.loop.run import _suspected  # pyright: ignore[reportPrivateUsage]
@@ -143,7 +143,7 @@ def test_p_near_the_level_is_undecided(null: NullModel, reference: Reference, ti
 
 
 def test_only_what_markers_weigh_can_be_suspected_of_them() -> None:
-    assert {one.name for one in every()} - {one.name for one in on_markers()} == {"slack.length"}
+    assert {one.name for one in all_strengths()} - {one.name for one in on_markers()} == {"slack.length"}
     with pytest.raises(UnknownNameError):
         Suspicion.parse("slack", on_markers())
 

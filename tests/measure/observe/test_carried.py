@@ -100,9 +100,9 @@ def test_what_a_carried_cloth_cannot_have_moves_no_prediction(swung: Observation
 def test_recordings_agree_on_whether_the_cloth_is_carried(swung: Observation) -> None:
     experiment = observe([swung], SETUP).experiment
     other = replace(experiment.recordings[0], name="still", attachments=None)
-    with pytest.raises(InputError, match="with and without attachments"):
+    with pytest.raises(InputError, match="some recordings have attachments"):
         replace(experiment, recordings=(*experiment.recordings, other))
-    with pytest.raises(InputError, match="attachments of shape"):
+    with pytest.raises(InputError, match="attachments have the shape"):
         replace(experiment.recordings[0], attachments=np.zeros((3, 2, 3)))
 
 

@@ -58,7 +58,7 @@ def test_the_same_points_give_the_same_matrix_which_nobody_can_change(points: np
     [
         ([[0, 0], [1, 0]], "2 source points"),
         ([[0, 0], [1, 0], [2, 0], [3, 0]], "on a line"),
-        ([[0, 0], [1, 0], [0, 1], [0, 1]], "in one place"),
+        ([[0, 0], [1, 0], [0, 1], [0, 1]], "at the same point"),
         ([[0, 0], [1, 0], [0, np.nan]], "not finite"),
     ],
 )

@@ -185,7 +185,7 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
             UsageError,
             "both mass-unknown and a density-uncertainty",
         ),
-        ("[material]\ndensity-uncertainty = 2\n[[recording]]\nsource = 'a'", InputError, "density uncertainty of 2.0"),
+        ("[material]\ndensity-uncertainty = 2\n[[recording]]\nsource = 'a'", InputError, "density uncertainty is 2.0"),
         ("[material]\ndensity-uncertainty = 0\n[[recording]]\nsource = 'a'", InputError, "density-uncertainty"),
         ("[material]\nname = 'camel'\n[[recording]]\nsource = 'a'", UnknownNameError, "camel"),
         ("up = 'w'\n[[recording]]\nsource = 'a'", UnknownNameError, "unknown up 'w'"),

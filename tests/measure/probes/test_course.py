@@ -69,7 +69,7 @@ def test_turbulence_is_taken_for_it(speed: float, length: float) -> None:
 def test_a_wind_of_pulses_is_not_turbulence() -> None:
     # Half a second of every 3.7 s, by whatever phase: in 2 s there is one or none.
     found = seen(pulses(), noise=1.0).variation(RECORDING)
-    assert found.whole[ALONG] > 0.005
+    assert found.total[ALONG] > 0.005
     assert not found.turbulent
     # Nor is it with the other parts of turbulence: it is too fast.
     fast = pulses()
@@ -87,7 +87,7 @@ def test_a_pressure_that_varies_alone_is_not_turbulence() -> None:
     # Noise alone makes a part of it seem to vary, by chance: seldom by so much.
     assert sum(v.turbulent for v in found) <= 2
     assert all(
-        "varies across its mean by" in v.words for v in found if not v.turbulent and v.fast[ALONG] < v.whole[ALONG] / 2
+        "varies across its mean by" in v.words for v in found if not v.turbulent and v.fast[ALONG] < v.total[ALONG] / 2
     )
 
 
@@ -108,8 +108,8 @@ def test_variances_are_the_winds_and_noise_adds_nothing_to_them() -> None:
     parts = turbulence(5.0, 60.0, seed=3)
     about = parts - parts.reshape(RECORDINGS, -1, 3).mean(axis=1).repeat(SEGMENTS, axis=0)[:, None]
     neighbours = (about[:, 1:] * about[:, :-1]).mean(axis=(0, 1))
-    np.testing.assert_allclose(seen(parts).variation(RECORDING).whole, neighbours, rtol=1e-12)
-    noisy = np.mean([seen(parts, noise=1.0, seed=seed).variation(RECORDING).whole for seed in range(200)], axis=0)
+    np.testing.assert_allclose(seen(parts).variation(RECORDING).total, neighbours, rtol=1e-12)
+    noisy = np.mean([seen(parts, noise=1.0, seed=seed).variation(RECORDING).total for seed in range(200)], axis=0)
     # Of noise of variance 1/h, products of neighbours have −1/(h N) of the N windows of a recording, for its mean.
     np.testing.assert_allclose(noisy, neighbours - 1 / SIZE / SEGMENTS / WINDOWS, rtol=0.03, atol=5e-6)
 
@@ -123,7 +123,7 @@ def test_a_steady_wind_that_differs_from_the_logged_one_does_not_swing() -> None
 def test_errors_that_are_larger_all_over_swing_no_more() -> None:
     parts = turbulence(5.0, 60.0)
     twice = replace(seen(parts), score=SIZE / 4 * parts, curvature=seen(parts).curvature / 4)  # over twice the scale
-    np.testing.assert_allclose(twice.variation(RECORDING).whole, seen(parts).variation(RECORDING).whole, rtol=1e-12)
+    np.testing.assert_allclose(twice.variation(RECORDING).total, seen(parts).variation(RECORDING).total, rtol=1e-12)
     np.testing.assert_allclose(twice.swing(RECORDING), seen(parts).swing(RECORDING) / 4, rtol=1e-12)
 
 

@@ -10,16 +10,16 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
-from measure.probes import Rows
+from measure.probes import StatisticRows
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Inner(Rows):
+class Inner(StatisticRows):
     size: NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Outer(Rows):
+class Outer(StatisticRows):
     _WHOLE: ClassVar = frozenset({"count"})
 
     place: NDArray[np.int64]
@@ -49,7 +49,7 @@ def test_parts_are_joined_in_order() -> None:
 
 
 def test_what_is_looked_at_in_some_parts_alone_is_refused() -> None:
-    with pytest.raises(UsageError, match="inner of some parts alone"):
+    with pytest.raises(UsageError, match="only some parts have inner"):
         Outer.joined([outer(1), replace(outer(2), inner=None)])
     with pytest.raises(UsageError, match="nothing to join"):
         Outer.joined([])

@@ -55,15 +55,15 @@ def test_a_wind_that_is_off_within_its_prior_leaves_less_misfit_once_it_may_be(
 ) -> None:
     off = replace(own_recording, wind=misread(own_recording.wind, gain=gain, direction=turn))
     found, speeds = looked_at(forecaster, off)
-    without = Evidence.of(replace(found, log=None), speeds, null()).fit(()).left
-    assert Evidence.of(found, speeds, null()).fit(()).left < 0.5 * without
+    without = Evidence.of(replace(found, log=None), speeds, null()).fit(()).remainder
+    assert Evidence.of(found, speeds, null()).fit(()).remainder < 0.5 * without
 
 
 def test_a_wind_that_is_known_exactly_has_no_nuisance(forecaster: Forecaster, own_recording: Trajectory) -> None:
     exact = replace(own_recording, wind=replace(own_recording.wind, gain=0.0, direction=0.0, clock=0.0))
     found, speeds = looked_at(forecaster, exact)
-    without = Evidence.of(replace(found, log=None), speeds, null()).fit(()).left
-    assert Evidence.of(found, speeds, null()).fit(()).left == pytest.approx(without)
+    without = Evidence.of(replace(found, log=None), speeds, null()).fit(()).remainder
+    assert Evidence.of(found, speeds, null()).fit(()).remainder == pytest.approx(without)
 
 
 def test_missing_markers_correct_nothing_and_leave_the_models_own_errors_small(

@@ -13,9 +13,9 @@ import pytest
 import torch
 
 from flagdata.errors import NotFoundError, UsageError
-from measure.propose import Decision, Outcome, Term, write
+from measure.propose import Decision, ProposalOutcome, Term, write
 from measure.propose.candidates import from_file
-from measure.propose.outcome import Course, Strength
+from measure.propose.outcome import StrengthCourse, TermStrength
 from measure.propose.terms import TermEffect
 from measure.verdict import Estimate
 from sim.effects import apply, load
@@ -25,8 +25,8 @@ from sim.scene import assemble, flag
 ROOT = Path(__file__).resolve().parents[3]
 
 
-def proposal(**fitted: tuple[float, str]) -> Outcome:
-    course = Course(
+def proposal(**fitted: tuple[float, str]) -> ProposalOutcome:
+    course = StrengthCourse(
         bin=0.2,
         times=[],
         amplitudes=[],
@@ -37,7 +37,7 @@ def proposal(**fitted: tuple[float, str]) -> Outcome:
         words="",
     )
     strengths = tuple(
-        Strength(
+        TermStrength(
             name=name,
             words="a push",
             course=course,
@@ -45,7 +45,7 @@ def proposal(**fitted: tuple[float, str]) -> Outcome:
         )
         for name, (value, unit) in fitted.items()
     )
-    return Outcome(
+    return ProposalOutcome(
         decision=Decision.KEPT,
         reason="",
         steps=(),
@@ -63,17 +63,17 @@ def proposal(**fitted: tuple[float, str]) -> Outcome:
 
 
 @pytest.fixture
-def two() -> Outcome:
+def two() -> ProposalOutcome:
     return proposal(upward_lower=(0.8, "m/s²"), toward_pole_lower_fly=(-1.5, "1/s²"))
 
 
 @pytest.fixture
-def heavy() -> Outcome:
+def heavy() -> ProposalOutcome:
     return proposal(mass_near_75_30=(2.0, "1"), mass_stripe_60=(0.5, "1"), left_of_motion_everywhere=(0.4, "1/s"))
 
 
 def test_a_proposal_that_was_changed_is_kept_and_the_new_one_gets_a_name_of_its_own(
-    two: Outcome, heavy: Outcome, tmp_path: Path
+    two: ProposalOutcome, heavy: ProposalOutcome, tmp_path: Path
 ) -> None:
     first = write(two, tmp_path).path
     assert write(heavy, tmp_path).path == first  # as it was written: replaced
@@ -85,7 +85,7 @@ def test_a_proposal_that_was_changed_is_kept_and_the_new_one_gets_a_name_of_its_
     assert "proposed_ab12ab12ab12_2:" in (tmp_path / "pyproject.toml").read_text()
 
 
-def test_the_file_is_the_sum_of_its_terms(two: Outcome, tmp_path: Path) -> None:
+def test_the_file_is_the_sum_of_its_terms(two: ProposalOutcome, tmp_path: Path) -> None:
     made = load(write(two, tmp_path).spec)
     assert made.strengths() == ("upward_lower", "toward_pole_lower_fly")
     assert made.parameters()["toward_pole_lower_fly"].unit == "1/s²"
@@ -118,7 +118,7 @@ def test_mass_of_the_file_is_that_of_its_terms(tmp_path: Path) -> None:
     np.testing.assert_allclose(ratio, 1 + 2 * near + 0.5 * stripe, rtol=1e-12)
 
 
-def test_its_strengths_can_be_tested_on_other_recordings(two: Outcome, tmp_path: Path) -> None:
+def test_its_strengths_can_be_tested_on_other_recordings(two: ProposalOutcome, tmp_path: Path) -> None:
     columns = from_file(write(two, tmp_path).spec)
     assert [column.parameter for column in columns] == ["upward_lower", "toward_pole_lower_fly"]
     # Half of the end of the prior farther from zero: the fit with the width of its interval.
@@ -126,7 +126,9 @@ def test_its_strengths_can_be_tested_on_other_recordings(two: Outcome, tmp_path:
     assert columns[0].at(0.3).upward_lower == 0.3  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def test_its_own_contract_tests_and_the_librarys_pass(two: Outcome, heavy: Outcome, tmp_path: Path) -> None:
+def test_its_own_contract_tests_and_the_librarys_pass(
+    two: ProposalOutcome, heavy: ProposalOutcome, tmp_path: Path
+) -> None:
     """Two files as if they were installed: entry points make them effects of the library."""
     outcomes = (two, replace(heavy, proposed_from="ef56" * 16))
     made = {f"proposed-{place}": write(outcome, tmp_path / str(place)) for place, outcome in enumerate(outcomes)}

@@ -13,7 +13,7 @@ from flagdata.errors import InputError, UsageError
 from measure.forecasting import Column, EffectColumn
 from measure.nulls import NullBank, NullOptions
 from measure.observe import Experiment, Specimen, WindTrack
-from measure.propose import Decision, Outcome, made_ready, write
+from measure.propose import Decision, ProposalOutcome, made_ready, write
 from measure.propose.outcome import Retest
 from measure.propose.propose import weigh
 from measure.propose.words import words
@@ -30,11 +30,11 @@ def silent(what: str, done: int, total: int) -> None:
 @pytest.fixture(scope="module")
 def found(
     pushed: Experiment, columns: tuple[EffectColumn, ...], bank: NullBank, directions: tuple[Column, ...]
-) -> Outcome:
+) -> ProposalOutcome:
     return weigh(made_ready(pushed), columns, bank, directions, options=NullOptions(), stage=silent)
 
 
-def test_a_planted_push_is_kept(found: Outcome) -> None:
+def test_a_planted_push_is_kept(found: ProposalOutcome) -> None:
     assert found.decision is Decision.KEPT, words(found)
     assert found.retest is not None
     assert found.retest.helped.low > 0
@@ -48,7 +48,9 @@ def test_a_planted_push_is_kept(found: Outcome) -> None:
     assert "kept" in words(found)
 
 
-def test_the_effect_of_the_file_is_the_planted_field(found: Outcome, specimen: Specimen, tmp_path: Path) -> None:
+def test_the_effect_of_the_file_is_the_planted_field(
+    found: ProposalOutcome, specimen: Specimen, tmp_path: Path
+) -> None:
     made = load(write(found, tmp_path).spec)
     effect = made(**{strength.name: strength.estimate.value for strength in found.strengths})
     assert isinstance(effect, FieldEffect)
@@ -68,7 +70,7 @@ def test_the_effect_of_the_file_is_the_planted_field(found: Outcome, specimen: S
     assert error < 0.3 * np.sqrt(np.mean(planted**2))
 
 
-def test_a_steady_force_is_seen_to_be_steady(found: Outcome) -> None:
+def test_a_steady_force_is_seen_to_be_steady(found: ProposalOutcome) -> None:
     strength = next(s for s in found.strengths if s.name.startswith("leftward"))
     course = strength.course
     assert len(course.by_recording) == 4

@@ -12,7 +12,7 @@ import pytest
 from flagdata.errors import CorruptError, InputError
 from measure.forecasting import Segments
 from measure.observe import Trajectory, WindTrack
-from measure.propose import Decision, Outcome, proposal_log
+from measure.propose import Decision, ProposalOutcome, proposal_log
 from measure.propose.propose import data_hash, split
 
 MARKERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
@@ -38,14 +38,14 @@ def test_of_three_winds_the_middle_one_is_not_seen_at_all_nor_the_ends_of_the_ot
     """Recordings of 8.6 s have four segments of 2 s."""
     segments, speeds = of(7.0, 3.0, 5.0)
     parts = split(segments, speeds)
-    assert parts.seen.tolist() == [True, True, True, False] * 2 + [False] * 4
+    assert parts.used.tolist() == [True, True, True, False] * 2 + [False] * 4
     assert "5.0 m/s" in parts.words
 
 
 def test_of_two_winds_the_ends_are_not_seen() -> None:
     segments, speeds = of(3.0, 7.0, seconds=14.6)
     parts = split(segments, speeds)
-    assert parts.seen.tolist() == ([True] * 5 + [False] * 2) * 2
+    assert parts.used.tolist() == ([True] * 5 + [False] * 2) * 2
 
 
 def test_too_few_segments_are_refused() -> None:
@@ -61,8 +61,8 @@ def test_the_hash_is_of_positions_and_wind() -> None:
     assert len({data_hash(s) for s in (segments, stronger, moved, segments.select([0]))}) == 4
 
 
-def outcome(seed: int) -> Outcome:
-    return Outcome(
+def outcome(seed: int) -> ProposalOutcome:
+    return ProposalOutcome(
         decision=Decision.REJECTED,
         reason="nulls show as much",
         steps=(),

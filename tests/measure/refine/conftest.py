@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from flagdata.rng import torch_draws
-from measure.refine import Camera, Evaluator, FixedView, Simulator, fingerprint
+from measure.refine import Evaluator, FilmCamera, FixedView, Simulator, fingerprint
 from models.crops import Cropping
 from models.estimator import Estimator
 from models.frontend import FrontEnd
@@ -44,7 +44,7 @@ def recipe() -> Recipe:
 @pytest.fixture(scope="session")
 def view() -> FixedView:
     zeta = RenderParameters(texture="flag/france", background="sky/1", width=SIZE, height=SIZE, raster_samples=2)
-    return FixedView(zeta=zeta, camera=Camera())
+    return FixedView(zeta=zeta, camera=FilmCamera())
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import CorruptError
-from measure.refine import Camera, DrawnView, Evaluator, FixedView, Simulator, fingerprint
+from measure.refine import DrawnView, Evaluator, FilmCamera, FixedView, Simulator, fingerprint
 from measure.refine.view import of_parameters
 from models.conditioning import VERSION
 from models.estimator import Estimator
@@ -91,5 +91,5 @@ def test_a_recordings_own_view_is_read_from_its_parameters(view: FixedView) -> N
     found = of_parameters({**stated, **camera, "density": 0.1}, where="test")
     assert found is not None
     assert found.zeta == view.zeta
-    assert found.camera == Camera(rate_factor=19.0, read_noise=1.0, shot_noise=2.0)
+    assert found.camera == FilmCamera(rate_factor=19.0, read_noise=1.0, shot_noise=2.0)
     assert of_parameters({"density": 0.1}, where="test") is None

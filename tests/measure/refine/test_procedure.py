@@ -11,7 +11,17 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.rng import child_seed
-from measure.refine import QUANTITIES, Evaluator, FixedView, Refinement, Request, Settings, Simulator, Target, refine
+from measure.refine import (
+    QUANTITIES,
+    Evaluator,
+    FilmRequest,
+    FixedView,
+    Refinement,
+    Settings,
+    Simulator,
+    Target,
+    refine,
+)
 from measure.refine.section import section
 from models.estimator import Estimator
 from sim.run import Recipe
@@ -23,7 +33,7 @@ WHOLE = replace(SETTINGS, to_floor=False)
 @pytest.fixture(scope="module")
 def target(recipe: Recipe, view: FixedView) -> Target:
     simulator = Simulator.of(recipe, view, frames=8, rate=25.0, batch=1)
-    clip = simulator.films([Request(point=(0.0,) * 16 + (0.2,), seed=child_seed(9, "target"))])[0].clip
+    clip = simulator.films([FilmRequest(point=(0.0,) * 16 + (0.2,), seed=child_seed(9, "target"))])[0].clip
     assert clip is not None
     return Target(name="known", clip=clip, view=view, truth={"wind_speed": 6.0, "density": 0.135})
 
@@ -45,7 +55,7 @@ def test_killed_and_resumed_it_gives_the_same_result(
     made: list[int] = []
     films = Simulator.films
 
-    def dying(self: Simulator, requests: list[Request]) -> list[object]:
+    def dying(self: Simulator, requests: list[FilmRequest]) -> list[object]:
         if sum(made) >= 24:
             raise KeyboardInterrupt
         made.append(len(requests))

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.tables import Range, Scale
-from measure.refine import Camera, FixedView, Request, Simulator
-from measure.refine.simulator import Scene
+from measure.refine import FilmCamera, FilmRequest, FixedView, Simulator
+from measure.refine.simulator import SimulatedScene
 from models.conditioning import conditioned
 from sim.run import IntegratorSpec, Recipe
 
@@ -30,9 +30,10 @@ def of(recipes: Recipe | list[Recipe], view: FixedView) -> Simulator:
 
 
 def test_each_request_draws_its_damping_over_the_whole_range(recipe: Recipe) -> None:
-    scene = Scene(damped(recipe))
+    scene = SimulatedScene(damped(recipe))
     found = np.array(
-        [scene.member(Request(point=HERE, seed=seed)).scene.material.damping for seed in range(400)], dtype=np.float64
+        [scene.member(FilmRequest(point=HERE, seed=seed)).scene.material.damping for seed in range(400)],
+        dtype=np.float64,
     )
     shares = np.log(found / DAMPING.low) / np.log(DAMPING.high / DAMPING.low)
     assert shares.min() >= 0
@@ -41,11 +42,14 @@ def test_each_request_draws_its_damping_over_the_whole_range(recipe: Recipe) -> 
 
 
 def test_a_scene_without_a_range_keeps_the_damping_of_its_material(recipe: Recipe) -> None:
-    assert Scene(recipe).member(Request(point=HERE, seed=7)).scene.material.damping == recipe.material.bases[0].damping
+    assert (
+        SimulatedScene(recipe).member(FilmRequest(point=HERE, seed=7)).scene.material.damping
+        == recipe.material.bases[0].damping
+    )
 
 
 def test_replicates_take_turns_at_the_scenes(recipe: Recipe, view: FixedView) -> None:
-    requests = [Request(point=HERE, seed=11, replicate=number) for number in (0, 1, 2)]
+    requests = [FilmRequest(point=HERE, seed=11, replicate=number) for number in (0, 1, 2)]
     both = [film.clip for film in of([recipe, damped(recipe)], view).films(requests)]
     first = [film.clip for film in of(recipe, view).films(requests)]
     other = [film.clip for film in of(damped(recipe), view).films(requests)]
@@ -77,13 +81,13 @@ def test_only_a_range_of_damping_says_that_it_is_drawn(recipe: Recipe, view: Fix
 def filmed(monkeypatch: pytest.MonkeyPatch) -> list[NDArray[np.uint8]]:
     """What cameras film while a test goes on, (frame, height, width) each."""
     found: list[NDArray[np.uint8]] = []
-    film = Camera.filmed
+    film = FilmCamera.filmed
 
-    def kept(self: Camera, frames: NDArray[np.uint8], *, seed: int) -> NDArray[np.uint8]:
+    def kept(self: FilmCamera, frames: NDArray[np.uint8], *, seed: int) -> NDArray[np.uint8]:
         found.append(film(self, frames, seed=seed))
         return found[-1]
 
-    monkeypatch.setattr(Camera, "filmed", kept)
+    monkeypatch.setattr(FilmCamera, "filmed", kept)
     return found
 
 
@@ -91,6 +95,6 @@ def filmed(monkeypatch: pytest.MonkeyPatch) -> list[NDArray[np.uint8]]:
 def test_a_simulated_clip_is_what_was_filmed_conditioned_once(
     recipe: Recipe, view: FixedView, filmed: list[NDArray[np.uint8]], wind: float
 ) -> None:
-    clip = of(recipe, view).films([Request(point=(*HERE[:-1], wind), seed=11)])[0].clip
+    clip = of(recipe, view).films([FilmRequest(point=(*HERE[:-1], wind), seed=11)])[0].clip
     (film,) = filmed
     np.testing.assert_array_equal(clip, conditioned(film, np.arange(FRAMES) / RATE).frames)

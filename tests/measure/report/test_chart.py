@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from measure.report.chart import Linear, Logarithmic, below, beside, path_through, thinned
+from measure.report.chart import Linear, Logarithmic, path_through, room_below, room_beside, thinned
 
 
 def test_a_linear_axis_maps_its_ends_and_its_middle() -> None:
@@ -26,7 +26,7 @@ def test_a_logarithmic_axis_gives_equal_ratios_equal_lengths() -> None:
 @pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-3.2e-5, 7.7e-5), (0.0, 41.27), (1999.0, 2003.5), (-9e7, 4e7)])
 def test_labels_have_room_and_stand_at_round_values_within_the_axis(low: float, high: float, length: float) -> None:
     scale = Linear(low, high, 0.0, length)
-    for room in (beside, below):
+    for room in (room_beside, room_below):
         ticks = scale.ticks(room)
         values = [v for v, _ in ticks]
         assert all(low <= v <= high or math.isclose(v, low) or math.isclose(v, high) for v in values)
@@ -39,10 +39,10 @@ def test_labels_have_room_and_stand_at_round_values_within_the_axis(low: float, 
 @pytest.mark.parametrize(("low", "high"), [(1e-9, 1e-3), (0.12, 0.9), (0.3, 4.0), (1e-2, 1e12)])
 def test_decades_are_labelled_as_far_as_there_is_room(low: float, high: float) -> None:
     scale = Logarithmic(low, high, 0.0, 300.0)
-    ticks = scale.ticks(beside)
+    ticks = scale.ticks(room_beside)
     assert ticks
     for (a, first), (b, second) in itertools.pairwise(ticks):
-        assert scale(b) - scale(a) >= (beside(first) + beside(second)) / 2 - 1e-6
+        assert scale(b) - scale(a) >= (room_beside(first) + room_beside(second)) / 2 - 1e-6
 
 
 def test_an_axis_over_nothing_or_one_value_still_has_a_length() -> None:

@@ -98,12 +98,12 @@ def test_the_document_holds_every_field_by_its_name() -> None:
     [
         ({"schema": "flagdata.verdict/2"}, "schema", "flagdata.verdict/2"),
         ({"conclusion": "perhaps"}, "verdict.conclusion", "perhaps"),
-        ({"seconds": "long"}, "verdict.seconds", "str instead of a number"),
-        ({"seconds": True}, "verdict.seconds", "bool instead of a number"),
-        ({"named": "lift"}, "verdict.named", "str instead of a list"),
+        ({"seconds": "long"}, "verdict.seconds", "of type str, not a number"),
+        ({"seconds": True}, "verdict.seconds", "of type bool, not a number"),
+        ({"named": "lift"}, "verdict.named", "of type str, not a list"),
         ({"findings": [["kind"]]}, "verdict.findings[0]", "1 entries"),
         ({"colour": "blue"}, "verdict", "unknown field colour"),
-        ({"test": {"statistic": 1.0}}, "verdict.test", "missing field critical, kinds, level, null, nulls, p_value"),
+        ({"test": {"statistic": 1.0}}, "verdict.test", "lacks the field critical, kinds, level, null, nulls, p_value"),
     ],
 )
 def test_a_document_that_does_not_fit_is_refused_with_the_place(change: dict[str, Any], where: str, what: str) -> None:

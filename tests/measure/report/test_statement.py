@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from measure.forecasting import Calibration, FieldColumn
-from measure.loop import Mode, Outcome
+from measure.loop import LoopOutcome, Mode
 from measure.observe import Experiment, Specimen, Trajectory, WindTrack
-from measure.probes import Line, Variation
-from measure.report import by_draw, lead, stated
+from measure.probes import SpectralLine, Variation
+from measure.report import by_draw, lead, with_sentences
 from measure.report.statement import assumptions, blowing, bounds, proposal, shedding
 from measure.verdict import Conclusion
 from tests.measure.report.verdicts import verdict
@@ -30,7 +30,7 @@ def test_the_most_certain_modes_are_reported_first() -> None:
     assert second.startswith("along the wind, hoist against fly (0.5")
     assert third.startswith("up, both ends against the middle (−4")
     assert "corner" not in said
-    assert "fits the remaining errors best, per mass: across" in proposal(modes, whole=False)
+    assert "fits the remaining errors best, per mass: across" in proposal(modes, is_all=False)
 
 
 def test_a_strength_that_is_another_in_every_recording_is_reported_with_its_values() -> None:
@@ -46,13 +46,13 @@ def test_a_strength_that_is_another_in_every_recording_is_reported_with_its_valu
 
 def test_a_line_is_reported_as_a_cylinders_vortex_shedding() -> None:
     # A Strouhal number of 0.2: 1.33 Hz for each m/s is a width of 0.15 m.
-    said = shedding(Line(far=9.0, reduced=0.2 / 0.15, direction=1))
+    said = shedding(SpectralLine(far=9.0, reduced=0.2 / 0.15, direction=1))
     assert "across the wind at 1.3 Hz for each m/s" in said
     assert "0.15 m" in said
 
 
 def test_a_course_that_is_not_turbulence_is_given_in_percent_of_the_wind() -> None:
-    said = blowing(Variation(whole=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
+    said = blowing(Variation(total=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
     expected = "varies by 13 % of its mean along its own direction, by 12 % within two seconds, and by 0 % across it"
     assert expected in said
 
@@ -82,7 +82,7 @@ def test_a_test_that_another_draw_could_decide_otherwise_says_so_and_what_would_
 
 
 @pytest.fixture
-def outcome(specimen: Specimen) -> Outcome:
+def outcome(specimen: Specimen) -> LoopOutcome:
     """An outcome of one recording for which the library has no answer."""
     recording = Trajectory(
         name="first",
@@ -94,21 +94,21 @@ def outcome(specimen: Specimen) -> Outcome:
     numbers = replace(
         verdict(Conclusion.OUTSIDE), words="", proposal="", separating="", assumptions=(), ranking=(), named=()
     )
-    return Outcome(
+    return LoopOutcome(
         verdict=numbers,
         experiment=Experiment(specimen=specimen, recordings=(recording,)),
         lags=(0.5,),
         at_bounds=("damping",),
         field=(Mode(column=FieldColumn(axis=1, mode=(0, 0)), value=3.0, error=0.2),),
-        line=Line(far=9.0, reduced=0.2 / 0.15, direction=1),
-        course=Variation(whole=np.array([0.0169, 0.0, 0.0]), fast=np.array([0.0144, 0.0, 0.0])),
+        line=SpectralLine(far=9.0, reduced=0.2 / 0.15, direction=1),
+        course=Variation(total=np.array([0.0169, 0.0, 0.0]), fast=np.array([0.0144, 0.0, 0.0])),
     )
 
 
 def test_an_outcome_without_an_answer_is_stated_with_its_line_its_course_and_its_field_in_this_order(
-    outcome: Outcome,
+    outcome: LoopOutcome,
 ) -> None:
-    said = stated(outcome)
+    said = with_sentences(outcome)
     assert said.words.startswith(lead(outcome.verdict))
     assert "at the bound of damping" in said.words
     assert said.proposal.index("as vortices") < said.proposal.index("a wind that varies") < said.proposal.index("force")
@@ -118,14 +118,14 @@ def test_an_outcome_without_an_answer_is_stated_with_its_line_its_course_and_its
     assert numbers == outcome.verdict
 
 
-def test_a_field_beside_a_named_effect_is_of_what_remains(outcome: Outcome) -> None:
-    falling = Variation(whole=np.array([-0.01, 0.0, 0.0]), fast=np.array([0.0, 0.0, 0.0]))
-    said = stated(replace(outcome, whole=False, line=None, course=falling)).proposal
+def test_a_field_beside_a_named_effect_is_of_what_remains(outcome: LoopOutcome) -> None:
+    falling = Variation(total=np.array([-0.01, 0.0, 0.0]), fast=np.array([0.0, 0.0, 0.0]))
+    said = with_sentences(replace(outcome, whole=False, line=None, course=falling)).proposal
     assert said.startswith("The smooth force field that fits the remaining errors best")
 
 
-def test_an_outcome_with_an_answer_proposes_nothing(outcome: Outcome) -> None:
-    assert stated(replace(outcome, field=())).proposal == ""
+def test_an_outcome_with_an_answer_proposes_nothing(outcome: LoopOutcome) -> None:
+    assert with_sentences(replace(outcome, field=())).proposal == ""
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_an_outcome_with_an_answer_proposes_nothing(outcome: Outcome) -> None:
     [(0.3, "known to 30 %", True), (0.1, "known to 10 %", True), (0.02, "known to 2 %", False)],
 )
 def test_how_well_the_cloth_was_weighed_is_an_assumption(
-    outcome: Outcome, known: float, expected: str, weigh: bool
+    outcome: LoopOutcome, known: float, expected: str, weigh: bool
 ) -> None:
     specimen = replace(outcome.experiment.specimen, density_uncertainty=known)
     (said,) = (
@@ -143,6 +143,6 @@ def test_how_well_the_cloth_was_weighed_is_an_assumption(
     assert ("density-uncertainty" in said) == weigh
 
 
-def test_an_unweighed_cloths_density_is_not_listed_as_known(outcome: Outcome) -> None:
+def test_an_unweighed_cloths_density_is_not_listed_as_known(outcome: LoopOutcome) -> None:
     specimen = replace(outcome.experiment.specimen, mass_known=False)
     assert not any("density is known" in t for t in assumptions(replace(outcome.experiment, specimen=specimen)))

@@ -150,7 +150,7 @@ def test_two_flags_are_numbered_by_their_motion_and_one_can_be_chosen() -> None:
     assert second.found.square.side < first.found.square.side
     # The other flag is frozen in either.
     assert np.quantile(second.frames[:, outside(second)].astype(float).std(axis=0), 0.99) <= 2 * second.found.noise
-    with pytest.raises(UsageError, match="flag 3 of a film in which 2 regions"):
+    with pytest.raises(UsageError, match="no flag 3: 2 regions"):
         made(drawn, flag=3)
 
 

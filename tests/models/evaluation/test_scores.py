@@ -97,7 +97,7 @@ def test_a_draw_scores_as_the_clips_of_the_groups_it_holds_do() -> None:
 def test_one_sequence_has_no_interval() -> None:
     resamples = Resamples.of(np.zeros(4, dtype=np.int64), generator=generator(1))
     found = estimate(SCORES["rmse"].values(of_wind(TRUTH, MEAN), "wind_speed", resamples), clips=4, groups=1)
-    assert not found.known
+    assert not found.has_interval
     assert found.as_dict()["interval"] is None
     assert found.value == pytest.approx(math.sqrt(1.61 / 4))
 
@@ -109,4 +109,4 @@ def test_errors_against_wind_are_those_of_each_bin_and_its_upper_end_belongs_to_
     assert [(b.low, b.high, b.rmse.clips) for b in bins] == [(0, 1, 2), (1, 2, 1), (3, 4, 2)]  # 4.0 ends the last bin
     assert [b.rmse.value for b in bins] == pytest.approx([math.sqrt(0.125), 1.0, math.sqrt(0.1)])
     assert [b.bias.value for b in bins] == pytest.approx([0.35, -1.0, 0.3])
-    assert [b.rmse.known for b in bins] == [True, False, True]
+    assert [b.rmse.has_interval for b in bins] == [True, False, True]

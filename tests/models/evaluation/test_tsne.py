@@ -24,7 +24,7 @@ def test_clusters_stay_apart_each_clip_keeps_its_wind_and_one_seed_gives_one_pic
     np.testing.assert_array_equal(found.wind[distance.argmin(axis=1)], found.wind)
     np.testing.assert_array_equal(layout(made, seed=1, perplexity=12, most=45).places, found.places)
     assert report.t_sne(found).startswith("<svg ")
-    with pytest.raises(InputError, match="60 clips and a perplexity of 60"):
+    with pytest.raises(InputError, match="60 clips do not admit a perplexity of 60"):
         layout(made, seed=1, perplexity=60)
 
 

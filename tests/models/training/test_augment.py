@@ -42,7 +42,7 @@ def disturbed(name: str, strength: float, *, source: str = "film", weight: NDArr
     augment = Augment(strengths={name: Strength(share=1.0, low=strength, high=strength)})
     if name in AFTER:
         return augment.after(still(), TIMES, source=source, variant=0, weight=weight)
-    return augment.before(still(), TIMES, source=source, other=lambda: 255 - still(1))
+    return augment.before(still(), TIMES, source=source, other_film=lambda: 255 - still(1))
 
 
 def test_every_disturbance_is_tried_here() -> None:
@@ -63,7 +63,8 @@ def test_a_film_is_disturbed_the_same_way_again_and_another_film_otherwise(name:
 def test_a_share_of_the_films_is_disturbed() -> None:
     augment = Augment(strengths={"dusk": Strength(share=0.3, low=0.5, high=0.5)})
     changed = [
-        (augment.before(still()[:1], TIMES[:1], source=str(k), other=still) != still()[:1]).any() for k in range(200)
+        (augment.before(still()[:1], TIMES[:1], source=str(k), other_film=still) != still()[:1]).any()
+        for k in range(200)
     ]
     assert np.mean(changed) == pytest.approx(0.3, abs=0.1)  # three standard deviations of a binomial share
 
@@ -72,7 +73,7 @@ def test_strengths_are_even_over_their_range() -> None:
     """Half of the light on average: gray levels of 0.2 to 0.8 of those before."""
     augment = Augment(strengths={"dusk": Strength(share=1.0, low=0.2, high=0.8)})
     film = np.full((1, 8, 8), 200, np.uint8)
-    left = [float(augment.before(film, TIMES[:1], source=str(k), other=still).mean()) / 200 for k in range(200)]
+    left = [float(augment.before(film, TIMES[:1], source=str(k), other_film=still).mean()) / 200 for k in range(200)]
     assert np.mean(left) == pytest.approx(0.5, abs=0.04)
     assert min(left) >= 0.19
     assert max(left) <= 0.81

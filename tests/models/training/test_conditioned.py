@@ -52,7 +52,7 @@ def test_a_film_that_is_too_slow_or_too_short_is_refused() -> None:
     for count, rate in ((40, 15.0), (28, 25.0)):
         times = np.arange(count) / rate
         film = FitFilm.of(swinging(times), times, size=SIDE)
-        with pytest.raises(InputError, match="for clips of 30 at 25 Hz"):
+        with pytest.raises(InputError, match="cannot give clips of 30 at 25 Hz"):
             film.starts(30, 25.0)
 
 
@@ -101,7 +101,7 @@ def test_films_of_another_rate_are_learned_from_once_they_are_conditioned(fast: 
     with pytest.raises(InputError, match="another rate than 25 Hz"):
         films(fast, tmp_path, recipe(extra="variants = 2\n"))
     conditioned = recipe(extra=CONDITIONED.replace("2", "2\nrate = 25.0", 1))
-    with pytest.raises(InputError, match=r"a film of 14 frames at 30 Hz for clips of 12 at 25 Hz"):
+    with pytest.raises(InputError, match=r"the film of 14 frames at 30 Hz cannot give clips of 12 at 25 Hz"):
         films(fast, tmp_path, conditioned)  # 0.43 s of film, 0.44 s of clip
     shorter = parse(
         TRAINING.replace("variants = 2\n", CONDITIONED).replace("frames = 12", "frames = 10"), name="s", where="s.toml"

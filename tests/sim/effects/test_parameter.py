@@ -38,7 +38,7 @@ def test_a_wanted_gradient_keeps_an_effect_at_null(make_system, plain, square) -
 
 def test_values_for_another_batch_are_refused(make_system, plain, square) -> None:
     system, state = make_system(square, [plain, plain])
-    with pytest.raises(UsageError, match="3 members in a batch of 2"):
+    with pytest.raises(UsageError, match="2 members, and there are values for 3"):
         apply([Porosity(open_share=torch.full((3,), 0.1))], system, state)
 
 

@@ -162,7 +162,7 @@ def test_a_camera_sees_nothing_outside_the_trajectory() -> None:
     time, trajectory = moving(end=0.5)
     with pytest.raises(UsageError, match="trajectory is known from"):
         ideal.observe(time, trajectory)
-    with pytest.raises(InputError, match="a trajectory of shape"):
+    with pytest.raises(InputError, match="the trajectory has the shape"):
         ideal.observe(time, trajectory.repeat(1, 2, 1, 1))
-    with pytest.raises(UsageError, match="1 draws for 50 frames"):
+    with pytest.raises(UsageError, match="there are 1 draws for 50 frames"):
         replace(FrameJitter(deviation=1e-3)).sampled(ideal)

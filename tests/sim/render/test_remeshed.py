@@ -11,7 +11,7 @@ import torch
 from flagdata.ingest import read_folder
 from flagdata.lake import RaggedMeshSequence
 from sim.render import Camera, Meshes, stage
-from sim.render.shutter import Motion
+from sim.render.shutter import VertexMotion
 from tests.sim.render.pieces import linear
 
 
@@ -34,7 +34,7 @@ def test_a_remeshed_flag_is_seen_where_its_vertices_project_and_moves_between_fr
         # A vertex on the outline has light on at most half a pixel beside it; the exposure moves it by a pixel or two.
         assert np.abs([xs.min() - low[0], ys.min() - low[1], xs.max() + 1 - high[0], ys.max() + 1 - high[1]]).max() < 4
     # At 6 m/s of wind no part of it moves faster than the wind does, nor does material jump where the mesh is cut anew.
-    motion = Motion.of(meshes)
+    motion = VertexMotion.of(meshes)
     fastest = float(motion.forth.norm(dim=1).max()) * meshes.rate
     assert 0.5 < fastest < 12.0
 

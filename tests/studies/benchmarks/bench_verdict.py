@@ -16,7 +16,7 @@ from typing import Any
 
 from flagdata.rng import child_seed
 from measure.forecasting import Setting
-from measure.loop import Options, solve
+from measure.loop import LoopOptions, solve
 from measure.nulls import bank as banks
 from measure.nulls import batches
 from measure.verdict import CRITERIA
@@ -55,7 +55,7 @@ def _timed(across: int, seed: int) -> dict[str, Any]:
         first = time.perf_counter() - began
         banks.build(Path(folder), wanted, workers=_cores())
         built = time.perf_counter() - began
-        options = Options(bank=Path(folder), seed=seed, workers=_cores())
+        options = LoopOptions(bank=Path(folder), seed=seed, workers=_cores())
         found: list[float] = []
         for _ in range(_RUNS):
             began = time.perf_counter()

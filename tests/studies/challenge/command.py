@@ -138,7 +138,7 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
     from flagdata.caches import user_cache
     from measure.calibrate import announced
     from measure.films.command import workload
-    from measure.loop import Options
+    from measure.loop import LoopOptions
     from measure.nulls import of_recordings
     from tests.studies.challenge.filing import filed
     from tests.studies.challenge.fitter import ClosingTheLoop, ClosingTheLoopOnFilms
@@ -156,7 +156,7 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
             say(announced(workload(lasting, films.options(given)), workers=workers))
     elif waiting:
         first = target.experiment(waiting[0])
-        options = Options(bank=bank)
+        options = LoopOptions(bank=bank)
         say(
             of_recordings(
                 first.recordings,

@@ -31,9 +31,9 @@ class ClosingTheLoop:
             InputError: the data do not do.
         """
         from measure.closing import close_loop
-        from measure.loop import Options
+        from measure.loop import LoopOptions
 
-        return close_loop(experiment, Options(seed=seed, bank=self.bank))
+        return close_loop(experiment, LoopOptions(seed=seed, bank=self.bank))
 
 
 @dataclass(frozen=True, kw_only=True)

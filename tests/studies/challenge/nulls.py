@@ -70,7 +70,7 @@ def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[Null
                 rate=rate,
                 noise=noise,
                 speeds=speeds,
-                duration=cut.lasting(banks.each(recipe.count * cut.segments(frames))),
+                duration=cut.lasting(banks.segments_of_each(recipe.count * cut.segments(frames))),
                 seed=own,
             )
         )

@@ -23,7 +23,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
 from measure.closing import close_loop
 from measure.forecasting import Calibration, Setting
-from measure.loop import Options
+from measure.loop import LoopOptions
 from measure.nulls import NullBatch, plan
 from measure.nulls import bank as banks
 from measure.observe import Specimen
@@ -100,7 +100,7 @@ def loop_scene(folder: Path) -> Scene:
     banks.build(folder / "bank", plan.batches(Setting.of(experiment), kinds=KINDS, seed=0), workers=2)
     kept = folder.with_name(f"{folder.name}.kept")
     kept.mkdir()
-    verdict = close_loop(experiment, Options(bank=folder / "bank", level=LEVEL))
+    verdict = close_loop(experiment, LoopOptions(bank=folder / "bank", level=LEVEL))
     (kept / "verdict").write_bytes(pickle.dumps(verdict))
     options = plan.NullOptions(bank=folder / "bank", level=LEVEL)
     (kept / "outcome").write_bytes(pickle.dumps(propose(experiment, dictionary(), options=options)))

@@ -24,7 +24,7 @@ from models.learner import Learner, Loss, build
 from models.outliers import Familiarity
 from models.storage import CARD, WEIGHTS, write_card, write_tensors
 from models.training import checkpoint
-from models.training.progress import Course
+from models.training.progress import LossCourse
 from tests.damage import damaged, damages, edited, edits
 from tests.studies.hostile.campaign import Subject
 
@@ -62,7 +62,7 @@ def standing() -> checkpoint.Standing:
     """A training that has not begun."""
     learner = small_learner()
     return checkpoint.Standing(
-        learner=learner, best=None, optimiser=torch.optim.Adam(learner.parameters()), course=Course(), batches={}
+        learner=learner, best=None, optimiser=torch.optim.Adam(learner.parameters()), course=LossCourse(), batches={}
     )
 
 

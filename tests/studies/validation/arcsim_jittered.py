@@ -25,7 +25,7 @@ import numpy as np
 
 from measure.closing import close_loop
 from measure.forecasting import Setting
-from measure.loop import Options
+from measure.loop import LoopOptions
 from measure.nulls import bank as banks
 from measure.nulls import batches
 from measure.observe import DENSITY_UNCERTAINTY, Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe
@@ -104,7 +104,7 @@ def _once(place: Path, name: str, experiment: Experiment, seed: int) -> dict[str
     """A verdict as the page reports it, from its file where it was made before."""
     kept = place / f"{name}-{experiment.specimen.density_uncertainty:g}.json"
     if not kept.exists():
-        record = _record(close_loop(experiment, Options(bank=place / "nulls", seed=seed)), CASES[name])
+        record = _record(close_loop(experiment, LoopOptions(bank=place / "nulls", seed=seed)), CASES[name])
         kept.write_text(json.dumps(record, allow_nan=False), encoding="utf-8")
     return json.loads(kept.read_text(encoding="utf-8"))
 

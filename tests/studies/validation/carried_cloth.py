@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 from flagdata.rng import child_seed
 from measure.closing import close_loop
 from measure.forecasting import Calibration, Setting
-from measure.loop import Options
+from measure.loop import LoopOptions
 from measure.nulls import NullBatch, plan, tracks
 from measure.nulls import bank as banks
 from measure.observe import Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
@@ -172,11 +172,11 @@ def _row(verdict: Verdict) -> dict[str, Any]:
     }
 
 
-def _bank(experiment: Experiment, seed: int) -> Options:
+def _bank(experiment: Experiment, seed: int) -> LoopOptions:
     """By `KINDS` kinds of nulls of an experiment's own ways."""
     setting = Setting.of(experiment)
     plan.simulated(setting, nulls=KINDS * banks.WINDS, seed=seed, workers=2, stage=lambda *_: None)
-    return Options(seed=seed, bank=plan.kept_in(setting, seed=seed))
+    return LoopOptions(seed=seed, bank=plan.kept_in(setting, seed=seed))
 
 
 def _places(cloth: Cloth) -> Floats:

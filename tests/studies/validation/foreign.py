@@ -26,7 +26,7 @@ from flagdata.errors import InputError, NotFoundError
 from flagdata.rng import child_seed
 from measure.closing import close_loop
 from measure.forecasting import Segments
-from measure.loop import Options
+from measure.loop import LoopOptions
 from measure.nulls import bank as banks
 from measure.observe import Observed, load, read
 from measure.shares import Share
@@ -97,7 +97,7 @@ def _bank(folder: Path, observed: Observed, seed: int) -> Path:
             markers=first.markers,
             rate=1 / segments.period,
             noise=NOISE,
-            duration=segments.cut.lasting(banks.each(len(segments))),
+            duration=segments.cut.lasting(banks.segments_of_each(len(segments))),
             speeds=banks.around(*SPEEDS),
             seed=child_seed(seed, "foreign", "null", index),
         )
@@ -122,7 +122,7 @@ def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str
         "findings": [found.kind for found in observed.findings],
     }
     try:
-        verdict = close_loop(observed.experiment, Options(seed=seed, bank=bank))
+        verdict = close_loop(observed.experiment, LoopOptions(seed=seed, bank=bank))
     except InputError as error:
         return {**row, "refused": str(error), "grade": "refused"}
     of = {parameter.name: parameter.after or parameter.before for parameter in verdict.parameters}

@@ -33,7 +33,7 @@ from scipy.signal import lfilter
 from flagdata.errors import InputError
 from flagdata.rng import child_seed, stream
 from measure.forecasting import Setting
-from measure.loop import Options, solve
+from measure.loop import LoopOptions, solve
 from measure.nulls import NullBatch, StiffnessFactors, batches
 from measure.nulls import bank as banks
 from measure.observe import Experiment, Hold, Observation, Setup, Specimen, WindTrack, from_arrays, observe, sheet
@@ -201,7 +201,7 @@ def _row(folder: Path, stressor: str, number: int, seed: int) -> dict[str, Any]:
 def _judged(truth: Truth, stressor: str, number: int, seed: int, bank: Path) -> dict[str, Any]:
     row: dict[str, Any] = {"stressor": stressor, "number": number, "true": dict(truth.parameters)}
     try:
-        found = solve(experiment(truth, stressor, child_seed(seed, "noise", number)), Options(bank=bank, seed=seed))
+        found = solve(experiment(truth, stressor, child_seed(seed, "noise", number)), LoopOptions(bank=bank, seed=seed))
     except InputError as error:
         return {**row, "refused": str(error)}
     verdict = found.verdict
