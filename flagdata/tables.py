@@ -126,8 +126,8 @@ def plain(quantity: Quantity | None) -> Any:
 
 def within(kind: Any, least: float = -math.inf, most: float = math.inf) -> Any:
     """Returns the type of numbers, or of quantities, that lie from `least` to `most`."""
-    bounds = {key: bound for key, bound in (("ge", least), ("le", most)) if math.isfinite(bound)}
-    return Annotated[kind, Meta(**bounds)]
+    low, high = (bound if math.isfinite(bound) else None for bound in (least, most))
+    return Annotated[kind, Meta(ge=low, le=high)]
 
 
 def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:

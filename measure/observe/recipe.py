@@ -317,7 +317,7 @@ def _material(form: Mapping[str, Any], folder: Path, *, where: str) -> Material 
         return None
     if name is not None and file is not None:
         raise UsageError("both name and file are given", where=where, fix="keep one of them")
-    base = named(name, where=where) if name is not None else material_file(folder / local_path(file))
+    base = named(name, where=where) if name is not None else material_file(folder / local_path(file or ""))
     thicken = form.get("thicken", 1.0)
     material = base.scaled(
         density=thicken,

@@ -399,8 +399,8 @@ def _wind(
         raise InputError(
             "no wind speed is given", where=where, fix="add speed = 4.0 (m/s), or a range; a log or samples"
         )
-    steady: dict[str, Any] = {"toward": 0.0, "vertical": 0.0}
-    return WindSpec(force=force, **(steady | {key: values[key] for key in _STEADY if key in values}))
+    steady: dict[str, Any] = {key: values[key] for key in _STEADY if key in values}
+    return WindSpec(force=force, **({"toward": 0.0, "vertical": 0.0} | steady))
 
 
 def _integrator(spec: IntegratorSpec, content: Mapping[str, Any], *, where: str) -> IntegratorSpec:
