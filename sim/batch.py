@@ -1,4 +1,4 @@
-"""Batches of flags through time: the one loop behind every simulation, whoever asks for it.
+"""Batches of flags through time: the one loop behind every simulation.
 
 Each caller states at which instants it looks (what comes before the first is the time to settle) and what a divergence
 leads to: figures that were published depend on both.
