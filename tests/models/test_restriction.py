@@ -193,7 +193,7 @@ def test_each_draw_has_its_own_statement_and_one_that_is_impossible_has_no_mass(
 def test_a_statement_that_the_model_cannot_use_is_refused() -> None:
     cases = [
         ("density", "0.01:0.10", "0.05 to 0.4"),
-        ("density", "0.5", "area weight of 0.5 kg/m²"),
+        ("density", "0.5", "area weight is 0.5 kg/m²"),
         ("bending_scale", "-4.0", "does not estimate the bending_scale"),
     ]
     refuse = unrefused(

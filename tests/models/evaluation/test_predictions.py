@@ -73,7 +73,7 @@ def test_other_files_and_missing_ones_are_named(tmp_path: Path) -> None:
     np.savez(tmp_path / "other.npz", a=np.ones(3))
     np.savez(tmp_path / "partial.npz", schema="flagdata.predictions/1", label="a")
     np.save(tmp_path / "array.npy", np.ones(3))
-    with pytest.raises(InputError, match="schema 'none'"):
+    with pytest.raises(InputError, match="schema is 'none'"):
         load(tmp_path / "other.npz")
     with pytest.raises(InputError, match="'targets' is missing"):
         load(tmp_path / "partial.npz")
