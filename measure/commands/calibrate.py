@@ -32,7 +32,9 @@ class CalibrateCommand(AsJson, Calibrating, Keeping):
     """The same on the command line, the reading model that is made beside, and what is written."""
 
     recordings: tuple[str, ...] = argument("Recordings of one flag; see `flagdata.calibrate`.", "RECORDING...")
-    flag_size: str | None = option(f"{LENGTHS}.", default=None, section=FLAG, metavar="LxH")
+    flag_size: str | None = option(  # pyright: ignore[reportIncompatibleVariableOverride]  refused with a fix
+        f"{LENGTHS}.", default=None, section=FLAG, metavar="LxH"
+    )
     only: str | None = option(
         "Do only one: weigh the cloth, in minutes of simulation, or calibrate the flag as an anemometer, as fast as "
         "its film is read.",
@@ -53,7 +55,7 @@ class CalibrateCommand(AsJson, Calibrating, Keeping):
         section=HOW,
         metavar="NAME|FOLDER|ID",
     )
-    workers: int | None = option(
+    workers: int | None = option(  # pyright: ignore[reportIncompatibleVariableOverride]  all cores
         "Number of processes that simulate; by default one for each core.", default=None, section=HOW, type=POSITIVE
     )
     report: Path | None = option(

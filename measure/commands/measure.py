@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 class MeasureCommand(AsJson, Measuring, Keeping):
     """The same on the command line: which of a lake's clips, what is refined, and what is written."""
 
-    source: str | None = argument("the film; see `flagdata.measure`.", "[SOURCE]", default=None)
+    source: str | None = argument(  # pyright: ignore[reportIncompatibleVariableOverride]  or a query
+        "The film; see `flagdata.measure`.", "[SOURCE]", default=None
+    )
     query: str | None = option(
         'SQL condition over clips, instead of SOURCE: "wind between 3 and 6".',
         default=None,

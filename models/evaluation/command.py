@@ -111,8 +111,9 @@ def evaluate(chosen: Evaluating) -> None:
     from models.evaluation.evaluation import as_document
 
     report.check(chosen.out, name=chosen.name)
-    source = flagdata.open(chosen.lake)
-    folder = chosen.cache if chosen.cache is not None else beside(lake_place(chosen.lake), ".inputs")
+    place = lake_place(str(chosen.lake))
+    source = flagdata.open(place)
+    folder = chosen.cache if chosen.cache is not None else beside(place, ".inputs")
     workers = chosen.workers or os.cpu_count() or 1
     desk = _Desk(source, chosen.dataset, chosen.at, folder, workers, chosen.seed, chosen.area_weight)
     evaluation = desk.evaluation(
