@@ -280,7 +280,10 @@ def test_the_base_model_is_led_on_only_to_where_less_is_left(
     def fitted(setting: At, fits: object) -> CoefficientFit:
         place = round(math.log2(setting.calibration.bending))
         return CoefficientFit(
-            active=(0, 1, 2), value=np.array([0.0, math.log(2), 0.0]), covariance=1e-2 * np.eye(3), left=left[place]
+            active=(0, 1, 2),
+            value=np.array([0.0, math.log(2), 0.0]),
+            covariance=1e-2 * np.eye(3),
+            remainder=left[place],
         )
 
     monkeypatch.setattr(run, "_looked_at", lambda setting: ())
