@@ -132,22 +132,22 @@ class NullBank:
         Raises:
             InputError: no experiment has that many segments, or too few kinds have such noise.
         """
-        plain: list[_GroupStatistics] = []
-        beside_gusts: list[_GroupStatistics] = []
+        plain: list[_NullGroups] = []
+        beside_gusts: list[_NullGroups] = []
         groups: list[_Group] = []
         for left_out in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
             evidence = Evidence.of(left_out.outside.statistics, left_out.outside.speeds, left_out.model.under(prior))
             for chosen in {tuple(sorted(group.tolist())): group for group in left_out.groups}.values():
                 picked, first_segment = evidence.select(chosen), left_out.outside.select(chosen[:1])
-                plain.append(_GroupStatistics.of(picked, self.columns, first_segment))
+                plain.append(_NullGroups.of(picked, self.columns, first_segment))
                 beside_gusts.append(
-                    _GroupStatistics.of(picked.freed(self.columns.index(GUSTS)), self.columns, first_segment)
+                    _NullGroups.of(picked.freed(self.columns.index(GUSTS)), self.columns, first_segment)
                 )
             first = left_out.groups[0]
             groups.append(_Group(evidence=evidence.select(first), own=left_out.outside.select(first[:1])))
-        with_gusts = Reference.of(_GroupStatistics.joined(beside_gusts), noise)
+        with_gusts = Reference.of(_NullGroups.joined(beside_gusts), noise)
         return Reference.of(
-            _GroupStatistics.joined(plain), noise, beside_gusts=with_gusts, columns=self.columns, groups=groups
+            _NullGroups.joined(plain), noise, beside_gusts=with_gusts, columns=self.columns, groups=groups
         )
 
 
@@ -160,7 +160,7 @@ class _Group:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _GroupStatistics(StatisticRows):
+class _NullGroups(StatisticRows):
     """Statistics of null groups.
 
     Attributes:
@@ -190,7 +190,7 @@ class _GroupStatistics(StatisticRows):
     damping: Floats
 
     @classmethod
-    def of(cls, evidence: Evidence, columns: tuple[str, ...], segment: Nulls) -> _GroupStatistics:
+    def of(cls, evidence: Evidence, columns: tuple[str, ...], segment: Nulls) -> _NullGroups:
         """Computes the statistics of one group, taken at its true calibration.
 
         A null's cloth is as far from the nominal one as cloths known to `PRIOR` are. Where the data's is known better,
@@ -230,7 +230,7 @@ class _Usual:
     pull_width: Floats
 
     @classmethod
-    def of(cls, groups: _GroupStatistics) -> _Usual:
+    def of(cls, groups: _NullGroups) -> _Usual:
         lines = None if groups.lines is None else Lines.of(groups.lines)
         powers = np.array([power(np.abs(swings), groups.damping) for swings in groups.swings.T])
         roots = _roots(groups, lines, powers)
@@ -250,7 +250,7 @@ class _Usual:
         part)."""
         return standardised(pulls, self.pull, self.pull_width)
 
-    def far(self, groups: _GroupStatistics) -> Floats:
+    def far(self, groups: _NullGroups) -> Floats:
         """Computes how far groups are from their mean, in deviations by each one's own tail, (group, column + 2 to
         11)."""
         distances = as_normal((_roots(groups, self.lines, self.powers) - self.centre) / self.width, self.degrees)
@@ -260,7 +260,7 @@ class _Usual:
         return distances
 
 
-def _roots(groups: _GroupStatistics, lines: Lines | None, powers: Floats) -> Floats:
+def _roots(groups: _NullGroups, lines: Lines | None, powers: Floats) -> Floats:
     swings = groups.swings * np.exp(-np.outer(groups.damping, powers))
     roots = np.c_[np.cbrt(np.c_[groups.shares, groups.left, groups.gained]), swings, groups.settled]
     return roots if lines is None or groups.lines is None else np.c_[roots, lines.standing_out(groups.lines)]
@@ -337,7 +337,7 @@ class Reference:
     @classmethod
     def of(
         cls,
-        statistics: _GroupStatistics,
+        statistics: _NullGroups,
         noise: float,
         *,
         beside_gusts: Reference | None = None,
@@ -457,9 +457,7 @@ class Reference:
         by_column: dict[int, list[Move]] = {}
         for move in shares:
             by_column.setdefault(move.column, []).append(move)
-        return tuple(
-            (moves_of[0], float(np.mean([shares[move] for move in moves_of]))) for moves_of in by_column.values()
-        )
+        return tuple((signs[0], float(np.mean([shares[move] for move in signs]))) for signs in by_column.values())
 
     @cached_property
     def _acting(self) -> dict[Move, Floats]:
@@ -469,18 +467,15 @@ class Reference:
             if self.suspected is None or (move.column, move.sign) == self.suspected:
                 acted = [group.evidence.moved(move.column, APPEARS * move.strength) for group in self.groups]
                 statistics_of[move] = np.array(
-                    [
-                        self._statistic_of_group(evidence, group.own)
-                        for evidence, group in zip(acted, self.groups, strict=True)
-                    ]
+                    [self._statistic(evidence, group.own) for evidence, group in zip(acted, self.groups, strict=True)]
                 )
         return statistics_of
 
-    def _statistic_of_group(self, evidence: Evidence, segment: Nulls) -> float:
+    def _statistic(self, evidence: Evidence, segment: Nulls) -> float:
         """Computes the test's statistic of a null group."""
         usual = self.usual[int(segment.numerics[0])]
         if self.suspected is None:
-            return float(usual.far(_GroupStatistics.of(evidence, self.columns, segment)).max())
+            return float(usual.far(_NullGroups.of(evidence, self.columns, segment)).max())
         return float(directed(usual.pulled(pulled(evidence)[None]), *self.suspected)[0])
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> Floats:
