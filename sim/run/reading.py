@@ -399,8 +399,9 @@ def _wind(
         raise InputError(
             "no wind speed is given", where=where, fix="add speed = 4.0 (m/s), or a range; a log or samples"
         )
-    steady: dict[str, Any] = {key: values[key] for key in _STEADY if key in values}
-    return WindSpec(force=force, **({"toward": 0.0, "vertical": 0.0} | steady))
+    steady: dict[str, Any] = {"toward": 0.0, "vertical": 0.0}
+    steady |= {key: values[key] for key in _STEADY if key in values}
+    return WindSpec(force=force, **steady)
 
 
 def _integrator(spec: IntegratorSpec, content: Mapping[str, Any], *, where: str) -> IntegratorSpec:
