@@ -93,14 +93,14 @@ CASES = [
         files={"a.log": network(36, 37)},
     ),
     Case(
-        "over_ground.py",
+        "samples/platform.py",
         "leave out --azimuth",
         "ingest a.log --platform fixed --azimuth 30",
         ("ingest a.log --platform fixed",),
         files={"a.log": network(36, reference="f8")},
     ),
     Case(
-        "over_ground.py",
+        "samples/platform.py",
         "leave out --platform",
         "ingest a.nmea --platform fixed",
         ("ingest a.nmea",),

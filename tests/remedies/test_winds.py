@@ -237,14 +237,14 @@ CASES = [
         files={"a.nmea": STREAM},
     ),
     Case(
-        "over_ground.py",
+        "samples/platform.py",
         "if the sensor is on a mast, give --platform fixed",
         "ingest a.nmea",
         ("ingest a.nmea --platform fixed",),
         files={"a.nmea": STREAM},
     ),
     Case(
-        "over_ground.py",
+        "samples/platform.py",
         "add --platform fixed, or leave it out",
         "ingest a.nmea --azimuth 30",
         ("ingest a.nmea --azimuth 30 --platform fixed", OR, "ingest a.nmea"),
