@@ -12,8 +12,8 @@ from pathlib import Path
 import av
 import numpy as np
 from av.video.frame import VideoFrame
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.lake.meshes import MeshSequence
 from flagdata.rng import stream
 from measure.workers import single_threaded
@@ -65,14 +65,12 @@ def write_film(
         container.mux(video.encode())
 
 
-def _rendered(
-    sequence: MeshSequence, zeta: RenderParameters, *, seed: int, workers: int
-) -> Iterator[NDArray[np.uint8]]:
+def _rendered(sequence: MeshSequence, zeta: RenderParameters, *, seed: int, workers: int) -> Iterator[UInt8Array]:
     """Pictures (n, 1.5 height, width) in YUV 4:2:0 with noise, in order, a chunk at a time."""
     firsts = range(0, len(sequence), _CHUNK)
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=single_threaded) as pool:
         # No more than two a worker are waited for, so that finished chunks do not pile up.
-        waiting: list[Future[NDArray[np.uint8]]] = []
+        waiting: list[Future[UInt8Array]] = []
         for first in firsts:
             if len(waiting) >= 2 * workers:
                 yield waiting.pop(0).result()
@@ -81,7 +79,7 @@ def _rendered(
             yield future.result()
 
 
-def _chunk(sequence: MeshSequence, zeta: RenderParameters, first: int, seed: int) -> NDArray[np.uint8]:
+def _chunk(sequence: MeshSequence, zeta: RenderParameters, first: int, seed: int) -> UInt8Array:
     meshes = Meshes.flag(sequence, heading=0.0)
     pictures = Raster().part(meshes, zeta, first, min(first + _CHUNK, len(meshes))).numpy()
     rng = stream(seed, "demo", "camera", first)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingRegressor
 
+from flagdata.arrays import Float32Array, FloatArray
 from flagdata.errors import InputError
 from models.ridge import require_table
 
@@ -36,12 +37,12 @@ class Boosting:
     levels: tuple[float, ...]
     features: int
 
-    def predict(self, features: NDArray[np.floating]) -> NDArray[np.float64]:
+    def predict(self, features: NDArray[np.floating]) -> FloatArray:
         """Estimates the mean of the targets of clips with features (n, f): (n, t)."""
         self._require(features)
         return np.stack([model.predict(features) for model in self.means], axis=1)
 
-    def predict_quantiles(self, features: NDArray[np.floating]) -> NDArray[np.float64]:
+    def predict_quantiles(self, features: NDArray[np.floating]) -> FloatArray:
         """Estimates quantiles of the targets: (n, level, t), ascending.
 
         Ensembles of neighbouring levels know nothing of each other and may cross; sorting them never makes a quantile
@@ -51,7 +52,7 @@ class Boosting:
         quantiles = [[model.predict(features) for model in models] for models in self.quantiles]
         return np.sort(np.asarray(quantiles).transpose(2, 1, 0), axis=1)
 
-    def samples(self, features: NDArray[np.floating], *, count: int) -> NDArray[np.float32]:
+    def samples(self, features: NDArray[np.floating], *, count: int) -> Float32Array:
         """Returns `count` equally probable values of each target by itself: (n, count, t) float32.
 
         They stand at the levels (i + ½)/count of the quantile function, linear between the fitted levels and constant
@@ -113,7 +114,7 @@ def fit_boosting(
     if len(ascending) < 2 or ascending != tuple(sorted(set(ascending))) or not 0 < ascending[0] < ascending[-1] < 1:
         raise InputError(f"the levels are {ascending}", fix="give at least two between 0 and 1, ascending")
 
-    def fitted(target: NDArray[np.float64], loss: str, level: float | None) -> HistGradientBoostingRegressor:
+    def fitted(target: FloatArray, loss: str, level: float | None) -> HistGradientBoostingRegressor:
         return HistGradientBoostingRegressor(
             loss=loss,
             quantile=level,

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 
 LEAST_SCALE = 0.05
@@ -101,7 +101,7 @@ class Cropping:
         side = min(height, width)
         return Crop(first=first, top=(height - side) // 2, left=(width - side) // 2, side=side, mirrored=False)
 
-    def cut(self, film: NDArray[np.uint8], crop: Crop) -> Tensor:
+    def cut(self, film: UInt8Array, crop: Crop) -> Tensor:
         """Cuts the part out of a film (frames, height, width): (1, frames, size, size), uint8 where nothing was
         resized, else float32 (bilinear; averaging where it shrinks)."""
         part = film[

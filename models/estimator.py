@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.errors import CorruptError, FlagdataError, InputError
 from flagdata.rng import torch_generator
 from models.crops import Cropping
@@ -47,16 +47,16 @@ class Estimates:
     """
 
     targets: tuple[Target, ...]
-    draws: NDArray[np.float32]
-    summary: NDArray[np.float32]
-    unlike: NDArray[np.float64] | None
+    draws: Float32Array
+    summary: Float32Array
+    unlike: FloatArray | None
 
     @property
-    def mean(self) -> NDArray[np.float64]:
+    def mean(self) -> FloatArray:
         """(n, target)."""
         return self.draws.mean(axis=1, dtype=np.float64)
 
-    def interval(self, share: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def interval(self, share: float) -> tuple[FloatArray, FloatArray]:
         """Computes the ends of the central interval with this share of each distribution: two of (n, target).
 
         Raises:
@@ -113,7 +113,7 @@ class Estimator:
             learner.to(device)
         return self
 
-    def inputs(self, clips: NDArray[np.uint8]) -> Tensor:
+    def inputs(self, clips: UInt8Array) -> Tensor:
         """Computes what the networks take, of clips (n, frames, height, width) gray: the largest square about the
         middle.
 

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.errors import InputError
 
 
-def shrunk_covariance(points: NDArray[np.floating]) -> tuple[NDArray[np.float64], float]:
+def shrunk_covariance(points: NDArray[np.floating]) -> tuple[FloatArray, float]:
     """Returns the covariance (d, d) of points (n, d), drawn towards m·1, and by how much, from 0 to 1.
 
     Σ* = ρ m 1 + (1 − ρ) S with S = XᵀX/n, m = tr S/d, ρ = b²/d², d² = ‖S − m 1‖²/d and b² = min(d²,
@@ -41,13 +42,13 @@ def shrunk_covariance(points: NDArray[np.floating]) -> tuple[NDArray[np.float64]
     return shrinkage * level * np.eye(d) + (1 - shrinkage) * sample, shrinkage
 
 
-def whitening(covariance: NDArray[np.floating], *, least: float) -> NDArray[np.float64]:
+def whitening(covariance: NDArray[np.floating], *, least: float) -> FloatArray:
     """Returns W (d, d) with WᵀW the inverse of a covariance whose eigenvalues are raised to `least`."""
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray(vectors.T / np.sqrt(np.maximum(values, least))[:, None])
 
 
-def conformal_p(reference: NDArray[np.floating], scores: NDArray[np.floating] | float) -> NDArray[np.float64]:
+def conformal_p(reference: NDArray[np.floating], scores: NDArray[np.floating] | float) -> FloatArray:
     """Returns p of scores (…): (1 + reference scores that are at least as large)/(their number + 1).
 
     Exact for a score that is exchangeable with the reference ones, whatever their distribution.
@@ -69,9 +70,9 @@ class Familiarity:
         reference: (n,), ascending distances of validation clips, which were not trained on.
     """
 
-    centre: NDArray[np.float64]
-    whitening: NDArray[np.float64]
-    reference: NDArray[np.float64]
+    centre: FloatArray
+    whitening: FloatArray
+    reference: FloatArray
 
     @classmethod
     def of(cls, training: NDArray[np.floating], validation: NDArray[np.floating]) -> Familiarity:
@@ -87,7 +88,7 @@ class Familiarity:
         values, vectors = np.linalg.eigh(covariance)
         if values[0] <= 0:
             raise InputError("all training summaries are equal", fix="train the network, or give more clips")
-        deviations: NDArray[np.float64] = np.sqrt(values)
+        deviations: FloatArray = np.sqrt(values)
         cloud = cls(
             centre=np.asarray(training, dtype=np.float64).mean(axis=0),
             whitening=np.diag(1 / deviations) @ vectors.T,
@@ -100,7 +101,7 @@ class Familiarity:
             )
         return cls(centre=cloud.centre, whitening=cloud.whitening, reference=reference)
 
-    def distance(self, summaries: NDArray[np.floating]) -> NDArray[np.float64]:
+    def distance(self, summaries: NDArray[np.floating]) -> FloatArray:
         """Mahalanobis distance of summaries (n, d) from the training clips: (n,), infinite where not finite."""
         x = np.asarray(summaries, dtype=np.float64)
         if x.ndim != 2 or x.shape[1] != len(self.centre):
@@ -109,7 +110,7 @@ class Familiarity:
         offset = np.where(finite[:, None], x, self.centre) - self.centre
         return np.where(finite, np.linalg.norm(offset @ self.whitening.T, axis=1), np.inf)
 
-    def p_value(self, summaries: NDArray[np.floating]) -> NDArray[np.float64]:
+    def p_value(self, summaries: NDArray[np.floating]) -> FloatArray:
         """Computes the conformal p of summaries (n, d): (1 + validation clips at least as far)/(validation clips + 1),
         (n,).
         """
@@ -136,16 +137,16 @@ class Familiarity:
             )
         return float(self.reference[n - exceeded])
 
-    def unfamiliar(self, summaries: NDArray[np.floating], *, false_alarm: float) -> NDArray[np.bool_]:
+    def unfamiliar(self, summaries: NDArray[np.floating], *, false_alarm: float) -> BoolArray:
         """Masks the summaries (n, d) that lie outside: beyond `threshold`, which is p ≤ false_alarm: (n,)."""
         return self.distance(summaries) > self.threshold(false_alarm)
 
-    def arrays(self) -> dict[str, NDArray[np.float64]]:
+    def arrays(self) -> dict[str, FloatArray]:
         """Returns all of its state by name, as it can be stored."""
         return {"centre": self.centre, "whitening": self.whitening, "reference": self.reference}
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Familiarity:
+    def of_arrays(cls, arrays: Mapping[str, FloatArray]) -> Familiarity:
         """Rebuilds it from what `arrays` gave.
 
         Raises:

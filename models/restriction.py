@@ -25,9 +25,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.stated import Stated
 from models.mixture import Mixture
@@ -56,12 +56,12 @@ class Known:
     """
 
     name: str
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    sigma: NDArray[np.float64]
+    low: FloatArray
+    high: FloatArray
+    sigma: FloatArray
 
     @classmethod
-    def stated(cls, name: str, statement: Stated, *, scale: NDArray[np.float64]) -> Known:
+    def stated(cls, name: str, statement: Stated, *, scale: FloatArray) -> Known:
         """States a quantity that is `scale` (n, m) times the one of the network."""
         low, high, sigma = (np.asarray(end / scale) for end in (statement.low, statement.high, statement.sigma))
         return cls(name=name, low=low, high=high, sigma=sigma)
@@ -101,7 +101,7 @@ class Known:
         """Whether values are stated, without uncertainty."""
         return bool((self.low == self.high).all() and not self.sigma.any())
 
-    def reach(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def reach(self) -> tuple[FloatArray, FloatArray]:
         """Returns (n, m) ends of where the quantity can lie."""
         return self.low - REACH * self.sigma, self.high + REACH * self.sigma
 
@@ -240,7 +240,7 @@ class _Ends:
         least, most = torch.tensor([[t.low, t.high] for t in targets], dtype=torch.float64).to(like).T
         return cls(least=least, most=most, low=low, high=high)
 
-    def tensor(self, values: NDArray[np.float64]) -> Tensor:
+    def tensor(self, values: FloatArray) -> Tensor:
         return torch.from_numpy(values).to(self.low)
 
     def inside(self, values: Tensor) -> Tensor:

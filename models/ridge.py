@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 
 PENALTIES = tuple(float(10.0**k) for k in np.arange(-4, 3.5, 0.5))
@@ -28,13 +29,13 @@ class Ridge:
         penalty: (t,), chosen for each target, a multiple of the number of clips.
     """
 
-    centre: NDArray[np.float64]
-    scale: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    intercept: NDArray[np.float64]
-    penalty: NDArray[np.float64]
+    centre: FloatArray
+    scale: FloatArray
+    weights: FloatArray
+    intercept: FloatArray
+    penalty: FloatArray
 
-    def predict(self, features: NDArray[np.floating]) -> NDArray[np.float64]:
+    def predict(self, features: NDArray[np.floating]) -> FloatArray:
         """Estimates the targets of clips with features (n, f): (n, t)."""
         if features.ndim != 2 or features.shape[1] != len(self.centre):
             raise InputError(
@@ -43,12 +44,12 @@ class Ridge:
             )
         return (features - self.centre) / self.scale @ self.weights + self.intercept
 
-    def arrays(self) -> dict[str, NDArray[np.float64]]:
+    def arrays(self) -> dict[str, FloatArray]:
         """Returns all of its state by name, as it can be stored."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Ridge:
+    def of_arrays(cls, arrays: Mapping[str, FloatArray]) -> Ridge:
         """Rebuilds it from what `arrays` gave."""
         return cls(**{field.name: np.asarray(arrays[field.name]) for field in fields(cls)})
 
@@ -89,7 +90,7 @@ def fit_ridge(features: NDArray[np.floating], targets: NDArray[np.floating], *, 
     )
 
 
-def require_table(features: NDArray[np.float64], targets: NDArray[np.float64], group: NDArray[np.integer]) -> None:
+def require_table(features: FloatArray, targets: FloatArray, group: NDArray[np.integer]) -> None:
     """Checks that features (n, f), targets (n, t) and groups (n,) are of the same clips, and finite.
 
     Raises:
@@ -105,7 +106,7 @@ def require_table(features: NDArray[np.float64], targets: NDArray[np.float64], g
         raise InputError("features or targets are not finite", where=f"clip {clip}", fix="leave that clip out")
 
 
-def _path(x: NDArray[np.float64], y: NDArray[np.float64]) -> list[Ridge]:
+def _path(x: FloatArray, y: FloatArray) -> list[Ridge]:
     """Returns the ridge of each of `PENALTIES`, by one singular value decomposition."""
     centre, spread = x.mean(axis=0), x.std(axis=0)
     scale = np.where(spread > 1e-12 * (1 + np.abs(centre)), spread, 1.0)

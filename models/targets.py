@@ -18,9 +18,9 @@ from enum import StrEnum
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UnknownNameError
 
 _MARGIN = 0.005
@@ -136,7 +136,7 @@ TARGETS = {**_OF_FLAGS, **_OF_FLAGS_OF_ANY_FABRIC, **_OF_FLAGS_OUTDOORS, **_OF_H
 """By the names that recipes know them by."""
 
 
-def truth(parameters: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -> NDArray[np.float64]:
+def truth(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> FloatArray:
     """Computes the targets of clips from their parameters: (n, target), NaN where a clip does not know them.
 
     Args:
@@ -151,7 +151,7 @@ def truth(parameters: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -
     return np.stack([_target_values(parameters, name) for name in names], axis=1)
 
 
-def _target_values(parameters: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np.float64]:
+def _target_values(parameters: Mapping[str, FloatArray], name: str) -> FloatArray:
     if name not in TARGETS:
         raise UnknownNameError.of("target", name, TARGETS)
     quantity = TARGETS[name].name
@@ -219,7 +219,7 @@ class Scaling:
         margin = (high - low) * _MARGIN
         return low - margin, high + margin
 
-    def beyond(self, values: NDArray[np.float64]) -> tuple[str, ...]:
+    def beyond(self, values: FloatArray) -> tuple[str, ...]:
         """Describes, for each target of which some of the values (n, target) lie beyond its widened range, how many and
         how far.
 
@@ -238,7 +238,7 @@ class Scaling:
                 )
         return tuple(texts)
 
-    def check(self, values: NDArray[np.float64], *, where: str) -> None:
+    def check(self, values: FloatArray, *, where: str) -> None:
         """Checks that all values (n, target) that are to be learned lie within their ranges.
 
         Raises:
@@ -253,7 +253,7 @@ class Scaling:
             "; ".join(beyond), where=where, fix=f"{fix}, or train on a data set whose values lie within the range"
         )
 
-    def _covers(self, name: str, values: NDArray[np.float64]) -> bool:
+    def _covers(self, name: str, values: FloatArray) -> bool:
         """Returns whether the target of that name is another one of the same quantity and cloth, whose range holds all
         of the values."""
         wanted = TARGETS[name]

@@ -12,9 +12,9 @@ from enum import StrEnum
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import ErrorKind, FlagdataError
 from sim.integrate import Integrator
 from sim.state import SPEED_LIMIT, State
@@ -98,9 +98,7 @@ class Batch:
                     self._check()
             yield self.state
 
-    def positions(
-        self, numbers: range, rate: float, *, look: Callable[[State], object] | None = None
-    ) -> NDArray[np.float64]:
+    def positions(self, numbers: range, rate: float, *, look: Callable[[State], object] | None = None) -> FloatArray:
         """Returns (frame, vertex, 3, member) [m] at these numbers of periods after the start; see `states`.
 
         The periods before the first are simulated one by one and not kept.
@@ -108,7 +106,7 @@ class Batch:
         Args:
             look: called with each state that is kept.
         """
-        frames: list[NDArray[np.float64]] = []
+        frames: list[FloatArray] = []
         for number, state in enumerate(self.states(range(numbers.stop), rate)):
             if number >= numbers.start:
                 frames.append(state.position.double().cpu().numpy().copy())

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError, UsageError
 from sim import on_mesh
 from sim.material import Material
@@ -85,10 +85,10 @@ class Cloth:
         if not materials:
             raise InputError("the batch has no members", where="cloth", fix="give one material for each member")
 
-        def real(values: NDArray[np.float64]) -> Tensor:
+        def real(values: FloatArray) -> Tensor:
             return torch.tensor(values, dtype=dtype, device=device)
 
-        def index(values: NDArray[np.int64]) -> Tensor:
+        def index(values: IntArray) -> Tensor:
             return torch.tensor(values, dtype=torch.int64, device=device)
 
         tables: dict[bytes, int] = {}
@@ -177,7 +177,7 @@ class Cloth:
         return self.mass.device
 
 
-def incidence(elements: NDArray[np.int64], vertex_count: int) -> NDArray[np.int64]:
+def incidence(elements: IntArray, vertex_count: int) -> IntArray:
     """Lists which corners of which elements meet at each vertex.
 
     Args:

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.errors import InputError
 from flagdata.tables import NotNegative, Positive
 from sim.cloth import Cloth
@@ -71,7 +71,7 @@ class ContactPairs:
     face: Tensor
 
 
-def layers(mesh: Mesh, contact: Contact) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def layers(mesh: Mesh, contact: Contact) -> tuple[FloatArray, FloatArray]:
     """Layers at rest: (face, 2) centres, and (face,) how far from them another layer begins [m]."""
     corners = mesh.rest[mesh.faces]
     centre = corners.mean(axis=1)
@@ -79,14 +79,14 @@ def layers(mesh: Mesh, contact: Contact) -> tuple[NDArray[np.float64], NDArray[n
     return centre, radius + _NEIGHBOURHOOD * contact.thickness
 
 
-def neighbours(mesh: Mesh, contact: Contact) -> NDArray[np.bool_]:
+def neighbours(mesh: Mesh, contact: Contact) -> BoolArray:
     """Masks pairs (vertex, face) that are too close at rest to count as different layers."""
     centre, separation = layers(mesh, contact)
     distance = np.linalg.norm(mesh.rest[:, None] - centre, axis=2)
     return distance < separation
 
 
-def candidates(cloth: Cloth, contact: Contact, position: Tensor, adjacent: NDArray[np.bool_]) -> ContactPairs:
+def candidates(cloth: Cloth, contact: Contact, position: Tensor, adjacent: BoolArray) -> ContactPairs:
     """Finds all pairs closer than the thickness by their bounding spheres, by looking at every pair of every member.
 
     Args:

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
-Floats = NDArray[np.float64]
+from flagdata.arrays import FloatArray, IntArray
+
+Floats = FloatArray
 
 _SAME = 1e-6
 """Share of the cloth's size within which vertices are at an end, or in one row."""
@@ -37,8 +38,8 @@ class Ends:
         weights: (end, k) of their values.
     """
 
-    vertices: NDArray[np.int64]
-    within: NDArray[np.int64]
+    vertices: IntArray
+    within: IntArray
     weights: Floats
 
     def continued(self, field: Tensor) -> Tensor:
@@ -59,7 +60,7 @@ def ends_of(rest: Floats) -> Ends:
     u = rest[:, 0]
     at_end = (u - u.min() <= _SAME * size[0]) | (u.max() - u <= _SAME * size[0])
     inner = np.flatnonzero(~at_end)
-    ends: list[tuple[int, NDArray[np.int64], Floats]] = []
+    ends: list[tuple[int, IntArray, Floats]] = []
     for vertex in np.flatnonzero(at_end).tolist():
         offsets = rest[inner] - rest[vertex]
         row = np.flatnonzero(np.abs(offsets[:, 1]) <= _SAME * size[1])

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 
 ARCSIM_STIFFNESS = 1e3
@@ -56,7 +56,7 @@ class Handles:
     def rigid(self) -> bool:
         return math.isinf(self.stiffness)
 
-    def offset(self, time: float) -> NDArray[np.float64]:
+    def offset(self, time: float) -> FloatArray:
         """Interpolates the displacement of the anchors at a time, (3,) [m]."""
         if len(self.times) == 1:
             return np.array(self.offsets[0])
@@ -64,7 +64,7 @@ class Handles:
         return np.array([np.interp(time, self.times, keys[:, axis]) for axis in range(3)])
 
 
-def corners(rest: NDArray[np.float64]) -> tuple[int, int]:
+def corners(rest: FloatArray) -> tuple[int, int]:
     """Finds the two hoist corners of a flag: the lowest and the highest vertex of those with the smallest u.
 
     Args:
@@ -74,14 +74,14 @@ def corners(rest: NDArray[np.float64]) -> tuple[int, int]:
     return hoist[0], hoist[-1]
 
 
-def full_hoist(rest: NDArray[np.float64]) -> tuple[int, ...]:
+def full_hoist(rest: FloatArray) -> tuple[int, ...]:
     """Lists all vertices of the hoist (smallest u), from low v to high v."""
     width = float(np.ptp(rest[:, 0]))
     edge = np.flatnonzero(rest[:, 0] <= rest[:, 0].min() + 1e-9 * width)
     return tuple(int(v) for v in edge[np.argsort(rest[edge, 1], kind="stable")])
 
 
-def top_corners(rest: NDArray[np.float64]) -> tuple[int, int]:
+def top_corners(rest: FloatArray) -> tuple[int, int]:
     """Finds the two upper corners of a hanging cloth: smallest and largest u of those with the largest v."""
     height = float(np.ptp(rest[:, 1]))
     edge: Sequence[int] = np.flatnonzero(rest[:, 1] >= rest[:, 1].max() - 1e-9 * height).tolist()

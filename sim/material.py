@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.recipes import Shelf, parsed
 
@@ -48,8 +49,8 @@ class Material:
     name: str
     source: str
     density: float
-    stretching: NDArray[np.float64]
-    bending: NDArray[np.float64]
+    stretching: FloatArray
+    bending: FloatArray
     damping: float = 0.25e-3
 
     def __post_init__(self) -> None:
@@ -67,7 +68,7 @@ class Material:
     def _error(self, message: str, fix: str) -> InputError:
         return InputError(message, where=f"material {self.name!r}", fix=fix)
 
-    def _table(self, values: ArrayLike, shape: tuple[int, int], table_name: str) -> NDArray[np.float64]:
+    def _table(self, values: ArrayLike, shape: tuple[int, int], table_name: str) -> FloatArray:
         try:
             table = np.array(values, dtype=np.float64)
         except (TypeError, ValueError, OverflowError) as error:

@@ -7,8 +7,8 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from sim.ends import Ends, ends_of
 
@@ -30,8 +30,8 @@ class Mesh:
             or faces of opposed orientation, vertices that no face uses.
     """
 
-    rest: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    rest: FloatArray
+    faces: IntArray
 
     def __post_init__(self) -> None:
         rest = np.array(self.rest, dtype=np.float64)
@@ -94,7 +94,7 @@ class Mesh:
             )
 
     @cached_property
-    def _doubled_areas(self) -> NDArray[np.float64]:
+    def _doubled_areas(self) -> FloatArray:
         a, b, c = (self.rest[self.faces[:, i]] for i in range(3))
         return (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
 
@@ -103,19 +103,19 @@ class Mesh:
         return len(self.rest)
 
     @cached_property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> FloatArray:
         """(face,) rest areas [m²]."""
         return self._doubled_areas / 2
 
     @cached_property
-    def vertex_areas(self) -> NDArray[np.float64]:
+    def vertex_areas(self) -> FloatArray:
         """(vertex,) a third of the rest areas around each vertex [m²]; times the density, the lumped mass."""
         return np.bincount(
             self.faces.ravel(), weights=np.repeat(self.areas / 3, 3), minlength=self.vertex_count
         ).astype(np.float64)
 
     @cached_property
-    def gradients(self) -> NDArray[np.float64]:
+    def gradients(self) -> FloatArray:
         """(face, 2, 3) derivatives of a linear field: ∂f/∂(u, v) = gradients @ (its three corner values) [1/m]."""
         a, b, c = (self.rest[self.faces[:, i]] for i in range(3))
         edges = np.stack([b - a, c - a], axis=2)
@@ -124,13 +124,13 @@ class Mesh:
         return np.einsum("fji,jc->fic", inverse, differences)
 
     @cached_property
-    def arms(self) -> NDArray[np.float64]:
+    def arms(self) -> FloatArray:
         """(face, 3, 2) corners relative to the face's centroid, at rest [m]."""
         corners = self.rest[self.faces]
         return corners - corners.mean(axis=1, keepdims=True)
 
     @cached_property
-    def hinges(self) -> NDArray[np.int64]:
+    def hinges(self) -> IntArray:
         """(hinge, 4) inner edges as [i, j, k, l]: the edge runs i→j in face (i, j, k) and j→i in face (j, i, l)."""
         start = self.faces.ravel()
         end = np.roll(self.faces, -1, axis=1).ravel()
@@ -140,7 +140,7 @@ class Mesh:
         return np.array(inner, dtype=np.int64).reshape(-1, 4)
 
     @cached_property
-    def boundary(self) -> NDArray[np.int64]:
+    def boundary(self) -> IntArray:
         """Sorted indices of the vertices on an edge with one face."""
         forward = np.stack([self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()], axis=1)
         pairs, counts = np.unique(np.sort(forward, axis=1), axis=0, return_counts=True)
@@ -152,24 +152,24 @@ class Mesh:
         return ends_of(self.rest)
 
     @cached_property
-    def hinge_lengths(self) -> NDArray[np.float64]:
+    def hinge_lengths(self) -> FloatArray:
         """(hinge,) rest lengths of the inner edges [m]."""
         edge = self.rest[self.hinges[:, 1]] - self.rest[self.hinges[:, 0]]
         return np.hypot(edge[:, 0], edge[:, 1])
 
     @cached_property
-    def hinge_areas(self) -> NDArray[np.float64]:
+    def hinge_areas(self) -> FloatArray:
         """(hinge,) rest areas of both faces of a hinge, summed [m²]."""
         i, j, k, l = self.hinges.T  # noqa: E741  the four corners as in `hinges`
         return _areas(self.rest, i, j, k) + _areas(self.rest, j, i, l)
 
     @cached_property
-    def hinge_directions(self) -> NDArray[np.float64]:
+    def hinge_directions(self) -> FloatArray:
         """(hinge,) directions of the inner edges in the cloth, from u, folded to [0, π/2]."""
         edge = np.abs(self.rest[self.hinges[:, 1]] - self.rest[self.hinges[:, 0]])
         return np.arctan2(edge[:, 1], edge[:, 0])
 
-    def components(self) -> NDArray[np.int64]:
+    def components(self) -> IntArray:
         """Labels the connected piece that each vertex belongs to, (vertex,)."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
@@ -180,9 +180,7 @@ class Mesh:
         return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _areas(
-    rest: NDArray[np.float64], i: NDArray[np.int64], j: NDArray[np.int64], k: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _areas(rest: FloatArray, i: IntArray, j: IntArray, k: IntArray) -> FloatArray:
     e, f = rest[j] - rest[i], rest[k] - rest[i]
     return (e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]) / 2
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from sim import handles as held
 from sim.air import AirForce, QuadraticNormal
@@ -49,7 +49,7 @@ class Scene:
     """
 
     mesh: Mesh
-    position: NDArray[np.float64]
+    position: FloatArray
     material: Material
     handles: Handles
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -92,7 +92,7 @@ class Scene:
             )
 
 
-def upright(mesh: Mesh) -> NDArray[np.float64]:
+def upright(mesh: Mesh) -> FloatArray:
     """Places the mesh in the y–z plane, u along y and v along z: across a wind in +x, as the reference scenes start.
 
     Returns:
@@ -102,9 +102,7 @@ def upright(mesh: Mesh) -> NDArray[np.float64]:
     return np.stack([zero, mesh.rest[:, 0], mesh.rest[:, 1]], axis=1)
 
 
-def roughened(
-    flat: NDArray[np.float64], handles: Handles, rng: np.random.Generator, sigma: float
-) -> NDArray[np.float64]:
+def roughened(flat: FloatArray, handles: Handles, rng: np.random.Generator, sigma: float) -> FloatArray:
     """Returns a start (vertex, 3) [m]: a flat one, with normal noise of deviation `sigma` [m] on what nothing holds."""
     noise = rng.normal(0.0, sigma, flat.shape)
     noise[list(handles.vertices)] = 0.0
@@ -184,7 +182,7 @@ def assemble(
                 fix="simulate such scenes in batches of their own",
             )
 
-    def real(values: NDArray[np.float64]) -> torch.Tensor:
+    def real(values: FloatArray) -> torch.Tensor:
         return torch.tensor(values, dtype=dtype, device=device)
 
     cloth = Cloth.build(

@@ -10,9 +10,9 @@ from typing import Protocol
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import BoolArray
 from flagdata.errors import ErrorKind, UsageError
 from sim import bending, contact, inertia, membrane
 from sim.air import AirForce
@@ -296,7 +296,7 @@ class System:
         return total + contact.force(self.cloth, self.contact, position, velocity, pairs)
 
     @cached_property
-    def neighbours(self) -> NDArray[np.bool_]:
+    def neighbours(self) -> BoolArray:
         """(vertex, face) whether contact passes over them: too close at rest to be different layers."""
         if self.contact is None:
             return np.ones((self.cloth.mesh.vertex_count, len(self.cloth.faces)), dtype=bool)

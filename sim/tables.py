@@ -28,9 +28,9 @@ from enum import StrEnum
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from sim.material import Material
 
 CURVATURE_SPACING = 5.0
@@ -60,7 +60,7 @@ GRIDS = {
 }
 
 
-def sample_stretching(table: NDArray[np.float64], evaluation: Evaluation) -> NDArray[np.float64]:
+def sample_stretching(table: FloatArray, evaluation: Evaluation) -> FloatArray:
     """Samples the stretching stiffness at the nodes of the evaluation's grid.
 
     Args:
@@ -122,7 +122,7 @@ def stretching_stiffness(
     return total[..., 0], total[..., 1], total[..., 2], total[..., 3]
 
 
-def bending_segments(materials: Sequence[Material]) -> NDArray[np.float64]:
+def bending_segments(materials: Sequence[Material]) -> FloatArray:
     """Computes the bending rows as coefficients of 1, c, (c − 1)₊, (c − 2)₊, (c − 3)₊ with c the curvature in columns.
 
     A piecewise linear function written as a sum vectorises where an indexed look-up does not.
@@ -158,7 +158,7 @@ def bending_stiffness(curvature: Tensor, segments: Tensor, rows: Tensor, evaluat
     return total.clamp(min=0)
 
 
-def direction_rows(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+def direction_rows(directions: FloatArray) -> FloatArray:
     """Weighs the table's rows (0, 45, 90°) for edges in these directions.
 
     Args:

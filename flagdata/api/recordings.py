@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
 from flagdata.arguments import checked
+from flagdata.arrays import UInt8Array
 from flagdata.dataset.source import AnyLake, opened
 from flagdata.errors import InputError, NotFoundError
 from flagdata.examples import example_of
@@ -145,7 +145,7 @@ def motion(
 
     film = source if isinstance(source, Frames) else _film(source, lake=lake, at=at)
 
-    def timed() -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    def timed() -> Iterator[tuple[int, UInt8Array]]:
         for time, image in film.frames(start, film.duration if end is None else end):
             yield round(time * NANOSECONDS), image
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.errors import InputError, RefusedError
 from flagdata.findings import Finding
 from flagdata.signals import Sensor
@@ -24,7 +25,7 @@ from measure.film.similarity import FlagSize
 from measure.film.source import Subject
 from measure.gate.reasons import REASONS
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 ANSWER = 1
 """Raised when the same recordings give another reading model."""
@@ -58,7 +59,7 @@ class Recording:
     findings: tuple[Finding, ...] = ()
 
     @property
-    def usable(self) -> NDArray[np.bool_]:
+    def usable(self) -> BoolArray:
         """(w,) windows with all their frames beside which the log is not silent."""
         starts = self.features.starts
         return self.features.whole & self.log.covers(starts, starts + self.features.layout.step)
@@ -249,7 +250,7 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
     )
 
 
-def _check_wind(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]]) -> None:
+def _check_wind(recordings: Sequence[Recording], usable: Sequence[BoolArray]) -> None:
     every = np.concatenate([one.winds(0.0)[own] for one, own in zip(recordings, usable, strict=True)])
     if every.std() < STEADY * every.mean():
         raise RefusedError(
@@ -260,7 +261,7 @@ def _check_wind(recordings: Sequence[Recording], usable: Sequence[NDArray[np.boo
         )
 
 
-def _rows(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]]) -> tuple[Floats, Floats]:
+def _rows(recordings: Sequence[Recording], usable: Sequence[BoolArray]) -> tuple[Floats, Floats]:
     """(n, 3 · column) features with the neighbours', and (n, column) without, of all usable windows."""
     both = list(zip(recordings, usable, strict=True))
     rows = np.concatenate([with_neighbours(one.features.values)[own] for one, own in both])
@@ -268,7 +269,7 @@ def _rows(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]]) 
 
 
 def _best_offset(
-    plain: Floats, winds: Callable[[float], Floats], blocks: NDArray[np.int_], clock: float, named: NDArray[np.bool_]
+    plain: Floats, winds: Callable[[float], Floats], blocks: NDArray[np.int_], clock: float, named: BoolArray
 ) -> float:
     """The most probable error of the clock [s], of windows without their neighbours, which could make up for it."""
     if clock <= _CLOCK:
@@ -278,7 +279,7 @@ def _best_offset(
     return float(_OFFSETS[misfit.argmin()]) * clock
 
 
-def _uncalibrated(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]], logged: Floats) -> float:
+def _uncalibrated(recordings: Sequence[Recording], usable: Sequence[BoolArray], logged: Floats) -> float:
     own = np.concatenate([one.features.winds[whole] for one, whole in zip(recordings, usable, strict=True)])
     return float(np.sqrt(np.mean((own - logged) ** 2)))
 

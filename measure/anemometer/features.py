@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, Float32Array, FloatArray, UInt8Array
 from flagdata.errors import RefusedError
 from measure.estimate.joint import WIND
 from measure.film.conditioned import ConditionedFilm
@@ -39,10 +39,10 @@ class Place:
         bare: (rows, columns) where no cloth moves.
     """
 
-    hoist: NDArray[np.float64]
+    hoist: FloatArray
     side: float
-    background: NDArray[np.float32]
-    bare: NDArray[np.bool_]
+    background: Float32Array
+    bare: BoolArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,17 +62,17 @@ class Features:
     """
 
     film: str
-    starts: NDArray[np.float64]
+    starts: FloatArray
     layout: Layout
-    values: NDArray[np.float64]
+    values: FloatArray
     names: tuple[str, ...]
-    summaries: NDArray[np.float32]
-    winds: NDArray[np.float64]
-    clip: NDArray[np.uint8]
+    summaries: Float32Array
+    winds: FloatArray
+    clip: UInt8Array
     place: Place
 
     @property
-    def whole(self) -> NDArray[np.bool_]:
+    def whole(self) -> BoolArray:
         """(w,) windows that have all their frames."""
         return np.asarray(np.isfinite(self.summaries).all(axis=1))
 
@@ -101,10 +101,10 @@ def features_of(
     scale = size.scale(trained_on(model.targets))
     reader = WindowReader(film, model, [scale], first=first, last=last)
     layout = reader.layout
-    summaries: NDArray[np.float32] | None = None
-    rows: dict[int, NDArray[np.float32]] = {}
+    summaries: Float32Array | None = None
+    rows: dict[int, Float32Array] = {}
     winds = np.full(layout.count, np.nan)
-    clip: NDArray[np.uint8] | None = None
+    clip: UInt8Array | None = None
     hoist = _Hoist()
     watcher = Watcher(film, size, begin=layout.first, count=layout.count, seconds=layout.step, found=hoist.take)
     reader.look = watcher.look
@@ -141,7 +141,7 @@ class _Hoist:
     """Where the hoist is in the conditioned picture."""
 
     def __init__(self) -> None:
-        self._ends: list[NDArray[np.float64]] = []
+        self._ends: list[FloatArray] = []
         self._side = 0.0
 
     def take(self, windows: Sequence[FilmWindow | None]) -> None:
@@ -151,14 +151,14 @@ class _Hoist:
                 self._ends.append(window.hoist / window.masks.shape[2])
                 self._side += window.side
 
-    def found(self) -> tuple[NDArray[np.float64], float]:
+    def found(self) -> tuple[FloatArray, float]:
         """Its ends (2, 2) in the picture's sides, NaN where no window shows them, and the side the flag flies to."""
         if not self._ends:
             return np.full((2, 2), np.nan), 0.0
         return np.median(self._ends, axis=0), float(np.sign(self._side))
 
 
-def _place(film: ConditionedFilm, hoist: NDArray[np.float64], side: float) -> Place:
+def _place(film: ConditionedFilm, hoist: FloatArray, side: float) -> Place:
     """The place, of what the last reading of the film found."""
     found, reference = film.found, film.reference
     if found is None or reference is None or found.region is None:

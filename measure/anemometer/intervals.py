@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from flagdata.arrays import FloatArray
+
+Floats = FloatArray
 
 
 def half_width(errors: Floats, level: float) -> float:

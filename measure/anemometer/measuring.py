@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import UsageError
 from flagdata.findings import Finding
 from flagdata.rng import stream
@@ -27,7 +27,7 @@ from measure.gate.reasons import REASONS
 from measure.gate.verdict import Reason, Verdict
 from models.estimator import Estimator
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 _SAME_SIZE = 0.01
 """Share by which a stated size may differ from that of the calibration: printed sizes are rounded."""

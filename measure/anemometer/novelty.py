@@ -24,11 +24,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.findings import Finding, Severity
 from measure.anemometer.features import Place
 from models.outliers import conformal_p, shrunk_covariance, whitening
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 SHIFT, FRAMING, BACKGROUND = 0.45, 0.2, 0.4
 """Levels, fixed on simulated flags of other seeds than those that judge (decision 047)."""
@@ -121,7 +122,7 @@ class Familiar:
         """(n,) conformal p of a window of the calibration being as far."""
         return conformal_p(self.distances, self.distance(values, winds))
 
-    def within(self, winds: Floats) -> NDArray[np.bool_]:
+    def within(self, winds: Floats) -> BoolArray:
         """(n,) whether films are compared at these winds."""
         return (winds >= self.low) & (winds <= self.high)
 
@@ -234,7 +235,7 @@ def _correlation(one: Place, other: Place) -> float:
     return float(np.corrcoef(own, others)[0, 1])
 
 
-def _details(place: Place, shared: NDArray[np.bool_]) -> Floats:
+def _details(place: Place, shared: BoolArray) -> Floats:
     """The picture less its light: its mean over the neighbourhood, of bare places alone."""
     weight = shared.astype(np.float32)
     light = cv2.GaussianBlur(place.background * weight, (0, 0), _BLUR)

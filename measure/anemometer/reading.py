@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.anemometer.features import Features, Place
 from measure.anemometer.novelty import Familiar
 from measure.anemometer.regression import Ridge, with_neighbours
 from measure.film.similarity import FlagSize
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

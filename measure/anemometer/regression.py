@@ -24,7 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from flagdata.arrays import BoolArray, FloatArray
+
+Floats = FloatArray
 
 BLOCK = 20.0
 """Length of a block [s]: gusts last some seconds."""
@@ -115,7 +117,7 @@ class Validated:
     rmse: float
 
 
-def validated(rows: Floats, winds: Floats, blocks: NDArray[np.int_], named: NDArray[np.bool_]) -> Validated:
+def validated(rows: Floats, winds: Floats, blocks: NDArray[np.int_], named: BoolArray) -> Validated:
     """Leave each block out in turn, with the windows beside it, for each penalty and weight of the named features.
 
     Args:

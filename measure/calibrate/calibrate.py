@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
@@ -165,7 +165,7 @@ class Fitted:
     low: Floats
     middle: Floats
     high: Floats
-    used: NDArray[np.bool_]
+    used: BoolArray
     misfit: float
     apart: Floats
     failed: int
@@ -349,9 +349,9 @@ class _Simulated:
     observed: Observed
     values: Mapping[str, Floats]
     summaries: Floats
-    used: NDArray[np.bool_]
+    used: BoolArray
 
-    def rows(self, which: NDArray[np.int64]) -> _Simulated:
+    def rows(self, which: IntArray) -> _Simulated:
         """With some of the simulations."""
         values = {name: own[which] for name, own in self.values.items()}
         return replace(self, values=values, summaries=self.summaries[which])

@@ -13,9 +13,8 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flagdata.arrays import read_arrays
+from flagdata.arrays import IntArray, read_arrays
 from flagdata.errors import CorruptError
 from flagdata.lake.durable import put_if_absent
 from flagdata.provenance import canonical, digest
@@ -108,7 +107,7 @@ class Design:
             for first in range(0, self.count, BATCH)
         ]
 
-    def batch(self, which: NDArray[np.int64]) -> Batch:
+    def batch(self, which: IntArray) -> Batch:
         """Some of the simulations, by their places in `values`."""
         values = {name: own[which] for name, own in self.values().items()}
         view = [values.pop("azimuth"), values.pop("elevation"), np.full(len(which), self.distance)]
@@ -121,7 +120,7 @@ class Design:
             seeds=tuple(child_seed(self.seed, "calibrate", "flag", self.recording, int(place)) for place in which),
         )
 
-    def damped(self) -> NDArray[np.int64]:
+    def damped(self) -> IntArray:
         """Places of the simulations in the longest steps that the design has."""
         own = self.batches()
         steps = [batch.step or 0.0 for batch in own]

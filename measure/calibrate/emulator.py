@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray
 from flagdata.errors import RefusedError
 from flagdata.rng import stream
 from measure.calibrate.prior import CLOTH, Floats, Uncertain
@@ -51,12 +51,12 @@ class Emulator:
     """
 
     model: Metamodel
-    used: NDArray[np.bool_]
+    used: BoolArray
     residuals: Floats
     weights: Floats
 
     @classmethod
-    def fit(cls, values: Mapping[str, Floats], summaries: Floats, shown: NDArray[np.bool_], *, name: str) -> Emulator:
+    def fit(cls, values: Mapping[str, Floats], summaries: Floats, shown: BoolArray, *, name: str) -> Emulator:
         """Fit it to simulations.
 
         Args:
@@ -106,9 +106,7 @@ class Emulator:
         return self.model.draw(regressors(values), stream(seed, "calibrate", "predicted"))
 
 
-def informative(
-    values: Mapping[str, Floats], summaries: Floats, shown: NDArray[np.bool_], *, name: str
-) -> NDArray[np.bool_]:
+def informative(values: Mapping[str, Floats], summaries: Floats, shown: BoolArray, *, name: str) -> BoolArray:
     """(k,) those of the shown summaries that depend on what is regressed on.
 
     Raises:

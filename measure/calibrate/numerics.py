@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.rng import stream
 from measure.calibrate.design import Design, read
 from measure.calibrate.discretisation import Discretisation
@@ -84,7 +84,7 @@ class Finer:
         batches: of them, in that order.
     """
 
-    places: NDArray[np.int64]
+    places: IntArray
     batches: tuple[Batch, ...]
 
     @classmethod

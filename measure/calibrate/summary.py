@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray
 from measure.calibrate.prior import Floats
 
 SHOWN = 0.6
@@ -59,6 +59,6 @@ class Projection:
         return np.einsum("wi,...ik->...wk", self.regressors, summaries)
 
 
-def shown(readings: Floats) -> NDArray[np.bool_]:
+def shown(readings: Floats) -> BoolArray:
     """(observable,) whether enough windows (window, observable) show it."""
     return np.asarray(np.isfinite(readings).mean(axis=0) >= SHOWN)

@@ -18,6 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.schema import UNUSABLE
@@ -26,7 +27,7 @@ from flagdata.timebase import NANOSECONDS
 from sim.effects.anemometer_lag import AnemometerLag
 from sim.wind.spectral import VonKarman
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 RATE = 10.0
 """Samples of the wind that blows in a simulation [Hz]; it is linear between them."""
@@ -152,7 +153,7 @@ class Log:
         """The same samples that much later [s]."""
         return replace(self, times=self.times + late)
 
-    def covers(self, starts: NDArray[np.floating], ends: NDArray[np.floating]) -> NDArray[np.bool_]:
+    def covers(self, starts: NDArray[np.floating], ends: NDArray[np.floating]) -> BoolArray:
         """(k,) whether no silence of the log longer than two of its periods, or two seconds, is in a window [s]."""
         gaps = np.diff(self.times)
         silent = gaps > max(2.0 * float(np.median(gaps)), 2.0)

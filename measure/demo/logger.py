@@ -7,8 +7,8 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from sim.datasets.recipe import AnemometerSpec, Truth
 
@@ -59,9 +59,7 @@ _STUCK = 12
 """Readings that repeat the one before them."""
 
 
-def write_log(
-    path: Path, speed: NDArray[np.float64], direction: NDArray[np.float64], *, first: datetime, quiet: int, seed: int
-) -> None:
+def write_log(path: Path, speed: FloatArray, direction: FloatArray, *, first: datetime, quiet: int, seed: int) -> None:
     """One reading a second, in km/h and degrees, with a gap anywhere and a stretch early on at which the logger stuck.
 
     Args:

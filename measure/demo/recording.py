@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.lake.meshes import MeshSequence
 from flagdata.rng import child_seed, stream
@@ -192,7 +192,7 @@ class Recording:
     sensor: Path
     noted: Noted
     clock_offset: float
-    wind: NDArray[np.float64]
+    wind: FloatArray
     area_weight: float
     damping: float
     acting: Acting | None
@@ -307,7 +307,7 @@ def _flown(recipe: RecordingRecipe, system: System, state: State, advance: Calla
     )
 
 
-def _log(recipe: RecordingRecipe, path: Path, times: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
+def _log(recipe: RecordingRecipe, path: Path, times: FloatArray, velocity: FloatArray) -> float:
     """Write the anemometer's log; what must be added to the camera's clock to reach the logger's [s]."""
     begin = from_datetime(START) - round(BEFORE * NANOSECONDS)
     seed = child_seed(recipe.seed, "demo", "anemometer")

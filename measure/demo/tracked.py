@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.observe.interpolation import onto
@@ -160,7 +160,7 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
     )
 
 
-def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object]) -> NDArray[np.float64]:
+def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object]) -> FloatArray:
     """(frame, vertex, 3, recording) [m]."""
     nominal = named(MATERIAL)
     material = replace(nominal.scaled(density=recipe.density, bending=recipe.bending), damping=recipe.damping)

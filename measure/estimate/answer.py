@@ -7,9 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.stated import Stated
@@ -131,13 +129,13 @@ class Quantity:
 
 
 def quantities(
-    draws: NDArray[np.float64],
-    prior: NDArray[np.float64],
+    draws: FloatArray,
+    prior: FloatArray,
     names: Sequence[str],
     *,
     level: float,
-    assumed: NDArray[np.float64],
-    places: NDArray[np.float64],
+    assumed: FloatArray,
+    places: FloatArray,
     stated: Mapping[str, Stated],
 ) -> tuple[Quantity, ...]:
     """All quantities of a posterior.
@@ -196,7 +194,7 @@ def _given(name: str, value: float, *, level: float) -> Quantity:
     )
 
 
-def information(posterior: NDArray[np.float64], prior: NDArray[np.float64]) -> float:
+def information(posterior: FloatArray, prior: FloatArray) -> float:
     """Kullback–Leibler divergence of two samples' Gaussians, posterior from prior [nat]:
     ½ (σ²/τ² − 1 − ln σ²/τ² + (m − μ)²/τ²)."""
     variance = float(prior.var())

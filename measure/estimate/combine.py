@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import CorruptError, InputError
 
 if TYPE_CHECKING:
@@ -101,12 +102,12 @@ def combined(
     logits: NDArray[np.floating],
     *,
     names: Sequence[str],
-    centre: NDArray[np.float64],
-    spread: NDArray[np.float64],
+    centre: FloatArray,
+    spread: FloatArray,
     dependence: Dependence,
     generator: np.random.Generator,
     given: Sequence[str] = (),
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[FloatArray, FloatArray]:
     """One posterior of all windows.
 
     Args:
@@ -140,7 +141,7 @@ def combined(
     return winds, shared
 
 
-def _cloth(white: NDArray[np.float64], correlation: float) -> NDArray[np.float64]:
+def _cloth(white: FloatArray, correlation: float) -> FloatArray:
     """(n, cloth) draws of the tempered product of posteriors (k, n, cloth), in units of the prior."""
     count, n, size = white.shape
     if not size:
@@ -162,12 +163,12 @@ def _cloth(white: NDArray[np.float64], correlation: float) -> NDArray[np.float64
 
 
 def _winds(
-    winds: NDArray[np.float64],
-    cloths: NDArray[np.float64],
-    shared: NDArray[np.float64],
+    winds: FloatArray,
+    cloths: FloatArray,
+    shared: FloatArray,
     correlation: float,
     generator: np.random.Generator,
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """(k, n, own) draws of each window's wind at the shared cloth."""
     count, n, _ = winds.shape
     common = generator.standard_normal(n)
@@ -182,7 +183,7 @@ def _winds(
     return out
 
 
-def _regression(cloth: NDArray[np.float64], wind: NDArray[np.float64]) -> NDArray[np.float64]:
+def _regression(cloth: FloatArray, wind: FloatArray) -> FloatArray:
     """(cloth,) slopes of the linear regression of wind on cloth, over the draws."""
     if not cloth.shape[1]:
         return np.zeros(0)

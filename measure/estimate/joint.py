@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray
 from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
@@ -72,10 +73,10 @@ class Look:
 
     start: float
     posterior: Mixture
-    logits: NDArray[np.float64]
-    summaries: NDArray[np.float32]
+    logits: FloatArray
+    summaries: Float32Array
     reasons: tuple[list[Reason], ...]
-    log_factor: NDArray[np.float64]
+    log_factor: FloatArray
 
     @property
     def blank(self) -> bool:
@@ -118,14 +119,14 @@ class Joint:
         own = child_seed(self.options.seed, "prior")
         return self.model.given(self.model.prior(len(self.sizes.scale)), self.known, seed=own, draws=DRAWS)
 
-    def given(self, posterior: Mixture, *, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def given(self, posterior: Mixture, *, seed: int) -> tuple[FloatArray, FloatArray]:
         """Logits (i, n, target) of a window's posterior given what is known, and their log Bayes factors (i, n)."""
         found = self.model.given(posterior, self.known, seed=seed, draws=DRAWS)
         factor = torch.where(found.log_mass > -torch.inf, found.log_mass - self._before.log_mass, -torch.inf)
         return found.logits.cpu().numpy(), factor.cpu().numpy()
 
     def by_weight(
-        self, seen: Sequence[Look], dependence: Dependence, found: Sequence[Quantity], draws: NDArray[np.float64]
+        self, seen: Sequence[Look], dependence: Dependence, found: Sequence[Quantity], draws: FloatArray
     ) -> Finding | None:
         """How the wind would change with the weight of the cloth, where that is open and matters: the answers for a
         light and a heavy cloth of those that the answer leaves possible; None where it does not.
@@ -162,7 +163,7 @@ class Joint:
             fix="weigh the cloth and give --area-weight",
         )
 
-    def joint(self, seen: Sequence[Look], dependence: Dependence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def joint(self, seen: Sequence[Look], dependence: Dependence) -> tuple[FloatArray, FloatArray]:
         """(n, target) draws of all windows together, the wind their mean, and (m, target) places of the windows' own in
         the network's range."""
         own = [place for place, name in enumerate(self.names) if name in OWN]
@@ -206,7 +207,7 @@ class Joint:
             p=p,
         )
 
-    def _rows(self, log_factor: NDArray[np.float64], *names: str) -> NDArray[np.intp]:
+    def _rows(self, log_factor: FloatArray, *names: str) -> NDArray[np.intp]:
         """Which of the draws, those of all sizes in a row, make the answer: each as often as the Bayes factor (i, n) of
         what is known makes its size probable, by systematic resampling.
 
@@ -221,7 +222,7 @@ class Joint:
         first = stream(self.options.seed, "sizes", *names).uniform()
         return np.searchsorted(share / share[-1], (first + np.arange(len(total))) / len(total))
 
-    def quantities(self, draws: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[Quantity, ...]:
+    def quantities(self, draws: FloatArray, places: FloatArray) -> tuple[Quantity, ...]:
         return quantities(
             draws,
             self.prior,
@@ -232,24 +233,24 @@ class Joint:
             stated=self.options.stated(self.model),
         )
 
-    def _places(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _places(self, values: FloatArray) -> FloatArray:
         """Places of values (…, target) in the network's range, 0 to 1: the range moves with the flag's size."""
         low, high = self._ends
         return (values - low) / (high - low)
 
     @property
-    def _ends(self) -> NDArray[np.float64]:
+    def _ends(self) -> FloatArray:
         """(2, target) of the range that the model learned."""
         return np.array([[t.low for t in self.model.targets], [t.high for t in self.model.targets]])
 
     @cached_property
-    def prior(self) -> NDArray[np.float64]:
+    def prior(self) -> FloatArray:
         """(n, target) draws of what is assumed of a flag of these sizes."""
         logits = self.prior_logits
         return scaled_back(self._values(logits.reshape(-1, len(self.names))), self.names, self.sizes.draws.ravel())
 
     @cached_property
-    def prior_logits(self) -> NDArray[np.float64]:
+    def prior_logits(self) -> FloatArray:
         """(i, n, target) draws of the same as the model knows them, for each size of flag."""
         learner, shape = self.model.learners[0], self.sizes.draws.shape
         if self.known:
@@ -258,7 +259,7 @@ class Joint:
         return learner.centre.double().cpu().numpy() + learner.spread.double().cpu().numpy() * normal
 
     @cached_property
-    def assumed(self) -> NDArray[np.float64]:
+    def assumed(self) -> FloatArray:
         """(target, 2) range that was simulated, at these sizes; of what was not simulated evenly 90 % of it."""
         ends = self._ends
         smallest, largest = np.quantile(self.sizes.draws, [0.05, 0.95])
@@ -276,5 +277,5 @@ class Joint:
         """Targets whose value was given."""
         return tuple(name for name, stated in self.options.stated(self.model).items() if stated.exact)
 
-    def _values(self, logits: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _values(self, logits: FloatArray) -> FloatArray:
         return self.model.learners[0].scaling.values(torch.from_numpy(logits)).numpy()

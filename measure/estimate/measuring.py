@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.errors import FlagdataError, RefusedError, UsageError
 from flagdata.film import Film
 from flagdata.findings import Finding
@@ -66,15 +66,15 @@ class Measurement:
     model: str
     options: Options
     names: tuple[str, ...]
-    draws: NDArray[np.float64]
+    draws: FloatArray
     quantities: tuple[Quantity, ...]
     windows: tuple[WindowAnswer, ...]
     combined: int
     dependence: Dependence
     verdict: Verdict
     sizes: Sizes
-    summary: NDArray[np.float32]
-    clip: NDArray[np.uint8]
+    summary: Float32Array
+    clip: UInt8Array
     findings: tuple[Finding, ...]
     bounds: tuple[Finding, ...]
 
@@ -154,7 +154,7 @@ def measure(
     reader = WindowReader(film, model, scales, step=options.step, first=options.first, last=options.last)
     layout, distinct = reader.layout, reader.distinct
     seen: list[Look] = []
-    clips: NDArray[np.uint8] | None = None  # of the first window, or of the first with something to measure
+    clips: UInt8Array | None = None  # of the first window, or of the first with something to measure
     interpolated = 0
     for window in reader.windows(advance):
         one = _look(window, gate, given)

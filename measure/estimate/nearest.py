@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow.compute as pc
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, UInt8Array
 from flagdata.lake import Lake
 from flagdata.record import Record
 from flagdata.rng import stream
@@ -39,7 +39,7 @@ class Neighbour:
 
     artifact: str
     name: str
-    frames: NDArray[np.uint8]
+    frames: UInt8Array
     distance: float
     known: Mapping[str, float]
 
@@ -48,7 +48,7 @@ class Neighbour:
 def nearest(
     lake: Lake,
     model: Estimator,
-    summary: NDArray[np.float32],
+    summary: Float32Array,
     *,
     without: str | None,
     at: str | None,

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.dataset.truth import TruthSeries, over_ground
 from flagdata.errors import InputError
 from flagdata.rng import stream
@@ -97,10 +97,10 @@ class Spectrum:
         windows: length of the run.
     """
 
-    frequency: NDArray[np.float64]
-    estimated: NDArray[np.float64]
-    logged: NDArray[np.float64]
-    coherence: NDArray[np.float64]
+    frequency: FloatArray
+    estimated: FloatArray
+    logged: FloatArray
+    coherence: FloatArray
     chance: float
     windows: int
 
@@ -149,19 +149,19 @@ class Beside:
         delay: None without an anemometer.
     """
 
-    time: NDArray[np.float64]
-    wind: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    p: NDArray[np.float64]
-    logged: NDArray[np.float64] | None = None
-    minute: NDArray[np.float64] | None = None
+    time: FloatArray
+    wind: FloatArray
+    low: FloatArray
+    high: FloatArray
+    p: FloatArray
+    logged: FloatArray | None = None
+    minute: FloatArray | None = None
     window: Agreement | None = None
     of_minute: Agreement | None = None
     spectrum: Spectrum | None = None
     delay: Delay | None = None
 
-    def columns(self) -> dict[str, NDArray[np.float64]]:
+    def columns(self) -> dict[str, FloatArray]:
         """Name → (n,), as they are written to tables."""
         out = {"time": self.time, "wind": self.wind, "low": self.low, "high": self.high, "p": self.p}
         if self.logged is not None and self.minute is not None:
@@ -219,7 +219,7 @@ def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None)
     )
 
 
-def agreement(series: Beside, reference: NDArray[np.float64], *, seed: int) -> Agreement | None:
+def agreement(series: Beside, reference: FloatArray, *, seed: int) -> Agreement | None:
     """How the windows that the reference covers agree with it; None where there is none."""
     known = np.isfinite(reference)
     count = int(known.sum())
@@ -238,7 +238,7 @@ def agreement(series: Beside, reference: NDArray[np.float64], *, seed: int) -> A
     )
 
 
-def _rmse_interval(off: NDArray[np.float64], seed: int) -> tuple[float, float]:
+def _rmse_interval(off: FloatArray, seed: int) -> tuple[float, float]:
     """90 % of the RMSE, by resampling blocks of ten windows: neighbours err alike."""
     blocks = np.array_split(np.square(off), max(1, len(off) // 10))
     sums, sizes = np.array([block.sum() for block in blocks]), np.array([len(block) for block in blocks])
@@ -248,7 +248,7 @@ def _rmse_interval(off: NDArray[np.float64], seed: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def spectrum(time: NDArray[np.float64], estimated: NDArray[np.float64], logged: NDArray[np.float64]) -> Spectrum | None:
+def spectrum(time: FloatArray, estimated: FloatArray, logged: FloatArray) -> Spectrum | None:
     """Over the longest run of windows one step apart, all of them estimated and logged; None where that is shorter than
     `LEAST_SPECTRUM`, or where one of the series does not vary."""
     if len(time) < LEAST_SPECTRUM:

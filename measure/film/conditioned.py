@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from flagdata.errors import UsageError
 from flagdata.film import Film
 from flagdata.findings import Finding, Severity
@@ -42,16 +42,16 @@ class CutOff:
         cut: (n, 4) whether the edge on each of `SIDES` cuts the flag off.
     """
 
-    times: NDArray[np.float64]
-    cut: NDArray[np.bool_]
+    times: FloatArray
+    cut: BoolArray
 
     @classmethod
-    def of(cls, found: Conditioning, times: NDArray[np.float64]) -> CutOff:
+    def of(cls, found: Conditioning, times: FloatArray) -> CutOff:
         """By what was found in the sample of frames of these times."""
         return cls(times=times, cut=found.cut > CUT)
 
     @cached_property
-    def any(self) -> NDArray[np.bool_]:
+    def any(self) -> BoolArray:
         """(n,) whether any edge does."""
         return np.asarray(self.cut.any(axis=1), dtype=np.bool_)
 
@@ -148,7 +148,7 @@ class ConditionedFilm:
         self._watch: FilmWatch | None = None
         self._cut: CutOff | None = None
         self.found: Conditioning | None = None
-        self.reference: NDArray[np.uint8] | None = None
+        self.reference: UInt8Array | None = None
 
     @property
     def name(self) -> str:
@@ -311,7 +311,7 @@ def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:
     return notes
 
 
-def _of_flag(found: Conditioning, reference: NDArray[np.uint8] | None, *, given: bool) -> list[Finding]:
+def _of_flag(found: Conditioning, reference: UInt8Array | None, *, given: bool) -> list[Finding]:
     """What was found of the flag; several are no matter where its number was given."""
     if found.region is None or reference is None:
         return []

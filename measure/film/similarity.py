@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
 from flagdata.findings import Finding
 from measure.gate.reasons import REASONS
@@ -163,7 +164,7 @@ class SizePrior:
         """Share of the flags that are longer than `length` [m]."""
         return float(ndtr(-math.log(length / self.median) / math.log(self.factor)))
 
-    def quantile(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    def quantile(self, share: FloatArray) -> FloatArray:
         """Lengths that these shares of the flags stay below [m]."""
         return self.median * np.exp(math.log(self.factor) * ndtri(share))
 
@@ -189,8 +190,8 @@ class Sizes:
     """
 
     given: FlagSize | None
-    scale: NDArray[np.float64]
-    draws: NDArray[np.float64]
+    scale: FloatArray
+    draws: FloatArray
     findings: tuple[Finding, ...]
 
     def only(self, places: Sequence[int]) -> Sizes:
@@ -299,9 +300,7 @@ def spacing(scale: float, *, rate: float) -> float:
     return math.sqrt(scale) / rate
 
 
-def scaled_back(
-    values: NDArray[np.floating], names: Sequence[str], scale: NDArray[np.float64] | float
-) -> NDArray[np.float64]:
+def scaled_back(values: NDArray[np.floating], names: Sequence[str], scale: FloatArray | float) -> FloatArray:
     """What a model said of a flag of scale s, as that flag's own.
 
     Args:

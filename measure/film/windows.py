@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.film import Film
 from flagdata.findings import Finding
@@ -81,7 +81,7 @@ class Window:
 
     index: int
     start: float
-    clips: NDArray[np.uint8]
+    clips: UInt8Array
     interpolated: int
 
 
@@ -169,7 +169,7 @@ class WindowReader:
             first=first,
             last=last,
         )
-        self.look: Callable[[float, NDArray[np.uint8]], object] | None = None
+        self.look: Callable[[float, UInt8Array], object] | None = None
         margin = 2 * self.layout.period
         self.distinct = Distinct(self._shown(film.frames(self.layout.first - margin, self.layout.last + margin)))
 

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.rng import child_seed, stream
 from measure.calibrate.design import Design
 from measure.calibrate.discretisation import LITTLE, Discretisation
@@ -52,7 +52,7 @@ class Pairs:
     """
 
     effect: Weighable
-    places: NDArray[np.int64]
+    places: IntArray
     strengths: Floats
     batches: tuple[Batch, ...]
 

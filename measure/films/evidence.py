@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp, ndtr
 
+from flagdata.arrays import FloatArray
 from measure.calibrate.prior import Floats, Uncertain
 from measure.calibrate.scatter import Scatter, scatter
 from measure.calibrate.sights import Placed, dimension, values
@@ -230,5 +230,5 @@ def _log_t(offset: Floats, precision: Floats) -> Floats:
 def quantiles(values: Floats, weights: Floats, shares: Sequence[float]) -> list[float]:
     """Of weighted draws (m,)."""
     order = np.argsort(values)
-    total: NDArray[np.float64] = np.cumsum(weights[order])
+    total: FloatArray = np.cumsum(weights[order])
     return [float(values[order][min(int(np.searchsorted(total, share)), len(order) - 1)]) for share in shares]

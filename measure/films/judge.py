@@ -14,9 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from flagdata.arrays import IntArray
 from measure.calibrate.prior import Floats
 from measure.films.score_test import Scored
 from measure.films.weigh import Misfits, Weighing
@@ -61,9 +61,7 @@ class Judged:
         return self.scored.p_value
 
 
-def judge(
-    own: Weighing, nulls: Misfits, kinds: NDArray[np.int64], scored: Scored, *, level: float, departure: float
-) -> Judged:
+def judge(own: Weighing, nulls: Misfits, kinds: IntArray, scored: Scored, *, level: float, departure: float) -> Judged:
     """Judge one experiment.
 
     Args:

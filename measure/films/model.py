@@ -18,8 +18,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray
 from measure.calibrate.emulator import Emulator
 from measure.calibrate.prior import Floats
 from measure.films.library import Weighable
@@ -73,7 +73,7 @@ class Model:
     responses: Mapping[str, Response] = field(default_factory=dict)
 
     @property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> BoolArray:
         """(2·observable,) which summaries are used."""
         return self.base.used
 

@@ -22,8 +22,8 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from measure.calibrate.prior import Floats
 from measure.films.evidence import Experiments
 from measure.nulls.clustered import ClusteredNulls
@@ -31,7 +31,7 @@ from models.outliers import shrunk_covariance
 
 ALIKE = 1.0
 """Logarithm of the area weight within which null flags count as alike to a weighed one."""
-Mask = NDArray[np.bool_]
+Mask = BoolArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +45,7 @@ class Directions:
     """
 
     changes: Floats
-    signs: NDArray[np.int64]
+    signs: IntArray
     suspected: tuple[int, int] | None = None
 
     def far(self, z: Floats) -> Floats:
@@ -125,15 +125,13 @@ class Scene:
     own: Floats
     base: Floats
     null: Floats
-    kinds: NDArray[np.int64]
+    kinds: IntArray
     alike: Mask
     changes: Floats
     _known: dict[frozenset[int], Axes] = field(default_factory=dict)
 
     @classmethod
-    def of(
-        cls, own: Experiments, base: Experiments, nulls: Experiments, kinds: NDArray[np.int64], changes: Floats
-    ) -> Scene:
+    def of(cls, own: Experiments, base: Experiments, nulls: Experiments, kinds: IntArray, changes: Floats) -> Scene:
         """From summaries and weights as scales read them."""
         at = [_logarithm(each, own) for each in (own, base, nulls)]
         coefficients = np.linalg.lstsq(_regressors(at[1]), base.whole, rcond=None)[0]
@@ -209,7 +207,7 @@ def score(
     own: Experiments,
     base: Experiments,
     nulls: Experiments,
-    kinds: NDArray[np.int64],
+    kinds: IntArray,
     directions: Directions,
     *,
     level: float,

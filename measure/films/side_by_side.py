@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.pages.pictures import moving, still
 from flagdata.rng import child_seed
 from measure.calibrate.prior import Floats
@@ -145,7 +145,7 @@ def _flown(
     return window, positions @ view.axes(0.0)[2]
 
 
-def drawn(cloth: ClothWindow, depth: Floats, film: FilmWindow, colour: tuple[int, int, int]) -> list[NDArray[np.uint8]]:
+def drawn(cloth: ClothWindow, depth: Floats, film: FilmWindow, colour: tuple[int, int, int]) -> list[UInt8Array]:
     """Frames (size, size, 3) of cloth as large and where the film has its own, at a pole.
 
     Args:
@@ -176,6 +176,6 @@ def drawn(cloth: ClothWindow, depth: Floats, film: FilmWindow, colour: tuple[int
     return made
 
 
-def _moving(label: str, frames: Sequence[NDArray[np.uint8]]) -> Moving:
+def _moving(label: str, frames: Sequence[UInt8Array]) -> Moving:
     pictures = np.stack(frames)
     return Moving(label=label, url=moving(pictures, rate=RATE, side=_SIDE), first=still(pictures[0], side=_SIDE))

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
 from measure.calibrate.calibrate import Options as Calibrating
@@ -47,7 +47,7 @@ class Simulations:
     base: tuple[Floats, ...]
     pairs: tuple[tuple[tuple[Pairs, Floats], ...], ...]
     nulls: tuple[Floats, ...]
-    kinds: NDArray[np.int64]
+    kinds: IntArray
     weights: Floats
     corrections: tuple[Correction, ...]
 
@@ -263,7 +263,7 @@ def of_nulls(
     weighed: tuple[float, float] | None,
     *,
     seed: int,
-) -> tuple[Experiments, NDArray[np.int64]]:
+) -> tuple[Experiments, IntArray]:
     """Null experiments with errors of pixels and of the scale, those that show all, and their kinds of numerics. Their
     meshes are about as coarse as the fit's, and are as far from a finer one."""
     found = []
@@ -305,7 +305,7 @@ def of_base(
 def _weighed(
     made: Experiments,
     weights: Floats,
-    which: NDArray[np.bool_],
+    which: BoolArray,
     weighed: tuple[float, float] | None,
     *,
     seed: int,

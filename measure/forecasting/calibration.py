@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.observe.trajectory import DENSITY_UNCERTAINTY
 from sim.material import Material
 
@@ -61,7 +61,7 @@ DAMPING = [name for name, *_ in THETA].index("damping")
 """Place of the damping among `THETA`."""
 
 
-def prior(density_uncertainty: float) -> NDArray[np.float64]:
+def prior(density_uncertainty: float) -> FloatArray:
     """Returns standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`.
 
     Bending is known within a factor of e (the spread of one kind of cloth: Wang et al. 2011). Damping is hardly ever

@@ -21,9 +21,9 @@ from functools import cached_property, partial
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import UsageError
 from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.regressors import DOUBLE, Column, StepColumn, WrittenColumn
@@ -39,7 +39,7 @@ from sim.state import State
 from sim.system import InapplicableError, System
 from sim.wind.sampled import Beyond, Even, SampledWind
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 WIDEST = 400
 """Members of a batch: beyond, a member costs as much as before. Steps of a flag of 176 vertices side by side in 40
@@ -172,7 +172,7 @@ class Forecaster:
                 )
         return errors, predictions
 
-    def _shares(self, mask: NDArray[np.bool_] | None, copies: int) -> Tensor | None:
+    def _shares(self, mask: BoolArray | None, copies: int) -> Tensor | None:
         """Converts a mask (frame, marker, segment) to (frame, marker, batch), 1 where it is set, else 0; None where
         there is none."""
         return None if mask is None else self._real(mask.astype(np.float64)).repeat(1, 1, copies)
@@ -259,7 +259,7 @@ class Forecaster:
         of matrices round differently with the number of columns, so that their number decides, not that of workers.
         """
 
-        def run(chosen: NDArray[np.int64]) -> Sequence[Tensor]:
+        def run(chosen: IntArray) -> Sequence[Tensor]:
             joint, start = JointBatch.of([batches[index] for index in chosen])
             errors, _ = self._run(
                 partial(self.integrator.advance_jointly, joint, duration=segments.period), start, segments

@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import UsageError
 from measure.forecasting.calibration import THETA
 from sim.cloth import Cloth
@@ -27,7 +27,7 @@ from sim.effects.parameter import Parameter
 from sim.state import State
 from sim.system import System
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 
 class Column(ABC):

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from measure.observe.trajectory import Trajectory, WindTrack
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 HORIZON = 0.04
 """About this long a prediction is [s]: 25 frames a second, the paper's rate."""
@@ -90,7 +90,7 @@ class Segment:
     wind: WindTrack
     noise: float
     anchors: Floats | None = None
-    seen: NDArray[np.bool_] | None = None
+    seen: BoolArray | None = None
     attachments: Floats | None = None
 
 
@@ -176,7 +176,7 @@ class Segments:
         return replace(self, items=tuple(self.items[i] for i in indices))
 
     @cached_property
-    def recording(self) -> NDArray[np.int64]:
+    def recording(self) -> IntArray:
         """(segment,) index of each one's recording."""
         return np.array([item.recording for item in self.items])
 
@@ -191,7 +191,7 @@ class Segments:
         return np.stack([item.positions for item in self.items], axis=-1)
 
     @cached_property
-    def seen(self) -> NDArray[np.bool_] | None:
+    def seen(self) -> BoolArray | None:
         """Returns whether each position was tracked, warm-up included, (frame, marker, segment); None where all
         were."""
         if all(item.seen is None for item in self.items):
@@ -200,7 +200,7 @@ class Segments:
         return np.stack([all_tracked if item.seen is None else item.seen for item in self.items], axis=-1)
 
     @cached_property
-    def counted(self) -> NDArray[np.bool_] | None:
+    def counted(self) -> BoolArray | None:
         """(frame, marker, segment) whether a prediction is compared, in the frames that count; None where all are.
 
         It is where the marker was tracked in that frame and in the two before, from which the model has its position

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.forecasting.alignment import aligned
 from measure.forecasting.calibration import PRIOR_WITHOUT_MASS, Calibration, prior
 from measure.forecasting.observer import Forecaster
@@ -15,7 +15,7 @@ from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Experiment
 from sim.integrate.split import SplitEuler
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 Stage = Callable[[str, int, int], object]
 """Called with what is under way, how much is done, and of how much."""
 
@@ -104,6 +104,6 @@ class Setting:
         return prior(specimen.density_uncertainty) if specimen.mass_known else PRIOR_WITHOUT_MASS
 
     @property
-    def recording(self) -> NDArray[np.int64]:
+    def recording(self) -> IntArray:
         """(segment,) index of each one's recording."""
         return self.segments.recording

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray, UInt8Array
 from measure.gate import motion
 from measure.gate.clip_statistics import SIDE, ClipStatistics
 
@@ -60,7 +60,7 @@ def _median_shift(clip: ClipStatistics, frame: int) -> float:
     return float(np.hypot(*np.median(shifts, axis=0)))
 
 
-def _phase_shift(one: NDArray[np.float32], other: NDArray[np.float32], noise: float) -> tuple[float, float]:
+def _phase_shift(one: Float32Array, other: Float32Array, noise: float) -> tuple[float, float]:
     """How far the second picture lies below and right of the first [px]."""
     hann = np.hanning(_TILE)
     window = np.outer(hann, hann)
@@ -72,7 +72,7 @@ def _phase_shift(one: NDArray[np.float32], other: NDArray[np.float32], noise: fl
     return _refined(surface[:, x], y), _refined(surface[y], x)
 
 
-def _refined(line: NDArray[np.float64], place: int) -> float:
+def _refined(line: FloatArray, place: int) -> float:
     """Place of a periodic line's peak by the parabola through three values, as a signed shift."""
     before, peak, after = line[place - 1], line[place], line[(place + 1) % len(line)]
     bend = before - 2 * peak + after
@@ -122,7 +122,7 @@ def loop(clip: ClipStatistics) -> float:
     return float(np.log10((apart.min() + _LEAST) / (np.median(apart) + _LEAST)))
 
 
-def _changes(clip: ClipStatistics) -> NDArray[np.float64]:
+def _changes(clip: ClipStatistics) -> FloatArray:
     """(n − 1,), mean absolute change from frame to frame over the moving pixels, or over all if none moves."""
     pixels = clip.gray[:, clip.moving] if clip.moving.any() else clip.gray.reshape(len(clip.gray), -1)
     return np.abs(np.diff(pixels, axis=0)).mean(axis=1).astype(np.float64)
@@ -264,7 +264,7 @@ CHECKS: dict[str, Check] = {
 }
 
 
-def measured(frames: NDArray[np.uint8]) -> NDArray[np.float64]:
+def measured(frames: UInt8Array) -> FloatArray:
     """(len(CHECKS),) statistics of frames (n, height, width) in the order of the table.
 
     Raises:

@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from scipy import ndimage
 from torch.nn import functional
 
+from flagdata.arrays import BoolArray, Float32Array, UInt8Array
 from flagdata.errors import InputError
 
 SIDE = 112
@@ -34,10 +34,10 @@ class ClipStatistics:
         gray: (n, SIDE, SIDE) float32 gray levels, 0 to 255.
     """
 
-    gray: NDArray[np.float32]
+    gray: Float32Array
 
     @classmethod
-    def of(cls, frames: NDArray[np.uint8]) -> ClipStatistics:
+    def of(cls, frames: UInt8Array) -> ClipStatistics:
         """Reduce frames (n, height, width).
 
         Raises:
@@ -57,12 +57,12 @@ class ClipStatistics:
         return cls(gray=small[0].numpy())
 
     @cached_property
-    def mean(self) -> NDArray[np.float32]:
+    def mean(self) -> Float32Array:
         """(SIDE, SIDE), of all frames."""
         return self.gray.mean(axis=0)
 
     @cached_property
-    def deviation(self) -> NDArray[np.float32]:
+    def deviation(self) -> Float32Array:
         """(SIDE, SIDE), standard deviation in time [gray levels]."""
         return self.gray.std(axis=0)
 
@@ -77,12 +77,12 @@ class ClipStatistics:
         return float(np.median(np.abs(rough[:, 1:-1, 1:-1]))) / (_MEDIAN * 6 * np.sqrt(2))
 
     @cached_property
-    def excess(self) -> NDArray[np.float32]:
+    def excess(self) -> Float32Array:
         """(SIDE, SIDE), variance in time beyond the noise, 0 where a pixel is still."""
         return np.where(self.moving, self.deviation**2 - self.still**2, 0).astype(np.float32)
 
     @cached_property
-    def moving(self) -> NDArray[np.bool_]:
+    def moving(self) -> BoolArray:
         """(SIDE, SIDE)."""
         return self.deviation > max(_NOISES * self.still, LEAST_DEVIATION)
 
@@ -92,7 +92,7 @@ class ClipStatistics:
         return float(self.mean.std())
 
     @cached_property
-    def slope(self) -> NDArray[np.float32]:
+    def slope(self) -> Float32Array:
         """(SIDE, SIDE), length of the mean picture's gradient [gray levels/px]."""
         down, right = np.gradient(self.mean)
         return np.hypot(down, right)

@@ -11,15 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from flagdata.arrays import Float32Array, FloatArray, UInt8Array
 from measure.gate.clip_statistics import SIDE, ClipStatistics
 
-Film = NDArray[np.uint8]
+Film = UInt8Array
 Distort = Callable[[Film, Film, np.random.Generator, int], Film]
 """A film (n, height, width), another one, a source of randomness, the frames wanted → a clip of so many frames."""
-Pixels = NDArray[np.float32] | NDArray[np.float64]
+Pixels = Float32Array | FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,7 +167,7 @@ def _patchwork(film: Film, other: Film, rng: np.random.Generator, count: int) ->
     return clip
 
 
-def _shifted(frame: Film, offset: NDArray[np.float64]) -> Film:
+def _shifted(frame: Film, offset: FloatArray) -> Film:
     return np.asarray(ndimage.shift(frame, offset, order=1, mode="nearest"), dtype=np.uint8)
 
 

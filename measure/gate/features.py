@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
 from measure.gate.checks import measured
 from models.estimator import Estimator
@@ -32,20 +33,20 @@ class Features:
         moved: (len(MOVES),) whitened distances that the summary moves by.
     """
 
-    checks: NDArray[np.float64]
-    handmade: NDArray[np.float64]
-    summary: NDArray[np.float64]
+    checks: FloatArray
+    handmade: FloatArray
+    summary: FloatArray
     distance: float
-    moved: NDArray[np.float64]
+    moved: FloatArray
 
-    def vector(self, model: Estimator) -> NDArray[np.float64]:
+    def vector(self, model: Estimator) -> FloatArray:
         """(f,) everything in one, the summary as the training clips' covariance whitens it, distances as logarithms."""
         cloud = _cloud(model)
         logs = np.log10(np.maximum([self.distance, *self.moved], 1e-3))
         return np.concatenate([self.checks, self.handmade, cloud.whitening @ (self.summary - cloud.centre), logs])
 
 
-def features_of(model: Estimator, frames: NDArray[np.uint8], summary: NDArray[np.floating] | None = None) -> Features:
+def features_of(model: Estimator, frames: UInt8Array, summary: NDArray[np.floating] | None = None) -> Features:
     """Measure a clip.
 
     Args:

@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from measure.gate.checks import CHECKS
 from measure.gate.distortions import DISTORTIONS
@@ -22,7 +22,7 @@ from measure.gate.features import MOVES
 from measure.gate.tail_probability import ExponentialTails
 from models.outliers import conformal_p, shrunk_covariance, whitening
 
-Vector = NDArray[np.float64]
+Vector = FloatArray
 
 _SIDED = tuple(
     (name, place, sign, kind)

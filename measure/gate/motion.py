@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from flagdata.arrays import BoolArray, Float32Array, FloatArray
 from measure.gate.clip_statistics import SIDE, ClipStatistics
 
 _EDGE = 3
@@ -93,14 +93,14 @@ def edges_moving(clip: ClipStatistics) -> float:
     return float(clip.moving[steep].mean())
 
 
-def _masses(inside: NDArray[np.bool_], amplitude: NDArray[np.float32]) -> NDArray[np.float64]:
+def _masses(inside: BoolArray, amplitude: Float32Array) -> FloatArray:
     """Sums of the amplitude over the connected regions, ascending."""
     found: Any = ndimage.label(inside)
     labels, count = found
     return np.sort(np.asarray(ndimage.sum_labels(amplitude, labels, np.arange(1, count + 1)), dtype=np.float64))
 
 
-def _extent(profile: NDArray[np.float32]) -> float:
+def _extent(profile: Float32Array) -> float:
     total = np.cumsum(profile, dtype=np.float64)
     if total[-1] <= 0:
         return 0.0

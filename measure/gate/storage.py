@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import CorruptError
 from measure.gate.gate import SCORES, Gate
 from measure.gate.tail_probability import ExponentialTails
@@ -20,7 +20,7 @@ GATE = "gate.safetensors"
 _DIRECT = ("centre", "scale", "whitening", "directions", "offsets", "calibration", "statistics")
 
 
-def fingerprint(model: Estimator) -> NDArray[np.uint8]:
+def fingerprint(model: Estimator) -> UInt8Array:
     """(32,) SHA-256 of the weights of the learner whose summaries the gate looks at."""
     digest = hashlib.sha256()
     for name, value in sorted(model.learners[0].state_dict().items()):

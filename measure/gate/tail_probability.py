@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import betainc
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 
 BODY = 0.8
@@ -23,11 +23,11 @@ class ExponentialTails:
         excess: (c,) mean excess over it, not less than the score's resolution.
     """
 
-    start: NDArray[np.float64]
-    excess: NDArray[np.float64]
+    start: FloatArray
+    excess: FloatArray
 
     @classmethod
-    def of(cls, scores: NDArray[np.float64], resolution: NDArray[np.float64]) -> ExponentialTails:
+    def of(cls, scores: FloatArray, resolution: FloatArray) -> ExponentialTails:
         """Measure them on scores (n, c) of plain clips.
 
         Raises:
@@ -40,7 +40,7 @@ class ExponentialTails:
         excess = beyond.sum(axis=0) / np.maximum((beyond > 0).sum(axis=0), 1)
         return cls(start=start, excess=np.maximum(excess, resolution))
 
-    def surprise(self, scores: NDArray[np.float64]) -> NDArray[np.float64]:
+    def surprise(self, scores: FloatArray) -> FloatArray:
         """(…, c) excesses over the start of the tail in mean excesses: each one more is e times rarer."""
         return (scores - self.start) / self.excess
 

@@ -42,9 +42,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import bdtrc, ndtr, ndtri
 
+from flagdata.arrays import BoolArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 
@@ -159,7 +159,7 @@ class Verdict:
         return not all(self.blank)
 
     @property
-    def strange(self) -> NDArray[np.bool_]:
+    def strange(self) -> BoolArray:
         """(k,) whether a window by itself would be refused."""
         return np.array(self.window_p) <= self.level
 

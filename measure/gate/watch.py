@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, Float32Array, UInt8Array
 from models.conditioning import noise
 
 SIDE = 240
@@ -46,7 +47,7 @@ _TOGETHER = 5
 _SPOT_NOISES, _SPOT_CHANGE = 5.0, 3.0
 """Deviation in time, over the median one and in gray levels, from which on a pixel belongs to a spot that changes."""
 
-Picture = NDArray[np.uint8]
+Picture = UInt8Array
 _Gray = TypeVar("_Gray", np.uint8, np.float32)
 
 
@@ -66,10 +67,10 @@ class FilmWatch:
     shape: tuple[int, int] = (0, 0)
     times: list[float] = field(default_factory=list)
     _frames: int = 0
-    _last: NDArray[np.float32] | None = None
-    _fine: NDArray[np.float32] | None = None
-    _coarse: NDArray[np.float32] | None = None
-    _thumbs: list[NDArray[np.float32]] = field(default_factory=list)
+    _last: Float32Array | None = None
+    _fine: Float32Array | None = None
+    _coarse: Float32Array | None = None
+    _thumbs: list[Float32Array] = field(default_factory=list)
     _sample: list[Picture] = field(default_factory=list)
     _bright: list[float] = field(default_factory=list)
     _noise: list[float] = field(default_factory=list)
@@ -90,7 +91,7 @@ class FilmWatch:
             self._bright.append(float(np.quantile(picture[::4, ::4], 0.99)))
             self._noise.append(noise.deviation(noise.rough(picture.astype(np.float32))[2:-2, 2:-2]))
 
-    def _change(self, small: NDArray[np.float32]) -> None:
+    def _change(self, small: Float32Array) -> None:
         """Add up how much the picture changes, in itself and averaged."""
         if self._last is not None:
             fine, coarse = np.abs(small - self._last), np.abs(self._thumbs[-1] - self._thumbs[-2])
@@ -155,7 +156,7 @@ class FilmWatch:
         nearest = np.where(far, distance, np.inf).min(axis=1)
         return float((nearest < _TWIN * usual).mean()) if usual > 0 else 1.0
 
-    def grain(self, mask: NDArray[np.bool_]) -> float:
+    def grain(self, mask: BoolArray) -> float:
         """Share of the change that is left when pixels are averaged over a fortieth of the picture's longer side: of
         cloth more than a half, of leaves less than a third.
 
@@ -194,7 +195,7 @@ def _averaged(picture: NDArray[_Gray], side: int) -> NDArray[_Gray]:
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=picture.dtype)
 
 
-def _resized(mask: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def _resized(mask: BoolArray, shape: tuple[int, ...]) -> BoolArray:
     return cv2.resize(mask.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_NEAREST).astype(bool)
 
 

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 from measure.gate.checks import CHECKS
 from measure.gate.clip_statistics import LEAST_DEVIATION, ClipStatistics
@@ -44,7 +45,7 @@ clips, of the training side, where 1 called still pictures repeated and 0 called
 class WindowGate(Protocol):
     """Looks at one window at a time."""
 
-    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
+    def judge(self, frames: UInt8Array, summary: NDArray[np.floating]) -> list[Reason]:
         """What was found of a window, strange or not; at least one reason.
 
         Where there are several, the first speaks for all: its p holds for the checks together.
@@ -73,7 +74,7 @@ class FamiliarityGate:
 
     cloud: Familiarity
 
-    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
+    def judge(self, frames: UInt8Array, summary: NDArray[np.floating]) -> list[Reason]:
         nothing = blank(frames)
         if nothing is not None:
             return [nothing.of(1 / (len(self.cloud.reference) + 1))]
@@ -105,7 +106,7 @@ class CheckedGate:
     calibrated: Gate
     false_alarm: float
 
-    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
+    def judge(self, frames: UInt8Array, summary: NDArray[np.floating]) -> list[Reason]:
         """As `WindowGate`. Of a statistic it says that the window is unlike the training clips, and in which figure:
         faults such as a moving camera are counted in the film (`measure.gate.counted`), and are stated from there."""
         judged = judge(
@@ -155,7 +156,7 @@ class Judgement:
 
 
 def judge(
-    frames: NDArray[np.uint8],
+    frames: UInt8Array,
     model: Estimator,
     gate: Gate,
     *,
@@ -262,7 +263,7 @@ def _reason(gate: Gate, place: int, value: float, p: float) -> Reason:
     )
 
 
-def blank(frames: NDArray[np.uint8]) -> Reason | None:
+def blank(frames: UInt8Array) -> Reason | None:
     """What a clip lacks; None where there is something to measure.
 
     Args:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import UsageError
 from measure.forecasting.calibration import PRIOR, THETA
 from measure.inference.random_effect import NullModel
@@ -17,7 +17,7 @@ from measure.probes.rows import StatisticRows
 from measure.probes.statistics import Statistics
 from measure.probes.wind_log import DIRECTION, NUISANCES, by_recording
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 Chosen = Sequence[int]
 
 _HERE = (0.0,) * len(THETA)
@@ -47,7 +47,7 @@ class Evidence(StatisticRows):
 
     _WHOLE: ClassVar = frozenset({"columns", "logged", "prior"})
 
-    recording: NDArray[np.int64]
+    recording: IntArray
     curvature: Floats
     score: Floats
     energy: Floats
@@ -224,7 +224,7 @@ class Evidence(StatisticRows):
         step = (score[candidates] - across.T @ solved[:, -1]) / np.maximum(information, np.maximum(1e-9 * total, _TINY))
         return step, moved, fitted
 
-    def left_out(self, outside: NDArray[np.bool_], chosen: Chosen = ()) -> Floats:
+    def left_out(self, outside: BoolArray, chosen: Chosen = ()) -> Floats:
         """Computes half misfits of some segments, when the nuisances and chosen columns are fitted to the others,
         (segment,)."""
         fit = self.select(~outside).fit(chosen)
@@ -256,7 +256,7 @@ class CoefficientFit:
         return float(self.value[index]), float(np.sqrt(self.covariance[index, index]))
 
 
-def left_together(recording: NDArray[np.int64]) -> NDArray[np.int64]:
+def left_together(recording: IntArray) -> IntArray:
     """Numbers the segments by what is left out together, (segment,): a recording, or each half of a single one."""
     if len(np.unique(recording)) > 1:
         return recording

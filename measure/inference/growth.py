@@ -8,9 +8,10 @@ errors' own size, is larger the more the cloth is damped: by a power of the damp
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from flagdata.arrays import FloatArray
+
+Floats = FloatArray
 
 
 def power(sizes: Floats, damping: Floats) -> float:

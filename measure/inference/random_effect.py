@@ -17,13 +17,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.forecasting.calibration import DAMPING, PRIOR, Calibration
 from measure.forecasting.setting import Design
 from measure.inference.growth import power
 from measure.probes.rows import StatisticRows
 from measure.probes.statistics import Statistics
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 _SHIFTS = 16
 """Number of shifts. In 112 null experiments, drops of columns fell by a fifth from 8 to 16, by a twentieth to 32."""
@@ -105,13 +106,13 @@ class Nulls(StatisticRows):
     statistics: Statistics
     speeds: Floats
     calibration: Floats
-    numerics: NDArray[np.int64]
+    numerics: IntArray
     noise: Floats
     period: Floats
     cloth: NDArray[np.str_]
 
     @cached_property
-    def experiment(self) -> NDArray[np.int64]:
+    def experiment(self) -> IntArray:
         """(segment,) recordings of one cloth, by one numerics: 0, 1, …"""
         _, index = np.unique(np.c_[self.numerics, self.calibration], axis=0, return_inverse=True)
         return index.reshape(-1)
@@ -164,9 +165,7 @@ def _features(speeds: Floats) -> Floats:
     return np.stack([np.ones_like(speeds), speeds, speeds**2], axis=1)
 
 
-def _by_cloth(
-    means: Floats, kinds: NDArray[np.int64], cloths: NDArray[np.str_], covariance: Floats
-) -> dict[str, Floats]:
+def _by_cloth(means: Floats, kinds: IntArray, cloths: NDArray[np.str_], covariance: Floats) -> dict[str, Floats]:
     """Predicts for each cloth, (column,), what the nulls of one nominal cloth have in common, beyond that of all.
 
     A random effect of the cloth beside one of the numerics, predicted linearly (Henderson, Biometrics 31:423, 1975).
@@ -204,7 +203,7 @@ def _principal(means: Floats, covariance: Floats) -> Floats:
     return (factor @ (directions[:, :count] * scale)).T
 
 
-def _inflation(residuals: Floats, recording: NDArray[np.int64], covariance: Floats) -> float:
+def _inflation(residuals: Floats, recording: IntArray, covariance: Floats) -> float:
     """Computes how much more recordings' means vary than those of as many independent segments, at least 1."""
     sums = np.stack(
         [

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from measure.forecasting.calibration import Calibration
 from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel
 from measure.probes.statistics import Projection, Statistics
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

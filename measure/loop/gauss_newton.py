@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.errors import ErrorKind, FlagdataError
 from measure.forecasting.calibration import PRIOR, THETA, Calibration
 from measure.forecasting.model import Model, errors_of, linearised
@@ -19,7 +19,7 @@ from measure.inference.random_effect import NullModel
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.probes.statistics import Statistics, reduced
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 ROUNDS = 3
 _FEW = 8
@@ -65,7 +65,7 @@ class Refined:
     speeds: Floats
     stays: bool
 
-    def without(self, outside: NDArray[np.bool_]) -> Model:
+    def without(self, outside: BoolArray) -> Model:
         """Fits the same model to the other segments alone, one step from `origin`."""
         step, _ = _step(self.statistics.select(~outside), self.null, self.speeds[~outside], self.origin, self.anchor)
         return self.origin.moved(cut(step))
@@ -140,7 +140,7 @@ def finished(
     whitened: WhitenedMisfit,
     models: Sequence[Model],
     chosen: Sequence[int],
-    insides: Sequence[NDArray[np.bool_]],
+    insides: Sequence[BoolArray],
 ) -> list[tuple[Model, tuple[float, ...]]]:
     """Moves models of the same columns by one linear step by all directions of the whitened misfit, each fitted to some
     segments; returns them with the standard errors of that step.

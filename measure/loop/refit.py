@@ -19,9 +19,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import BoolArray, FloatArray
 from measure.ends import Bound, Span, of_profile
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.model import Model, errors_of
@@ -145,7 +145,7 @@ def across(column: EffectColumn, coefficient: float) -> tuple[Floats, int]:
     return np.geomspace(min(sizes) / BEYOND, _WITHIN_THE_END * farthest, COUNT), sign
 
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -175,7 +175,7 @@ class Fits:
                 self._made[key] = None
         return self._made[key]
 
-    def left_out(self, fitted: Refined, outsides: Sequence[NDArray[np.bool_]]) -> list[LeftOut]:
+    def left_out(self, fitted: Refined, outsides: Sequence[BoolArray]) -> list[LeftOut]:
         """Computes what one of these models leaves, each time fitted to the other segments alone."""
         keys = [(fitted.chosen, outside.tobytes()) for outside in outsides]
         new = [index for index, key in enumerate(keys) if key not in self._left]

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from measure.forecasting.segments import Segments
 from measure.loop.validation import Predictions
 from measure.observe.trajectory import Experiment
 from measure.verdict.record import Residual
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 _SHOWN = 50
 """Frames in motion: two seconds at 25 a second."""
 
@@ -61,12 +61,12 @@ def residuals(
     return tuple(residuals_of)
 
 
-def _joined(values: Floats, places: NDArray[np.int64]) -> Floats:
+def _joined(values: Floats, places: IntArray) -> Floats:
     """Joins one recording's segments one after another, (frame, marker, 3)."""
     return np.concatenate([values[..., segment] for segment in places])
 
 
-def _over(errors: Floats, counted: NDArray[np.bool_], axis: int) -> Floats:
+def _over(errors: Floats, counted: BoolArray, axis: int) -> Floats:
     """Computes the root mean square distance over frames (0) or markers (1) [m], of what was tracked; NaN where nothing
     was."""
     count = counted.sum(axis=axis)

@@ -21,8 +21,8 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError, UsageError
 from flagdata.provenance import code_version
 from flagdata.rng import child_seed
@@ -67,7 +67,7 @@ from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, 
 
 
 def parameters(
-    base: Refined, larger: Refined | None, reach: NDArray[np.float64], *, density_uncertainty: float
+    base: Refined, larger: Refined | None, reach: FloatArray, *, density_uncertainty: float
 ) -> tuple[Parameter, ...]:
     """Estimates density, bending and damping, by their logarithms, of the base and of a larger model.
 
@@ -123,7 +123,7 @@ def _damping(value: float, half: float) -> Estimate:
     return Estimate(value=value, low=max(0.0, low), high=high, unit="s", level=CRITERIA.interval)
 
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 _FLOOR_COPIES = 4
 _LOOKS = 4
 """At most: a damping of 30 ms is reached from 2.5 ms in two or three."""
@@ -404,7 +404,7 @@ def _trial(solved: Solved, options: LoopOptions) -> Trial:
         of_recording, floor = simulated.result()
     comparisons: list[Comparison] = []
     differences: list[Floats] = []
-    places: list[NDArray[np.int64]] = []
+    places: list[IntArray] = []
     squared = 0.0
     frames = len(setting.segments.items[0].positions) - setting.segments.first
     for number, (fold, (before, after, *wrong)) in enumerate(zip(all_folds, zip(*tried, strict=True), strict=True)):

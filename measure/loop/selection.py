@@ -13,9 +13,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.forecasting.calibration import THETA
 from measure.forecasting.regressors import TURNED, EffectColumn, columns, names
 from measure.inference.evidence import Evidence, gains
@@ -33,7 +33,7 @@ from measure.verdict.quantity import number
 from measure.verdict.record import Candidate, Conclusion, Estimate
 from sim.effects import EFFECTS
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 GUST_COLUMN = -1
 """Stands for gusts, which are no column: only their size can be found, not their course."""
@@ -67,7 +67,7 @@ class Weighed:
     candidate: Candidate
     error: float
     gains: Floats
-    recording: NDArray[np.int64]
+    recording: IntArray
     admissible: bool
     unlike: str = ""
     measured: Estimate | None = None
@@ -268,7 +268,7 @@ def _confidence_set(ranking: Sequence[Weighed], evidence: Evidence) -> list[Weig
     return [w for w in able if not _leads(best, w.gains, evidence.recording) and _leads(w.gains, 0 * best, w.recording)]
 
 
-def _leads(first: Floats, second: Floats, recording: NDArray[np.int64]) -> bool:
+def _leads(first: Floats, second: Floats, recording: IntArray) -> bool:
     """Returns whether held-out scores (segment,) are better by more than `Criteria.lead` standard errors of the
     difference."""
     return bool((first - second).sum() > CRITERIA.lead * total_error(first - second, recording))

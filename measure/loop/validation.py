@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.rng import child_seed
 from measure.forecasting.model import Model, errors_of
 from measure.forecasting.observer import Forecaster
@@ -27,7 +27,7 @@ from measure.observe.anchors import as_seen
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Comparison, Estimate
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 _DURATION = 4.5  # s: two segments of each recording
 _ENOUGH = 3
 """Segments of a recording beyond which two may be left out."""
@@ -38,7 +38,7 @@ class Fold:
     """Segments that are left out of a fit, and what is left out in words."""
 
     words: str
-    outside: NDArray[np.bool_]
+    outside: BoolArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,7 +55,7 @@ class Trial:
 
     comparisons: tuple[Comparison, ...] = ()
     apart: Floats | None = None
-    recording: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    recording: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     rises: bool = False
 
     @property
@@ -64,7 +64,7 @@ class Trial:
         return None if self.apart is None else a_segment(self.apart, self.recording)
 
 
-def total_error(values: Floats, recording: NDArray[np.int64]) -> float:
+def total_error(values: Floats, recording: IntArray) -> float:
     """Computes the standard error of a sum over segments (segment,) that are drawn within recordings.
 
     Recordings are strata: that an effect helps more in strong wind than in light wind is no chance. Where one has a
@@ -75,7 +75,7 @@ def total_error(values: Floats, recording: NDArray[np.int64]) -> float:
     return math.sqrt(sum(len(part) * float(np.var(part, ddof=1)) for part in _strata(values, recording)))
 
 
-def _strata(values: Floats, recording: NDArray[np.int64]) -> list[Floats]:
+def _strata(values: Floats, recording: IntArray) -> list[Floats]:
     strata = [values[recording == index] for index in np.unique(recording)]
     return strata if min(len(part) for part in strata) > 1 else [values]
 
@@ -139,7 +139,7 @@ def left_out(
     segments: Segments,
     fitted: Refined,
     whitened: WhitenedMisfit,
-    outsides: Sequence[NDArray[np.bool_]],
+    outsides: Sequence[BoolArray],
 ) -> list[LeftOut]:
     """Computes what a model leaves, each time fitted to the other segments alone."""
     begun = [fitted.without(outside) for outside in outsides]
@@ -153,7 +153,7 @@ def measured(
     segments: Segments,
     models: Sequence[Model],
     whitened: WhitenedMisfit,
-    outsides: Sequence[NDArray[np.bool_]],
+    outsides: Sequence[BoolArray],
     chosen: Sequence[int] = (),
 ) -> list[LeftOut]:
     """Computes what models leave as they are; what each leaves along the nuisances and chosen columns is fitted to the
@@ -176,7 +176,7 @@ def _squared(errors: Floats) -> Floats:
 def compare(
     fold: Fold,
     *,
-    recording: NDArray[np.int64],
+    recording: IntArray,
     frames: int,
     before: LeftOut,
     after: LeftOut,
@@ -218,7 +218,7 @@ def share_removed(before: Floats, after: Floats, floor: Floats) -> float | None:
     return float(before.mean() - after.mean()) / above if above > CRITERIA.room * most else None
 
 
-def a_segment(values: Floats, recording: NDArray[np.int64]) -> Estimate:
+def a_segment(values: Floats, recording: IntArray) -> Estimate:
     """Averages misfits over segments, drawn within recordings, with Student's interval [nat]."""
     value, reach = float(values.mean()), math.inf
     if len(values) > 1:
@@ -257,8 +257,8 @@ def _reach(values: Floats) -> float:
 
 
 def numerical_floor(
-    setting: Setting, recordings: NDArray[np.int64], model: Model, *, copies: int, seed: int
-) -> tuple[NDArray[np.int64], Floats]:
+    setting: Setting, recordings: IntArray, model: Model, *, copies: int, seed: int
+) -> tuple[IntArray, Floats]:
     """Computes errors of segments simulated from a model by other numerics and predicted by it.
 
     Args:

@@ -22,14 +22,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import rankdata, t
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.nulls.conformal import MOST_KINDS
 from measure.shares import clopper_pearson
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,7 +42,7 @@ class ClusteredNulls:
     """
 
     null: Floats
-    kinds: NDArray[np.int64]
+    kinds: IntArray
 
     @cached_property
     def count(self) -> int:

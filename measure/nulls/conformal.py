@@ -20,11 +20,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.shares import clopper_pearson
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 MOST_KINDS = 1000
 """Kinds of numerics beyond which none are proposed: 1,000 take some six hours of a core."""
@@ -45,7 +45,7 @@ class GroupedConformal:
     """
 
     null: Floats
-    kinds: NDArray[np.int64]
+    kinds: IntArray
 
     @cached_property
     def count(self) -> int:

@@ -12,12 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.forecasting.strengths import on_markers
 from measure.inference.evidence import Evidence
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 APPEARS = 0.25
 """Share of a shift that the fit's mesh expects of an effect which appears in recordings of other meshes: the median of

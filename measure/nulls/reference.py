@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
 from measure.forecasting.calibration import DAMPING, PRIOR, THETA, Calibration
@@ -26,7 +26,7 @@ from measure.probes.lines import Lines, SpectralLine, strongest
 from measure.probes.rows import StatisticRows
 from measure.verdict.criteria import CRITERIA
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 _GROUPS = 400
 GUSTS = "air-density.change"
 """The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
@@ -44,7 +44,7 @@ class LeftOut:
 
     model: NullModel
     outside: Nulls
-    groups: tuple[NDArray[np.int64], ...]
+    groups: tuple[IntArray, ...]
 
 
 def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> Iterator[LeftOut]:
@@ -63,7 +63,7 @@ def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> I
         outside = pool.select(pool.experiment == index)
         recording = outside.statistics.recording
         places = [np.flatnonzero(recording == r) for r in np.unique(recording)]
-        groups: list[NDArray[np.int64]] = []
+        groups: list[IntArray] = []
         for _ in range(groups_of_each):
             chosen = np.concatenate([places[k] for k in rng.permutation(len(places))])[:segments]
             if len(chosen) < segments:
@@ -186,7 +186,7 @@ class _NullGroups(StatisticRows):
     lines: Floats | None
     deviations: Floats
     noise: Floats
-    kinds: NDArray[np.int64]
+    kinds: IntArray
     damping: Floats
 
     @classmethod
@@ -317,7 +317,7 @@ class Reference:
     scaled: Floats
     spread: Floats
     far: Floats
-    kinds: NDArray[np.int64]
+    kinds: IntArray
     deviations: Floats
     centre: Floats
     width: Floats

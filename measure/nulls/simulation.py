@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import FlagdataError
 from flagdata.rng import stream
 from measure.forecasting.calibration import Calibration
@@ -35,7 +35,7 @@ from sim.scene import Scene, assemble
 from sim.system import System
 from sim.wind.sampled import Beyond, Even, SampledWind
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 SETTLE = 3.0  # s, before the first frame; a flag of 1.5 m has forgotten a start from rest after two swings
 _FINER = (1.3, 1.75)

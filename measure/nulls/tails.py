@@ -13,9 +13,10 @@ far data are. A null counts in the tail of its own statistics: by all others, an
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from flagdata.arrays import FloatArray
+
+Floats = FloatArray
 
 _NORMAL = 1e6
 """Degrees of freedom from which a tail is the normal's."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.observables.cloth import ClothWindow
 from measure.observables.film import FilmWindow
 from measure.observables.unseen import UnseenError
@@ -15,7 +15,7 @@ _NARROWEST = 0.12
 """Share of the flat area that is seen below which the view is along the flag: one that hangs in folds shows more."""
 
 
-def chord(window: Window) -> NDArray[np.float64]:
+def chord(window: Window) -> FloatArray:
     """(n, 2) from the middle of the hoist to the middle of the free edge: away from the hoist, and up [m]. Frames
     that show no cloth are left out.
 

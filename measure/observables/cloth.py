@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from measure.observables.silhouettes import Silhouettes
 
@@ -44,7 +45,7 @@ class View:
                 fix="give an elevation below 80° and a distance above 0",
             )
 
-    def axes(self, heading: float) -> NDArray[np.float64]:
+    def axes(self, heading: float) -> FloatArray:
         """(3, 3) rows: the picture's right, its up, and the direction of view, of a wind that goes to `heading`."""
         around, up = heading + self.azimuth, self.elevation
         forward = [math.cos(around) * math.cos(up), math.sin(around) * math.cos(up), math.sin(up)]
@@ -69,11 +70,11 @@ class ClothWindow:
         InputError: shapes that disagree, values that are not finite, vertices that are not there.
     """
 
-    times: NDArray[np.float64]
-    points: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    hoist: NDArray[np.int64]
-    free: NDArray[np.int64]
+    times: FloatArray
+    points: FloatArray
+    faces: IntArray
+    hoist: IntArray
+    free: IntArray
     length: float
     height: float
 
@@ -96,17 +97,17 @@ class ClothWindow:
         return 1.0 if x[:, self.free].mean() >= x[:, self.hoist].mean() else -1.0
 
     @cached_property
-    def middle_of_hoist(self) -> NDArray[np.float64]:
+    def middle_of_hoist(self) -> FloatArray:
         """(n, 2) midway between the hoist's ends: what a person finds on the pole [m]."""
         return (self.points[:, self.hoist[0]] + self.points[:, self.hoist[-1]]) / 2
 
     @cached_property
-    def free_edge(self) -> NDArray[np.float64]:
+    def free_edge(self) -> FloatArray:
         """(n, 2) mean of the free edge: away from the middle of the hoist, and above it [m]."""
         return self._from_hoist(self.points[:, self.free].mean(axis=1))
 
     @cached_property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> FloatArray:
         """(n, 2) centroid of the middle third of the silhouette's area [m from the hoist, as `free_edge`]."""
         return self.silhouettes.middle_of(1 / 3, 2 / 3)
 
@@ -129,7 +130,7 @@ class ClothWindow:
             times=self.times, masks=masks, scale=scale, hoist=-low, length=self.length, height=self.height
         )
 
-    def _from_hoist(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _from_hoist(self, places: FloatArray) -> FloatArray:
         return (places - self.middle_of_hoist) * np.array([self.side, 1.0])
 
 
@@ -137,7 +138,7 @@ def seen_from(
     view: View,
     positions: NDArray[np.floating],
     *,
-    times: NDArray[np.float64],
+    times: FloatArray,
     faces: NDArray[np.integer],
     hoist: NDArray[np.integer],
     free: NDArray[np.integer],
@@ -183,7 +184,7 @@ def seen_from(
     )
 
 
-def edges_of(rest: NDArray[np.floating]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def edges_of(rest: NDArray[np.floating]) -> tuple[IntArray, IntArray]:
     """Hoist and free edge of a flat flag from their upper ends: vertices of least and of largest first coordinate.
 
     Args:

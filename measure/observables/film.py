@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from flagdata.errors import InputError
 from measure.observables.silhouettes import Silhouettes
 from measure.observables.unseen import UnseenError
@@ -36,12 +36,12 @@ class FilmWindow:
         InputError: shapes that disagree.
     """
 
-    times: NDArray[np.float64]
-    frames: NDArray[np.uint8]
-    masks: NDArray[np.bool_]
-    shown: NDArray[np.bool_]
+    times: FloatArray
+    frames: UInt8Array
+    masks: BoolArray
+    shown: BoolArray
     scale: float
-    hoist: NDArray[np.float64]
+    hoist: FloatArray
     side: float
     length: float
     height: float
@@ -79,12 +79,12 @@ class FilmWindow:
         )
 
     @cached_property
-    def free_edge(self) -> NDArray[np.float64]:
+    def free_edge(self) -> FloatArray:
         """(n, 2) middle of the free edge, as far as the outline shows it: away from the middle of the hoist, and above
         it [m]."""
         return self.silhouettes.free_edge()
 
     @cached_property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> FloatArray:
         """(n, 2) centroid of the middle third of the silhouette's area, likewise."""
         return self.silhouettes.middle_of(1 / 3, 2 / 3)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.observables.chord import Window, chord
 from measure.observables.motion import spectrum
 from measure.observables.observable import Observable
@@ -14,7 +14,7 @@ _STILL = 0.004
 """Root mean square motion of the free edge, in flag lengths, below which there is no spectrum but of noise."""
 
 
-def moving(window: Window) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def moving(window: Window) -> tuple[FloatArray, FloatArray]:
     """Frequencies and power of the free edge's motion, `motion.spectrum`.
 
     Raises:

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from flagdata.arrays import FloatArray
 from measure.observables.unseen import UnseenError
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 RATE = 25.0
 """Rate [Hz] at which courses are compared: films of 25 fps and more have it."""
 LOWEST, HIGHEST = 0.4, 8.0

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.errors import InputError
 
 _TAIL = 0.06
@@ -32,10 +32,10 @@ class Silhouettes:
         InputError: shapes that disagree, or times that do not ascend.
     """
 
-    times: NDArray[np.float64]
-    masks: NDArray[np.bool_]
+    times: FloatArray
+    masks: BoolArray
     scale: float
-    hoist: NDArray[np.float64]
+    hoist: FloatArray
     length: float
     height: float
 
@@ -48,21 +48,21 @@ class Silhouettes:
             )
 
     @cached_property
-    def area(self) -> NDArray[np.float64]:
+    def area(self) -> FloatArray:
         """(n,) [m²] of the picture's plane."""
         return self.masks.sum(axis=(1, 2)) / self.scale**2
 
     @cached_property
-    def columns(self) -> NDArray[np.float64]:
+    def columns(self) -> FloatArray:
         """(columns,) distance of the middles of the mask's columns from the hoist, away from it [m]."""
         return (np.arange(self.masks.shape[2]) + 0.5 - self.hoist[0]) / self.scale
 
     @cached_property
-    def rows(self) -> NDArray[np.float64]:
+    def rows(self) -> FloatArray:
         """(rows,) height of the middles of the mask's rows above the middle of the hoist [m]."""
         return (self.hoist[1] - np.arange(self.masks.shape[1]) - 0.5) / self.scale
 
-    def middle_of(self, low: float, high: float) -> NDArray[np.float64]:
+    def middle_of(self, low: float, high: float) -> FloatArray:
         """(n, 2) centroid [m] of the cloth between two shares of its area, counted away from the hoist; NaN without."""
         profile = self.masks.sum(axis=1).astype(np.float64)
         held = np.where(profile > 0, profile, 1.0)
@@ -72,7 +72,7 @@ class Silhouettes:
         up = np.einsum("nrc,r->nc", self.masks, self.rows) / held
         return np.stack([(inside * self.columns).sum(axis=1), (inside * up).sum(axis=1)], axis=1) / (high - low)
 
-    def free_edge(self) -> NDArray[np.float64]:
+    def free_edge(self) -> FloatArray:
         """(n, 2) middle of the free edge as far as an outline shows it [m]: midway between the middle quarter of the
         free outline and the centroid of the `_TAIL` of the area that is farthest along the chord; NaN without cloth.
 
@@ -84,13 +84,13 @@ class Silhouettes:
                 found[k] = (self._along_outline(mask) + self._tail(mask)) / 2
         return found
 
-    def _tail(self, mask: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def _tail(self, mask: BoolArray) -> FloatArray:
         rows, columns = np.nonzero(mask)
         places = np.stack([self.columns[columns], self.rows[rows]], axis=1)
         along = places @ places.mean(axis=0)
         return places[along >= np.quantile(along, 1 - _TAIL)].mean(axis=0)
 
-    def _along_outline(self, mask: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def _along_outline(self, mask: BoolArray) -> FloatArray:
         contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         border = np.asarray(max(contours, key=len), np.int64)[:, 0]
         places = np.stack([self.columns[border[:, 0]], self.rows[border[:, 1]]], axis=1)

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.dataset.truth import TruthSeries, over_ground
 from flagdata.lake.meshes import write_plain
 from flagdata.signals import WindSeries
@@ -48,11 +48,11 @@ class Table:
     length: float
     height: float
     seconds: float
-    time: NDArray[np.float64]
+    time: FloatArray
     readings: Mapping[str, tuple[Reading, ...]]
-    wind: NDArray[np.float64] | None = None
+    wind: FloatArray | None = None
 
-    def values(self, name: str) -> NDArray[np.float64]:
+    def values(self, name: str) -> FloatArray:
         """(w,) of an observable, NaN where a window does not show it."""
         return np.array([reading.value for reading in self.readings[name]])
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import RefusedError
 from measure.film.conditioned import ConditionedFilm
 from measure.film.similarity import FlagSize
@@ -39,7 +39,7 @@ class Watched:
         seconds: length of a window.
     """
 
-    starts: NDArray[np.float64]
+    starts: FloatArray
     windows: tuple[FilmWindow | None, ...]
     seconds: float
 
@@ -124,9 +124,9 @@ class Watcher:
         self._begin, self._count, self._seconds = begin, count, seconds
         self._a_chunk = max(1, round(CHUNK / seconds))
         self._done = 0
-        self._held: list[tuple[float, NDArray[np.uint8]]] = []
+        self._held: list[tuple[float, UInt8Array]] = []
 
-    def look(self, time: float, frame: NDArray[np.uint8]) -> None:
+    def look(self, time: float, frame: UInt8Array) -> None:
         """Take the next frame, conditioned, and its time [s]; frames before the first window are left out."""
         if time < self._begin:
             return
@@ -150,7 +150,7 @@ class Watcher:
                 fix="give another film, or --crop around the flag",
             )
 
-    def _read(self, held: Sequence[tuple[float, NDArray[np.uint8]]], some: int) -> None:
+    def _read(self, held: Sequence[tuple[float, UInt8Array]], some: int) -> None:
         some = min(some, self._count - self._done)
         if some > 0:
             begin = self._begin + self._done * self._seconds
@@ -160,7 +160,7 @@ class Watcher:
 
 def _chunk(
     film: ConditionedFilm,
-    held: Sequence[tuple[float, NDArray[np.uint8]]],
+    held: Sequence[tuple[float, UInt8Array]],
     begin: float,
     count: int,
     seconds: float,

@@ -6,9 +6,9 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, Delaunay, KDTree, QhullError
 
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from sim.mesh import Mesh, grid
 
@@ -19,7 +19,7 @@ _CLEARANCE = 0.6  # of the spacing: inner points keep that far from the outline
 _SHARP = math.radians(15)  # turn of an outline at a corner that the mesh keeps
 _SLIVER = 0.05  # twice the area over the squared longest edge
 
-Points = NDArray[np.float64]
+Points = FloatArray
 
 
 def rectangle(width: float, height: float, *, vertices: int = VERTICES) -> Mesh:
@@ -52,7 +52,7 @@ def hull(points: Points, *, where: str) -> Points:
         ) from None
 
 
-def outline(rest: Points, faces: NDArray[np.int64], *, where: str) -> Points:
+def outline(rest: Points, faces: IntArray, *, where: str) -> Points:
     """Finds the outer edge of a triangulated cloth, (corner, 2).
 
     Raises:
@@ -133,7 +133,7 @@ def model_mesh(corners: Points, *, vertices: int = VERTICES) -> Mesh:
     return Mesh(rest=points[used], faces=compact.reshape(-1, 3))
 
 
-def sharp_corners(corners: Points) -> NDArray[np.int64]:
+def sharp_corners(corners: Points) -> IntArray:
     """Indices of the corners at which an outline turns by more than 15°."""
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
     turn = np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
@@ -148,7 +148,7 @@ def distance_to(corners: Points, point: Points) -> float:
     return float(np.hypot(*(offset - share[:, None] * along).T).min())
 
 
-def inside(corners: Points, points: Points) -> NDArray[np.bool_]:
+def inside(corners: Points, points: Points) -> BoolArray:
     """Returns whether points are within a polygon, (point,): a ray from each crosses its edges an odd number of
     times."""
     x, y = points[:, 0:1], points[:, 1:2]

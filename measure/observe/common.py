@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial import KDTree
 
+from flagdata.arrays import IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe.interpolation import onto
@@ -116,7 +116,7 @@ def _shared(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], t
     """Selects the markers that all recordings have; None where these are too few to speak of one layout."""
     most = max(recordings, key=lambda recording: len(recording.markers))
     size = _SAME * float(np.ptp(most.markers, axis=0).max())
-    places: list[NDArray[np.int64]] = []
+    places: list[IntArray] = []
     shared = np.ones(len(most.markers), dtype=bool)
     for recording in recordings:
         distance, nearest = KDTree(recording.markers).query(most.markers)

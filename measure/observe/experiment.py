@@ -21,10 +21,10 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from scipy.stats import chi2
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe import cloth
@@ -59,10 +59,10 @@ class Stencils:
         weights: (marker, k) with unit sum of squares, so that unit noise leaves unit noise.
     """
 
-    neighbours: NDArray[np.int64]
-    weights: NDArray[np.float64]
+    neighbours: IntArray
+    weights: FloatArray
 
-    def of(self, values: NDArray[np.float64], step: int = 1) -> NDArray[np.float64]:
+    def of(self, values: FloatArray, step: int = 1) -> FloatArray:
         """Computes departures of every `step`-th marker, (frame, …, 3), from values (frame, marker, 3); NaN where one
         is NaN."""
         weights, neighbours = self.weights[::step], self.neighbours[::step]
@@ -72,7 +72,7 @@ class Stencils:
         return departure
 
 
-def estimate(markers: NDArray[np.float64], positions: NDArray[np.float64], *, where: str) -> float:
+def estimate(markers: FloatArray, positions: FloatArray, *, where: str) -> float:
     """Estimates the standard deviation of a coordinate's noise [m].
 
     Within 10 % for white noise on a motion that is smooth on the scale of the frames or of the markers; too large where
@@ -104,7 +104,7 @@ def estimate(markers: NDArray[np.float64], positions: NDArray[np.float64], *, wh
     return smallest
 
 
-def stencils(markers: NDArray[np.float64], degree: int) -> Stencils | None:
+def stencils(markers: FloatArray, degree: int) -> Stencils | None:
     """Computes departures from polynomials of a degree fitted to the nearest neighbours; None where there are too few
     of them.
 
@@ -130,7 +130,7 @@ def stencils(markers: NDArray[np.float64], degree: int) -> Stencils | None:
     return Stencils(neighbours=neighbours, weights=weights / np.linalg.norm(weights, axis=1, keepdims=True))
 
 
-def _quietest(values: NDArray[np.float64], order: int) -> float:
+def _quietest(values: FloatArray, order: int) -> float:
     """Estimates the standard deviation at the markers that move least, from differences (frame, marker, 3) of an order
     in time; infinite where too few values are finite."""
     square = (values * values).sum(axis=2) / 3

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe.trajectory import Floats, Trajectory
@@ -39,9 +39,9 @@ class Filled:
     """
 
     frames: slice
-    markers: NDArray[np.bool_]
+    markers: BoolArray
     positions: Floats
-    seen: NDArray[np.bool_] | None
+    seen: BoolArray | None
     findings: tuple[Finding, ...]
 
 
@@ -147,7 +147,7 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
     return Filled(frames=frames, markers=markers_used, positions=complete, seen=tracked_used, findings=tuple(findings))
 
 
-def _filled(positions: Floats, tracked: NDArray[np.bool_], markers: Floats, longest: int) -> Floats:
+def _filled(positions: Floats, tracked: BoolArray, markers: Floats, longest: int) -> Floats:
     """Fills (frame, marker, 3)."""
     complete = np.array(positions)
     index = np.arange(len(complete))
@@ -167,7 +167,7 @@ def _filled(positions: Floats, tracked: NDArray[np.bool_], markers: Floats, long
     return complete
 
 
-def _long_gap(track: Floats, carried: Floats, gap: NDArray[np.int64]) -> Floats:
+def _long_gap(track: Floats, carried: Floats, gap: IntArray) -> Floats:
     """Fills a gap (gap, 3) of a marker (frame, 3), by its own positions at the gap's ends or by where its neighbours
     take it."""
     off, half = track - carried, max(1, (len(gap) + 1) // 2)
@@ -175,7 +175,7 @@ def _long_gap(track: Floats, carried: Floats, gap: NDArray[np.int64]) -> Floats:
     return moved if _swing(off, half) < _swing(track, half) and np.isfinite(moved).all() else _across(track, gap)
 
 
-def _across(series: Floats, gap: NDArray[np.int64]) -> Floats:
+def _across(series: Floats, gap: IntArray) -> Floats:
     """Interpolates a series (frame, 3) in a gap, (gap, 3): it changes evenly between its ends, and stays beyond a
     single one."""
     ends = [frame for frame in (gap[0] - 1, gap[-1] + 1) if 0 <= frame < len(series)]
@@ -193,9 +193,7 @@ def _swing(series: Floats, half: int) -> float:
     return float((finite**2).sum(axis=1).mean()) if len(finite) else np.inf
 
 
-def _carried(
-    positions: Floats, tracked: NDArray[np.bool_], markers: Floats, neighbours: NDArray[np.int64], marker: int
-) -> Floats:
+def _carried(positions: Floats, tracked: BoolArray, markers: Floats, neighbours: IntArray, marker: int) -> Floats:
     """Maps a marker by the quadratic map of its nearest tracked neighbours, (frame, 3) [m].
 
     It is not finite in frames in which hardly a marker was tracked.
@@ -223,13 +221,13 @@ def _weights(arms: Floats) -> Floats:
     return np.linalg.pinv(basis, rcond=1e-3)[0]
 
 
-def _gaps(tracked: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def _gaps(tracked: BoolArray) -> Iterator[tuple[int, int]]:
     """Yields the first frame of each gap, and the frame after it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[True], tracked, [True]]).astype(np.int8)))
     yield from ((int(begin), int(end)) for begin, end in zip(edges[::2], edges[1::2], strict=True))
 
 
-def _stretch(tracked: NDArray[np.bool_]) -> slice:
+def _stretch(tracked: BoolArray) -> slice:
     """Cuts to the frames from the first to the last in which nearly as many markers were tracked as usually, of those
     that are tracked half the time; all frames where there are none such."""
     often = tracked.mean(axis=0) >= _LEAST
@@ -240,5 +238,5 @@ def _stretch(tracked: NDArray[np.bool_]) -> slice:
     return slice(int(enough[0]), int(enough[-1]) + 1)
 
 
-def _first(frames: NDArray[np.bool_]) -> int:
+def _first(frames: BoolArray) -> int:
     return int(np.argmax(frames.any(axis=1)))

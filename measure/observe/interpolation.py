@@ -5,16 +5,16 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RBFInterpolator
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 
 _COINCIDENT = 1e-6
 """Share of the cloth's size: points nearer than this are one. Rest coordinates are often kept in single precision."""
 
 
-def onto(source_rest: NDArray[np.float64], target_rest: NDArray[np.float64]) -> NDArray[np.float64]:
+def onto(source_rest: FloatArray, target_rest: FloatArray) -> FloatArray:
     """Computes the matrix that takes values at source points to values at target points: thin-plate splines in (u, v).
 
     Of all fields through the source's values it gives the one of least ∫ f_uu² + 2 f_uv² + f_vv² (Duchon, 1977), and
@@ -43,7 +43,7 @@ def onto(source_rest: NDArray[np.float64], target_rest: NDArray[np.float64]) -> 
 
 
 @lru_cache(maxsize=32)
-def _matrix(source_bytes: bytes, target_bytes: bytes) -> NDArray[np.float64]:
+def _matrix(source_bytes: bytes, target_bytes: bytes) -> FloatArray:
     source, target = (np.frombuffer(b, dtype=np.float64).reshape(-1, 2) for b in (source_bytes, target_bytes))
     centre, size = _frame(source)
     source, target = (source - centre) / size, (target - centre) / size
@@ -61,7 +61,7 @@ def _matrix(source_bytes: bytes, target_bytes: bytes) -> NDArray[np.float64]:
     return matrix
 
 
-def _frame(source: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+def _frame(source: FloatArray) -> tuple[FloatArray, float]:
     """Computes the points' centre and the size of their box, once they are known to define a spline."""
     if len(source) < 3:
         raise InputError(f"there are {len(source)} source points", where="interpolation", fix="give at least three")
@@ -79,5 +79,5 @@ def _frame(source: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     return (low + high) / 2, size
 
 
-def _distances(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _distances(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.hypot(a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1])

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from flagdata.ingest.meshes import read_folder
@@ -38,15 +39,15 @@ class Location:
         weights: (point, 3) barycentric coordinates in it, which sum to 1.
     """
 
-    corners: NDArray[np.int64]
-    weights: NDArray[np.float64]
+    corners: IntArray
+    weights: FloatArray
 
-    def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of(self, values: FloatArray) -> FloatArray:
         """Interpolates values (vertex, …) at the points, (point, …), linear in each face."""
         return np.einsum("pc,pc...->p...", self.weights, values[self.corners])
 
 
-def locate(rest: NDArray[np.float64], faces: NDArray[np.int64], points: NDArray[np.float64], *, where: str) -> Location:
+def locate(rest: FloatArray, faces: IntArray, points: FloatArray, *, where: str) -> Location:
     """Finds the faces in which points of the flat cloth lie, and where in them.
 
     Args:
@@ -88,7 +89,7 @@ def locate(rest: NDArray[np.float64], faces: NDArray[np.int64], points: NDArray[
     return Location(corners=faces[containing], weights=weights)
 
 
-def sample(sequence: MeshSequence | RaggedMeshSequence, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def sample(sequence: MeshSequence | RaggedMeshSequence, points: FloatArray) -> FloatArray:
     """Interpolates where points of the flat cloth (point, 2) are in each frame, (frame, point, 3) [m], linear in each
     face.
 
@@ -96,7 +97,7 @@ def sample(sequence: MeshSequence | RaggedMeshSequence, points: NDArray[np.float
         InputError: a point that is not on the cloth in every frame.
     """
     positions = np.empty((len(sequence), len(points), 3))
-    last: tuple[NDArray[np.float32], NDArray[np.int32]] | None = None
+    last: tuple[Float32Array, NDArray[np.int32]] | None = None
     location: Location | None = None
     for index in range(len(sequence)):
         mesh = sequence.frame(index)
@@ -109,7 +110,7 @@ def sample(sequence: MeshSequence | RaggedMeshSequence, points: NDArray[np.float
     return positions
 
 
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe.cloth import outline
@@ -91,7 +91,7 @@ class Observation:
     source: str = ""
     known: Known = field(default_factory=Known)
     findings: tuple[Finding, ...] = ()
-    seen: NDArray[np.bool_] | None = None
+    seen: BoolArray | None = None
 
     def __post_init__(self) -> None:
         where = f"recording {self.name!r}"
@@ -126,7 +126,7 @@ def from_arrays(
     positions: Floats,
     rest: Floats,
     rate: float,
-    faces: NDArray[np.int64] | None = None,
+    faces: IntArray | None = None,
     wind: WindTrack | None = None,
     noise: float | None = None,
     known: Known | None = None,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from measure.observe.cloth import VERTICES
 from measure.observe.trajectory import DENSITY_UNCERTAINTY
@@ -52,7 +52,7 @@ class Setup:
     material: Material | None = None
     mass_known: bool = True
     density_uncertainty: float = DENSITY_UNCERTAINTY
-    outline: NDArray[np.float64] | None = None
+    outline: FloatArray | None = None
     pins: Hold | tuple[tuple[float, float], ...] | None = None
     carried: bool = False
     stiffness: float | None = None
@@ -85,7 +85,7 @@ class Setup:
         return InputError(message, where="setup", fix=fix)
 
 
-def sheet(width: float, height: float) -> NDArray[np.float64]:
+def sheet(width: float, height: float) -> FloatArray:
     """Outlines a rectangle from (0, 0) to (width, height) [m].
 
     Raises:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray, BoolArray, FloatArray
 from flagdata.errors import InputError
 from sim.air import AirForce, QuadraticNormal
 from sim.handles import ARCSIM_STIFFNESS
@@ -16,7 +16,7 @@ from sim.material import Material
 from sim.mesh import Mesh
 from sim.scene import GRAVITY
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 GAIN = 0.03
 """Share: calibrated cups and sonics are good to 1 to 3 % (IEC 61400-12-1, annex I, classes them so)."""
@@ -167,7 +167,7 @@ class Trajectory:
     wind: WindTrack
     noise: float = 0.0
     source: str = ""
-    seen: NDArray[np.bool_] | None = None
+    seen: BoolArray | None = None
     attachments: Floats | None = None
 
     def __post_init__(self) -> None:
@@ -314,7 +314,7 @@ def _frozen(values: Floats) -> Floats:
     return array
 
 
-def described(specimen: Specimen) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+def described(specimen: Specimen) -> tuple[dict[str, Any], list[AnyArray]]:
     """Lists plain values and arrays that say all of a cloth and its uncertainties, to be hashed; no names and files."""
     material = specimen.material
     content: dict[str, Any] = {

@@ -21,13 +21,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.probes.rows import StatisticRows
 from measure.verdict.criteria import CRITERIA
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 ALONG, LEFT = 0, 1
 _WINDOW = 0.2
@@ -49,7 +49,7 @@ class Course(StatisticRows):
     curvature: Floats
     log: Floats | None = None
 
-    def swing(self, recording: NDArray[np.int64]) -> Floats:
+    def swing(self, recording: IntArray) -> Floats:
         """Computes Σ √(h h') c c' over neighbouring windows, c about its recording's mean, a segment, (part,).
 
         In units of the errors' scale, so that errors that are larger all over leave no larger ones.
@@ -60,7 +60,7 @@ class Course(StatisticRows):
         value, weight = self._about(recording), self._together
         return (weight * value[:, :-1] * value[:, 1:]).sum(axis=(0, 1)) / len(recording)
 
-    def variation(self, recording: NDArray[np.int64]) -> Variation:
+    def variation(self, recording: IntArray) -> Variation:
         """Computes how the wind varies, as shares of its mean."""
         value, weight = self._about(recording), self._together
         within = value - self._mean(value)
@@ -88,7 +88,7 @@ class Course(StatisticRows):
         """Averages over the windows, (segment, 1, part)."""
         return (self._diagonal * value).sum(axis=1, keepdims=True) / self._diagonal.sum(axis=1, keepdims=True)
 
-    def _about(self, recording: NDArray[np.int64]) -> Floats:
+    def _about(self, recording: IntArray) -> Floats:
         """Computes c less its recording's mean, and less what its log may be off by, (segment, window, part)."""
         value = self._centred(self.score, recording)
         if self.log is None:
@@ -103,7 +103,7 @@ class Course(StatisticRows):
             )
         return value
 
-    def _centred(self, score: Floats, recording: NDArray[np.int64]) -> Floats:
+    def _centred(self, score: Floats, recording: IntArray) -> Floats:
         """Computes scores over h, less their recording's mean, (segment, window, part)."""
         value = score / self._diagonal
         for index in np.unique(recording):

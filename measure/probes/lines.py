@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.forecasting.regressors import cosine
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 REDUCED: Floats = np.geomspace(1.0, 4.0, 70)
 """f/U [1/m]: bodies 5 to 20 cm wide. Below are the harmonics of the flutter of a flag of 1.5 m, at about 0.3, by which
@@ -148,7 +148,7 @@ def strongest(prominence: Floats) -> Floats:
     return _strongest(prominence)[0]
 
 
-def _strongest(prominence: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def _strongest(prominence: Floats) -> tuple[Floats, IntArray]:
     resolved = np.flatnonzero(np.isfinite(prominence[:, :, 0]).mean(axis=0) >= 0.5)
     if not len(resolved):  # too few frames a second for any: as prominent as its neighbourhood
         return np.zeros(prominence.shape[2]), np.zeros(prominence.shape[2], dtype=np.int64)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.errors import UsageError
 
 
@@ -19,7 +19,7 @@ class StatisticRows:
 
     _WHOLE: ClassVar[frozenset[str]] = frozenset()
 
-    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Self:
+    def select(self, chosen: BoolArray | IntArray) -> Self:
         """Selects some of the rows; indices may repeat."""
         return replace(self, **{name: _select_rows(getattr(self, name), chosen) for name in self._by_row()})
 
@@ -41,7 +41,7 @@ class StatisticRows:
         return [field.name for field in fields(cls) if field.name not in cls._WHOLE]
 
 
-def _select_rows(value: Any, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Any:
+def _select_rows(value: Any, chosen: BoolArray | IntArray) -> Any:
     if value is None:
         return None
     return value.select(chosen) if isinstance(value, StatisticRows) else value[chosen]

@@ -27,9 +27,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import BoolArray, IntArray
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import Column, winds
@@ -119,7 +119,7 @@ class Statistics(StatisticRows):
             not looked at.
     """
 
-    recording: NDArray[np.int64]
+    recording: IntArray
     r: Floats
     response: Floats
     error: Floats
@@ -289,7 +289,7 @@ def _with_log(piece: _Piece, along: Projection, off: Sequence[Tensor]) -> Statis
 
 
 def _turned(
-    pole_moment: PoleMoment, base: Tensor, changes: Sequence[Tensor], recording: NDArray[np.int64]
+    pole_moment: PoleMoment, base: Tensor, changes: Sequence[Tensor], recording: IntArray
 ) -> tuple[Statistics, Tensor]:
     """Statistics of moments of errors and sensitivities (frame, marker, 3, segment), with their directions, (segment,
     column, frame) of length 1 where there is any."""
@@ -311,7 +311,7 @@ def _spectrum(forecaster: Forecaster, segments: Segments) -> Spectrum:
     return Spectrum.of(forecaster.markers, forecaster.specimen.mesh.rest, speeds, segments.period)
 
 
-def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def _chunks(recording: IntArray) -> list[IntArray]:
     chunks: list[list[int]] = [[]]
     for index in np.unique(recording):
         in_recording = np.flatnonzero(recording == index).tolist()
@@ -321,9 +321,7 @@ def _chunks(recording: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [np.array(chunk) for chunk in chunks if chunk]
 
 
-def error_scale(
-    base: Tensor, recording: NDArray[np.int64], noise: Floats, counted: NDArray[np.bool_] | None = None
-) -> Tensor:
+def error_scale(base: Tensor, recording: IntArray, noise: Floats, counted: BoolArray | None = None) -> Tensor:
     """Computes root mean square errors of a marker in the recording, beyond what its noise explains, (marker, segment)
     [m].
 
@@ -358,9 +356,9 @@ def _clipped(errors: Tensor, scale: Tensor) -> Tensor:
 def reduced(
     base: Tensor,
     changes: Sequence[Tensor],
-    recording: NDArray[np.int64],
+    recording: IntArray,
     noise: Floats,
-    counted: NDArray[np.bool_] | None = None,
+    counted: BoolArray | None = None,
 ) -> Statistics:
     """Computes statistics of segments: errors, sensitivities (frame, marker, 3, segment) and the noise of their markers
     [m].

@@ -16,16 +16,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import WindTrack
 from measure.probes.course import ALONG, Course
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 NUISANCES, DIRECTION = 3, 1
 """How many there are for each recording, and the place of the direction among them."""
@@ -117,7 +117,7 @@ def _misfit(value: Floats, weight: Floats, expected: Floats) -> float:
     return float((weight * (off - (weight * off).sum() / weight.sum()) ** 2).sum())
 
 
-def by_recording(moved: Floats, recording: NDArray[np.int64]) -> Floats:
+def by_recording(moved: Floats, recording: IntArray) -> Floats:
     """Spreads (segment, row, nuisance) to (segment, row, nuisance · recording): each moves its own recording alone."""
     numbers = np.unique(recording)
     of_recording = (recording[:, None] == numbers).astype(np.float64)

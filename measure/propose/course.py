@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from flagdata.arrays import FloatArray
 from measure.forecasting.model import Model
 from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.setting import Setting
@@ -19,7 +19,7 @@ from measure.propose.outcome import PeriodogramLine, StrengthCourse
 from measure.verdict.record import Estimate
 from sim.effects import apply
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 BIN = 0.2
 """Duration of a stretch [s]: five frames at 25 a second."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.forecasting.calibration import THETA
 from measure.inference.evidence import Evidence
 from measure.inference.random_effect import Nulls
@@ -20,7 +20,7 @@ from measure.nulls.reference import left_out_groups
 from measure.probes.statistics import Statistics
 from measure.propose.projected import evidence
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 _NOTHING = 1e-6
 """Mean share below which a term has no projected response."""

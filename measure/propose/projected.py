@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.model import Model, linearised
 from measure.forecasting.observer import WIDEST, Forecaster
@@ -111,7 +111,7 @@ def _bundle(
     }
 
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 _TOGETHER = 40
 """Columns reduced at a time: bounds memory."""
@@ -141,7 +141,7 @@ class ProjectedSegments:
         along = forecaster.sensitivities(null_columns, segments, nominal, base)
         return cls(forecaster=forecaster, segments=segments, base=base, directions=tuple(along))
 
-    def select(self, chosen: NDArray[np.int64]) -> ProjectedSegments:
+    def select(self, chosen: IntArray) -> ProjectedSegments:
         """Selects some segments only."""
         return replace(
             self,

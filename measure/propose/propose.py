@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.errors import InputError
 from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.model import Model
@@ -52,7 +52,7 @@ _FLOOR_COPIES = 2
 def retest(
     setting: Setting,
     whitened: WhitenedMisfit,
-    used: NDArray[np.bool_],
+    used: BoolArray,
     before: Model,
     after: Model,
     *,
@@ -148,11 +148,11 @@ class Split:
         words: what the test is on.
     """
 
-    used: NDArray[np.bool_]
+    used: BoolArray
     words: str
 
 
-def split(segments: Segments, speeds: NDArray[np.float64]) -> Split:
+def split(segments: Segments, speeds: FloatArray) -> Split:
     """Splits off the last third of every recording for the test; of three or more, also the whole one of the middle
     wind.
 
@@ -191,7 +191,7 @@ def data_hash(segments: Segments) -> str:
     return digest.hexdigest()
 
 
-Floats = NDArray[np.float64]
+Floats = FloatArray
 
 _CALM = 0.3
 """Wind below which its direction is not known well enough for terms along it [m/s]."""

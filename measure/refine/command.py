@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from flagdata.arrays import UInt8Array
 from flagdata.console import progress
 from flagdata.errors import InputError
 from flagdata.lake import Artifact
@@ -65,7 +63,7 @@ class Clip:
     """
 
     name: str
-    frames: NDArray[np.uint8]
+    frames: UInt8Array
     recording: Artifact | None = None
 
 

@@ -14,9 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from flagdata.arrays import read_arrays
+from flagdata.arrays import FloatArray, UInt8Array, read_arrays
 from flagdata.checksums import is_sealed, sealed
 from flagdata.errors import CorruptError
 from flagdata.outputs import rewrite
@@ -39,8 +38,8 @@ class Evaluated:
         seconds: by stage, all replicates together, at the time they were made.
     """
 
-    embedding: NDArray[np.float64]
-    frame: NDArray[np.uint8] | None
+    embedding: FloatArray
+    frame: UInt8Array | None
     seconds: dict[str, float]
 
 
@@ -70,7 +69,7 @@ class Evaluator:
         return digest(canonical({"simulator": self.simulator.identity, "model": self.model, "seed": self.seed}))
 
     def evaluate(
-        self, points: NDArray[np.float64], replicates: int, *, advance: Callable[[int], object] | None = None
+        self, points: FloatArray, replicates: int, *, advance: Callable[[int], object] | None = None
     ) -> list[Evaluated]:
         """Evaluates clips of points (n, 17) of [−1, 1]¹⁷, this many of each.
 
@@ -93,7 +92,7 @@ class Evaluator:
             advance(sum(len(requests) for requests in asked) - len(missing))
         return [_together([self._cached(request) for request in requests]) for requests in asked]
 
-    def clip(self, point: NDArray[np.float64], replicate: int = 0) -> NDArray[np.uint8] | None:
+    def clip(self, point: FloatArray, replicate: int = 0) -> UInt8Array | None:
         """Simulates all frames (frame, height, width) of one clip again; None where that fails."""
         return self.simulator.films([self._request(point.tolist(), replicate)])[0].clip
 
@@ -122,7 +121,7 @@ class Evaluator:
         ]
 
     @torch.no_grad()
-    def embed(self, clips: NDArray[np.uint8]) -> NDArray[np.float64]:
+    def embed(self, clips: UInt8Array) -> FloatArray:
         """Embeds clips (n, frame, height, width) uint8 to (n, dimension), one by one, so that none depends on the
         others."""
         rows = []

@@ -19,9 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 
 
@@ -39,19 +39,17 @@ class Metamodel:
         rows: n, each counted by the design effect.
     """
 
-    centre: NDArray[np.float64]
-    spread: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
-    inverse: NDArray[np.float64]
-    scatter: NDArray[np.float64]
+    centre: FloatArray
+    spread: FloatArray
+    coefficients: FloatArray
+    inverse: FloatArray
+    scatter: FloatArray
     freedom: float
     correlation: float
     rows: float
 
     @classmethod
-    def fit(
-        cls, regressors: NDArray[np.float64], summaries: NDArray[np.float64], group: NDArray[np.int64]
-    ) -> Metamodel:
+    def fit(cls, regressors: FloatArray, summaries: FloatArray, group: IntArray) -> Metamodel:
         """Fits it.
 
         Args:
@@ -96,7 +94,7 @@ class Metamodel:
             rows=rows,
         )
 
-    def log_density(self, regressors: NDArray[np.float64], observed: NDArray[np.float64]) -> NDArray[np.float64]:
+    def log_density(self, regressors: FloatArray, observed: FloatArray) -> FloatArray:
         """Logarithms (m,) of the density of a summary (k,), or of one each (m, k), at regressors (m, p − 1)."""
         k, freedom = observed.shape[-1], self.freedom
         x = _design(regressors, self.centre, self.spread)
@@ -113,7 +111,7 @@ class Metamodel:
             - 0.5 * (freedom + k) * np.log1p(distance / freedom)
         )
 
-    def draw(self, regressors: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    def draw(self, regressors: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Draws from that density at each of regressors (m, p − 1), (m, k)."""
         x = _design(regressors, self.centre, self.spread)
         stretch = 1 + ((x @ self.inverse) * x).sum(axis=1)
@@ -128,13 +126,11 @@ def least(regressors: int, summaries: int) -> int:
     return regressors + summaries + 1
 
 
-def _design(
-    regressors: NDArray[np.float64], centre: NDArray[np.float64], spread: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _design(regressors: FloatArray, centre: FloatArray, spread: FloatArray) -> FloatArray:
     return np.concatenate([np.ones((len(regressors), 1)), (regressors - centre) / spread], axis=1)
 
 
-def _correlation(residual: NDArray[np.float64], group: NDArray[np.int64]) -> float:
+def _correlation(residual: FloatArray, group: IntArray) -> float:
     """Estimates the intra-class correlation of residuals (n, k) in their own covariance, 0 to 1; 0 without
     replicates."""
     covariance = residual.T @ residual / len(residual)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from measure.refine.metamodel import Metamodel
 from measure.refine.space import BENDING, WIND, Space
@@ -27,7 +28,7 @@ CLOTHS, WINDS, DRAWS = 2000, 121, 4000
 REGRESSORS = 4
 
 
-def regressors(reported: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
+def regressors(reported: FloatArray, space: Space) -> FloatArray:
     """Computes what the metamodel is linear in, of reported quantities (n, 5): (n, `REGRESSORS`).
 
     The wind's share u of its range and √u, since a flag that hangs in a faint wind rises within a few tenths of its
@@ -50,15 +51,15 @@ class Posterior:
         effective: Kish's effective number of the weighted prior draws of the cloth.
     """
 
-    points: NDArray[np.float64]
-    winds: NDArray[np.float64]
+    points: FloatArray
+    winds: FloatArray
     effective: float
 
 
 def posterior(
     space: Space,
     models: Sequence[Metamodel],
-    observed: Sequence[NDArray[np.float64]],
+    observed: Sequence[FloatArray],
     *,
     seed: int,
     cloths: int = CLOTHS,
@@ -99,18 +100,18 @@ def posterior(
 
 def _likelihood(
     model: Metamodel,
-    reported: NDArray[np.float64],
+    reported: FloatArray,
     grid: NDArray[np.floating],
-    observed: NDArray[np.float64],
+    observed: FloatArray,
     space: Space,
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """Computes the logarithm of the density of what was observed, (cloth, wind)."""
     rows = np.repeat(reported, len(grid), axis=0)
     rows[:, 0] = np.tile(grid, len(reported))
     return model.log_density(regressors(rows, space), observed).reshape(len(reported), len(grid))
 
 
-def bending_table(space: Space, drawn: Posterior, level: float) -> NDArray[np.float64]:
+def bending_table(space: Space, drawn: Posterior, level: float) -> FloatArray:
     """Tabulates median and interval of each bending coefficient [N·m], (15, 3): mostly the prior's."""
     values = space.values(drawn.points)[:, :BENDING]
     return np.quantile(values, [0.5, (1 - level) / 2, (1 + level) / 2], axis=0).T

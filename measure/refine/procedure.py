@@ -26,8 +26,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
@@ -46,7 +46,7 @@ from models.outliers import shrunk_covariance
 from sim.run.recipe import Recipe
 
 
-def squared(embedding: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+def squared(embedding: FloatArray, target: FloatArray) -> FloatArray:
     """Computes the squared Euclidean distance of embeddings (…, d) to one (d,): (…), infinite where a simulation
     failed.
 
@@ -68,13 +68,13 @@ class ReplicateMetric:
         pairs: of replicates that it was found from.
     """
 
-    whitening: NDArray[np.float64]
+    whitening: FloatArray
     shrinkage: float
     floor: float
     pairs: int
 
     @classmethod
-    def of(cls, groups: list[NDArray[np.float64]]) -> ReplicateMetric:
+    def of(cls, groups: list[FloatArray]) -> ReplicateMetric:
         """Measures it on the embeddings (replicate, d) of some θ; failed ones are left out.
 
         Deviations from their θ's mean are enlarged by √(R/(R − 1)), so that their covariance is that of replicates.
@@ -103,7 +103,7 @@ class ReplicateMetric:
         ]
         return cls(whitening=whitening, shrinkage=shrinkage, floor=float(np.median(between)), pairs=len(between))
 
-    def squared(self, embedding: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+    def squared(self, embedding: FloatArray, target: FloatArray) -> FloatArray:
         """Computes the squared distance of embeddings (…, d) to one (d,): (…), infinite where a simulation failed."""
         return squared(embedding @ self.whitening.T, self.whitening @ target)
 
@@ -232,7 +232,7 @@ class _Run:
             start.amortised(self.estimator, target.clip, self.space, aspect=aspect, seed=seed, draws=400)
             for target in self.targets
         ]
-        points: list[NDArray[np.float64]] = []  # (clip, θ, 17) of each round
+        points: list[FloatArray] = []  # (clip, θ, 17) of each round
         groups: list[list[Evaluated]] = [[] for _ in self.targets]
         ends: list[float] = []
         rounds: list[Round] = []
@@ -286,7 +286,7 @@ class _Run:
             seed=self.settings.seed,
         )
 
-    def _first(self, estimates: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def _first(self, estimates: Sequence[FloatArray]) -> FloatArray:
         """Draws points (clip, θ, 17): draws of the amortised posteriors, widened; the cloth of each clip's in turn."""
         count = self.settings.fewest // self.settings.replicates
         rng = stream(self.settings.seed, OWN, "first")
@@ -297,7 +297,7 @@ class _Run:
         base = start.completed(self.space, shared, seed=self.settings.seed)
         return self._with_winds(base, chosen[:, :, 0])
 
-    def _next(self, current: Posterior, done: int, number: int) -> NDArray[np.float64]:
+    def _next(self, current: Posterior, done: int, number: int) -> FloatArray:
         """Draws points of the refined posterior, (clip, θ, 17), their winds widened."""
         remaining = self.settings.budget - done
         count = max(1, min(self.settings.batch, remaining) // self.settings.replicates)
@@ -307,7 +307,7 @@ class _Run:
         winds = middle + self.settings.widening * (current.winds[chosen] - middle)
         return self._with_winds(current.points[chosen], winds.T)
 
-    def _with_winds(self, base: NDArray[np.float64], winds: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _with_winds(self, base: FloatArray, winds: FloatArray) -> FloatArray:
         """Cloths (θ, 17) with the winds (clip, θ) [m/s] of each clip."""
         out = np.broadcast_to(base, (len(winds), len(base), DIMENSION)).copy()
         entry = self.space.wind
@@ -316,9 +316,9 @@ class _Run:
 
     def _posterior(
         self,
-        points: NDArray[np.float64],
+        points: FloatArray,
         groups: Sequence[Sequence[Evaluated]],
-        observed: Sequence[NDArray[np.float64]],
+        observed: Sequence[FloatArray],
         number: int,
     ) -> Posterior:
         models = []
@@ -331,7 +331,7 @@ class _Run:
             models.append(Metamodel.fit(predictors, summaries, number_of_point[finite]))
         return posterior(self.space, models, observed, seed=child_seed(self.settings.seed, OWN, "posterior", number))
 
-    def _prior(self) -> NDArray[np.float64]:
+    def _prior(self) -> FloatArray:
         return self.space.reported(self.space.prior(stream(self.settings.seed, OWN, "prior"), 4000))
 
     def _intervals(self, current: Posterior) -> tuple[Interval, ...]:
@@ -342,7 +342,7 @@ class _Run:
             spans = (*spans, replace(wind, name=f"{wind.name}.{clip}"))
         return spans
 
-    def _spans(self, draws: NDArray[np.float64], prior: NDArray[np.float64]) -> tuple[Interval, ...]:
+    def _spans(self, draws: FloatArray, prior: FloatArray) -> tuple[Interval, ...]:
         density, limits = self.space.density, limits_of("density")
         learned = next(target for target in self.estimator.targets if target.name == "density")
         if density.low > learned.low or density.high < learned.high:  # narrower: the user states it
@@ -357,10 +357,10 @@ class _Run:
 
     def _traces(
         self,
-        points: NDArray[np.float64],
+        points: FloatArray,
         groups: Sequence[Sequence[Evaluated]],
         metrics: Sequence[ReplicateMetric],
-        embedded: Sequence[NDArray[np.float64]],
+        embedded: Sequence[FloatArray],
         ends: list[float],
     ) -> tuple[Trace, ...]:
         return tuple(
@@ -378,7 +378,7 @@ class _Run:
         current: Posterior,
         metrics: Sequence[ReplicateMetric],
         groups: Sequence[Sequence[Evaluated]],
-        embedded: Sequence[NDArray[np.float64]],
+        embedded: Sequence[FloatArray],
         reached: bool,
     ) -> tuple[Finding, ...]:
         out: list[Finding] = []
@@ -435,7 +435,7 @@ class _Run:
 
 
 def _nearest(
-    metrics: Sequence[ReplicateMetric], groups: Sequence[Sequence[Evaluated]], embedded: Sequence[NDArray[np.float64]]
+    metrics: Sequence[ReplicateMetric], groups: Sequence[Sequence[Evaluated]], embedded: Sequence[FloatArray]
 ) -> float:
     """Finds the smallest mean squared distance of a θ's replicates, the mean over targets at the same cloth."""
     distances = np.array(

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.findings import Finding
 from flagdata.tables import Range
 from measure.ends import Span, span
@@ -119,7 +119,7 @@ class Refinement:
     level: float
     intervals: tuple[Interval, ...]
     amortised: tuple[Interval, ...]
-    bending: NDArray[np.float64]
+    bending: FloatArray
     rounds: tuple[Round, ...]
     traces: tuple[Trace, ...]
     floor: float
@@ -168,8 +168,8 @@ class Refinement:
 
 
 def intervals_of(
-    draws: NDArray[np.float64],
-    prior: NDArray[np.float64],
+    draws: FloatArray,
+    prior: FloatArray,
     level: float,
     *,
     ranges: Sequence[Range],
@@ -205,5 +205,5 @@ def intervals_of(
     return tuple(intervals)
 
 
-def _finite(values: NDArray[np.float64]) -> list[float | None]:
+def _finite(values: FloatArray) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]

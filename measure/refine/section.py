@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.pages.pictures import figure_url, moving, still
 from flagdata.pages.render import render
 from measure.refine.evaluator import Evaluator
@@ -38,7 +38,7 @@ class Shown:
     """
 
     step: int
-    frame: NDArray[np.uint8] | None
+    frame: UInt8Array | None
     wind: float
     distance: float
 

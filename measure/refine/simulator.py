@@ -18,8 +18,8 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed, stream
@@ -65,7 +65,7 @@ class SimulatedFilm:
         seconds: by stage, this film's share of them: "simulate", "render", which includes filming and conditioning.
     """
 
-    clip: NDArray[np.uint8] | None
+    clip: UInt8Array | None
     seconds: dict[str, float]
 
 

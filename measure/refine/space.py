@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.provenance import canonical, digest
 from flagdata.tables import Range, Scale, plain
@@ -172,7 +172,7 @@ class Space:
             Range(low=tilt - slope, high=tilt + slope),
         )
 
-    def values(self, unit: NDArray[np.float64]) -> NDArray[np.float64]:
+    def values(self, unit: FloatArray) -> FloatArray:
         """Converts points (n, 17) of [−1, 1]¹⁷ to SI values.
 
         Raises:
@@ -187,7 +187,7 @@ class Space:
         columns = [[entry.at(float(value)) for value in share[:, i]] for i, entry in enumerate(self.ranges)]
         return np.array(columns, dtype=np.float64).T.reshape(len(unit), DIMENSION)
 
-    def unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def unit(self, values: FloatArray) -> FloatArray:
         """Converts SI values to points (n, 17) of [−1, 1]¹⁷; those outside of the box are moved to its edge."""
         out = np.empty_like(values, dtype=np.float64)
         for i, entry in enumerate(self.ranges):
@@ -197,7 +197,7 @@ class Space:
             out[:, i] = 2 * (column - low) / (high - low) - 1
         return np.clip(out, -1.0, 1.0)
 
-    def prior(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+    def prior(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Points (count, 17) of the prior: what the scenes' recipes draw."""
         if self.parts:
             weight = np.array([weight for _, weight in self.parts])
@@ -215,7 +215,7 @@ class Space:
         shares[:, :BENDING] = (drawn - low) / (high - low)
         return np.clip(2 * shares - 1, -1.0, 1.0)
 
-    def reported(self, unit: NDArray[np.float64]) -> NDArray[np.float64]:
+    def reported(self, unit: FloatArray) -> FloatArray:
         """Computes the `QUANTITIES` of points (n, 17): (n, quantity), in their units."""
         values = self.values(unit)
         logs = np.log10(values[:, :BENDING]).reshape(-1, _ROWS, _COLUMNS)
@@ -238,7 +238,7 @@ class Space:
         return digest(canonical({"material": self.material.fingerprint, "ranges": ranges}))
 
 
-def _drawn(entry: Range, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def _drawn(entry: Range, shares: FloatArray) -> FloatArray:
     """Values of a range at shares of it."""
     if entry.scale is Scale.LINEAR:
         return entry.low + shares * (entry.high - entry.low)

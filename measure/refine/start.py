@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.stated import Stated
@@ -45,7 +45,7 @@ def require(estimator: Estimator) -> None:
 
 
 @torch.no_grad()
-def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[np.float64]:
+def summaries(estimator: Estimator, embedding: FloatArray) -> FloatArray:
     """Computes the network's own estimates of `SUMMARISED` from embeddings (n, d), all learners' side by side: (n, 2).
 
     Each is a share of its target's range: the logistic function of the posterior's mean logit, which stays finite and
@@ -69,8 +69,8 @@ def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[n
 
 
 def amortised(
-    estimator: Estimator, clip: NDArray[np.uint8], space: Space, *, aspect: float, seed: int, draws: int
-) -> NDArray[np.float64]:
+    estimator: Estimator, clip: UInt8Array, space: Space, *, aspect: float, seed: int, draws: int
+) -> FloatArray:
     """Draws `TARGETS` for a clip (frame, height, width): (draw, 4), in the targets' units. Where the space's area
     weights are fewer than the network's, they hold for the clip, as does the aspect (length over height) for a network
     that estimates it.
@@ -86,19 +86,19 @@ def amortised(
     return estimates.draws[0][:, [names.index(name) for name in TARGETS]].astype(np.float64)
 
 
-def _logits(values: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
+def _logits(values: FloatArray, space: Space) -> FloatArray:
     """Logits of the places of values (…, 4) of `TARGETS` in the ranges of the space, much as networks learn them."""
     low, high = _ends(space)
     share = np.clip((values - low) / (high - low), _MARGIN, 1 - _MARGIN)
     return np.log(share / (1 - share))
 
 
-def _ends(space: Space) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _ends(space: Space) -> tuple[FloatArray, FloatArray]:
     """Returns lower and upper ends of `TARGETS`, (4,)."""
     return np.array([entry.low for entry in space.start_ranges]), np.array([entry.high for entry in space.start_ranges])
 
 
-def widened(values: NDArray[np.float64], factor: float, space: Space) -> NDArray[np.float64]:
+def widened(values: FloatArray, factor: float, space: Space) -> FloatArray:
     """Draws (n, 4) of `TARGETS` with their logits' deviations from the mean enlarged."""
     low, high = _ends(space)
     z = _logits(values, space)
@@ -106,7 +106,7 @@ def widened(values: NDArray[np.float64], factor: float, space: Space) -> NDArray
     return low + (high - low) / (1 + np.exp(-z))
 
 
-def completed(space: Space, drawn: NDArray[np.float64], *, seed: int) -> NDArray[np.float64]:
+def completed(space: Space, drawn: FloatArray, *, seed: int) -> FloatArray:
     """Completes points (n, 17) of [−1, 1]¹⁷ with the wind and density of `drawn` (n, 4), and bending of the prior as
     near to its scale and anisotropy as 20,000 draws come, no draw twice."""
     pool = space.prior(stream(seed, "refine", "pool"), _POOL)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 from flagdata.lake import Artifact
 from measure.refine.space import BENDING, QUANTITIES, Space
@@ -29,7 +29,7 @@ class Target:
     """
 
     name: str
-    clip: NDArray[np.uint8]
+    clip: UInt8Array
     view: View
     truth: Mapping[str, float] = field(default_factory=dict)
 
@@ -42,7 +42,7 @@ class Target:
             )
 
 
-def of_recording(recording: Artifact, clip: NDArray[np.uint8], *, otherwise: View, space: Space) -> Target:
+def of_recording(recording: Artifact, clip: UInt8Array, *, otherwise: View, space: Space) -> Target:
     """Makes a target of a recording in the lake: ζ and truth are what its row states, if it is simulated.
 
     Args:
@@ -53,9 +53,7 @@ def of_recording(recording: Artifact, clip: NDArray[np.uint8], *, otherwise: Vie
     return as_stated(recording.name, clip, content, otherwise=otherwise, space=space)
 
 
-def as_stated(
-    name: str, clip: NDArray[np.uint8], parameters: Mapping[str, Any], *, otherwise: View, space: Space
-) -> Target:
+def as_stated(name: str, clip: UInt8Array, parameters: Mapping[str, Any], *, otherwise: View, space: Space) -> Target:
     """Makes a target of which `parameters` state what recordings of simulated flags state, or nothing.
 
     Args:

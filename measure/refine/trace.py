@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from flagdata.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -20,15 +21,15 @@ class Trace:
     """
 
     method: str
-    points: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    seconds: NDArray[np.float64]
+    points: FloatArray
+    distances: FloatArray
+    seconds: FloatArray
 
     def __len__(self) -> int:
         return len(self.points)
 
     @property
-    def best(self) -> NDArray[np.int64]:
+    def best(self) -> IntArray:
         """(n,) number of the nearest evaluation so far."""
         order = np.arange(len(self))
         new = self.distances <= np.minimum.accumulate(self.distances)

@@ -13,8 +13,8 @@ from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 from flagdata.provenance import canonical, digest
 from flagdata.record.video import decode
@@ -43,7 +43,7 @@ class FilmCamera:
     read_noise: float = 0.9
     shot_noise: float = 1.75
 
-    def filmed(self, frames: NDArray[np.uint8], *, seed: int) -> NDArray[np.uint8]:
+    def filmed(self, frames: UInt8Array, *, seed: int) -> UInt8Array:
         """Converts colours (n, height, width, 3) to gray frames (n, height, width) as they come back from the camera's
         file."""
         spec = CameraSpec(

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup, escape
 from matplotlib import colormaps
-from numpy.typing import NDArray
 from PIL import Image
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.pages.pictures import data_url
 from measure.report.chart import Chart, Linear, drawing, room_beside
 from measure.verdict.quantity import Display, display
@@ -39,7 +39,7 @@ class Shade:
     def in_unit(self) -> Display:
         return display((self.low, self.high), "m")
 
-    def picture(self, values: NDArray[np.float64]) -> str:
+    def picture(self, values: FloatArray) -> str:
         """Encodes a PNG of values (row, column) [m], the first row on top, as a URL; transparent where there is no
         value."""
         part = (values - self.low) / (self.high - self.low)
@@ -95,7 +95,7 @@ def colour_bar(shade: Shade, meaning: str) -> Markup:
     return drawing(300, 48, f"Colours of the {meaning}", ends, "".join(parts))
 
 
-def triangles(markers: NDArray[np.float64]) -> NDArray[np.int64]:
+def triangles(markers: FloatArray) -> IntArray:
     """Triangulates markers (marker, 2) [m], (triangle, 3), without slivers; empty where they lie on a line."""
     if on_a_line(markers):
         return np.zeros((0, 3), dtype=np.int64)
@@ -106,7 +106,7 @@ def triangles(markers: NDArray[np.float64]) -> NDArray[np.int64]:
     return faces[area > _SLIVER * np.median(area)]
 
 
-def on_a_line(markers: NDArray[np.float64]) -> bool:
+def on_a_line(markers: FloatArray) -> bool:
     """Returns whether markers (marker, 2) span no area."""
     if len(markers) < 4:
         return True
@@ -125,7 +125,7 @@ def _maps(
     ]
 
 
-def _map(markers: NDArray[np.float64], values: NDArray[np.float64], shade: Shade, title: str) -> Markup:
+def _map(markers: FloatArray, values: FloatArray, shade: Shade, title: str) -> Markup:
     (left, bottom), (right, top) = markers.min(axis=0), markers.max(axis=0)
     across = _WIDTH - _LEFT - 14
     tall = float(np.clip(across * (top - bottom) / (right - left), 30, 320))
@@ -154,7 +154,7 @@ def _map(markers: NDArray[np.float64], values: NDArray[np.float64], shade: Shade
     return chart.svg()
 
 
-def _profile(markers: NDArray[np.float64], values: NDArray[np.float64], shade: Shade, title: str) -> Markup:
+def _profile(markers: FloatArray, values: FloatArray, shade: Shade, title: str) -> Markup:
     """Draws markers on a line: the value against the distance along it."""
     along = np.linalg.norm(markers - markers[:1], axis=1) if len(markers) else np.zeros(0)
     order = np.argsort(along)

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup, escape
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.report.chart import drawing
 from measure.report.cloth import on_a_line, triangles
 from measure.verdict.record import Residual
@@ -68,10 +68,10 @@ class MotionClip:
     markers: int
     of_frames: int
     of_markers: int
-    edges: NDArray[np.int64]
-    observed: NDArray[np.float64]
-    before: NDArray[np.float64]
-    after: NDArray[np.float64] | None
+    edges: IntArray
+    observed: FloatArray
+    before: FloatArray
+    after: FloatArray | None
     azimuth: float
     factor: int
 
@@ -162,7 +162,7 @@ def still(stretch: MotionClip, after_label: str) -> Markup:
     )
 
 
-def _wires(points: NDArray[np.float64], stretch: MotionClip, scale: float, centre: tuple[float, float]) -> str:
+def _wires(points: FloatArray, stretch: MotionClip, scale: float, centre: tuple[float, float]) -> str:
     """Writes path data of the edges between markers (marker, xyz), as seen from `stretch.azimuth` and `ELEVATION`."""
     x, y, z = points.T
     right = x * math.cos(stretch.azimuth) + y * math.sin(stretch.azimuth)
@@ -177,7 +177,7 @@ def _wires(points: NDArray[np.float64], stretch: MotionClip, scale: float, centr
     )
 
 
-def _azimuth(observed: NDArray[np.float64]) -> float:
+def _azimuth(observed: FloatArray) -> float:
     """Computes the direction [rad] of the cloth's longest horizontal extent, turned by a sixth of a right angle."""
     flat = observed[..., :2].reshape(-1, 2)
     flat = flat[np.isfinite(flat).all(axis=1)]
@@ -185,7 +185,7 @@ def _azimuth(observed: NDArray[np.float64]) -> float:
     return (math.atan2(y, x) + math.pi / 12 + math.pi / 2) % math.pi - math.pi / 2
 
 
-def _edges(uv: NDArray[np.float64]) -> NDArray[np.int64]:
+def _edges(uv: FloatArray) -> IntArray:
     """Lists edges (edge, 2): the sides of the triangles over the markers, or neighbours along a line."""
     if on_a_line(uv):
         order = np.argsort(np.linalg.norm(uv - uv[:1], axis=1))
@@ -194,7 +194,7 @@ def _edges(uv: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.unique(np.sort(sides, axis=1), axis=0)
 
 
-def _enlargement(observed: NDArray[np.float64], predicted: NDArray[np.float64]) -> int:
+def _enlargement(observed: FloatArray, predicted: FloatArray) -> int:
     """Chooses the largest factor that keeps nearly all errors within a part of the cloth's size."""
     errors = np.linalg.norm(predicted - observed, axis=-1)
     errors = errors[np.isfinite(errors)]
@@ -205,20 +205,20 @@ def _enlargement(observed: NDArray[np.float64], predicted: NDArray[np.float64]) 
     return max((f for f in FACTORS if f <= room), default=1)
 
 
-def _array(frames: Sequence[Sequence[Sequence[float]]]) -> NDArray[np.float64]:
+def _array(frames: Sequence[Sequence[Sequence[float]]]) -> FloatArray:
     return np.asarray(frames, dtype=np.float64).reshape(len(frames), len(frames[0]) if frames else 0, 3)
 
 
-def _spread(count: int, most: int) -> NDArray[np.int64]:
+def _spread(count: int, most: int) -> IntArray:
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 
 
-def _centre(values: NDArray[np.float64]) -> float:
+def _centre(values: FloatArray) -> float:
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if finite.size else 0.0
 
 
-def _finite_reach(values: NDArray[np.float64]) -> float:
+def _finite_reach(values: FloatArray) -> float:
     finite = np.abs(values[np.isfinite(values)])
     return float(finite.max()) if finite.size and finite.max() > 0 else 1.0
 
@@ -230,6 +230,6 @@ def _rate(times: Sequence[float]) -> float:
     return float(1 / np.median(steps)) if steps.size else math.nan
 
 
-def _packed(values: NDArray[np.float64], reach: float) -> str:
+def _packed(values: FloatArray, reach: float) -> str:
     scaled = np.where(np.isfinite(values), values / reach * _REACH, MISSING)
     return base64.b64encode(scaled.round().astype("<i2").tobytes()).decode("ascii")

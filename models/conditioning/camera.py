@@ -19,7 +19,8 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from flagdata.arrays import BoolArray, Float32Array, FloatArray, UInt8Array
 
 _BLURS = (4.0, 1.5)
 """Widths of the Gaussians [px] by which pictures are smoothed, coarse to fine."""
@@ -50,13 +51,13 @@ class Edges:
         axes: (a, 2) unit vectors along which the picture may shift: both, or the one across a single straight edge.
     """
 
-    places: NDArray[np.float32]
-    values: NDArray[np.float32]
-    slopes: NDArray[np.float32]
-    axes: NDArray[np.float64]
+    places: Float32Array
+    values: Float32Array
+    slopes: Float32Array
+    axes: FloatArray
 
     @classmethod
-    def of(cls, reference: NDArray[np.uint8], outside: NDArray[np.bool_]) -> Edges | None:
+    def of(cls, reference: UInt8Array, outside: BoolArray) -> Edges | None:
         """Finds the edges of a picture (height, width) within the background's mask; None where there are too few."""
         smoothed = [_smoothed(reference, blur) for blur in _BLURS]
         slopes = [
@@ -83,13 +84,13 @@ class Edges:
         slopes = self.slopes[-1].astype(np.float64)
         return replace(self, axes=np.linalg.eigh(slopes.T @ slopes)[1][:, 1:].T)
 
-    def misfit(self, picture: NDArray[np.uint8], shift: tuple[float, float]) -> float:
+    def misfit(self, picture: UInt8Array, shift: tuple[float, float]) -> float:
         """Computes the mean difference of a picture from the reference at a shift [gray levels], each clipped at `2 *
         _HUBER`."""
         away = self._difference(_smoothed(picture, _BLURS[-1]), -1, np.array(shift))
         return float(np.minimum(np.abs(away), 2 * _HUBER).mean())
 
-    def shift(self, picture: NDArray[np.uint8], guess: tuple[float, float]) -> tuple[float, float] | None:
+    def shift(self, picture: UInt8Array, guess: tuple[float, float]) -> tuple[float, float] | None:
         """Estimates the shift along x and y [px] from the reference picture to this one; None where none fits.
 
         Args:
@@ -102,7 +103,7 @@ class Edges:
             shift = self._refined(smoothed, self._searched(smoothed[0], start))
         return None if shift is None else (float(shift[0]), float(shift[1]))
 
-    def _refined(self, smoothed: list[NDArray[np.float32]], guess: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def _refined(self, smoothed: list[Float32Array], guess: FloatArray) -> FloatArray | None:
         """Refines a guess of the shift by Gauss–Newton steps, coarse to fine; None where it does not fit."""
         shift, difference = guess.copy(), np.zeros(len(self.places))
         for level, picture in enumerate(smoothed):
@@ -122,7 +123,7 @@ class Edges:
         fits = (np.abs(difference) < 2 * _HUBER).mean() >= _FITS
         return shift if fits else None
 
-    def _searched(self, smoothed: NDArray[np.float32], guess: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _searched(self, smoothed: Float32Array, guess: FloatArray) -> FloatArray:
         """Searches a grid of shifts about a guess for the best one, as is needed after a jerk of the camera."""
         steps = np.arange(-_JERK, _JERK + 1, _GRID, dtype=np.float64)
         shifts = (
@@ -135,19 +136,19 @@ class Edges:
         away = np.linalg.norm(shifts - guess, axis=1) / _JERK
         return shifts[int(np.argmin(misfit + 0.1 * _HUBER * away))]
 
-    def _difference(self, smoothed: NDArray[np.float32], level: int, shift: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _difference(self, smoothed: Float32Array, level: int, shift: FloatArray) -> FloatArray:
         at = (self.places + shift).astype(np.float32)
         values = cv2.remap(smoothed, at[:, :1], at[:, 1:], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(values, dtype=np.float64)[:, 0] - self.values[level]
 
 
-def _smoothed(picture: NDArray[np.uint8], blur: float) -> NDArray[np.float32]:
+def _smoothed(picture: UInt8Array, blur: float) -> Float32Array:
     return np.asarray(cv2.GaussianBlur(picture.astype(np.float32), (0, 0), blur), dtype=np.float32)
 
 
 WORK = 480
 """Longer side [px] of the pictures in which features are followed."""
-Transform = NDArray[np.float64]
+Transform = FloatArray
 """(2, 3) similarity from places in the reference picture to places in a frame, both [px]."""
 STILL = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
@@ -185,8 +186,8 @@ class Camera:
         moves: whether frames are moved back; of a camera that is still, and of one whose motion no feature shows, none.
     """
 
-    reference: NDArray[np.uint8]
-    corners: NDArray[np.float32]
+    reference: UInt8Array
+    corners: Float32Array
     moves: bool
     edges: Edges | None = None
 
@@ -205,7 +206,7 @@ class Camera:
         """The same in words."""
         return f"{self.support} {'corners' if self.edges is None else 'pixels at edges'} of the background"
 
-    def follow(self, picture: NDArray[np.uint8], guess: Transform) -> Transform | None:
+    def follow(self, picture: UInt8Array, guess: Transform) -> Transform | None:
         """Registers a frame: the transform from the reference picture to it; None where too few features are matched.
 
         Args:
@@ -222,7 +223,7 @@ class Camera:
 
 
 def camera_of(
-    pictures: Sequence[NDArray[np.uint8]], *, outside: NDArray[np.bool_] | None = None, least: float = 0.0
+    pictures: Sequence[UInt8Array], *, outside: BoolArray | None = None, least: float = 0.0
 ) -> tuple[Camera, list[Transform]]:
     """Returns the camera of a film, from a sample of its frames in order, and the transform of each of them.
 
@@ -261,7 +262,7 @@ def camera_of(
 
 
 def by_edges(
-    pictures: Sequence[NDArray[np.uint8]], *, outside: NDArray[np.bool_], least: float = 0.0
+    pictures: Sequence[UInt8Array], *, outside: BoolArray, least: float = 0.0
 ) -> tuple[Camera, list[Transform]]:
     """Estimates the camera and its transforms as `camera_of` does, from the background's edges in place of its corners.
 
@@ -296,7 +297,7 @@ class _Aligned:
     misfit: float
 
 
-def _aligned(pictures: Sequence[NDArray[np.uint8]], camera: Camera) -> _Aligned:
+def _aligned(pictures: Sequence[UInt8Array], camera: Camera) -> _Aligned:
     middle, lost = len(pictures) // 2, 0
     transforms = [STILL] * len(pictures)
     for order in (range(middle + 1, len(pictures)), range(middle - 1, -1, -1)):
@@ -318,14 +319,12 @@ def motion(transforms: Sequence[Transform], point: tuple[float, float]) -> float
     return float(np.sqrt(np.square(at - at.mean(axis=0)).sum(axis=1).mean()))
 
 
-def path(transforms: Sequence[Transform], point: tuple[float, float]) -> NDArray[np.float64]:
+def path(transforms: Sequence[Transform], point: tuple[float, float]) -> FloatArray:
     """Returns (n, 2) positions of a point of the reference picture in each frame [px]."""
     return np.stack([transform @ np.array([*point, 1.0]) for transform in transforms])
 
 
-def _sampled(
-    pictures: Sequence[NDArray[np.uint8]], corners: NDArray[np.float32]
-) -> tuple[NDArray[np.float32], NDArray[np.bool_], list[Transform]]:
+def _sampled(pictures: Sequence[UInt8Array], corners: Float32Array) -> tuple[Float32Array, BoolArray, list[Transform]]:
     """Tracks corners through a sample: (frame, corner, 2) positions, (frame, corner) whether each follows its frame's
     transform, and the transforms."""
     count, middle = len(pictures), len(pictures) // 2
@@ -346,7 +345,7 @@ def _sampled(
     return places, follows, transforms
 
 
-def _again(camera: Camera, pictures: Sequence[NDArray[np.uint8]], guesses: Sequence[Transform]) -> list[Transform]:
+def _again(camera: Camera, pictures: Sequence[UInt8Array], guesses: Sequence[Transform]) -> list[Transform]:
     transforms = []
     for picture, guess in zip(pictures, guesses, strict=True):
         transform = camera.follow(picture, guess)
@@ -355,8 +354,8 @@ def _again(camera: Camera, pictures: Sequence[NDArray[np.uint8]], guesses: Seque
 
 
 def _followed(
-    reference: NDArray[np.uint8], picture: NDArray[np.uint8], corners: NDArray[np.float32], guess: Transform
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    reference: UInt8Array, picture: UInt8Array, corners: Float32Array, guess: Transform
+) -> tuple[Float32Array, BoolArray]:
     start = _moved(corners, guess)
     places, status, _ = cv2.calcOpticalFlowPyrLK(
         reference,
@@ -371,11 +370,11 @@ def _followed(
     return np.asarray(places, dtype=np.float32).reshape(-1, 2), status.ravel().astype(bool)
 
 
-def _moved(places: NDArray[np.float32], transform: Transform) -> NDArray[np.float32]:
+def _moved(places: Float32Array, transform: Transform) -> Float32Array:
     return (places @ transform[:, :2].T + transform[:, 2]).astype(np.float32)
 
 
-def _similarity(before: NDArray[np.float32], after: NDArray[np.float32]) -> Transform | None:
+def _similarity(before: Float32Array, after: Float32Array) -> Transform | None:
     """Fits the similarity that most pairs of points agree on; None where too few do or no camera turns and zooms so."""
     if len(before) < _FEWEST:
         return None
@@ -391,7 +390,7 @@ def _similarity(before: NDArray[np.float32], after: NDArray[np.float32]) -> Tran
     return np.asarray(transform, dtype=np.float64)
 
 
-def _spread(corners: NDArray[np.float32], shape: tuple[int, int]) -> bool:
+def _spread(corners: Float32Array, shape: tuple[int, int]) -> bool:
     if len(corners) < _FEWEST:
         return False
     extent = np.ptp(corners, axis=0)

@@ -8,8 +8,8 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from models.conditioning import framing, noise
 from models.conditioning.camera import STILL, WORK, Camera, Transform, by_edges, camera_of, path
@@ -71,12 +71,12 @@ class Conditioning:
     regions: tuple[Region, ...]
     chosen: int
     square: Square
-    weight: NDArray[np.float32]
-    background: NDArray[np.uint8]
+    weight: Float32Array
+    background: UInt8Array
     noise: float
-    kept: NDArray[np.float32]
-    path: NDArray[np.float64]
-    cut: NDArray[np.float64]
+    kept: Float32Array
+    path: FloatArray
+    cut: FloatArray
 
     @property
     def region(self) -> Region | None:
@@ -88,7 +88,7 @@ class Conditioning:
         """Share of the sample in which the edge on each of `whole.SIDES` cuts the cloth off, 0 to 1."""
         return dict(zip(SIDES, (self.cut > CUT).mean(axis=0).tolist(), strict=True))
 
-    def follow(self, frame: NDArray[np.uint8], guess: Transform) -> Transform | None:
+    def follow(self, frame: UInt8Array, guess: Transform) -> Transform | None:
         """Registers a frame: the transform from the reference picture to it; None where the background's features are
         not found.
 
@@ -98,7 +98,7 @@ class Conditioning:
         """
         return self.camera.follow(shrunk(frame, self.scale), guess) if self.camera.moves else STILL
 
-    def show(self, frame: NDArray[np.uint8], transform: Transform) -> NDArray[np.uint8]:
+    def show(self, frame: UInt8Array, transform: Transform) -> UInt8Array:
         """Returns the (size, size) picture of the flag: registered, cropped, scaled, all else frozen."""
         drawn = _framed(frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves)
         away = drawn - self._still
@@ -106,7 +106,7 @@ class Conditioning:
         return np.rint(self._still + residual + self.weight * (away - residual)).astype(np.uint8)
 
     @cached_property
-    def _still(self) -> NDArray[np.float32]:
+    def _still(self) -> Float32Array:
         return self.background.astype(np.float32)
 
 
@@ -121,15 +121,13 @@ class Conditioned:
         lost: frames in which the background's features were not found; the transform of the frame before is used.
     """
 
-    frames: NDArray[np.uint8]
+    frames: UInt8Array
     found: Conditioning
-    path: NDArray[np.float64]
+    path: FloatArray
     lost: int
 
 
-def conditioned(
-    frames: NDArray[np.uint8], times: NDArray[np.float64], *, size: int = 300, flag: int | None = None
-) -> Conditioned:
+def conditioned(frames: UInt8Array, times: FloatArray, *, size: int = 300, flag: int | None = None) -> Conditioned:
     """Conditions a short film in memory.
 
     Args:
@@ -162,11 +160,11 @@ class Follower:
 
     def __init__(self, conditioning: Conditioning) -> None:
         self._found, self._last = conditioning, STILL
-        self._path: list[NDArray[np.float64]] = []
+        self._path: list[FloatArray] = []
         self.lost = 0
 
     @property
-    def path(self) -> NDArray[np.float64]:
+    def path(self) -> FloatArray:
         """(n, 2) of the square's centre in each frame so far [px of the film]."""
         return np.array(self._path).reshape(-1, 2)
 
@@ -184,7 +182,7 @@ class Follower:
             "shake": float(np.sqrt(np.square(steps).sum(axis=1).mean())),
         }
 
-    def show(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def show(self, frame: UInt8Array) -> UInt8Array:
         """Returns the (size, size) picture of the next frame (height, width)."""
         conditioning = self._found
         transform = conditioning.follow(frame, self._last)
@@ -197,10 +195,10 @@ class Follower:
 
 
 def conditioning_of(
-    sample: Sequence[NDArray[np.uint8]] | NDArray[np.uint8],
+    sample: Sequence[UInt8Array] | UInt8Array,
     *,
     size: int,
-    times: NDArray[np.float64] | None = None,
+    times: FloatArray | None = None,
     flag: int | None = None,
     within: tuple[int, int, int, int] | None = None,
 ) -> Conditioning:
@@ -265,7 +263,7 @@ def conditioning_of(
     )
 
 
-def shrunk(frame: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
+def shrunk(frame: UInt8Array, scale: float) -> UInt8Array:
     """Averages a frame (height, width) down."""
     if scale >= 1:
         return np.ascontiguousarray(frame)
@@ -274,8 +272,8 @@ def shrunk(frame: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
 
 
 def _camera_and_regions(
-    small: list[NDArray[np.uint8]], times: NDArray[np.float64], inside: NDArray[np.bool_] | None, unit: float
-) -> tuple[Camera, list[Transform], NDArray[np.uint8], tuple[Region, ...]]:
+    small: list[UInt8Array], times: FloatArray, inside: BoolArray | None, unit: float
+) -> tuple[Camera, list[Transform], UInt8Array, tuple[Region, ...]]:
     """Estimates the camera and the cloth in turns, each with the other's last estimate, and registers the pictures.
 
     Args:
@@ -301,7 +299,7 @@ def _camera_and_regions(
     return camera, transforms, registered, regions_of(registered, times, within=inside)
 
 
-def _outside(regions: Sequence[Region], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def _outside(regions: Sequence[Region], shape: tuple[int, ...]) -> BoolArray:
     """Masks the background: away from all moving cloth."""
     outside = np.ones(shape, bool)
     for region in regions:
@@ -309,7 +307,7 @@ def _outside(regions: Sequence[Region], shape: tuple[int, ...]) -> NDArray[np.bo
     return outside
 
 
-def _registered(small: list[NDArray[np.uint8]], transforms: list[Transform]) -> NDArray[np.uint8]:
+def _registered(small: list[UInt8Array], transforms: list[Transform]) -> UInt8Array:
     height, width = small[0].shape
     moved = [
         picture
@@ -327,19 +325,19 @@ def _registered(small: list[NDArray[np.uint8]], transforms: list[Transform]) -> 
 
 
 def _framed(
-    frame: NDArray[np.uint8], square: Square, size: int, transform: Transform, *, scale: float, moves: bool
-) -> NDArray[np.uint8]:
+    frame: UInt8Array, square: Square, size: int, transform: Transform, *, scale: float, moves: bool
+) -> UInt8Array:
     if not moves:
         return framing.cut(frame, square, size)
     return framing.warp(frame, square, size, framing.scaled(transform, scale))
 
 
-def _centre(square: Square, transform: Transform, scale: float) -> NDArray[np.float64]:
+def _centre(square: Square, transform: Transform, scale: float) -> FloatArray:
     middle = (square.x + square.side / 2, square.y + square.side / 2)
     return path([framing.scaled(transform, scale)], middle)[0]
 
 
-def _widened(mask: NDArray[np.bool_], share: float) -> NDArray[np.uint8]:
+def _widened(mask: BoolArray, share: float) -> UInt8Array:
     """Widens the mask by a share of its size."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     radius = max(1, round(share * max(np.ptp(rows), np.ptp(columns))))
@@ -347,7 +345,7 @@ def _widened(mask: NDArray[np.bool_], share: float) -> NDArray[np.uint8]:
     return np.asarray(cv2.dilate(mask.astype(np.uint8), disc), dtype=np.uint8)
 
 
-def _weight(mask: NDArray[np.bool_], square: Square, size: int, scale: float) -> NDArray[np.float32]:
+def _weight(mask: BoolArray, square: Square, size: int, scale: float) -> Float32Array:
     """Weighs pixels (size, size): 1 on and about the cloth, falling to 0 across the feather."""
     extent = max(np.ptp(np.flatnonzero(mask.any(axis=1))), np.ptp(np.flatnonzero(mask.any(axis=0)))) + 1
     widened = _widened(mask, _AROUND + _FEATHER)
@@ -360,7 +358,7 @@ def _weight(mask: NDArray[np.bool_], square: Square, size: int, scale: float) ->
     return np.clip(away / feather, 0.0, 1.0).astype(np.float32)
 
 
-def _noise(stack: NDArray[np.uint8], weight: NDArray[np.float32]) -> float:
+def _noise(stack: UInt8Array, weight: Float32Array) -> float:
     """Estimates the deviation of the camera's noise where the film (n, size, size) is frozen [gray levels].
 
     By the differences of frames, which have √2 times the noise of one.
@@ -373,7 +371,7 @@ def _noise(stack: NDArray[np.uint8], weight: NDArray[np.float32]) -> float:
     return max(noise.deviation(rough) / np.sqrt(2), _ROUNDING)
 
 
-def _inside(within: tuple[int, int, int, int], shape: tuple[int, ...], scale: float) -> NDArray[np.bool_]:
+def _inside(within: tuple[int, int, int, int], shape: tuple[int, ...], scale: float) -> BoolArray:
     x, y, width, height = (round(value * scale) for value in within)
     inside = np.zeros(shape[:2], bool)
     inside[max(y, 0) : y + height, max(x, 0) : x + width] = True

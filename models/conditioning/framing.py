@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from flagdata.arrays import UInt8Array
 from models.conditioning.camera import Transform
 
 FILL = 0.62
@@ -84,7 +84,7 @@ def _begin(low: float, high: float, side: int, length: int) -> int:
     return round(about + min(max(inside - about, -_ASIDE * side), _ASIDE * side))
 
 
-def cut(picture: NDArray[np.uint8], square: Square, size: int) -> NDArray[np.uint8]:
+def cut(picture: UInt8Array, square: Square, size: int) -> UInt8Array:
     """Crops a square of an unmoved picture (height, width) to (size, size)."""
     height, width = picture.shape
     rows = np.arange(square.y, square.y + square.side).clip(0, height - 1)
@@ -97,7 +97,7 @@ def cut(picture: NDArray[np.uint8], square: Square, size: int) -> NDArray[np.uin
     return np.asarray(image.resize((size, size), Image.Resampling.HAMMING))
 
 
-def warp(picture: NDArray[np.uint8], square: Square, size: int, transform: Transform) -> NDArray[np.uint8]:
+def warp(picture: UInt8Array, square: Square, size: int, transform: Transform) -> UInt8Array:
     """Crops the square of the reference picture, as a picture (height, width) shows it, to (size, size).
 
     Args:

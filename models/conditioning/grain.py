@@ -10,8 +10,8 @@ most of which change stay as they are.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.rng import stream
 
 STILL = 0.5
@@ -21,7 +21,7 @@ DEVIATION = 0.5
 """Of that noise [gray levels], the median over places of what films of the training's cameras have in time."""
 
 
-def grained(clip: NDArray[np.uint8], *, seed: int) -> NDArray[np.uint8]:
+def grained(clip: UInt8Array, *, seed: int) -> UInt8Array:
     """Adds noise to a clip (n, height, width) gray where it never changes, if that is most of it; else returns the clip
     itself. else the clip itself. What is black all the time lies beyond the picture, and neither counts nor changes.
     """

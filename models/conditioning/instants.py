@@ -17,6 +17,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, UInt8Array
+
 _FLOWS = 8
 """Pairs of frames whose flows are kept: windows at several sizes of flag meet the same pairs again."""
 NEAR = 0.25
@@ -25,13 +27,13 @@ motion uneven, an interpolated one smooths it, and the wind that the network rea
 the other; at this share films of 25, 30 and 60 frames a second agree (decision 035)."""
 NEAR_OF_SLOW = 0.4
 """The same of a film slower than the network's frames, between which more of the motion is lost."""
-TimedFrame = tuple[float, NDArray[np.uint8]]
+TimedFrame = tuple[float, UInt8Array]
 """Time from the film's first frame [s], and the picture, (height, width) gray."""
 
 
 def at_instants(
     frames: Sequence[TimedFrame], instants: NDArray[np.floating], *, period: float, interpolator: Interpolator
-) -> tuple[NDArray[np.uint8], int]:
+) -> tuple[UInt8Array, int]:
     """Resamples a film at n instants: (n, height, width) pictures, and how many of them were interpolated.
 
     Args:
@@ -66,11 +68,9 @@ class Interpolator:
         # The search divides the picture among threads, and its result depends on how many there are.
         cv2.setNumThreads(1)
         self._search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
-        self._flows: dict[tuple[float, float], tuple[NDArray[np.float32], NDArray[np.float32]]] = {}
+        self._flows: dict[tuple[float, float], tuple[Float32Array, Float32Array]] = {}
 
-    def between(
-        self, first: tuple[float, NDArray[np.uint8]], second: tuple[float, NDArray[np.uint8]], instant: float
-    ) -> NDArray[np.uint8]:
+    def between(self, first: tuple[float, UInt8Array], second: tuple[float, UInt8Array], instant: float) -> UInt8Array:
         """Interpolates a picture (height, width) gray at an instant from the first frame's to the second's.
 
         Args:
@@ -92,8 +92,8 @@ class Interpolator:
         return cv2.addWeighted(from_first, 1 - t, from_second, t, 0.0).astype(np.uint8)
 
     def _flow(
-        self, first: tuple[float, NDArray[np.uint8]], second: tuple[float, NDArray[np.uint8]]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        self, first: tuple[float, UInt8Array], second: tuple[float, UInt8Array]
+    ) -> tuple[Float32Array, Float32Array]:
         """Returns (height, width, 2) flows from the first frame to the second and back [px, x then y]."""
         key = (first[0], second[0])
         if key not in self._flows:
@@ -102,6 +102,6 @@ class Interpolator:
             self._flows[key] = (self._calculated(first[1], second[1]), self._calculated(second[1], first[1]))
         return self._flows[key]
 
-    def _calculated(self, a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.float32]:
+    def _calculated(self, a: UInt8Array, b: UInt8Array) -> Float32Array:
         start = np.zeros((*a.shape, 2), dtype=np.float32)
         return np.asarray(self._search.calc(np.ascontiguousarray(a), np.ascontiguousarray(b), start), np.float32)

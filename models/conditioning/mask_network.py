@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from flagdata.arrays import BoolArray
 from flagdata.errors import CorruptError
 from models.conditioning.stills import Stills
 from models.storage import WEIGHTS, check_model, read_card, read_tensors
@@ -87,7 +88,7 @@ def inputs_of(pictures: NDArray[np.generic], stills: Stills) -> Tensor:
     return torch.from_numpy((channels - middle) / spread * lit)
 
 
-def _lit(stills: Stills) -> NDArray[np.bool_]:
+def _lit(stills: Stills) -> BoolArray:
     """Masks (rows, columns) that are black all the time; keeps everything where all of it is."""
     brightest = stills.greatest
     lit = np.logical_and.outer(brightest.max(axis=1) > _BLACK, brightest.max(axis=0) > _BLACK)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from flagdata.arrays import Float32Array
 
 _ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
 """The difference of two Laplacians, by which smooth changes do not pass; white noise of deviation σ leaves 6 σ."""
@@ -13,12 +14,12 @@ _MEDIAN = 0.6745
 """Median of the absolute value of a normal variable, over its deviation."""
 
 
-def rough(picture: NDArray[np.float32]) -> NDArray[np.float32]:
+def rough(picture: Float32Array) -> Float32Array:
     """Filters smooth parts out of a picture (height, width)."""
     return np.asarray(cv2.filter2D(picture, cv2.CV_32F, _ROUGH), dtype=np.float32)
 
 
-def deviation(rough_pixels: NDArray[np.float32]) -> float:
+def deviation(rough_pixels: Float32Array) -> float:
     """Estimates the standard deviation of a pixel's noise from pixels filtered by `rough`, by the median [gray
     levels]."""
     return float(np.median(np.abs(rough_pixels))) / (_MEDIAN * _LEFT)

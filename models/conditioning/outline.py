@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from models.conditioning.mask_network import MaskNetwork, inputs_of, shipped
 from models.conditioning.stills import SAMPLE, Stills
 
@@ -42,7 +42,7 @@ _MOVES = 5.0
 _UPRIGHT = 0.35
 """Greatest offset of the hoist's ends along the picture's rows, over their distance along its columns."""
 
-Masks = NDArray[np.bool_]
+Masks = BoolArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,12 +58,12 @@ class Outliner:
     """
 
     stills: Stills
-    hoist: NDArray[np.float64]
+    hoist: FloatArray
     side: float
     network: MaskNetwork
 
     @classmethod
-    def of(cls, pictures: NDArray[np.uint8]) -> Outliner | None:
+    def of(cls, pictures: UInt8Array) -> Outliner | None:
         """Finds the hoist in pictures (n, size / 2, size / 2) as `Conditioning.show` gives them, `halved`, spread over
         the film. Returns None where they are fewer than ten or show no upright hoist with cloth beside it.
         """
@@ -86,7 +86,7 @@ class Outliner:
         side = 1.0 if usual.sum(axis=0) @ (np.arange(usual.shape[1]) + 0.5 - places[:, 0].mean()) >= 0 else -1.0
         return cls(stills=stills, hoist=_lowered(usual > 0.5, places, side), side=side, network=network)
 
-    def masks(self, pictures: NDArray[np.uint8]) -> tuple[Masks, NDArray[np.float64]]:
+    def masks(self, pictures: UInt8Array) -> tuple[Masks, FloatArray]:
         """Segments the cloth in pictures (n, size / 2, size / 2), `halved`, that follow one another in the film: the
         largest part that is cloth, on its side of the hoist's line, with its holes filled. Also returns Dice's
         coefficient (n,) with the truth, as the network expects it.
@@ -107,7 +107,7 @@ class Outliner:
         )
 
 
-def _maps(network: MaskNetwork, small: NDArray[np.uint8], stills: Stills) -> Iterator[Tensor]:
+def _maps(network: MaskNetwork, small: UInt8Array, stills: Stills) -> Iterator[Tensor]:
     """Yields (n, 3, rows, columns) logits, a few pictures at a time."""
     for k in range(0, len(small), _TOGETHER):
         inputs = inputs_of(small[k : k + _TOGETHER], stills).contiguous(memory_format=torch.channels_last)
@@ -116,7 +116,7 @@ def _maps(network: MaskNetwork, small: NDArray[np.uint8], stills: Stills) -> Ite
         yield maps
 
 
-def _end(logits: Tensor) -> NDArray[np.float64] | None:
+def _end(logits: Tensor) -> FloatArray | None:
     """Locates an end of the hoist: (2,) column and row; None where its position is not certain."""
     shares = logits.flatten().softmax(dim=0).reshape(logits.shape).numpy()
     row, column = np.unravel_index(int(shares.argmax()), shares.shape)
@@ -131,7 +131,7 @@ def _end(logits: Tensor) -> NDArray[np.float64] | None:
     return np.array([neighbourhood.sum(axis=0) @ columns, neighbourhood.sum(axis=1) @ rows]) / total + 0.5
 
 
-def _lowered(usual: Masks, places: NDArray[np.float64], side: float) -> NDArray[np.float64]:
+def _lowered(usual: Masks, places: FloatArray, side: float) -> FloatArray:
     """Moves the hoist's upper end (2, 2) to where the cloth's upper edge beside it meets the hoist's line: a pole's top
     is not the cloth's corner. The network's point is unchanged where the cloth does not show the edge, or shows one
     that does not lead there.
@@ -153,7 +153,7 @@ def _lowered(usual: Masks, places: NDArray[np.float64], side: float) -> NDArray[
     return np.stack([np.array([places[0, 0], row]), places[1]])
 
 
-def _side_of_hoist(hoist: NDArray[np.float64], side: float, shape: tuple[int, ...]) -> Masks:
+def _side_of_hoist(hoist: FloatArray, side: float, shape: tuple[int, ...]) -> Masks:
     """Masks the cloth's side of the line through the hoist: a pole before the cloth is not cloth."""
     (x, y), (across, down) = hoist[0], hoist[1] - hoist[0]
     rows, columns = np.indices(shape) + 0.5

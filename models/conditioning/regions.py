@@ -12,7 +12,8 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from flagdata.arrays import BoolArray, Float32Array, FloatArray, UInt8Array
 
 Side = Literal["left", "right", "top"]
 _COARSE = 120
@@ -57,7 +58,7 @@ class Region:
         aspect: width over height of the outline across the hoist, for a flag that flies to the side.
     """
 
-    mask: NDArray[np.bool_]
+    mask: BoolArray
     share: float
     hoist: Side
     aspect: float
@@ -69,9 +70,7 @@ class Region:
         return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
-def regions_of(
-    pictures: NDArray[np.uint8], times: NDArray[np.float64], *, within: NDArray[np.bool_] | None = None
-) -> tuple[Region, ...]:
+def regions_of(pictures: UInt8Array, times: FloatArray, *, within: BoolArray | None = None) -> tuple[Region, ...]:
     """Finds the regions of a film that move like cloth, the strongest motion first; none where nothing moves.
 
     Args:
@@ -110,13 +109,13 @@ def regions_of(
     return tuple(regions)
 
 
-def nearby(times: NDArray[np.float64]) -> NDArray[np.bool_]:
+def nearby(times: FloatArray) -> BoolArray:
     """Returns (n − 1,) whether each picture follows the one before so soon that they are compared."""
     intervals = np.diff(times)
     return intervals <= max(MOMENT, float(intervals.min()) * 1.5)
 
 
-def _shrunk(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
+def _shrunk(pictures: UInt8Array) -> Float32Array:
     height, width = pictures.shape[1:]
     scale = min(1.0, _COARSE / max(height, width))
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
@@ -124,7 +123,7 @@ def _shrunk(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.stack(shrunk).astype(np.float32)
 
 
-def _deviation(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
+def _deviation(pictures: UInt8Array) -> Float32Array:
     """Computes the 95 % quantile (height, width) of the distance from the median in time: a rare visit counts."""
     subset = pictures[:: -(-len(pictures) // _DEVIATION)]
     middle = np.median(subset, axis=0).astype(np.int16)
@@ -134,11 +133,11 @@ def _deviation(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def _outline(
-    region: NDArray[np.bool_],
-    other_regions: NDArray[np.bool_],
-    deviation: NDArray[np.float32],
-    within: NDArray[np.bool_] | None,
-) -> NDArray[np.bool_]:
+    region: BoolArray,
+    other_regions: BoolArray,
+    deviation: Float32Array,
+    within: BoolArray | None,
+) -> BoolArray:
     """Outlines all places that the cloth visits, its plain parts and the gaps between folds filled."""
     size = _size(region)
     noise = float(np.median(deviation))
@@ -159,13 +158,13 @@ def _outline(
     return _without_pole(np.asarray(filled, dtype=np.uint8), size).astype(bool)
 
 
-def _without_pole(mask: NDArray[np.uint8], size: float) -> NDArray[np.uint8]:
+def _without_pole(mask: UInt8Array, size: float) -> UInt8Array:
     """Removes long strips as thin as a pole that sways from the mask; a tip stays, as it is short."""
     body = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _disc(_THIN * size))
     return mask & np.asarray(cv2.dilate(body, _disc(2 * _THIN * size)), np.uint8) if body.any() else mask
 
 
-def _hoist(mask: NDArray[np.bool_], deviation: NDArray[np.float32]) -> tuple[Side, float]:
+def _hoist(mask: BoolArray, deviation: Float32Array) -> tuple[Side, float]:
     """Finds the side at which the cloth moves least, and its width over its height there."""
     rows, columns = np.nonzero(mask)
     moves = deviation[rows, columns]
@@ -180,11 +179,11 @@ def _hoist(mask: NDArray[np.bool_], deviation: NDArray[np.float32]) -> tuple[Sid
     return ("left" if of_left <= of_right else "right"), float(wide / (np.ptp(rows[at_hoist]) + 1))
 
 
-def _size(mask: NDArray[np.bool_]) -> float:
+def _size(mask: BoolArray) -> float:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     return float(max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1)
 
 
-def _disc(radius: float) -> NDArray[np.uint8]:
+def _disc(radius: float) -> UInt8Array:
     side = 2 * max(1, round(radius)) + 1
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)).astype(np.uint8)

@@ -11,8 +11,8 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from models.conditioning.instants import TimedFrame
 
 SHARE = 0.15
@@ -43,7 +43,7 @@ class Distinct:
     def __iter__(self) -> Iterator[TimedFrame]:
         waiting: deque[TimedFrame] = deque()
         changes: deque[float] = deque(maxlen=2 * _ABOUT + 1)  # of the frames about the first that waits
-        last: NDArray[np.uint8] | None = None
+        last: UInt8Array | None = None
         for time, picture in self._source:
             change = np.inf if last is None else float(np.abs(picture.astype(np.int16) - last).mean())
             last = picture

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
+
 HALVED = 2
 """By how much pictures are averaged down before cloth is sought in them."""
 SAMPLE = 120
@@ -28,9 +30,9 @@ class Stills:
         least, greatest: (rows, columns) 3 % and 97 % quantiles of them.
     """
 
-    usual: NDArray[np.uint8]
-    least: NDArray[np.uint8]
-    greatest: NDArray[np.uint8]
+    usual: UInt8Array
+    least: UInt8Array
+    greatest: UInt8Array
 
     @classmethod
     def of(cls, small: Sequence[NDArray[np.generic]] | NDArray[np.generic]) -> Stills:
@@ -46,11 +48,11 @@ class Stills:
         return cls(usual=_bytes(middle), least=_bytes(low), greatest=_bytes(high))
 
 
-def halved(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def halved(picture: UInt8Array) -> UInt8Array:
     """Averages a picture down by `HALVED`."""
     size = (picture.shape[1] // HALVED, picture.shape[0] // HALVED)
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _bytes(values: NDArray[np.generic]) -> NDArray[np.uint8]:
+def _bytes(values: NDArray[np.generic]) -> UInt8Array:
     return np.rint(np.asarray(values, np.float32)).astype(np.uint8)

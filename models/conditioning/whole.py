@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from models.conditioning.camera import STILL, Transform
 from models.conditioning.regions import nearby
 
@@ -23,9 +23,7 @@ _NEAR = 5
 """Pixels about the places of the cloth that belong to it."""
 
 
-def at_edges(
-    registered: NDArray[np.uint8], times: NDArray[np.float64], transforms: Sequence[Transform], mask: NDArray[np.bool_]
-) -> NDArray[np.float64]:
+def at_edges(registered: UInt8Array, times: FloatArray, transforms: Sequence[Transform], mask: BoolArray) -> FloatArray:
     """Measures how much of the cloth moves at the picture's edges: (n, 4) length along each of `SIDES`, in sizes of the
     cloth.
 
@@ -55,7 +53,7 @@ def at_edges(
     return lengths
 
 
-def _inside(transform: Transform, shape: tuple[int, int]) -> NDArray[np.bool_]:
+def _inside(transform: Transform, shape: tuple[int, int]) -> BoolArray:
     """Masks the pixels of the reference picture that lie in a picture, without its outermost pixels."""
     ones = np.ones(shape, np.uint8)
     if transform is not STILL:
@@ -64,7 +62,7 @@ def _inside(transform: Transform, shape: tuple[int, int]) -> NDArray[np.bool_]:
     return _eroded(ones > 0, 1)
 
 
-def _eroded(mask: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
+def _eroded(mask: BoolArray, width: int) -> BoolArray:
     square = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
     eroded = cv2.erode(mask.astype(np.uint8), square, borderType=cv2.BORDER_CONSTANT, borderValue=0)
     return np.asarray(eroded, dtype=np.bool_)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 
 LEVEL = 0.90
@@ -62,11 +62,11 @@ class Resamples:
         counts: (1 + draws, G) how often each group occurs; the first row is all ones, the data themselves.
     """
 
-    index: NDArray[np.int64]
-    counts: NDArray[np.float64]
+    index: IntArray
+    counts: FloatArray
 
     @classmethod
-    def of(cls, group: NDArray[np.int64], *, generator: np.random.Generator, draws: int = DRAWS) -> Resamples:
+    def of(cls, group: IntArray, *, generator: np.random.Generator, draws: int = DRAWS) -> Resamples:
         """Draws from the groups of clips.
 
         Args:
@@ -87,25 +87,25 @@ class Resamples:
     def groups(self) -> int:
         return self.counts.shape[1]
 
-    def sums(self, terms: NDArray[np.float64]) -> NDArray[np.float64]:
+    def sums(self, terms: FloatArray) -> FloatArray:
         """Sums (1 + draws, k) over clips of terms (n, k), in the data and in each draw."""
         per_group = np.zeros((self.groups, terms.shape[1]))
         np.add.at(per_group, self.index, terms)
         return self.counts @ per_group
 
-    def pair_ratio(self, hits: NDArray[np.float64], of: NDArray[np.float64]) -> NDArray[np.float64]:
+    def pair_ratio(self, hits: FloatArray, of: FloatArray) -> FloatArray:
         """Computes Σ hits / Σ of (1 + draws,), where both (G, G) are sums over pairs of groups; a pair counts as often
         as the product of its groups' occurrences."""
         upper = np.einsum("bi,bi->b", self.counts @ hits, self.counts)
         return ratio(upper, np.einsum("bi,bi->b", self.counts @ of, self.counts))
 
 
-def ratio(upper: NDArray[np.float64], lower: NDArray[np.float64]) -> NDArray[np.float64]:
+def ratio(upper: FloatArray, lower: FloatArray) -> FloatArray:
     """Divides, NaN where the denominator is not positive."""
     return np.divide(upper, lower, out=np.full(np.shape(upper), np.nan), where=lower > 0)
 
 
-def estimate(values: NDArray[np.float64], *, clips: int, groups: int) -> ScoreEstimate:
+def estimate(values: FloatArray, *, clips: int, groups: int) -> ScoreEstimate:
     """Returns the interval of values (1 + draws,), of which the first is the data's.
 
     Draws in which the score is undefined (none of a bin's groups occurs) are left out.

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom
 
+from flagdata.arrays import Float32Array, FloatArray
 from flagdata.errors import InputError
 from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate
 from models.evaluation.predictions import Predictions
@@ -26,7 +27,7 @@ BINS = 10
 BAND = 0.99
 """Share of a binomial within the rank histogram's band: Talts et al. show 99 %."""
 
-Array = NDArray[np.float64]
+Array = FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,7 +96,7 @@ def cells(predictions: Predictions, target: str) -> Cells:
     return Cells.of(predictions.truth[:, column].astype(np.float32), draws)
 
 
-def _draws(predictions: Predictions) -> NDArray[np.float32]:
+def _draws(predictions: Predictions) -> Float32Array:
     if predictions.samples is None:
         raise InputError(
             "the model gives no samples",

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from models.crops import Cropping
 from models.estimator import Estimator
@@ -62,7 +62,7 @@ def takes_any_length(estimator: Estimator) -> bool:
 
 
 def readouts(
-    predictions: Sequence[Predictions], parameters: Mapping[str, NDArray[np.float64]], *, data: str, seed: int
+    predictions: Sequence[Predictions], parameters: Mapping[str, FloatArray], *, data: str, seed: int
 ) -> list[Read]:
     """Follows the protocol of Bouman et al. 2013 on the embedding of each model's first run, one simulation left out at
     a time.

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.dataset.pairs import Pairs
 from flagdata.rng import child_seed
 from models.boosting import Boosting, fit_boosting
@@ -38,7 +38,7 @@ class Fitted:
     ridge: Ridge
     boosting: Boosting
 
-    def quantiles(self, film: NDArray[np.uint8]) -> NDArray[np.float64]:
+    def quantiles(self, film: UInt8Array) -> FloatArray:
         """Quantiles that boosting predicts for a clip (frame, height, width): (level, target)."""
         return self.boosting.predict_quantiles(_features(film).double().numpy())[0]
 
@@ -88,13 +88,13 @@ def predictions(train: Pairs, pairs: Pairs, *, cache: Path, workers: int, seed: 
     ]
 
 
-def _features(film: NDArray[np.uint8]) -> Tensor:
+def _features(film: UInt8Array) -> Tensor:
     """Computes (1, feature) of a clip."""
     cut = _CROPPING.cut(film, _CROPPING.whole((film.shape[0], film.shape[1], film.shape[2])))
     return features(cut[None].float(), rate=_FRONT_END.rate)
 
 
-def _table(prepared: Prepared, variants: int) -> NDArray[np.float64]:
+def _table(prepared: Prepared, variants: int) -> FloatArray:
     entries = np.arange(len(prepared))
     parts = [prepared.batch(entries, np.full(len(entries), variant)).double().numpy() for variant in range(variants)]
     return np.concatenate(parts)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate
@@ -20,7 +21,7 @@ from models.evaluation.scores import SCORES
 COMPONENTS = 50
 """Principal components the paper keeps."""
 
-Array = NDArray[np.float64]
+Array = FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +48,7 @@ def bouman(
     embedding: NDArray[np.floating],
     quantities: Mapping[str, Array],
     *,
-    group: NDArray[np.int64],
+    group: IntArray,
     generator: np.random.Generator,
     components: int = COMPONENTS,
 ) -> Readout:
@@ -99,9 +100,7 @@ def bouman(
     )
 
 
-def _admissible(
-    embedding: NDArray[np.floating], group: NDArray[np.int64], components: int
-) -> tuple[int, tuple[Finding, ...]]:
+def _admissible(embedding: NDArray[np.floating], group: IntArray, components: int) -> tuple[int, tuple[Finding, ...]]:
     """Limits components to three fifths of a fold's degrees of freedom, which admits the paper's 50 components of 90
     clips."""
     clips, dimension = embedding.shape
@@ -123,9 +122,7 @@ def _admissible(
     return most, (Finding.of("fewer-components", text, value=float(most)),)
 
 
-def leave_one_group_out(
-    embedding: NDArray[np.floating], truth: Array, *, group: NDArray[np.int64], components: int
-) -> Array:
+def leave_one_group_out(embedding: NDArray[np.floating], truth: Array, *, group: IntArray, components: int) -> Array:
     """Predicts (n, t) for each group by principal component regression on all others.
 
     PCA and regression are both fitted without the group. The other groups' scatter and cross moments are the whole's

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import UInt8Array
 from flagdata.dataset.pairs import Pairs
 from flagdata.rng import child_seed
 from flagdata.stated import Stated
@@ -128,7 +128,7 @@ def _batch(prepared: Prepared, first: int) -> Tensor:
 def time_a_clip(estimator: Estimator, pairs: Pairs) -> float:
     """Milliseconds a clip takes on one core from its pixels: the median of some clips, one at a time."""
 
-    def work(clip: NDArray[np.uint8]) -> None:
+    def work(clip: UInt8Array) -> None:
         inputs = estimator.inputs(clip)
         for learner in estimator.learners:
             learner.head(learner.network(inputs))
@@ -136,7 +136,7 @@ def time_a_clip(estimator: Estimator, pairs: Pairs) -> float:
     return milliseconds(work, pairs)
 
 
-def milliseconds(work: Callable[[NDArray[np.uint8]], object], pairs: Pairs) -> float:
+def milliseconds(work: Callable[[UInt8Array], object], pairs: Pairs) -> float:
     """Times what one clip (1, frames, height, width) costs on one core: the median of some, decoded before [ms]."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)

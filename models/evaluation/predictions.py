@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import read_arrays
+from flagdata.arrays import Float32Array, FloatArray, IntArray, read_arrays
 from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
 
 SCHEMA = "flagdata.predictions/1"
@@ -39,11 +39,11 @@ class Predictions:
 
     label: str
     targets: tuple[str, ...]
-    truth: NDArray[np.float64]
-    mean: NDArray[np.float64]
-    samples: NDArray[np.float32] | None
-    embedding: NDArray[np.float32] | None
-    group: NDArray[np.int64]
+    truth: FloatArray
+    mean: FloatArray
+    samples: Float32Array | None
+    embedding: Float32Array | None
+    group: IntArray
     parameters: int
     milliseconds: float
     note: str

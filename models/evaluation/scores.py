@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate, ratio
 from models.evaluation.predictions import Predictions
@@ -21,7 +21,7 @@ TOLERANCE = 0.5
 BIN = 1.0
 """Width of the bins of the error against wind [m/s]."""
 
-Array = NDArray[np.float64]
+Array = FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,8 +9,8 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from models.evaluation.bootstrap import LEVEL, Resamples, ScoreEstimate, estimate
 from models.evaluation.calibration import LEVELS, coverage_values
@@ -18,7 +18,7 @@ from models.evaluation.predictions import DENSITY, WIND, Predictions
 from models.evaluation.scores import SCORES, rmse_bound
 from models.evaluation.triplets import accuracy_values
 
-Values = Mapping[str, NDArray[np.float64]]
+Values = Mapping[str, FloatArray]
 """Metric → (1 + draws,): its value in the data, then in each draw of sequences."""
 
 OF_TARGETS = ("rmse", "relative_error", "bias", "r_squared", "pearson")
@@ -145,7 +145,7 @@ def check_same_clips(first: Predictions, second: Predictions) -> None:
             raise InputError(f"the models were not tested on the same truth of {target}", where=where, fix=fix)
 
 
-def metric_values(predictions: Predictions, resamples: Resamples, triplets: NDArray[np.int64] | None) -> Values:
+def metric_values(predictions: Predictions, resamples: Resamples, triplets: IntArray | None) -> Values:
     """Computes every metric of the table that these predictions have an output for."""
     values = {}
     if WIND in predictions.targets:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata import rng
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from models.evaluation.bootstrap import Resamples
 
@@ -17,13 +18,13 @@ COUNT = 3500
 """Triplets the paper drew from its test set."""
 
 
-def possible(group: NDArray[np.int64]) -> bool:
+def possible(group: IntArray) -> bool:
     """Returns whether clips (n,) of these groups have any triplet: two groups, one of them with two clips."""
     size = np.unique(group, return_counts=True)[1]
     return len(size) > 1 and bool((size > 1).any())
 
 
-def draw(group: NDArray[np.int64], *, seed: int, count: int = COUNT) -> NDArray[np.int64]:
+def draw(group: IntArray, *, seed: int, count: int = COUNT) -> IntArray:
     """Draws triplets (count, 3) of clips: anchor, positive, negative; the same for one seed.
 
     The anchor is uniform among clips that share their group with another, the positive among those others, the negative
@@ -47,9 +48,7 @@ def draw(group: NDArray[np.int64], *, seed: int, count: int = COUNT) -> NDArray[
     return order[np.column_stack([anchor, positive, negative])]
 
 
-def accuracy_values(
-    embedding: NDArray[np.floating], triplets: NDArray[np.int64], resamples: Resamples
-) -> NDArray[np.float64]:
+def accuracy_values(embedding: NDArray[np.floating], triplets: IntArray, resamples: Resamples) -> FloatArray:
     """Computes (1 + draws,) triplet accuracies in the data and in each draw of groups.
 
     A triplet rests on two sequences; in a draw it counts as often as the product of their occurrences.
@@ -70,7 +69,7 @@ def accuracy_values(
     return resamples.pair_ratio(hits, of)
 
 
-def _check(group: NDArray[np.int64]) -> None:
+def _check(group: IntArray) -> None:
     if not possible(group):
         raise InputError(
             "the clips have no triplet",

@@ -10,9 +10,9 @@ import importlib.util
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flagdata import rng
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from models.evaluation.predictions import WIND, Predictions
 
@@ -26,8 +26,8 @@ class TsneLayout:
     """Places (n, 2) of clips in the plane and their true wind (n,) [m/s], of `clips` that were tested."""
 
     label: str
-    places: NDArray[np.float64]
-    wind: NDArray[np.float64]
+    places: FloatArray
+    wind: FloatArray
     clips: int
 
 

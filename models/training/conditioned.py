@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray, IntArray, UInt8Array
 from flagdata.errors import InputError
 from models.conditioning import Conditioning, Follower, conditioning_of
 from models.conditioning.instants import Interpolator, TimedFrame, at_instants
@@ -35,12 +35,12 @@ class FitFilm:
     """
 
     found: Conditioning
-    frames: NDArray[np.uint8]
-    times: NDArray[np.float64]
+    frames: UInt8Array
+    times: FloatArray
     _interpolator: Interpolator = field(default_factory=lambda: Interpolator(capacity=1000))
 
     @classmethod
-    def of(cls, film: NDArray[np.uint8], times: NDArray[np.float64], *, size: int = SIZE) -> FitFilm:
+    def of(cls, film: UInt8Array, times: FloatArray, *, size: int = SIZE) -> FitFilm:
         """Conditions a film (n, height, width) gray with the times of its frames [s]."""
         stride = -(-len(film) // SAMPLE)
         sample, instants = film[::stride], times[::stride]
@@ -53,7 +53,7 @@ class FitFilm:
         )
 
     @property
-    def weight(self) -> NDArray[np.float32]:
+    def weight(self) -> Float32Array:
         """(size, size) 1 on the cloth, 0 where the film is frozen."""
         return self.found.weight
 
@@ -61,7 +61,7 @@ class FitFilm:
     def _frames(self) -> list[TimedFrame]:
         return list(zip(self.times.tolist(), self.frames, strict=True))
 
-    def starts(self, count: int, rate: float) -> NDArray[np.int64]:
+    def starts(self, count: int, rate: float) -> IntArray:
         """Returns the frames on which clips of `count` frames at `rate` [Hz] may begin.
 
         Raises:
@@ -77,7 +77,7 @@ class FitFilm:
             )
         return fits
 
-    def whole(self, rate: float) -> NDArray[np.uint8]:
+    def whole(self, rate: float) -> UInt8Array:
         """Resamples all of the film at `rate` [Hz]: (m, size, size).
 
         Raises:
@@ -86,7 +86,7 @@ class FitFilm:
         self.starts(1, rate)
         return self.clip(0, int(self.times[-1] * rate + 1e-6) + 1, rate)[0]
 
-    def clip(self, first: int, count: int, rate: float) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    def clip(self, first: int, count: int, rate: float) -> tuple[UInt8Array, FloatArray]:
         """Resamples (count, size, size) pictures at `rate` [Hz] from a frame on, and returns their times [s]."""
         instants = self.times[first] + np.arange(count) / rate
         period = float(np.median(np.diff(self.times)))

@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import AnyArray, BoolArray, FloatArray, IntArray, UInt8Array
 from flagdata.checksums import is_sealed, sealed
 from flagdata.dataset.pairs import Pairs
 from flagdata.errors import CorruptError, FlagdataError, InputError
@@ -63,7 +63,7 @@ class Files:
     def __len__(self) -> int:
         return len(self.paths)
 
-    def __getitem__(self, index: tuple[NDArray[np.int64], NDArray[np.int64]]) -> NDArray[Any]:
+    def __getitem__(self, index: tuple[IntArray, IntArray]) -> AnyArray:
         """Reads (len(entries), *shape) from the entries' files.
 
         Raises:
@@ -95,9 +95,9 @@ class Prepared:
         front_end: they were made by.
     """
 
-    maps: NDArray[Any] | Files
-    parameters: dict[str, NDArray[np.float64]]
-    sequence: NDArray[np.int64]
+    maps: AnyArray | Files
+    parameters: dict[str, FloatArray]
+    sequence: IntArray
     fingerprint: str
     front_end: FrontEnd
 
@@ -124,7 +124,7 @@ class Prepared:
             maps[entry] = self.maps[np.full(variants, entry), np.arange(variants)]
         return replace(self, maps=maps)
 
-    def truth(self, names: Sequence[str]) -> NDArray[np.float64]:
+    def truth(self, names: Sequence[str]) -> FloatArray:
         """Returns (n, target), as `models.targets.truth`.
 
         Raises:
@@ -132,12 +132,12 @@ class Prepared:
         """
         return complete_truth(self.parameters, names)
 
-    def batch(self, entries: NDArray[np.int64], variant: NDArray[np.int64]) -> Tensor:
+    def batch(self, entries: IntArray, variant: IntArray) -> Tensor:
         """Returns (len(entries), *shape) float32."""
         return as_input(torch.from_numpy(self.maps[entries, variant]))
 
 
-def complete_truth(parameters: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -> NDArray[np.float64]:
+def complete_truth(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> FloatArray:
     """Returns (n, target), as `models.targets.truth`, where every entry states all of them.
 
     Raises:
@@ -212,7 +212,7 @@ def prepare_films(
     )
 
 
-def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> NDArray[np.int64]:
+def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> IntArray:
     """Selects a row of the table for each film, of all simulations or of the first of a random order of this seed.
 
     Raises:
@@ -283,7 +283,7 @@ def _row_of_second_film(pairs: Pairs, row: int) -> int:
     return int(first[(row_of_film + 1) % len(recordings)])
 
 
-def _conditioned_clip(pairs: Pairs, row: int, front_end: FrontEnd) -> NDArray[np.uint8]:
+def _conditioned_clip(pairs: Pairs, row: int, front_end: FrontEnd) -> UInt8Array:
     """Returns the clip of a row, of its conditioned film: (frames, size, size)."""
     film = FitFilm.of(pairs.film(row), pairs.film_times(row))
     starts = film.starts(front_end.frames, front_end.rate)
@@ -292,7 +292,7 @@ def _conditioned_clip(pairs: Pairs, row: int, front_end: FrontEnd) -> NDArray[np
 
 def _prepared(
     pairs: Pairs,
-    rows: NDArray[np.int64],
+    rows: IntArray,
     front_end: FrontEnd,
     key: Callable[[int], dict[str, Any]],
     compute: Callable[[int], list[Tensor]],
@@ -338,7 +338,7 @@ def _prepared(
     )
 
 
-def _check_rate(pairs: Pairs, rows: NDArray[np.int64], front_end: FrontEnd) -> None:
+def _check_rate(pairs: Pairs, rows: IntArray, front_end: FrontEnd) -> None:
     """Refuses clips of another frame rate than the front end's frequencies assume."""
     table = pairs.table
     seconds = (table.end[rows] - table.start[rows]) / NANOSECONDS
@@ -407,7 +407,7 @@ def _write(path: Path, clips: Sequence[Tensor], front_end: FrontEnd) -> None:
     rewrite(path, sealed(content.getvalue()))
 
 
-def _first_sequences(pairs: Pairs, rows: NDArray[np.int64], *, count: int | None, seed: int) -> NDArray[np.bool_]:
+def _first_sequences(pairs: Pairs, rows: IntArray, *, count: int | None, seed: int) -> BoolArray:
     """Masks the films that belong to the first `count` simulations of an order that depends on the seed alone."""
     if count is None:
         return np.ones(len(rows), dtype=np.bool_)
@@ -422,5 +422,5 @@ def _first_sequences(pairs: Pairs, rows: NDArray[np.int64], *, count: int | None
     return np.isin(pairs.table.seed[rows], chosen)
 
 
-def _shape(film: NDArray[np.uint8]) -> tuple[int, int, int]:
+def _shape(film: UInt8Array) -> tuple[int, int, int]:
     return film.shape[0], film.shape[1], film.shape[2]

@@ -21,11 +21,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch import distributed as ranks
 from torch.nn.parallel import DistributedDataParallel
 
+from flagdata.arrays import IntArray
 from flagdata.errors import CorruptError, ErrorKind, FlagdataError, RefusedError, UsageError
 from flagdata.provenance import array_hash
 from flagdata.rng import stream, torch_draws
@@ -46,7 +46,7 @@ class TrainingBatch:
     """
 
     inputs: Tensor
-    entries: NDArray[np.int64]
+    entries: IntArray
     sequence: Tensor
 
 
@@ -115,7 +115,7 @@ class Batches:
         content = {name: value for name, value in self.state().items() if name not in ("epoch", "cursor")}
         return array_hash(content, [order.astype("<i8"), variant[order].astype("<i8")])
 
-    def _order(self, epoch: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _order(self, epoch: int) -> tuple[IntArray, IntArray]:
         """Returns entries in the epoch's order, and which variant of each entry it takes."""
         rng = stream(self.seed, "batches", epoch)
         if self.together:

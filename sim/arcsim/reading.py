@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.ingest.meshes import read_obj
 from flagdata.ingest.meshes.folder import read_json
@@ -297,7 +297,7 @@ def _scaled(material: Material, entry: Mapping[str, Any], where: str) -> Materia
     return replace(scaled, damping=_number(entry, "damping", 0.0, where))
 
 
-def _placed(positions: NDArray[np.float64], transform: Mapping[str, Any], where: str) -> NDArray[np.float64]:
+def _placed(positions: FloatArray, transform: Mapping[str, Any], where: str) -> FloatArray:
     """Applies a transform: scaled, turned (angle in degrees about an axis), then moved."""
     placed = positions * _number(transform, "scale", 1.0, where)
     if "rotate" in transform:

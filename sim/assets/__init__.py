@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 from flagdata.registry import Registry
 from sim.assets.photos import Photos
@@ -28,7 +28,7 @@ class AssetKind(Protocol):
         """Draws the name of one member."""
         ...
 
-    def image(self, member: str) -> NDArray[np.uint8]:
+    def image(self, member: str) -> UInt8Array:
         """Renders a member's picture (height, width, 3), sRGB.
 
         Raises:
@@ -75,7 +75,7 @@ class Assets:
         if self.photos is not None:
             self._photos()
 
-    def texture(self, name: str) -> NDArray[np.uint8]:
+    def texture(self, name: str) -> UInt8Array:
         """Renders a texture by name: (height, width, 3) sRGB, upper row first.
 
         Raises:
@@ -84,7 +84,7 @@ class Assets:
         kind, member = _split(name, "texture", "flag/japan")
         return TEXTURES[kind].image(member)
 
-    def background(self, name: str) -> NDArray[np.uint8]:
+    def background(self, name: str) -> UInt8Array:
         """Renders a background by name: (height, width, 3) sRGB.
 
         Raises:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from sim.assets.colour import Hue, hue
 from sim.assets.noise import Picture, Plane, defocused, fractal, over, ridge, smoothstep
 from sim.assets.seeded import Seeded
@@ -120,7 +120,7 @@ def _buildings(rng: np.random.Generator) -> Picture:
     return over(picture, _ground(rng), smoothstep(-0.004, 0.004, street - _HEIGHT))
 
 
-def _house(rng: np.random.Generator, picture: Picture, distance: float, haze: NDArray[np.float64]) -> Picture:
+def _house(rng: np.random.Generator, picture: Picture, distance: float, haze: FloatArray) -> Picture:
     """Paints a façade with rows of windows, some lit, some mirroring the sky, in front of a picture."""
     left, width, top = rng.uniform(-0.2, 1.2), rng.uniform(0.12, 0.6), rng.uniform(0.25, 1.05) * (1 - 0.4 * distance)
     first, last = np.searchsorted(_X[0], [left, left + width])

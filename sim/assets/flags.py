@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, Float32Array, UInt8Array
 from flagdata.errors import UnknownNameError
 from sim.assets.colour import decoded, encoded, of_hex
 
@@ -31,7 +31,7 @@ class FlagSheet:
         colours: "#rrggbb" of the indices so far.
     """
 
-    fine: NDArray[np.uint8] = field(repr=False)
+    fine: UInt8Array = field(repr=False)
     colours: list[str]
 
     @classmethod
@@ -40,7 +40,7 @@ class FlagSheet:
         return cls(fine=np.zeros((rows * _FINE, columns * _FINE), dtype=np.uint8), colours=[colour])
 
     @cached_property
-    def _grid(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def _grid(self) -> tuple[Float32Array, Float32Array]:
         rows, columns = self.fine.shape
         x, y = (np.arange(columns) + 0.5) / rows, (np.arange(rows) + 0.5) / rows
         return x.astype(np.float32)[None, :], y.astype(np.float32)[:, None]
@@ -56,7 +56,7 @@ class FlagSheet:
     def disc(self, x: float, y: float, radius: float, colour: str) -> None:
         self.where(self.in_disc(x, y, radius), colour)
 
-    def in_disc(self, x: float, y: float, radius: float) -> NDArray[np.bool_]:
+    def in_disc(self, x: float, y: float, radius: float) -> BoolArray:
         """Masks samples (sub-rows, sub-columns) that a disc covers."""
         px, py = self._grid
         return (px - np.float32(x)) ** 2 + (py - np.float32(y)) ** 2 <= np.float32(radius**2)
@@ -74,7 +74,7 @@ class FlagSheet:
         turns = [points_to + 4 * math.pi / 5 * k for k in range(5)]
         self.polygon([(x + radius * math.cos(t), y + radius * math.sin(t)) for t in turns], colour)
 
-    def turned(self, x: float, y: float, direction: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def turned(self, x: float, y: float, direction: float) -> tuple[Float32Array, Float32Array]:
         """Coordinates of all samples about (x, y): the first in a direction from +x towards +y [rad], the second a
         quarter turn on, clockwise as seen."""
         px, py = self._grid
@@ -82,7 +82,7 @@ class FlagSheet:
         c, s = np.float32(math.cos(direction)), np.float32(math.sin(direction))
         return np.asarray(dx * c + dy * s, dtype=np.float32), np.asarray(dy * c - dx * s, dtype=np.float32)
 
-    def inside(self, corners: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    def inside(self, corners: Sequence[tuple[float, float]]) -> BoolArray:
         """Masks samples (sub-rows, sub-columns) that a polygon covers, by the non-zero winding rule."""
         px, py = self._grid
         winding = np.zeros(self.fine.shape, dtype=np.int8)
@@ -94,10 +94,10 @@ class FlagSheet:
             winding[rows] += np.where(px < edge, np.int8(1 if by > ay else -1), np.int8(0))
         return winding != 0
 
-    def where(self, mask: NDArray[np.bool_], colour: str) -> None:
+    def where(self, mask: BoolArray, colour: str) -> None:
         self.fine[mask] = self._index(colour)
 
-    def bytes(self) -> NDArray[np.uint8]:
+    def bytes(self) -> UInt8Array:
         """Averages sub-samples in linear light: (rows, columns, 3) sRGB."""
         rows, columns = (n // _FINE for n in self.fine.shape)
         blocks = self.fine.reshape(rows, _FINE, columns, _FINE)
@@ -300,14 +300,14 @@ class _National:
         names = sorted(FLAGS)
         return names[int(rng.integers(len(names)))]
 
-    def image(self, member: str) -> NDArray[np.uint8]:
+    def image(self, member: str) -> UInt8Array:
         if member not in FLAGS:
             raise UnknownNameError.of("flag", member, FLAGS)
         return _painted(member)
 
 
 @functools.cache
-def _painted(name: str) -> NDArray[np.uint8]:
+def _painted(name: str) -> UInt8Array:
     sheet = FlagSheet.blank(rows=ROWS, columns=ROWS * 3 // 2, colour=_WHITE)
     FLAGS[name].draw(sheet)
     image = sheet.bytes()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
-Plane = NDArray[np.float64]
+from flagdata.arrays import FloatArray
+
+Plane = FloatArray
 """(row, column)."""
-Picture = NDArray[np.float64]
+Picture = FloatArray
 """(row, column, 3) sRGB in [0, 1], or about."""
 
 
@@ -33,18 +34,18 @@ def fractal(rng: np.random.Generator, rows: int, columns: int, *, slope: float, 
     return (field - field.mean()) / field.std()
 
 
-def ridge(rng: np.random.Generator, columns: int, *, slope: float) -> NDArray[np.float64]:
+def ridge(rng: np.random.Generator, columns: int, *, slope: float) -> FloatArray:
     """Draws a random line (columns,) with mean 0 and standard deviation 1, as `fractal`, not periodic."""
     return fractal(rng, 2, 2 * columns, slope=slope)[0, :columns]
 
 
-def smoothstep(low: float, high: float, value: NDArray[np.float64]) -> NDArray[np.float64]:
+def smoothstep(low: float, high: float, value: FloatArray) -> FloatArray:
     """Interpolates: 0 below `low`, 1 above `high`, a smooth cubic between."""
     t = np.clip((value - low) / (high - low), 0.0, 1.0)
     return t * t * (3 - 2 * t)
 
 
-def over(below: Picture, colour: NDArray[np.float64], share: Plane) -> Picture:
+def over(below: Picture, colour: FloatArray, share: Plane) -> Picture:
     """Lays a colour or picture over another one with the share (row, column) that it covers."""
     return below + share[:, :, None] * (colour - below)
 

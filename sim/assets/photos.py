@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError, UnknownNameError
 
 _SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp")
@@ -40,7 +40,7 @@ class Photos:
     def draw(self, rng: np.random.Generator) -> str:
         return self.members[int(rng.integers(len(self.members)))]
 
-    def image(self, member: str) -> NDArray[np.uint8]:
+    def image(self, member: str) -> UInt8Array:
         """Reads a photograph (height, width, 3), turned upright as its EXIF data say, at most 1024 px long.
 
         Raises:

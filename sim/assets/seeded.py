@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
 from flagdata.rng import stream
 
@@ -22,12 +22,12 @@ class Seeded:
     """
 
     kind: str
-    paint: Callable[[np.random.Generator], NDArray[np.float64]]
+    paint: Callable[[np.random.Generator], FloatArray]
 
     def draw(self, rng: np.random.Generator) -> str:
         return str(int(rng.integers(2**31)))
 
-    def image(self, member: str) -> NDArray[np.uint8]:
+    def image(self, member: str) -> UInt8Array:
         """Paints the picture of a seed.
 
         Raises:

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray
 from flagdata.errors import CorruptError
 
 PROTOCOL_VERSION = 1
@@ -40,7 +40,7 @@ class Message:
 
     kind: str
     fields: Mapping[str, Any] = field(default_factory=dict)
-    arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    arrays: Mapping[str, AnyArray] = field(default_factory=dict)
 
 
 def encode(message: Message) -> bytes:
@@ -74,7 +74,7 @@ def decode(read: Read) -> Message:
         raise _broken(f"a head that is not one ({error})") from None
     if version != PROTOCOL_VERSION:
         raise _broken(f"protocol version {version}, not {PROTOCOL_VERSION}")
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, AnyArray] = {}
     for entry in described:
         if entry["dtype"] not in _DTYPES:
             raise _broken(f"an array of type {entry['dtype']!r}")

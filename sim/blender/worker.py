@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray, Float32Array, UInt8Array
 from sim.blender.protocol import Message, decode, encode
 
 _SENSOR = 36.0  # mm, of the camera model; only its ratio to the lens matters
@@ -112,7 +113,7 @@ class Studio:
         sky.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
         sky.inputs["Strength"].default_value = fields["sky"]
 
-    def _set_objects(self, objects: list[Mapping[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> None:
+    def _set_objects(self, objects: list[Mapping[str, Any]], arrays: Mapping[str, AnyArray]) -> None:
         data = self._bpy.data
         for thing in self._objects.values():
             mesh = thing.data
@@ -130,7 +131,7 @@ class Studio:
             self._objects[name] = data.objects.new(name, mesh)
             self._scene.collection.objects.link(self._objects[name])
 
-    def _material(self, described: Mapping[str, Any], texture: NDArray[np.uint8] | None) -> Any:
+    def _material(self, described: Mapping[str, Any], texture: UInt8Array | None) -> Any:
         """Makes a diffuse sheet that reflects the share 1 − t of its albedo and transmits t."""
         material = self._bpy.data.materials.new(described["name"])
         material.use_nodes = True
@@ -152,7 +153,7 @@ class Studio:
             tree.nodes.active = sampled
         return material
 
-    def _image(self, name: str, texture: NDArray[np.uint8]) -> Any:
+    def _image(self, name: str, texture: UInt8Array) -> Any:
         height, width, _ = texture.shape
         image = self._bpy.data.images.new(name, width=width, height=height, alpha=False)
         pixels = np.ones((height, width, 4), dtype=np.float32)
@@ -161,7 +162,7 @@ class Studio:
         image.update()
         return image
 
-    def picture(self, message: Message) -> NDArray[np.float32]:
+    def picture(self, message: Message) -> Float32Array:
         """Renders the meshes of a "frame" message, (height, width, 4)."""
         for name, thing in self._objects.items():
             arrays = message.arrays
@@ -172,7 +173,7 @@ class Studio:
         return self._read()
 
     def _shape(
-        self, name: str, thing: Any, positions: NDArray[np.float32], faces: NDArray[np.int32], uv: NDArray[np.float32]
+        self, name: str, thing: Any, positions: Float32Array, faces: NDArray[np.int32], uv: Float32Array
     ) -> None:
         mesh = thing.data
         same = name in self._faces and np.array_equal(self._faces[name], faces) and len(mesh.vertices) == len(positions)
@@ -187,7 +188,7 @@ class Studio:
         mesh.update()
         thing.update_tag()
 
-    def _read(self) -> NDArray[np.float32]:
+    def _read(self) -> Float32Array:
         """Reads the picture that was written; Blender gives the pixels of a render only by way of a file."""
         image = self._bpy.data.images.load(str(self._picture))
         try:

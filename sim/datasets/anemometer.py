@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindSeries
@@ -57,8 +57,8 @@ def read(spec: AnemometerSpec, crew: Crew, member: Member, *, instrument: int, s
 
 def logged(
     spec: AnemometerSpec,
-    time: NDArray[np.float64],
-    velocity: NDArray[np.float64],
+    time: FloatArray,
+    velocity: FloatArray,
     *,
     instrument: int,
     seed: int,
@@ -98,7 +98,7 @@ def logged(
     return Reading(series=series, parameters={**known, "anemometer.noise": noise})
 
 
-def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[FloatArray, FloatArray]:
     """Times (n,) since the simulation's start [s], and the air's velocity (n, 3) at them [m/s].
 
     A wind that changes is known only from the start; one that does not began `before` the first frame.
@@ -114,20 +114,18 @@ def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[NDArray[np.fl
     return times, velocities(system, times)
 
 
-def velocities(system: System, times: NDArray[np.float64]) -> NDArray[np.float64]:
+def velocities(system: System, times: FloatArray) -> FloatArray:
     """(n, 3) [m/s] of the undisturbed air that the first of a batch stands in, at times (n,) [s]."""
     with torch.no_grad():
         return np.stack([system.wind.velocity(float(t))[:, 0].double().numpy() for t in times])
 
 
-def blowing_from(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+def blowing_from(x: FloatArray, y: FloatArray) -> FloatArray:
     """Where a wind (x towards east, y towards north) blows from, clockwise from north, in [0, 2π) [rad]."""
     return np.mod(np.arctan2(-x, -y), 2 * math.pi)
 
 
-def _means(
-    time: NDArray[np.float64], values: NDArray[np.float64], rate: float, phase: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _means(time: FloatArray, values: FloatArray, rate: float, phase: float) -> tuple[FloatArray, FloatArray]:
     """Stamps (m,) a period apart, and the means (m, k) of values (n, k) over the period that ends with each."""
     period = 1 / rate
     first = math.ceil((time[0] + period) * rate - phase) + phase

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from flagdata.arrays import UInt8Array
 from flagdata.documents import column_json
 from flagdata.lake import Lake
 from flagdata.outputs import check_file, rewrite, write_file
@@ -171,7 +171,7 @@ def _names(parameters: Sequence[dict[str, Any]]) -> list[tuple[str, list[tuple[s
 def _sheet(lake: Lake, recipe: DatasetRecipe, rows: Sequence[dict[str, Any]]) -> str:
     """Frames of a few films drawn by chance, as a data URL."""
     order = stream(recipe.seed, "card").permutation(len(rows))[:_SHOWN].tolist()
-    pictures: list[NDArray[np.uint8]] = []
+    pictures: list[UInt8Array] = []
     for number in order:
         record = Record.open(lake.record_place(rows[number]["object"]))
         frame = record.frames(record.frame_count // 2, 1)[0]

@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 from flagdata.record.video import VideoEncoder
 from flagdata.record.writer import Coding, encode_jpeg
@@ -38,7 +38,7 @@ def settings(spec: CameraSpec, *, seed: int) -> dict[str, float]:
     }
 
 
-def coded(frames: NDArray[np.uint8], drawn: dict[str, float], spec: CameraSpec, *, seed: int) -> list[bytes]:
+def coded(frames: UInt8Array, drawn: dict[str, float], spec: CameraSpec, *, seed: int) -> list[bytes]:
     """Frames (n, height, width, 3) as the camera stores them, one message each.
 
     Args:
@@ -57,7 +57,7 @@ def coded(frames: NDArray[np.uint8], drawn: dict[str, float], spec: CameraSpec, 
     return [encoder.encode(gray) for gray in _noisy(frames, drawn, seed=seed)]
 
 
-def jpegs(frames: NDArray[np.uint8], drawn: dict[str, float], *, slot: int, seed: int) -> tuple[list[bytes], int]:
+def jpegs(frames: UInt8Array, drawn: dict[str, float], *, slot: int, seed: int) -> tuple[list[bytes], int]:
     """JPEGs of frames (n, height, width, 3), gray (Rec. 601, as everywhere in `flagdata.ingest`), and their quality.
 
     All are `slot` bytes long. Where one would be longer at the drawn quality, the whole film has the best at which none
@@ -86,13 +86,13 @@ def jpegs(frames: NDArray[np.uint8], drawn: dict[str, float], *, slot: int, seed
     return [filled(jpeg, slot) for jpeg in coded], quality
 
 
-def _noisy(frames: NDArray[np.uint8], drawn: dict[str, float], *, seed: int) -> Iterator[NDArray[np.uint8]]:
+def _noisy(frames: UInt8Array, drawn: dict[str, float], *, seed: int) -> Iterator[UInt8Array]:
     rng = stream(seed, "camera", "noise")
     for frame in frames:
         yield noisy(np.asarray(Image.fromarray(frame).convert("L")), drawn, rng)
 
 
-def noisy(gray: NDArray[np.uint8], drawn: Mapping[str, float], rng: np.random.Generator) -> NDArray[np.uint8]:
+def noisy(gray: UInt8Array, drawn: Mapping[str, float], rng: np.random.Generator) -> UInt8Array:
     """A gray picture (height, width) with the camera's noise.
 
     Args:

@@ -34,9 +34,9 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from sim.cloth import Cloth
 from sim.effects.effect import ForceEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
@@ -83,7 +83,7 @@ class FiniteSpanLoading(ForceEffect):
         return mass.expand_as(cloth.mass)
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        def real(values: NDArray[np.float64]) -> Tensor:
+        def real(values: FloatArray) -> Tensor:
             return torch.as_tensor(values, dtype=cloth.dtype, device=cloth.device)
 
         modes, gains = real(cosines(cloth.mesh)), real(relative_masses(cloth.mesh))
@@ -128,20 +128,20 @@ def extent(mesh: Mesh) -> tuple[float, float]:
     return float(length), float(height)
 
 
-def angles(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def angles(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
     """Computes angles (vertex,) from 0 to π along the cloth and over its height."""
     along, over = (np.pi * (mesh.rest - mesh.rest.min(0)) / extent(mesh)).T
     return along, over
 
 
-def profile_over_height(mesh: Mesh) -> NDArray[np.float64]:
+def profile_over_height(mesh: Mesh) -> FloatArray:
     """Computes the profile e (vertex,), nothing at the free edges, of mean 1 over the cloth."""
     _, over = angles(mesh)
     shape = np.sqrt(np.clip(1 - (2 * over / np.pi - 1) ** 2, 0, None))
     return np.asarray(shape * mesh.vertex_areas.sum() / (shape * mesh.vertex_areas).sum())
 
 
-def cosines(mesh: Mesh) -> NDArray[np.float64]:
+def cosines(mesh: Mesh) -> FloatArray:
     """Computes (vertex, mode) cosines, those along the cloth innermost."""
     along, over = angles(mesh)
     first = np.cos(np.arange(_ALONG) * along[:, None])
@@ -149,7 +149,7 @@ def cosines(mesh: Mesh) -> NDArray[np.float64]:
     return (second[:, :, None] * first[:, None]).reshape(len(along), -1)
 
 
-def relative_masses(mesh: Mesh) -> NDArray[np.float64]:
+def relative_masses(mesh: Mesh) -> FloatArray:
     """Computes (mode,) m(k)/m(k₀) over the mode's square integrated over the cloth [1/m²].
 
     Nothing for modes that half a wave of the mesh's cells does not resolve.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray, IntArray
 from sim.mesh import Mesh
 from sim.state import State
 from sim.system import System
@@ -48,21 +48,21 @@ def disturbed(wind: Tensor, relative: Tensor) -> Tensor:
     return wind + relative[0] * level + relative[1] * left_of(wind, axis=0) + relative[2] * norm(level, axis=0) * up
 
 
-def boundary_edges(mesh: Mesh) -> NDArray[np.int64]:
+def boundary_edges(mesh: Mesh) -> IntArray:
     """Lists edges with one face, (edge, 2) vertices, sorted."""
     pairs = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
     unique, counts = np.unique(np.sort(pairs, axis=1), axis=0, return_counts=True)
     return unique[counts == 1]
 
 
-def hem_lengths(mesh: Mesh) -> NDArray[np.float64]:
+def hem_lengths(mesh: Mesh) -> FloatArray:
     """Computes half the length of the boundary edges at each vertex, (vertex,) [m]; their sum is the perimeter."""
     edges = boundary_edges(mesh)
     half = np.hypot(*(mesh.rest[edges[:, 1]] - mesh.rest[edges[:, 0]]).T) / 2
     return np.bincount(edges.ravel(), weights=np.repeat(half, 2), minlength=mesh.vertex_count).astype(np.float64)
 
 
-def edge_distances(mesh: Mesh) -> NDArray[np.float64]:
+def edge_distances(mesh: Mesh) -> FloatArray:
     """Computes the distance to the nearest boundary edge in the flat cloth, (vertex,) [m]."""
     edges = boundary_edges(mesh)
     start, along = mesh.rest[edges[:, 0]], mesh.rest[edges[:, 1]] - mesh.rest[edges[:, 0]]

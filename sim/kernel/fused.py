@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray, IntArray
 from sim.cloth import Cloth
 from sim.compiler import library
 from sim.contact import Contact, layers
@@ -483,13 +483,13 @@ def _set_contact(settings: _Contact, system: System, contact: Contact, face: Ten
     return {f"contact_{name}": tensor for name, tensor in tensors.items()}
 
 
-def _groups(points: NDArray[np.float64], width: int) -> NDArray[np.int64]:
+def _groups(points: FloatArray, width: int) -> IntArray:
     """Points (n, 2) in groups of `width` that lie close together: (group, width) indices, -1 where there is none.
 
     Halved across the longer side until few enough are left, always at a multiple of the width.
     """
 
-    def halved(chosen: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    def halved(chosen: IntArray) -> list[IntArray]:
         if len(chosen) <= width:
             return [np.pad(chosen, (0, width - len(chosen)), constant_values=-1)]
         longer = int(np.argmax(np.ptp(points[chosen], axis=0)))

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import AnyArray, IntArray
 from flagdata.errors import UsageError
 from sim.cloth import incidence
 from sim.mesh import Mesh
@@ -94,7 +94,7 @@ class WarpKernel:
             _check_room(cloth.mesh, where.max_shared_memory_per_block)
         alive: list[Tensor] = []
 
-        def array(values: NDArray[Any] | Tensor, dtype: Any = None) -> Any:
+        def array(values: AnyArray | Tensor, dtype: Any = None) -> Any:
             tensor = torch.as_tensor(values).to(cloth.device).contiguous()
             alive.append(tensor)
             return code.wp.from_torch(tensor, dtype=dtype)
@@ -187,7 +187,7 @@ def _check_room(mesh: Mesh, room: int) -> None:
         )
 
 
-def _sheet(mesh: Mesh, held: Tensor) -> dict[str, NDArray[np.int64]]:
+def _sheet(mesh: Mesh, held: Tensor) -> dict[str, IntArray]:
     """Computes the index arrays of `leapfrog.Sheet`."""
     faces, hinges = mesh.faces, mesh.hinges
     place_of = {  # directed edge → face and the corner opposite
@@ -201,7 +201,7 @@ def _sheet(mesh: Mesh, held: Tensor) -> dict[str, NDArray[np.int64]]:
     hold = np.zeros(mesh.vertex_count, dtype=np.int64)
     hold[held.cpu().numpy()] = 1 + np.arange(len(held))
 
-    def pair(lower: NDArray[np.int64], upper: NDArray[np.int64]) -> NDArray[np.int64]:
+    def pair(lower: IntArray, upper: IntArray) -> IntArray:
         return lower | upper << 16
 
     (a, b, c), (ea, eb, ec) = faces.T, edge.T

@@ -15,9 +15,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import Float32Array
 from sim.assets import Assets
 from sim.blender.process import WorkerProcess
 from sim.blender.protocol import Message
@@ -77,7 +77,7 @@ class Cycles:
         setup = self._scene(placed, parameters, pictures)
         timeout = _LEAST_TIMEOUT + _SLOWEST * parameters.width * parameters.height * parameters.cycles_samples
         self.worker.request([setup], timeout=timeout)
-        frames: list[NDArray[np.float32]] = []
+        frames: list[Float32Array] = []
         for messages in _frames(meshes, placed, parameters, pictures):
             answers = self.worker.request(messages, timeout=timeout, setup=setup)
             frames.append(np.mean([answer.arrays["rgba"] for answer in answers], axis=0))

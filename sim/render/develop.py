@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from PIL import Image
 from torch import Tensor
 
+from flagdata.arrays import Float32Array, UInt8Array
 from flagdata.schema import FRAME_SIZE
 from sim.assets.colour import decoded
 from sim.render.parameters import RenderParameters
@@ -19,11 +19,11 @@ _WHOLE = 0.6  # the background scale at which an image's shorter side just fills
 
 
 @functools.cache
-def _decoding() -> NDArray[np.float32]:
+def _decoding() -> Float32Array:
     return decoded(np.arange(256) / 255).astype(np.float32)
 
 
-def to_linear(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+def to_linear(image: UInt8Array) -> Float32Array:
     """Converts sRGB bytes of any shape to linear values in [0, 1] (IEC 61966-2-1)."""
     return _decoding()[image]
 
@@ -35,7 +35,7 @@ def to_bytes(linear: Tensor) -> Tensor:
     return (code * 255 + 0.5).to(torch.uint8)
 
 
-def plate(image: NDArray[np.uint8], parameters: RenderParameters) -> NDArray[np.float32]:
+def plate(image: UInt8Array, parameters: RenderParameters) -> Float32Array:
     """Resamples the background as it appears in the frame.
 
     At `background_scale` 0.6 the image's shorter side is as long as the frame's longer one; larger scales enlarge it

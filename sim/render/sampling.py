@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from sim.render.parameters import RenderParameters
 
@@ -34,9 +34,9 @@ class Samples:
             the whole sun gives [W/m²].
     """
 
-    jitter: NDArray[np.float64]
-    time: NDArray[np.float64]
-    to_sun: NDArray[np.float64]
+    jitter: FloatArray
+    time: FloatArray
+    to_sun: FloatArray
     sun_weight: float
 
     @classmethod
@@ -55,7 +55,7 @@ class Samples:
         )
 
 
-def _hammersley(count: int) -> NDArray[np.float64]:
+def _hammersley(count: int) -> FloatArray:
     """Computes (count, 2) points in (0, 1)², each coordinate once in the middle of each of `count` equal parts."""
     index, mirrored = np.arange(count), np.zeros(count)
     for bit in range(count.bit_length()):
@@ -64,7 +64,7 @@ def _hammersley(count: int) -> NDArray[np.float64]:
 
 
 @functools.cache
-def _spread_out(count: int) -> NDArray[np.float64]:
+def _spread_out(count: int) -> FloatArray:
     """Spreads (count, 2) points as of `_hammersley`; few ones in that one of some orders that keeps them farthest
     apart, taken as a pattern that repeats, and on no diagonal."""
     points = _hammersley(count)
@@ -82,7 +82,7 @@ def _spread_out(count: int) -> NDArray[np.float64]:
     return pattern
 
 
-def _dealt(values: NDArray[np.float64], reference: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+def _dealt(values: FloatArray, reference: FloatArray, name: str) -> FloatArray:
     """Orders the rows of `values` so that, among some orders, their columns correlate least with those of
     `reference`."""
     count, rng = len(values), stream(0, "render", "samples", name)
@@ -96,7 +96,7 @@ def _dealt(values: NDArray[np.float64], reference: NDArray[np.float64], name: st
     return values[orders[int(np.argmin(np.round(worst, 9)))]]
 
 
-def _cone(points: NDArray[np.float64], middle: tuple[float, float, float], radius: float) -> NDArray[np.float64]:
+def _cone(points: FloatArray, middle: tuple[float, float, float], radius: float) -> FloatArray:
     """Spreads directions (point, 3), equally dense in solid angle, within an angular radius [rad] of a middle.
 
     A disc of uniform radiance L gives a surface that faces its middle E = π L sin² radius; a share 1/n of its solid

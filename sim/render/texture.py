@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import UInt8Array
 from sim.render.develop import to_linear
 
 
@@ -28,7 +27,7 @@ class Pyramid:
     start: Tensor
 
     @classmethod
-    def of(cls, image: NDArray[np.uint8], *, device: torch.device) -> Pyramid:
+    def of(cls, image: UInt8Array, *, device: torch.device) -> Pyramid:
         """Makes the pyramid of an sRGB image (height, width, 3); halved in linear light, odd last rows and columns
         dropped."""
         levels = [torch.from_numpy(to_linear(image)).to(device)]

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import LimitError
 from flagdata.lake.meshes import MeshSequence
 from flagdata.timebase import NANOSECONDS
@@ -135,7 +135,7 @@ class Outcome:
 
     member: Member
     sequence: MeshSequence | None
-    wind: NDArray[np.float64]
+    wind: FloatArray
     diagnosis: Diagnosis
     failure: tuple[str, str] | None = None
 
@@ -266,9 +266,7 @@ def _crumpled(diagnosis: Diagnosis) -> tuple[str, str] | None:
     return "crumpled", f"it crumpled: its faces are compressed by {rate}; declare more damping"
 
 
-def _attributes(
-    crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnosis, wind: NDArray[np.float64]
-) -> dict[str, Any]:
+def _attributes(crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnosis, wind: FloatArray) -> dict[str, Any]:
     """Returns what a sequence says of itself, also outside the lake; the wind where its recipe gives samples of it."""
     return {
         "source": "flagdata simulate",

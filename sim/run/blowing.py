@@ -8,9 +8,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from flagdata.provenance import canonical, digest
 from flagdata.series import Wind
@@ -36,7 +36,7 @@ class WindSamples:
     velocity: Floats
     artifact: str = ""
 
-    def mean(self, frames: int, rate: float) -> NDArray[np.float64]:
+    def mean(self, frames: int, rate: float) -> FloatArray:
         """Returns the mean (3,) at the frames that are kept [m/s]."""
         kept = np.arange(frames) / rate
         return np.stack([np.interp(kept, self.times, part).mean() for part in self.velocity.T])

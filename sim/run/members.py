@@ -10,8 +10,8 @@ from typing import TypeAlias
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed, stream
 from flagdata.tables import Quantity, Range, ends
 from sim import handles as held
@@ -191,12 +191,12 @@ class Crew:
             members.append(Member(index=end, seed=0, base=place, scene=scene, parameters={}, effects=effects))
         return self.assemble(members)
 
-    def _start(self, seed: int) -> NDArray[np.float64]:
+    def _start(self, seed: int) -> FloatArray:
         spec = self.recipe.scene
         flat = self._flat(spec)
         return roughened(flat, self.handles, stream(seed, "start"), spec.start_noise) if spec.start_noise else flat
 
-    def _flat(self, spec: SceneSpec) -> NDArray[np.float64]:
+    def _flat(self, spec: SceneSpec) -> FloatArray:
         """(vertex, 3) where the cloth starts, before its noise [m]."""
         if spec.arcsim is not None:
             return spec.arcsim.scene.position
@@ -243,15 +243,13 @@ def _of(quantity: Quantity | None, default: float) -> Quantity:
     return default if quantity is None else quantity
 
 
-def _factors(spec: MaterialSpec, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def _factors(spec: MaterialSpec, shares: FloatArray) -> FloatArray:
     quantity = spec.bending_each
     values = [quantity.at(share) if isinstance(quantity, Range) else quantity for share in shares.tolist()]
     return np.array(values).reshape(BENDING_SHAPE)
 
 
-def _material(
-    base: Material, *, density: float, stretching: float, bending: NDArray[np.float64], damping: float
-) -> Material:
+def _material(base: Material, *, density: float, stretching: float, bending: FloatArray, damping: float) -> Material:
     return replace(
         base,
         density=density,

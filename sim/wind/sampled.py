@@ -17,12 +17,13 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from flagdata.schema import UNUSABLE
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
 
-Floats: TypeAlias = NDArray[np.float64]
+Floats: TypeAlias = FloatArray
 
 _LONGEST_GAP = 5.0
 """Longest gap of a log that is bridged [s]: large eddies last a few seconds."""

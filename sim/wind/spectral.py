@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 
 
@@ -46,13 +47,13 @@ class VonKarman:
         """Standard deviation of the speed [m/s]."""
         return self.intensity * self.mean
 
-    def density(self, frequency: ArrayLike) -> NDArray[np.float64]:
+    def density(self, frequency: ArrayLike) -> FloatArray:
         """One-sided spectral density [m²/s] at frequencies [Hz]; shape kept."""
         scale = self.length / self.mean
         reduced = np.asarray(frequency, dtype=np.float64) * scale
         return 4 * self.sigma**2 * scale / (1 + 70.8 * reduced**2) ** (5 / 6)
 
-    def series(self, rng: np.random.Generator, *, duration: float, rate: float) -> NDArray[np.float64]:
+    def series(self, rng: np.random.Generator, *, duration: float, rate: float) -> FloatArray:
         """A realisation of the speed [m/s], (round(duration · rate),), sampled at `rate` [Hz].
 
         The Fourier coefficients are independent complex Gaussians with variance S(f) Δf over a period of at least

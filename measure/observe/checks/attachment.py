@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe import cloth
@@ -105,7 +105,7 @@ def hoist_stands_still(experiment: Experiment) -> bool:
     return True
 
 
-def _still(recording: Trajectory, specimen: Specimen) -> tuple[NDArray[np.bool_], Floats]:
+def _still(recording: Trajectory, specimen: Specimen) -> tuple[BoolArray, Floats]:
     """Masks the markers that stand still, (marker,), and measures how far each is from the nearest pin [m], 0 of one
     that is beside it."""
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())

@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay, KDTree, QhullError
 
+from flagdata.arrays import BoolArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe import cloth
@@ -38,7 +38,7 @@ _UNITS = {
 class Edges:
     """Neighbouring markers: (edge, 2) indices and (edge,) distances at rest [m]."""
 
-    ends: NDArray[np.int64]
+    ends: IntArray
     rest: Floats
 
     @classmethod
@@ -177,7 +177,7 @@ def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Findin
     )
 
 
-def _taut(lengths: Floats, sigma: float) -> tuple[Floats, NDArray[np.bool_]]:
+def _taut(lengths: Floats, sigma: float) -> tuple[Floats, BoolArray]:
     """Computes the upper decile of each length over its frames without the noise's part, (edge,), and masks the edges
     that have one.
 

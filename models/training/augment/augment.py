@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.registry import Registry
 from flagdata.rng import stream
 
-Film = NDArray[np.uint8]
+Film = UInt8Array
 """(n, height, width) gray."""
 
 BEFORE = Registry(
@@ -72,11 +72,11 @@ class Drawn:
     """
 
     film: Film
-    times: NDArray[np.float64]
+    times: FloatArray
     strength: float
     rng: np.random.Generator
     other: Callable[[], Film]
-    weight: NDArray[np.float32]
+    weight: Float32Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +127,7 @@ class Augment:
         strength = self.strengths.get(name)
         return strength is not None and self._stream(name, source).random() < strength.share
 
-    def before(self, film: Film, times: NDArray[np.float64], *, source: str, other_film: Callable[[], Film]) -> Film:
+    def before(self, film: Film, times: FloatArray, *, source: str, other_film: Callable[[], Film]) -> Film:
         """Disturbs a film as it was taken.
 
         Args:
@@ -137,9 +137,7 @@ class Augment:
         everywhere = np.ones(film.shape[1:], dtype=np.float32)
         return self._applied(BEFORE, film, times, (source,), other_film, everywhere)
 
-    def after(
-        self, clip: Film, times: NDArray[np.float64], *, source: str, variant: int, weight: NDArray[np.float32]
-    ) -> Film:
+    def after(self, clip: Film, times: FloatArray, *, source: str, variant: int, weight: Float32Array) -> Film:
         """Disturbs a conditioned clip by what conditioning leaves."""
 
         def none() -> Film:
@@ -151,10 +149,10 @@ class Augment:
         self,
         disturbances: Registry,
         film: Film,
-        times: NDArray[np.float64],
+        times: FloatArray,
         source: tuple[str | int, ...],
         other_film: Callable[[], Film],
-        weight: NDArray[np.float32],
+        weight: Float32Array,
     ) -> Film:
         for name in disturbances:
             if self.happens(name, *source):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array
 from models.training.augment.augment import Disturbance, Drawn, Film
 
 
@@ -29,7 +29,7 @@ def _dusk(drawn: Drawn) -> Film:
 
 def _noise(drawn: Drawn) -> Film:
     """Adds a sensor's noise; the strength is its standard deviation [gray levels]."""
-    noise: NDArray[np.float32] = drawn.rng.standard_normal(drawn.film.shape, dtype=np.float32)
+    noise: Float32Array = drawn.rng.standard_normal(drawn.film.shape, dtype=np.float32)
     return np.clip(np.rint(drawn.film + np.float32(drawn.strength) * noise), 0, 255).astype(np.uint8)
 
 

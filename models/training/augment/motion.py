@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray
 from models.training.augment.augment import Disturbance, Drawn, Film
 
 _SLOWEST_TURN, _FASTEST_TURN = 0.3, 8.0
@@ -18,7 +18,7 @@ _TURN = 0.002
 """Turn about the optical axis for each pixel of shake [rad]."""
 
 
-def course(rng: np.random.Generator, times: NDArray[np.float64], axes: int) -> NDArray[np.float64]:
+def course(rng: np.random.Generator, times: FloatArray, axes: int) -> FloatArray:
     """Draws paths (n, axes) of mean 0 and root mean square 1: waves of random frequencies, the slower the larger."""
     frequency = np.geomspace(_SLOWEST_TURN, _FASTEST_TURN, _WAVES) * rng.uniform(0.8, 1.25, (axes, _WAVES))
     phase = rng.uniform(0, 2 * np.pi, (axes, _WAVES))
@@ -66,7 +66,7 @@ def _pole_sway(drawn: Drawn) -> Film:
     return _moved(drawn, np.stack([sway, 0 * sway], axis=1), np.repeat(up, width, axis=1))
 
 
-def _moved(drawn: Drawn, path: NDArray[np.float64], share: NDArray[np.float32]) -> Film:
+def _moved(drawn: Drawn, path: FloatArray, share: Float32Array) -> Film:
     """Moves each frame by its row of the path times `share`, where it is not frozen."""
     rows, columns = np.indices(drawn.film.shape[1:], dtype=np.float32)
     share = share * drawn.weight

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array
 from models.training.augment.augment import Disturbance, Drawn, Film
 
 _SLOWEST, _FASTEST = 0.3, 2.5
@@ -66,7 +66,7 @@ def _second_flag(drawn: Drawn) -> Film:
     return film
 
 
-def _fields(rng: np.random.Generator, shape: tuple[int, int, int], length: float) -> NDArray[np.float32]:
+def _fields(rng: np.random.Generator, shape: tuple[int, int, int], length: float) -> Float32Array:
     """Draws smooth random fields of variance 1 and a correlation length [px]."""
     fields = []
     for white in rng.standard_normal(shape, dtype=np.float32):
