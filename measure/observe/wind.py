@@ -88,7 +88,7 @@ def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[W
     if unusable:
         findings.append(
             Finding.of(
-                "wind-samples-unusable-out",
+                "wind-samples-left-out",
                 f"{unusable} of {len(good)} samples of the wind are unusable and left out",
                 where=where,
                 count=unusable,
