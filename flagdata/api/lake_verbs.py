@@ -94,8 +94,8 @@ def tag(chosen: Naming) -> tuple[Ref, ...]:
     """Names a version of a lake for good, as `flagdata tag` does; without a name, lists the tags.
 
     ```python
-    (v1,) = flagdata.tag("v1", lake="field.lake")
-    rows = flagdata.query("field.lake", at="v1")
+    (v2,) = flagdata.tag("v2", lake="field.lake")
+    rows = flagdata.query("field.lake", at="v2")
     ```
 
     Returns:

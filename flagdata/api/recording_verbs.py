@@ -124,8 +124,8 @@ def align(chosen: Aligning) -> Mapping[str, Any]:
     """Puts a camera and an anemometer of a lake, or two anemometers, on one clock, as `flagdata align` does.
 
     ```python
-    found = flagdata.align("film", "mast", lake="field.lake")
-    found["recording"], found["clock"]["offset"]  # id, s
+    aligned = flagdata.align("flag", "anemometer", lake="field.lake", by="given", offset=-0.4, offset_sigma=0.1)
+    aligned["recording"], aligned["clock"]["offset"]  # id, s
     ```
 
     Returns:
@@ -374,7 +374,7 @@ def ingest(chosen: Ingesting) -> tuple[IngestResult, ...]:
     """Brings camera files, anemometer logs, mesh sequences and marker tables into a lake, as `flagdata ingest` does.
 
     ```python
-    film, wind = flagdata.ingest(["flag.mp4", "mast.csv"], lake="field.lake", session="monday")
+    film, wind = flagdata.ingest(["flag.mp4", "anemometer.csv"], lake="field.lake", session="monday")
     film.artifact.id, wind.report["samples"]
     ```
 

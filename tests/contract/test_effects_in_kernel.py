@@ -266,5 +266,5 @@ def test_code_of_another_kind_is_refused(tmp_path: Path) -> None:
     other = OWN_CODE.replace("const Face<V>& seen, Vector3<V>& push", "const Vector3<V>&, Vector3<V>&")
     other = other.replace("push = add(push, scale(seen.normal, number[0] * seen.across));", "")
     system, _ = of_file(tmp_path, other.replace("FaceForce", "Flow"))
-    with pytest.raises(UsageError, match="FLOW for Sideways"):
+    with pytest.raises(UsageError, match=r"C\+\+ of Sideways is of the kind FLOW"):
         Kernel.of(system)

@@ -14,7 +14,7 @@ from tests.remedies.unexecuted import UNEXECUTED
 from tests.remedies.user import found
 
 HERE = Path(__file__).parent
-EXECUTED = 251
+EXECUTED = 250
 """Remedies at least that tests type."""
 OPTIONS = {
     name: {word for parameter in command.params for word in (*parameter.opts, *parameter.secondary_opts)}

@@ -174,7 +174,7 @@ CASES = [
         files={"a.log": COMPONENTS},
     ),
     Case(
-        "serial_lines.py",
+        "makers.py",
         "leave out --unit",
         "ingest a.log --unit kn",
         ("ingest a.log",),

@@ -185,8 +185,11 @@ def test_linearised_stiffness_is_the_derivative_of_the_force_at_small_strain(mak
     system, state = make_system(distorted, [plain])
     field = velocity_like(crumpled(distorted, 1))
     step = 1e-6
-    for part, slots in ((membrane, system.cloth.face_slots), (bending, system.cloth.hinge_slots)):
-        at = part.Linearised.at(system.cloth, state.position)
+    for part, kind, slots in (
+        (membrane, membrane.LinearisedMembrane, system.cloth.face_slots),
+        (bending, bending.LinearisedBending, system.cloth.hinge_slots),
+    ):
+        at = kind.at(system.cloth, state.position)
         from sim.cloth import gather_sum
 
         product = gather_sum(at.corner_products(field), slots)

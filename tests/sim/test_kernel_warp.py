@@ -148,7 +148,7 @@ def test_a_mesh_that_does_not_fit_is_refused(flapping, monkeypatch) -> None:
     with pytest.raises(UsageError, match="bytes of shared memory"):
         batch._check_room(grid(width=1.5, height=1.0, columns=60, rows=40), 232_448)
     monkeypatch.setattr(batch, "FACES_LIMIT", 47)
-    with pytest.raises(UsageError, match="a mesh of 48 faces"):
+    with pytest.raises(UsageError, match="the mesh has 48 faces"):
         advance(flapping[0], flapping[1], 0.002, steps=2, backend=Backend.WARP)
 
 

@@ -238,7 +238,7 @@ def test_a_steady_wind_is_refused_and_nothing_is_committed(tmp_path: Path) -> No
         (["--by", "stamps"], "needs the uncertainty"),
         (["--offset-sigma", "1"], "is estimated"),
         (["--by", "given", "--offset", "3", "--offset-sigma", "1", "--search", "5"], "searches nothing"),
-        (["--by", "given", "--offset", "nan", "--offset-sigma", "1"], "offset of nan"),
+        (["--by", "given", "--offset", "nan", "--offset-sigma", "1"], "offset nan s is not finite"),
         (["--by", "given", "--offset", "1", "--offset-sigma", "0"], "uncertainty 0"),
         (["--by", "stamps", "--offset-sigma", "1", "--plot", "x.png"], "no search to draw"),
     ],

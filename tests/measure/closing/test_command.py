@@ -78,7 +78,7 @@ def test_what_makes_no_sense_is_refused(
 
 def test_winds_are_one_for_all_or_one_each(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, error = said([str(table), "--rate", str(RATE), *["--wind", "4"] * 3], capsys)
-    assert (code, error["what"]) == (2, "3 winds for 2 recordings")
+    assert (code, error["what"]) == (2, "there are 3 winds for 2 recordings")
 
 
 @pytest.mark.parametrize("option", ["--offset=2", "--sensor=generic-csv", "--zone=+02:00"])

@@ -186,5 +186,5 @@ def test_courses_of_some_parts_alone_are_refused(forecaster: Forecaster, own_rec
     assert both is not None
     assert both.score.shape[0] == 2 * len(segments)
     np.testing.assert_array_equal(own.select(np.array([0])).recording, own.recording[:1])
-    with pytest.raises(UsageError, match="course of some parts"):
+    with pytest.raises(UsageError, match="only some parts have course"):
         Statistics.joined([own, replace(own, course=None)])

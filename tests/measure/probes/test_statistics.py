@@ -40,7 +40,7 @@ def test_the_projection_of_the_base_models_errors_is_r(forecaster: Forecaster, s
     np.testing.assert_allclose(again, found.lines, rtol=1e-6)
     whole = Statistics.joined([alone.select(np.array([0])), alone.select(np.arange(1, len(segments)))])
     np.testing.assert_array_equal(whole.lines, found.lines)
-    with pytest.raises(UsageError, match="lines of some parts"):
+    with pytest.raises(UsageError, match="only some parts have lines"):
         Statistics.joined([alone, replace(alone, lines=None)])
 
 

@@ -165,7 +165,7 @@ def test_clips_longer_than_the_films_are_refused(lake: Path, tmp_path: Path) -> 
     longer = ["evaluate", "small", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path), "--frames", "90"]
     done = CliRunner().invoke(root, longer)
     assert isinstance(done.exception, InputError)
-    assert "film of 14 frames" in str(done.exception)
+    assert "film has 14 frames" in str(done.exception)
 
 
 def test_a_shipped_ensemble_estimates_clips_and_knows_what_is_unlike_them(lake: Path, tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def test_malformed_tables_are_refused_with_the_reason(tmp_path: Path):
         ([HEADER, "0,a,0,0,0,0,0", "0,a,0,0,0,0,0"], MarkerOptions(), InputError, "twice in a frame"),
         ([HEADER, "0,a,0,0,0,0,0", "1,a,0.5,0,0,0,0"], MarkerOptions(), InputError, "has u from 0 to 0.5"),
         ([HEADER, "0,a,,0,0,0,0"], MarkerOptions(), InputError, "has no u"),
-        ([HEADER, ",a,0,0,0,0,0"], MarkerOptions(), InputError, "without time"),
+        ([HEADER, ",a,0,0,0,0,0"], MarkerOptions(), InputError, "has no time"),
         ([HEADER, "0,a,0,0,0,0,0"], MarkerOptions(rate=25.0), UsageError, "times of its own"),
         (["frame,marker,u,v,x,y,z", "0,a,0,0,0,0,0"], MarkerOptions(), UsageError, "frame numbers only"),
         (["frame,marker,u,v,x,y,z", "0.5,a,0,0,0,0,0"], MarkerOptions(rate=25.0), InputError, "decimals"),
