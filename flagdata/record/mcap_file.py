@@ -19,7 +19,6 @@ from mcap.opcode import Opcode
 from mcap.records import (
     AttachmentIndex,
     Channel,
-    Chunk,
     ChunkIndex,
     DataEnd,
     Footer,
@@ -37,6 +36,8 @@ from flagdata.arrays import BoolArray, IntArray, UInt8Array
 MAGIC = b"\x89MCAP0\r\n"
 _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _HEADER = 9  # bytes of opcode and length, which the length does not count
+_CHUNK = struct.Struct("<BQQQQIIQ")
+"""Opcode, length; first and last time, size and CRC of the records, length of the compression's name, their length."""
 _NOTE = struct.Struct("<QQ")  # log time, offset in the chunk
 
 
@@ -255,17 +256,14 @@ class McapFile:
         if not self._chunk.messages:
             return
         done, self._chunk = self._chunk, _OpenChunk()
-        data = bytes(done.data)
-        chunk = Chunk(
-            compression="",
-            data=data,
-            message_start_time=done.start,
-            message_end_time=done.end,
-            uncompressed_crc=zlib.crc32(data),
-            uncompressed_size=len(data),
-        )
+        size = len(done.data)
         offset = self._at
-        self._write(_bytes(chunk))
+        self._write(
+            _CHUNK.pack(
+                Opcode.CHUNK, _CHUNK.size - _HEADER + size, done.start, done.end, size, zlib.crc32(done.data), 0, size
+            )
+        )
+        self._write(done.data)  # never copied: one message may be of hundreds of megabytes
         length = self._at - offset
         places: dict[int, int] = {}
         first = self._at
@@ -281,12 +279,12 @@ class McapFile:
                 message_index_offsets=places,
                 message_index_length=self._at - first,
                 compression="",
-                compressed_size=len(data),
-                uncompressed_size=len(data),
+                compressed_size=size,
+                uncompressed_size=size,
             )
         )
 
-    def _write(self, data: bytes) -> None:
+    def _write(self, data: bytes | bytearray) -> None:
         self._crc = zlib.crc32(data, self._crc)
         self._at += len(data)
         self._stream.write(data)
