@@ -25,12 +25,11 @@ from numpy.typing import NDArray
 from flagdata.arrays import IntArray
 from flagdata.errors import CorruptError, InputError
 from flagdata.record.checksums import CHECKSUMS, FIX, HEAD_BYTES, ChannelChecksums, Checksums, metadata_checksum
+from flagdata.record.mcap_file import CHUNK, MAGIC, MESSAGE, RECORD_HEAD
 from flagdata.record.source import Bytes
 
-MAGIC = b"\x89MCAP0\r\n"
-RECORD_HEAD = 9  # opcode, uint64 length
-MESSAGE_HEAD = RECORD_HEAD + 22  # channel, sequence, log_time, publish_time; then the data
-CHUNK_HEAD = RECORD_HEAD + 8 + 8 + 8 + 4 + 4 + 8  # and the name of the compression; then the records
+MESSAGE_HEAD = MESSAGE.size  # then the data
+CHUNK_HEAD = CHUNK.size  # and the name of the compression; then the records
 _FOOTER = struct.Struct("<BQQQI")
 _INDEX = struct.Struct("<BQHI")  # opcode, length, channel, bytes of the entries
 _INDEX_ENTRY = 16  # log time, offset

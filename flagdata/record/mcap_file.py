@@ -34,9 +34,10 @@ from mcap.records import (
 from flagdata.arrays import BoolArray, IntArray, UInt8Array
 
 MAGIC = b"\x89MCAP0\r\n"
-_MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
-_HEADER = 9  # bytes of opcode and length, which the length does not count
-_CHUNK = struct.Struct("<BQQQQIIQ")
+MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
+RECORD_HEAD = 9
+"""Bytes of opcode and length of a record, which the length does not count."""
+CHUNK = struct.Struct("<BQQQQIIQ")
 """Opcode, length; first and last time, size and CRC of the records, length of the compression's name, their length."""
 _NOTE = struct.Struct("<QQ")  # log time, offset in the chunk
 
@@ -127,9 +128,9 @@ class McapFile:
 
     def add_message(self, *, channel_id: int, log_time: int, publish_time: int, sequence: int, data: bytes) -> None:
         """Add one message; times are UTC nanoseconds of 1970 or later."""
-        length = _MESSAGE.size - _HEADER + len(data)
+        length = MESSAGE.size - RECORD_HEAD + len(data)
         offset = len(self._chunk.data)
-        self._chunk.data += _MESSAGE.pack(Opcode.MESSAGE, length, channel_id, sequence, log_time, publish_time)
+        self._chunk.data += MESSAGE.pack(Opcode.MESSAGE, length, channel_id, sequence, log_time, publish_time)
         self._chunk.data += data
         self._count(channel_id, 1, log_time, log_time)
         self._chunk.note(channel_id, _NOTE.pack(log_time, offset), 1, log_time, log_time)
@@ -142,13 +143,13 @@ class McapFile:
             len(lengths),
             dtype=[("op", "u1"), ("n", "<u8"), ("ch", "<u2"), ("seq", "<u4"), ("log", "<u8"), ("pub", "<u8")],
         )
-        head["op"], head["n"], head["ch"] = Opcode.MESSAGE, lengths + (_MESSAGE.size - _HEADER), channel_id
+        head["op"], head["n"], head["ch"] = Opcode.MESSAGE, lengths + (MESSAGE.size - RECORD_HEAD), channel_id
         head["seq"] = np.arange(sequence, sequence + len(lengths))
         head["log"], head["pub"] = block.log_time, block.publish_time
-        head = head.view(np.uint8).reshape(-1, _MESSAGE.size)
+        head = head.view(np.uint8).reshape(-1, MESSAGE.size)
         records = np.hstack([head, block.payload])
         used = np.hstack([np.ones(head.shape, dtype=bool), block.used])
-        ends = np.cumsum(lengths + _MESSAGE.size)
+        ends = np.cumsum(lengths + MESSAGE.size)
         first = 0
         while first < len(lengths):
             before = int(ends[first - 1]) if first else 0
@@ -184,7 +185,7 @@ class McapFile:
         self._attachments.append(
             AttachmentIndex(
                 offset=offset,
-                length=_HEADER + length,
+                length=RECORD_HEAD + length,
                 create_time=create_time,
                 log_time=log_time,
                 data_size=size,
@@ -258,11 +259,8 @@ class McapFile:
         done, self._chunk = self._chunk, _OpenChunk()
         size = len(done.data)
         offset = self._at
-        self._write(
-            _CHUNK.pack(
-                Opcode.CHUNK, _CHUNK.size - _HEADER + size, done.start, done.end, size, zlib.crc32(done.data), 0, size
-            )
-        )
+        crc, length = zlib.crc32(done.data), CHUNK.size - RECORD_HEAD + size
+        self._write(CHUNK.pack(Opcode.CHUNK, length, done.start, done.end, size, crc, 0, size))
         self._write(done.data)  # never copied: one message may be of hundreds of megabytes
         length = self._at - offset
         places: dict[int, int] = {}

@@ -5,7 +5,6 @@ A few bytes of LZ4 or Zstandard may unpack to gigabytes, whatever a chunk states
 
 from __future__ import annotations
 
-import io
 import zlib
 from collections.abc import Iterator
 
@@ -21,19 +20,6 @@ _FED = 64 << 10
 """Bytes given to LZ4 at a time: it keeps a copy of those that it has not used."""
 _PIECE = 1 << 20
 _FIX = "run `flagdata recover` on the file"
-
-
-class WithinFile(io.BufferedReader):
-    """A file of which no read asks for more than is left: a read takes the memory for what it asks for first."""
-
-    def __init__(self, raw: io.FileIO) -> None:
-        super().__init__(raw)
-        self._end = raw.seek(0, io.SEEK_END)
-        raw.seek(0)
-
-    def read(self, size: int | None = -1, /) -> bytes:
-        left = max(0, self._end - self.tell())
-        return super().read(left if size is None or size < 0 else min(size, left))
 
 
 def unpacked(chunk: Chunk, *, where: str | None = None) -> memoryview:

@@ -163,10 +163,6 @@ def _address(bucket: str, key: str) -> str:
     return f"{base}/{quote(key)}" if key else f"{base}/" if virtual else base
 
 
-def _quoted(text: str) -> str:
-    return quote(text, safe="-_.~")
-
-
 def _answer(status: int, headers: Any, body: bytes) -> Answer:
     return Answer(status=status, headers={name.lower(): value for name, value in headers.items()}, body=body)
 
