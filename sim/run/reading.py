@@ -31,7 +31,7 @@ change what a member is; everything else does.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -60,7 +60,7 @@ from flagdata.tables import (
     within,
 )
 from sim import material
-from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
+from sim.air import AIR_FORCES, AirForce
 from sim.arcsim import SWEEPS, ArcsimScene, read_material, read_scene
 from sim.contact import Contact
 from sim.effects import EFFECTS
@@ -70,7 +70,7 @@ from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
 from sim.run import blowing
-from sim.run.blowing import Logs
+from sim.run.blowing import Logs, WindSamples
 from sim.run.recipe import (
     DTYPES,
     Attachment,
@@ -202,6 +202,8 @@ _FORCES: Mapping[str, Mapping[str, Any]] = {
     "stokes": {"viscosity": NotNegative},
 }
 """Force of the air → its keys in [wind]."""
+_FORCE = "quadratic-normal"
+"""The force where a recipe names none."""
 _STEADY: Mapping[str, Any] = {
     "speed": Annotated[Quantity, Meta(ge=0.0, le=100.0)],
     "toward": AngleQuantity,
@@ -378,30 +380,28 @@ def _wind(
     content: Mapping[str, Any], scene: SceneSpec, time: TimeSpec, logs: Logs | None = None, *, where: str
 ) -> WindSpec:
     if scene.arcsim is not None and not content:
-        x, y, z = scene.arcsim.scene.wind
-        return WindSpec(speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=scene.arcsim.scene.air)
-    name = content.get("force")
-    types = {
-        "force": Annotated[str, Named("wind force", AIR_FORCES)],
-        **_FORCES.get(str(name), _FORCES["quadratic-normal"]),
-    }
+        return _mean_wind(scene.arcsim.scene.wind, force=scene.arcsim.scene.air)
+    own = _FORCES.get(str(content.get("force")), _FORCES[_FORCE])
     source = blowing.source(content, where=where)
+    types = {"force": Annotated[str, Named("wind force", AIR_FORCES)], **own}
     values = entries({**types, **(blowing.TYPES[source] if source else _STEADY)}, content, where=where)
-    air = {key: values[key] for key in types if key in values and key != "force"}
-    force: AirForce = Stokes(**air) if name == "stokes" else QuadraticNormal(**air)
+    force: AirForce = AIR_FORCES[values.get("force", _FORCE)](**{key: values[key] for key in own if key in values})
     if source:
         samples = blowing.read(
             values, before=time.first, duration=(time.frames - 1) / time.rate, logs=logs, where=where
         )
-        x, y, z = samples.mean(time.frames, time.rate).tolist()
-        return WindSpec(speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=force, samples=samples)
+        return _mean_wind(samples.mean(time.frames, time.rate).tolist(), force=force, samples=samples)
     if "speed" not in values:
         raise InputError(
             "no wind speed is given", where=where, fix="add speed = 4.0 (m/s), or a range; a log or samples"
         )
-    steady: dict[str, Any] = {"toward": 0.0, "vertical": 0.0}
-    steady |= {key: values[key] for key in _STEADY if key in values}
-    return WindSpec(force=force, **steady)
+    return WindSpec(force=force, **{key: values[key] for key in _STEADY if key in values})
+
+
+def _mean_wind(velocity: Sequence[float], *, force: AirForce, samples: WindSamples | None = None) -> WindSpec:
+    """Returns the wind whose mean is a velocity (3,) of the air [m/s]."""
+    x, y, z = velocity
+    return WindSpec(speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=force, samples=samples)
 
 
 def _integrator(spec: IntegratorSpec, content: Mapping[str, Any], *, where: str) -> IntegratorSpec:
