@@ -13,8 +13,6 @@ from flagdata.html import table
 from flagdata.signals import Sensor
 from flagdata.timebase import iso
 
-Floats = FloatArray
-
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Wind:
@@ -32,11 +30,11 @@ class Wind:
     """
 
     name: str
-    time: Floats
+    time: FloatArray
     start: int
-    speed: Floats
-    direction: Floats
-    channels: Mapping[str, Floats]
+    speed: FloatArray
+    direction: FloatArray
+    channels: Mapping[str, FloatArray]
     sensor: Sensor
     findings: tuple[Finding, ...] = ()
 
@@ -76,9 +74,9 @@ class Motion:
     """
 
     name: str
-    time: Floats
+    time: FloatArray
     start: int | None
-    energy: Floats
+    energy: FloatArray
     findings: tuple[Finding, ...] = ()
 
     def __len__(self) -> int:

@@ -19,8 +19,6 @@ from torch import Tensor
 
 from flagdata.arrays import FloatArray, IntArray
 
-Floats = FloatArray
-
 _SAME = 1e-6
 """Share of the cloth's size within which vertices are at an end, or in one row."""
 _NEAREST = 16
@@ -40,7 +38,7 @@ class Ends:
 
     vertices: IntArray
     within: IntArray
-    weights: Floats
+    weights: FloatArray
 
     def continued(self, field: Tensor) -> Tensor:
         """Replaces a field's values (vertex, …) at the ends by those continued from within."""
@@ -51,7 +49,7 @@ class Ends:
         return field.index_copy(0, at, torch.einsum("ek,ek...->e...", weights, field[within]))
 
 
-def ends_of(rest: Floats) -> Ends:
+def ends_of(rest: FloatArray) -> Ends:
     """Finds the ends of a cloth of rest coordinates (vertex, 2), which run along it first [m].
 
     Vertices beside which too few others lie for a parabola are left out.
@@ -60,7 +58,7 @@ def ends_of(rest: Floats) -> Ends:
     u = rest[:, 0]
     at_end = (u - u.min() <= _SAME * size[0]) | (u.max() - u <= _SAME * size[0])
     inner = np.flatnonzero(~at_end)
-    ends: list[tuple[int, IntArray, Floats]] = []
+    ends: list[tuple[int, IntArray, FloatArray]] = []
     for vertex in np.flatnonzero(at_end).tolist():
         offsets = rest[inner] - rest[vertex]
         row = np.flatnonzero(np.abs(offsets[:, 1]) <= _SAME * size[1])
@@ -80,7 +78,7 @@ def ends_of(rest: Floats) -> Ends:
     return Ends(vertices=np.array([vertex for vertex, *_ in ends], dtype=np.int64), within=within, weights=weights)
 
 
-def _exact(terms: Floats) -> Floats | None:
+def _exact(terms: FloatArray) -> FloatArray | None:
     """Computes least weights (k,) of values at offsets that give polynomials of terms (k, term) their value at no
     offset; None where none do."""
     if len(terms) < terms.shape[1]:

@@ -57,7 +57,6 @@ _CHUNK = 1 << 20  # B
 _CHUNKS_A_SHARD = 64
 _HEAD = "flagdata_meshes"
 
-Floats = Float32Array
 Indices = NDArray[np.int32]
 Instants = IntArray
 
@@ -67,9 +66,9 @@ class Mesh:
     """One frame: positions (vertex, 3) [m], faces (face, 3) vertex indices, rest (vertex, 2) [m], time [ns]."""
 
     time: int
-    positions: Floats
+    positions: Float32Array
     faces: Indices
-    rest: Floats
+    rest: Float32Array
 
 
 class _Moving(ABC):
@@ -113,9 +112,9 @@ class MeshSequence(_Moving):
     """
 
     time: Instants
-    positions: Floats
+    positions: Float32Array
     faces: Indices
-    rest: Floats
+    rest: Float32Array
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -148,9 +147,9 @@ class RaggedMeshSequence(_Moving):
     """
 
     time: Instants
-    positions: Floats
+    positions: Float32Array
     faces: Indices
-    rest: Floats
+    rest: Float32Array
     vertex_offset: Instants
     face_offset: Instants
     attributes: Mapping[str, Any] = field(default_factory=dict)
@@ -381,7 +380,9 @@ def _wrong(what: str, wanted: str) -> InputError:
     return InputError(what, where="mesh sequence", fix=f"give {wanted}")
 
 
-def _check(time: Instants, positions: Floats, faces: Indices, rest: Floats, attributes: Mapping[str, Any]) -> None:
+def _check(
+    time: Instants, positions: Float32Array, faces: Indices, rest: Float32Array, attributes: Mapping[str, Any]
+) -> None:
     arrays = (("time", time, np.int64), ("positions", positions, np.float32), ("faces", faces, np.int32))
     for name, values, dtype in (*arrays, ("rest", rest, np.float32)):
         if values.dtype != dtype:

@@ -25,8 +25,6 @@ from measure.film.similarity import FlagSize
 from measure.film.source import Subject
 from measure.gate.reasons import REASONS
 
-Floats = FloatArray
-
 ANSWER = 1
 """Raised when the same recordings give another reading model."""
 LEAST = 60.0
@@ -64,7 +62,7 @@ class Recording:
         starts = self.features.starts
         return self.features.whole & self.log.covers(starts, starts + self.features.layout.step)
 
-    def winds(self, offset: float) -> Floats:
+    def winds(self, offset: float) -> FloatArray:
         """(w,) mean of the log over each window, the log `offset` seconds later than its stamps [m/s]."""
         starts = self.features.starts - offset
         return self.log.mean_speed(starts, starts + self.features.layout.step)
@@ -210,7 +208,7 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
     times = np.concatenate([one.features.starts[own] for one, own in zip(recordings, usable, strict=True)])
     blocks = blocks_of(times, numbers)
 
-    def winds(offset: float) -> Floats:
+    def winds(offset: float) -> FloatArray:
         return np.concatenate([one.winds(offset)[own] for one, own in zip(recordings, usable, strict=True)])
 
     clock = max(one.log.clock for one in recordings)
@@ -261,7 +259,7 @@ def _check_wind(recordings: Sequence[Recording], usable: Sequence[BoolArray]) ->
         )
 
 
-def _rows(recordings: Sequence[Recording], usable: Sequence[BoolArray]) -> tuple[Floats, Floats]:
+def _rows(recordings: Sequence[Recording], usable: Sequence[BoolArray]) -> tuple[FloatArray, FloatArray]:
     """(n, 3 · column) features with the neighbours', and (n, column) without, of all usable windows."""
     both = list(zip(recordings, usable, strict=True))
     rows = np.concatenate([with_neighbours(one.features.values)[own] for one, own in both])
@@ -269,7 +267,7 @@ def _rows(recordings: Sequence[Recording], usable: Sequence[BoolArray]) -> tuple
 
 
 def _best_offset(
-    plain: Floats, winds: Callable[[float], Floats], blocks: NDArray[np.int_], clock: float, named: BoolArray
+    plain: FloatArray, winds: Callable[[float], FloatArray], blocks: NDArray[np.int_], clock: float, named: BoolArray
 ) -> float:
     """The most probable error of the clock [s], of windows without their neighbours, which could make up for it."""
     if clock <= _CLOCK:
@@ -279,7 +277,7 @@ def _best_offset(
     return float(_OFFSETS[misfit.argmin()]) * clock
 
 
-def _uncalibrated(recordings: Sequence[Recording], usable: Sequence[BoolArray], logged: Floats) -> float:
+def _uncalibrated(recordings: Sequence[Recording], usable: Sequence[BoolArray], logged: FloatArray) -> float:
     own = np.concatenate([one.features.winds[whole] for one, whole in zip(recordings, usable, strict=True)])
     return float(np.sqrt(np.mean((own - logged) ** 2)))
 

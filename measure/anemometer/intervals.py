@@ -13,10 +13,8 @@ import numpy as np
 
 from flagdata.arrays import FloatArray
 
-Floats = FloatArray
 
-
-def half_width(errors: Floats, level: float) -> float:
+def half_width(errors: FloatArray, level: float) -> float:
     """Half of the interval that contains the wind with `level` [m/s], of errors (n,); infinite where they are too
     few."""
     n = len(errors)
@@ -24,7 +22,9 @@ def half_width(errors: Floats, level: float) -> float:
     return math.inf if rank > n else float(np.sort(np.abs(errors))[rank - 1])
 
 
-def mean_errors(errors: Floats, *, count: int, length: int, draws: int, generator: np.random.Generator) -> Floats:
+def mean_errors(
+    errors: FloatArray, *, count: int, length: int, draws: int, generator: np.random.Generator
+) -> FloatArray:
     """(draw,) errors of the mean over `count` windows [m/s]: blocks of neighbouring errors drawn with replacement
     (moving blocks: Künsch, Annals of Statistics 17, 1989).
 

@@ -27,8 +27,6 @@ from measure.gate.reasons import REASONS
 from measure.gate.verdict import Reason, Verdict
 from models.estimator import Estimator
 
-Floats = FloatArray
-
 _SAME_SIZE = 0.01
 """Share by which a stated size may differ from that of the calibration: printed sizes are rounded."""
 
@@ -157,8 +155,8 @@ def _size_reason(given: FlagSize | None, model: ReadingModel) -> list[Finding]:
 def _verdict(
     film: ConditionedFilm,
     features: Features,
-    used: Floats,
-    winds: Floats,
+    used: FloatArray,
+    winds: FloatArray,
     model: ReadingModel,
     options: Options,
     findings: Sequence[Finding],
@@ -205,14 +203,14 @@ def _window(
     return WindowAnswer(start=start, end=start + features.layout.length, quantities=(own,), p=judged.window_p[place])
 
 
-def _dependence(errors: Floats, model: ReadingModel, count: int) -> Dependence:
+def _dependence(errors: FloatArray, model: ReadingModel, count: int) -> Dependence:
     """The correlation of windows at which the mean of so many errs as `errors` do."""
     ratio = float(errors.var() / model.errors.var()) * count
     correlation = 0.0 if count < 2 else float(np.clip((ratio - 1) / (count - 1), 0.0, 1.0))
     return Dependence(wind=correlation, cloth=1.0, source="blocks of the calibration that were left out")
 
 
-def _about(winds: Floats, features: Features, model: ReadingModel) -> list[Finding]:
+def _about(winds: FloatArray, features: Features, model: ReadingModel) -> list[Finding]:
     found = []
     low, high = model.range
     beyond = int(np.count_nonzero((winds < low) | (winds > high)))

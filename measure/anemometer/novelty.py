@@ -29,8 +29,6 @@ from flagdata.findings import Finding, Severity
 from measure.anemometer.features import Place
 from models.outliers import conformal_p, shrunk_covariance, whitening
 
-Floats = FloatArray
-
 SHIFT, FRAMING, BACKGROUND = 0.45, 0.2, 0.4
 """Levels, fixed on simulated flags of other seeds than those that judge (decision 047)."""
 ENOUGH = 3
@@ -60,17 +58,17 @@ class Familiar:
             what the mean over one window would be off by if it were as slow as theirs.
     """
 
-    centre: Floats
-    spread: Floats
-    coefficients: Floats
-    whitening: Floats
-    distances: Floats
+    centre: FloatArray
+    spread: FloatArray
+    coefficients: FloatArray
+    whitening: FloatArray
+    distances: FloatArray
     low: float
     high: float
     noise: float
 
     @classmethod
-    def of(cls, values: Floats, winds: Floats, blocks: NDArray[np.int_]) -> Familiar:
+    def of(cls, values: FloatArray, winds: FloatArray, blocks: NDArray[np.int_]) -> Familiar:
         """Of windows (n, column), the winds that were read of them and their blocks of time (n,)."""
         whole = cls._fitted(values, winds)
         distances, noises = np.empty(len(winds)), []
@@ -91,7 +89,7 @@ class Familiar:
         )
 
     @classmethod
-    def _fitted(cls, values: Floats, winds: Floats) -> Familiar:
+    def _fitted(cls, values: FloatArray, winds: FloatArray) -> Familiar:
         centre, spread = values.mean(axis=0), values.std(axis=0)
         spread = np.where(spread > 0, spread, 1.0)
         standard = (values - centre) / spread
@@ -110,23 +108,23 @@ class Familiar:
             whitening=np.asfortranarray(whitening(covariance, least=1e-12)),  # the order of products' sums
         )
 
-    def _white(self, values: Floats, winds: Floats) -> Floats:
+    def _white(self, values: FloatArray, winds: FloatArray) -> FloatArray:
         powers = np.vander(winds, _DEGREE + 1, increasing=True)
         return ((values - self.centre) / self.spread - powers @ self.coefficients) @ self.whitening.T
 
-    def distance(self, values: Floats, winds: Floats) -> Floats:
+    def distance(self, values: FloatArray, winds: FloatArray) -> FloatArray:
         """(n,) of windows (n, column) at the winds that are read of them."""
         return np.sqrt(np.square(self._white(values, winds)).mean(axis=1))
 
-    def p_value(self, values: Floats, winds: Floats) -> Floats:
+    def p_value(self, values: FloatArray, winds: FloatArray) -> FloatArray:
         """(n,) conformal p of a window of the calibration being as far."""
         return conformal_p(self.distances, self.distance(values, winds))
 
-    def within(self, winds: Floats) -> BoolArray:
+    def within(self, winds: FloatArray) -> BoolArray:
         """(n,) whether films are compared at these winds."""
         return (winds >= self.low) & (winds <= self.high)
 
-    def shift(self, values: Floats, winds: Floats) -> float | None:
+    def shift(self, values: FloatArray, winds: FloatArray) -> float | None:
         """Distance of the mean of windows (n, column), less what the means of as few windows scatter by; NaN where too
         few are `within`, None where the calibration had too few windows to know their scatter."""
         if len(self.distances) < ENOUGH * len(self.centre):
@@ -235,7 +233,7 @@ def _correlation(one: Place, other: Place) -> float:
     return float(np.corrcoef(own, others)[0, 1])
 
 
-def _details(place: Place, shared: BoolArray) -> Floats:
+def _details(place: Place, shared: BoolArray) -> FloatArray:
     """The picture less its light: its mean over the neighbourhood, of bare places alone."""
     weight = shared.astype(np.float32)
     light = cv2.GaussianBlur(place.background * weight, (0, 0), _BLUR)

@@ -12,8 +12,6 @@ from measure.anemometer.novelty import Familiar
 from measure.anemometer.regression import Ridge, with_neighbours
 from measure.film.similarity import FlagSize
 
-Floats = FloatArray
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReadingModel:
@@ -38,8 +36,8 @@ class ReadingModel:
     step: float
     names: tuple[str, ...]
     ridge: Ridge
-    winds: Floats
-    errors: Floats
+    winds: FloatArray
+    errors: FloatArray
     block: int
     familiar: Familiar
     places: tuple[Place, ...]
@@ -54,10 +52,10 @@ class ReadingModel:
         """Least and greatest wind of the windows that it was fitted to [m/s]."""
         return float(self.winds.min()), float(self.winds.max())
 
-    def used(self, features: Features) -> Floats:
+    def used(self, features: Features) -> FloatArray:
         """(w, column) the features that are used; rows of NaN where frames are missing."""
         return features.values[:, [features.names.index(name) for name in self.names]]
 
-    def read(self, used: Floats) -> Floats:
+    def read(self, used: FloatArray) -> FloatArray:
         """(w,) winds [m/s] of `used`; NaN where frames are missing."""
         return self.ridge(with_neighbours(used))

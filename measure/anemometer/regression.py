@@ -26,8 +26,6 @@ from numpy.typing import NDArray
 
 from flagdata.arrays import BoolArray, FloatArray
 
-Floats = FloatArray
-
 BLOCK = 20.0
 """Length of a block [s]: gusts last some seconds."""
 PENALTIES = tuple(float(v) for v in np.geomspace(1.0, 1e5, 21))
@@ -49,46 +47,46 @@ class Ridge:
         penalty: that was chosen.
     """
 
-    centre: Floats
-    spread: Floats
-    coefficients: Floats
+    centre: FloatArray
+    spread: FloatArray
+    coefficients: FloatArray
     offset: float
     penalty: float
 
     @classmethod
-    def fitted(cls, rows: Floats, winds: Floats, penalty: float, weights: Floats | float = 1.0) -> Ridge:
+    def fitted(cls, rows: FloatArray, winds: FloatArray, penalty: float, weights: FloatArray | float = 1.0) -> Ridge:
         """To rows (n, column) and winds (n,) [m/s], all finite; the penalty of a column is over its squared weight."""
         centre, spread = _standard(rows, weights)
         offset = float(winds.mean())
         coefficients = _solved((rows - centre) / spread, winds - offset, [penalty])[0]
         return cls(centre=centre, spread=spread, coefficients=coefficients, offset=offset, penalty=penalty)
 
-    def __call__(self, rows: Floats) -> Floats:
+    def __call__(self, rows: FloatArray) -> FloatArray:
         """(n,) winds [m/s] of rows (n, column)."""
         return self.offset + (rows - self.centre) / self.spread @ self.coefficients
 
 
-def _standard(rows: Floats, weights: Floats | float) -> tuple[Floats, Floats]:
+def _standard(rows: FloatArray, weights: FloatArray | float) -> tuple[FloatArray, FloatArray]:
     """Mean and standard deviation of columns, the latter over the weights."""
     spread = rows.std(axis=0)
     return rows.mean(axis=0), np.where(spread > 0, spread, 1.0) / weights
 
 
-def _solved(rows: Floats, winds: Floats, penalties: Sequence[float]) -> Floats:
+def _solved(rows: FloatArray, winds: FloatArray, penalties: Sequence[float]) -> FloatArray:
     """(penalty, column) coefficients of centred rows (n, column) and winds (n,)."""
     left, values, right = np.linalg.svd(rows, full_matrices=False)
     along = left.T @ winds
     return np.stack([(values / (values**2 + penalty) * along) @ right for penalty in penalties])
 
 
-def with_neighbours(values: Floats) -> Floats:
+def with_neighbours(values: FloatArray) -> FloatArray:
     """(w, 3 · feature) each window's features (w, feature) with those of the one before and the one after."""
     before, after = np.roll(values, 1, axis=0), np.roll(values, -1, axis=0)
     before[0], after[-1] = np.nan, np.nan
     return np.concatenate([values, *(np.where(np.isfinite(one), one, values) for one in (before, after))], axis=1)
 
 
-def blocks_of(times: Floats, recordings: NDArray[np.int_]) -> NDArray[np.int_]:
+def blocks_of(times: FloatArray, recordings: NDArray[np.int_]) -> NDArray[np.int_]:
     """(n,) number of the block of time that each window is in; none is of two recordings.
 
     Args:
@@ -112,12 +110,12 @@ class Validated:
     """
 
     penalty: float
-    weights: Floats
-    predicted: Floats
+    weights: FloatArray
+    predicted: FloatArray
     rmse: float
 
 
-def validated(rows: Floats, winds: Floats, blocks: NDArray[np.int_], named: BoolArray) -> Validated:
+def validated(rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], named: BoolArray) -> Validated:
     """Leave each block out in turn, with the windows beside it, for each penalty and weight of the named features.
 
     Args:
@@ -130,7 +128,7 @@ def validated(rows: Floats, winds: Floats, blocks: NDArray[np.int_], named: Bool
     return min(tried, key=lambda one: one.rmse)
 
 
-def _validated(rows: Floats, winds: Floats, blocks: NDArray[np.int_], weights: Floats) -> Validated:
+def _validated(rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], weights: FloatArray) -> Validated:
     predicted = np.empty((len(PENALTIES), len(winds)))
     for block in np.unique(blocks):
         inside = np.flatnonzero(blocks == block)

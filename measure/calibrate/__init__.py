@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from measure.calibrate.numerics import FLAGS, MEASURED, Finer
     from measure.calibrate.observed import Observed, constant_wind
     from measure.calibrate.posterior import Sight, weighed
-    from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats, Normal, Uncertain, draws
+    from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Normal, Uncertain, draws
     from measure.calibrate.simulation import COLUMNS, OBSERVED, Batch, Flag, mean_bending
     from measure.calibrate.summary import LEAST_WINDOWS, Projection
     from measure.calibrate.tables import of_table

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, IntArray
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
@@ -21,7 +21,7 @@ from measure.calibrate.leaving_out import LEFT_OUT, usable
 from measure.calibrate.numerics import Correction, corrected
 from measure.calibrate.observed import Observed, check_in_all, constant_wind
 from measure.calibrate.posterior import Posterior, Sight, posterior, weighed
-from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, FABRIC, NUISANCES, Floats, Uncertain
+from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, FABRIC, NUISANCES, Uncertain
 from measure.calibrate.scatter import TAKEN_APART
 from measure.calibrate.simulation import OBSERVED, Flag
 from measure.calibrate.summary import LEAST_IN_ALL, shown
@@ -162,12 +162,12 @@ class Fitted:
     """
 
     observed: Observed
-    low: Floats
-    middle: Floats
-    high: Floats
+    low: FloatArray
+    middle: FloatArray
+    high: FloatArray
     used: BoolArray
     misfit: float
-    apart: Floats
+    apart: FloatArray
     failed: int
 
     @property
@@ -299,7 +299,7 @@ def calibrate(
         InputError: see `Observed` and `designs_of`.
         RefusedError: see `answered`.
     """
-    made: list[tuple[Observed, Mapping[str, Floats], Floats, Correction]] = []
+    made: list[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]] = []
     for one, design in zip(recordings, designs_of(recordings, options), strict=True):
         readings = simulated(design, folder=folder, workers=workers, advance=advance)
         correction = corrected(design, readings, folder=folder, workers=workers, advance=advance)
@@ -347,8 +347,8 @@ class _Simulated:
     """
 
     observed: Observed
-    values: Mapping[str, Floats]
-    summaries: Floats
+    values: Mapping[str, FloatArray]
+    summaries: FloatArray
     used: BoolArray
 
     def rows(self, which: IntArray) -> _Simulated:
@@ -372,7 +372,7 @@ class _Simulated:
 
 
 def answered(
-    simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats, Correction]],
+    simulations: Sequence[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]],
     options: Options,
     *,
     left_out: Sequence[Finding] = (),
@@ -389,7 +389,7 @@ def answered(
         InputError: too little is left.
     """
 
-    def seen(one: tuple[Observed, Mapping[str, Floats], Floats, Correction]) -> tuple[_Simulated, Sight]:
+    def seen(one: tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]) -> tuple[_Simulated, Sight]:
         observed, values, readings, correction = one
         summaries = with_errors(observed, readings, correction, seed=options.seed)
         looked = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
@@ -447,13 +447,13 @@ def _answered(
     return replace(calibration, findings=findings)
 
 
-def with_errors(observed: Observed, readings: Floats, correction: Correction, *, seed: int) -> Floats:
+def with_errors(observed: Observed, readings: FloatArray, correction: Correction, *, seed: int) -> FloatArray:
     """(simulation, summary) of readings (simulation, window, observable) with errors of numerics and of pixels."""
     summaries = correction.of(observed.projection.of(readings), seed=seed)
     return (summaries + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
 
 
-def quantity(about: Uncertain, draws: Floats, level: float) -> Quantity:
+def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
     """What draws of the posterior say of a quantity."""
     assumed = about.at(np.array([(1 - level) / 2, (1 + level) / 2])).tolist()
     shares = np.linspace(0.0, 1.0, 1001)

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, TimeError
 from flagdata.files import check_input
 from flagdata.ingest.headings import small_table, small_table_head
@@ -20,7 +21,6 @@ from flagdata.parquet import read_parquet
 from flagdata.plain_text import plain_text
 from flagdata.timebase import NANOSECONDS, parse
 from flagdata.units import spelled, unit
-from measure.calibrate.prior import Floats
 from measure.film.similarity import FlagSize
 from measure.observables import OBSERVABLES
 
@@ -45,17 +45,17 @@ class Columns:
     """
 
     where: str
-    values: Mapping[str, Floats]
+    values: Mapping[str, FloatArray]
     origin: int = 0
     lines: tuple[int, ...] = ()
 
     def __contains__(self, name: str) -> bool:
         return name in self.values
 
-    def __getitem__(self, name: str) -> Floats:
+    def __getitem__(self, name: str) -> FloatArray:
         return self.values[name]
 
-    def of(self, name: str) -> Floats:
+    def of(self, name: str) -> FloatArray:
         """(n,) of a column, NaN throughout where the table has none."""
         return self.values.get(name, np.full(len(self.lines), math.nan))
 
@@ -82,7 +82,7 @@ def read(path: Path, size: FlagSize) -> Columns:
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise InputError(f"columns {', '.join(twice)} stand twice", where=where, fix="keep one of each")
     lines = tuple(number for number, _ in rows)
-    values: dict[str, Floats] = {}
+    values: dict[str, FloatArray] = {}
     origin = 0
     for place, name, stated in wanted:
         scale = _scale(name, stated, size, where=where)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import IntArray, read_arrays
+from flagdata.arrays import FloatArray, IntArray, read_arrays
 from flagdata.errors import CorruptError
 from flagdata.lake.durable import put_if_absent
 from flagdata.provenance import canonical, digest
@@ -27,7 +27,6 @@ from measure.calibrate.prior import (
     FABRIC,
     NUISANCES,
     STRETCHING,
-    Floats,
     Uncertain,
     clock_error,
     draws,
@@ -87,7 +86,7 @@ class Design:
             *((clock_error(self.log.clock),) if self.log.clock else ()),
         )
 
-    def values(self) -> Mapping[str, Floats]:
+    def values(self) -> Mapping[str, FloatArray]:
         """Name → (count,), by ascending damping, so that batches can be simulated in long steps."""
         # In another order in each place: two scramblings of a Sobol sequence are correlated, row by row.
         own = child_seed(self.seed, "calibrate", "place", self.place)
@@ -130,7 +129,7 @@ class Design:
 
 def simulated(
     design: Design, *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
-) -> Floats:
+) -> FloatArray:
     """(simulation, window, observable) in the order of the design's values; NaN where a flag diverged.
 
     Args:
@@ -145,7 +144,7 @@ def simulated(
 
 def read(
     batches: Sequence[Batch], *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
-) -> Floats:
+) -> FloatArray:
     """(flag, place, window, observable) of batches, in order; those that the folder lacks are simulated. As
     `simulated`."""
     paths = [folder / f"{digest(canonical(dict(batch.content())))[:32]}.npz" for batch in batches]
@@ -171,7 +170,7 @@ def _make(batch: Batch, path: Path) -> None:
     put_if_absent(path, buffer.getvalue())
 
 
-def _read(path: Path) -> Floats:
+def _read(path: Path) -> FloatArray:
     again = "delete the file: it is made anew"
     content = read_arrays(path, what="a file of kept simulations", fix=again)
     try:

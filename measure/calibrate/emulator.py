@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import BoolArray
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.errors import RefusedError
 from flagdata.rng import stream
-from measure.calibrate.prior import CLOTH, Floats, Uncertain
+from measure.calibrate.prior import CLOTH, Uncertain
 from measure.refine.metamodel import Metamodel, least
 
 SHOWN_BY = 0.8
@@ -28,7 +28,7 @@ INFORMATIVE = 0.8
 depends on nothing that is regressed on adds noise to the scatter's estimate, and nothing else."""
 
 
-def regressors(values: Mapping[str, Floats]) -> Floats:
+def regressors(values: Mapping[str, FloatArray]) -> FloatArray:
     """(n, p) what summaries are linear in: quadratics in the logarithms of weight and damping with their product, the
     logarithm of bending, and the place through the cosine of its azimuth, the chord's shortening."""
     weight, bending, damping = (
@@ -52,11 +52,11 @@ class Emulator:
 
     model: Metamodel
     used: BoolArray
-    residuals: Floats
-    weights: Floats
+    residuals: FloatArray
+    weights: FloatArray
 
     @classmethod
-    def fit(cls, values: Mapping[str, Floats], summaries: Floats, shown: BoolArray, *, name: str) -> Emulator:
+    def fit(cls, values: Mapping[str, FloatArray], summaries: FloatArray, shown: BoolArray, *, name: str) -> Emulator:
         """Fit it to simulations.
 
         Args:
@@ -86,27 +86,27 @@ class Emulator:
         return replace(own, residuals=np.where(complete[:, None], summaries[:, used] - mean, np.nan))
 
     @property
-    def factor(self) -> Floats:
+    def factor(self) -> FloatArray:
         """Lower Cholesky factor of the scale matrix of this recording alone."""
         return np.asarray(np.linalg.cholesky(self.model.scatter / self.model.freedom), dtype=np.float64)
 
     @property
-    def deviations(self) -> Floats:
+    def deviations(self) -> FloatArray:
         """(used summary,) of replicates about their prediction."""
         return np.sqrt(np.diag(self.model.scatter) / self.model.freedom)
 
-    def predict(self, values: Mapping[str, Floats]) -> tuple[Floats, Floats]:
+    def predict(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Means (n, k) of the used summaries at values, and factors (n,) of the scatter there."""
         x = (regressors(values) - self.model.centre) / self.model.spread
         x = np.concatenate([np.ones((len(x), 1)), x], axis=1)
         return x @ self.model.coefficients, 1 + ((x @ self.model.inverse) * x).sum(axis=1)
 
-    def draw(self, values: Mapping[str, Floats], *, seed: int) -> Floats:
+    def draw(self, values: Mapping[str, FloatArray], *, seed: int) -> FloatArray:
         """(n, used summary) draws of the predictive density at values."""
         return self.model.draw(regressors(values), stream(seed, "calibrate", "predicted"))
 
 
-def informative(values: Mapping[str, Floats], summaries: Floats, shown: BoolArray, *, name: str) -> BoolArray:
+def informative(values: Mapping[str, FloatArray], summaries: FloatArray, shown: BoolArray, *, name: str) -> BoolArray:
     """(k,) those of the shown summaries that depend on what is regressed on.
 
     Raises:
@@ -128,7 +128,7 @@ def informative(values: Mapping[str, Floats], summaries: Floats, shown: BoolArra
     return used
 
 
-def _left_out(x: Floats, y: Floats) -> Floats:
+def _left_out(x: FloatArray, y: FloatArray) -> FloatArray:
     """(k,) root mean square of leave-one-out errors of least squares."""
     design = np.concatenate([np.ones((len(x), 1)), (x - x.mean(axis=0)) / x.std(axis=0)], axis=1)
     hat = design @ np.linalg.pinv(design)

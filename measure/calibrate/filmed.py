@@ -19,6 +19,7 @@ import numpy as np
 from flagdata.align.declared import given
 from flagdata.align.lag import LagSearch
 from flagdata.align.logs import clock_between
+from flagdata.arrays import FloatArray
 from flagdata.clock import ClockModel
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.findings import Finding
@@ -31,7 +32,6 @@ from flagdata.stated import Stated
 from measure.calibrate.columns import Columns
 from measure.calibrate.leaving_out import usable
 from measure.calibrate.observed import LONGEST, Excerpt, Observed, check_duration, check_in_all, cut, first_part
-from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.tables import Beside, instants, of_table, rows_of
 from measure.calibrate.wind import Log
@@ -168,7 +168,7 @@ def estimated(
     return replace(model, segments=segments)
 
 
-def follows(table: Columns) -> Floats:
+def follows(table: Columns) -> FloatArray:
     """(n,) of the column that follows the wind most closely, from 0 up.
 
     Raises:

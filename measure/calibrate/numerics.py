@@ -15,11 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import IntArray
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.rng import stream
 from measure.calibrate.design import Design, read
 from measure.calibrate.discretisation import Discretisation
-from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import Batch
 
 FLAGS = 32
@@ -52,10 +51,10 @@ class Correction:
         sigma: (2, observable) standard deviation from flag to flag, with the error of the mean.
     """
 
-    mean: Floats
-    sigma: Floats
+    mean: FloatArray
+    sigma: FloatArray
 
-    def of(self, summaries: Floats, *, seed: int) -> Floats:
+    def of(self, summaries: FloatArray, *, seed: int) -> FloatArray:
         """Summaries (n, 1 or 2, observable) with what a finer mesh would add to each."""
         size = summaries.shape[1]
         drawn = stream(seed, "calibrate", "numerics").standard_normal(summaries.shape)
@@ -99,7 +98,7 @@ class Finer:
             places=own, batches=tuple(replace(design.batch(part), until=until, discretisation=FINE) for part in parts)
         )
 
-    def correction(self, fine: Floats, coarse: Floats) -> Correction:
+    def correction(self, fine: FloatArray, coarse: FloatArray) -> Correction:
         """From their readings.
 
         Args:
@@ -125,7 +124,7 @@ class Finer:
 
 def corrected(
     design: Design,
-    readings: Floats,
+    readings: FloatArray,
     *,
     folder: Path,
     workers: int = 1,

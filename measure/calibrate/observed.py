@@ -17,10 +17,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, RefusedError
 from flagdata.findings import Finding
 from flagdata.rng import stream
-from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.summary import LEAST_IN_ALL, LEAST_WINDOWS, SHOWN, Projection, shown
 from measure.calibrate.wind import STEADY, Log
@@ -44,7 +44,7 @@ PASSING_TOGETHER = {("frequency", "bandwidth"): 0.75, ("bandwidth", "amplitude-u
 """The same of the differences of their two windows."""
 
 
-def drawn(projection: Projection, windows: int, count: int, *, name: str, seed: int) -> Floats:
+def drawn(projection: Projection, windows: int, count: int, *, name: str, seed: int) -> FloatArray:
     """(count, 1 or 2, observable) errors of summaries of films whose windows err by a standard deviation of one.
 
     Args:
@@ -61,7 +61,7 @@ def drawn(projection: Projection, windows: int, count: int, *, name: str, seed: 
     return found
 
 
-def correlations(together: Mapping[tuple[str, str], float]) -> Floats:
+def correlations(together: Mapping[tuple[str, str], float]) -> FloatArray:
     """(observable, observable) of pairs of names."""
     found = np.eye(len(OBSERVED))
     for (one, other), value in together.items():
@@ -121,11 +121,11 @@ class Observed:
 
     name: str
     source: str
-    readings: Floats
+    readings: FloatArray
     log: Log
     first: float = 0.0
     place: str | None = None
-    sigma: Floats = field(default_factory=lambda: np.zeros(len(OBSERVED)))
+    sigma: FloatArray = field(default_factory=lambda: np.zeros(len(OBSERVED)))
     findings: tuple[Finding, ...] = ()
     excerpt: Excerpt | None = None
 
@@ -149,7 +149,7 @@ class Observed:
         return len(self.readings) * WINDOW
 
     @property
-    def speed(self) -> Floats:
+    def speed(self) -> FloatArray:
         """(window,) mean of the logged wind [m/s]."""
         starts = np.arange(len(self.readings)) * WINDOW
         return self.log.mean_speed(starts, starts + WINDOW)
@@ -166,11 +166,11 @@ class Observed:
         return Projection(speed=self.speed, changes=not self.steady)
 
     @property
-    def summary(self) -> Floats:
+    def summary(self) -> FloatArray:
         """(summary,)."""
         return self.projection.of(self.readings).ravel()
 
-    def pixels(self, count: int, *, seed: int) -> Floats:
+    def pixels(self, count: int, *, seed: int) -> FloatArray:
         """(count, 1 or 2, observable) draws of what errors of pixels add to its summary."""
         return self.sigma * drawn(self.projection, len(self.readings), count, name=self.name, seed=seed)
 

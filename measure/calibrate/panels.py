@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.pages.pictures import figure_url
 from measure.calibrate.observed import Observed
-from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.observables import OBSERVABLES
 
@@ -24,7 +24,7 @@ class Band:
         colour: of the band and of its middle.
     """
 
-    found: Floats
+    found: FloatArray
     colour: str
 
 

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from measure.calibrate.emulator import Emulator
-from measure.calibrate.prior import Floats
 from measure.calibrate.scatter import Scatter, scatter
 from measure.calibrate.sights import Placed, dimension, values
 
@@ -34,14 +34,14 @@ _STRETCH = 2.0
 
 
 def ensemble(
-    likelihood: Callable[[Floats], Floats],
+    likelihood: Callable[[FloatArray], FloatArray],
     *,
     groups: int,
     dimension: int,
     walkers: int,
     steps: int,
     rng: np.random.Generator,
-) -> Floats:
+) -> FloatArray:
     """(group, draw, dimension) normal scores; of the steps the first half is not kept, and one in `_THIN` of the rest.
 
     Args:
@@ -50,7 +50,7 @@ def ensemble(
         walkers: of each group, an even number.
     """
 
-    def density(scores: Floats) -> Floats:
+    def density(scores: FloatArray) -> FloatArray:
         return likelihood(scores) - 0.5 * np.square(scores).sum(axis=2)
 
     prior = rng.standard_normal((groups, _STARTS, dimension))
@@ -102,12 +102,12 @@ class Posterior:
         together: whether what is unknown of the cloth was taken as the same in all recordings.
     """
 
-    cloth: Mapping[str, Floats]
-    places: tuple[Mapping[str, Floats], ...]
+    cloth: Mapping[str, FloatArray]
+    places: tuple[Mapping[str, FloatArray], ...]
     together: bool
 
 
-def posterior(sights: Sequence[Sight], observed: Sequence[Floats], *, seed: int) -> Posterior:
+def posterior(sights: Sequence[Sight], observed: Sequence[FloatArray], *, seed: int) -> Posterior:
     """Draws of the cloth that recordings show.
 
     Args:
@@ -126,7 +126,7 @@ def posterior(sights: Sequence[Sight], observed: Sequence[Floats], *, seed: int)
     return Posterior(cloth=cloth, places=tuple(places), together=about.together)
 
 
-def weighed(sights: Sequence[Sight], observed: Sequence[Floats], *, seed: int) -> Mapping[str, Floats]:
+def weighed(sights: Sequence[Sight], observed: Sequence[FloatArray], *, seed: int) -> Mapping[str, FloatArray]:
     """Name → (flag, draw) of the cloths of several flags, each by itself, seen from the sights' places.
 
     Args:
@@ -148,16 +148,16 @@ def weighed(sights: Sequence[Sight], observed: Sequence[Floats], *, seed: int) -
 def _drawn(
     sights: Sequence[Sight],
     about: Scatter,
-    observed: Sequence[Floats],
+    observed: Sequence[FloatArray],
     *,
     walkers: int,
     steps: int,
     rng: np.random.Generator,
-) -> Floats:
+) -> FloatArray:
     """(flag, draw, dimension) normal scores of flags whose summaries are (flag, summary) in each recording."""
     whole = np.concatenate([own[:, one.emulator.used] for one, own in zip(sights, observed, strict=True)], axis=1)
 
-    def likelihood(scores: Floats) -> Floats:
+    def likelihood(scores: FloatArray) -> FloatArray:
         cloth, places = values(scores.reshape(-1, scores.shape[2]), sights)
         found = [one.emulator.predict({**cloth, **place}) for one, place in zip(sights, places, strict=True)]
         mean = np.concatenate([own for own, _ in found], axis=1)

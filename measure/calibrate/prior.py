@@ -19,8 +19,6 @@ from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.tables import Range, Scale
 
-Floats = FloatArray
-
 
 @dataclass(frozen=True, kw_only=True)
 class Normal:
@@ -40,7 +38,7 @@ class Normal:
         if not (math.isfinite(self.mean) and self.sigma > 0):
             raise InputError(f"{self.mean} ± {self.sigma}", where="prior", fix="give a finite mean and a deviation > 0")
 
-    def at(self, share: Floats) -> Floats:
+    def at(self, share: FloatArray) -> FloatArray:
         """Quantiles of shares in (0, 1)."""
         return self.mean + self.sigma * ndtri(np.clip(share, 1e-6, 1 - 1e-6))
 
@@ -60,7 +58,7 @@ class Among:
     places: tuple[int, ...]
     count: int
 
-    def at(self, share: Floats) -> Floats:
+    def at(self, share: FloatArray) -> FloatArray:
         """Values of shares in [0, 1)."""
         whole = np.minimum(share, np.nextafter(1.0, 0.0)) * len(self.places)
         part = whole.astype(np.int64)
@@ -102,7 +100,7 @@ class Uncertain:
         """Of the prior; None of one that is no range."""
         return (self.prior.low, self.prior.high) if isinstance(self.prior, Range) else None
 
-    def at(self, share: Floats) -> Floats:
+    def at(self, share: FloatArray) -> FloatArray:
         """Values of shares in [0, 1)."""
         if not isinstance(self.prior, Range):
             return self.prior.at(share)
@@ -204,7 +202,7 @@ ELEVATION = Uncertain(
 )
 
 
-def draws(quantities: tuple[Uncertain, ...], count: int, *, seed: int, name: str) -> Mapping[str, Floats]:
+def draws(quantities: tuple[Uncertain, ...], count: int, *, seed: int, name: str) -> Mapping[str, FloatArray]:
     """Name → (count,) values, from a scrambled Sobol sequence of the named stream.
 
     Args:

@@ -17,9 +17,9 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import gammaln
 
+from flagdata.arrays import FloatArray
 from flagdata.findings import Finding
 from measure.calibrate.emulator import Emulator
-from measure.calibrate.prior import Floats
 
 FEWEST_FREEDOM = 20
 """Degrees of freedom below which recordings are taken as independent."""
@@ -44,12 +44,12 @@ class Scatter:
         together: whether recordings' residuals were taken together.
     """
 
-    white: Floats
+    white: FloatArray
     determinant: float
     freedom: float
     together: bool
 
-    def log_density(self, offset: Floats, stretch: Floats) -> Floats:
+    def log_density(self, offset: FloatArray, stretch: FloatArray) -> FloatArray:
         """(n,) logarithm of multivariate t at offsets (n, k), its covariance (n,) times as large."""
         k, freedom = offset.shape[1], self.freedom
         constant = gammaln((freedom + k) / 2) - gammaln(freedom / 2) - 0.5 * k * math.log(freedom * math.pi)
@@ -60,7 +60,7 @@ class Scatter:
             - 0.5 * (freedom + k) * np.log1p(self.distance(offset, stretch) / freedom)
         )
 
-    def distance(self, offset: Floats, stretch: Floats) -> Floats:
+    def distance(self, offset: FloatArray, stretch: FloatArray) -> FloatArray:
         """(n,) squared standardised distance of offsets (n, k)."""
         return np.asarray(np.square(offset @ self.white.T).sum(axis=1) / stretch)
 
@@ -78,7 +78,7 @@ def scatter(emulators: Sequence[Emulator]) -> Scatter:
     )
 
 
-def _covariance(emulators: Sequence[Emulator]) -> tuple[Floats, float, bool]:
+def _covariance(emulators: Sequence[Emulator]) -> tuple[FloatArray, float, bool]:
     """Predictive one of the residuals, its degrees of freedom, and whether it is of all recordings together."""
     first = emulators[0]
     if all(np.array_equal(one.weights, first.weights) for one in emulators):

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from scipy.special import ndtr
 
-from measure.calibrate.prior import CLOTH, NUISANCES, Floats, Uncertain
+from flagdata.arrays import FloatArray
+from measure.calibrate.prior import CLOTH, NUISANCES, Uncertain
 
 BESIDE = ("gain", "scale")
 """Nuisances that are fitted beside the place."""
@@ -46,9 +47,9 @@ def dimension(sights: Sequence[Placed]) -> int:
     return len(CLOTH) + sum(len(sights[first].quantities) for first in set(first_of([one.place for one in sights])))
 
 
-def values(scores: Floats, sights: Sequence[Placed]) -> tuple[dict[str, Floats], list[dict[str, Floats]]]:
+def values(scores: FloatArray, sights: Sequence[Placed]) -> tuple[dict[str, FloatArray], list[dict[str, FloatArray]]]:
     """Cloths, and places of each recording, at normal scores (n, dimension or more)."""
-    shares: Iterator[Floats] = iter(ndtr(scores).T)
+    shares: Iterator[FloatArray] = iter(ndtr(scores).T)
     cloth = {one.name: one.at(next(shares)) for one in CLOTH}
     owners = first_of([one.place for one in sights])
     own = {first: {one.name: one.at(next(shares)) for one in sights[first].quantities} for first in sorted(set(owners))}

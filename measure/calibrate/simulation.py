@@ -15,10 +15,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed, stream
 from measure.calibrate.discretisation import Discretisation
 from measure.calibrate.fabric import TABLES
-from measure.calibrate.prior import Floats
 from measure.calibrate.wind import RATE as WIND_RATE
 from measure.calibrate.wind import Log, blown
 from measure.forecasting.regressors import EffectColumn
@@ -117,12 +117,12 @@ class Batch:
     flag: Flag
     log: Log
     duration: float
-    values: Mapping[str, Floats]
-    places: Floats
+    values: Mapping[str, FloatArray]
+    places: FloatArray
     seeds: tuple[int, ...]
     columns: int = COLUMNS
     observables: tuple[str, ...] = OBSERVED
-    effects: tuple[tuple[EffectColumn, Floats], ...] = field(default_factory=tuple)
+    effects: tuple[tuple[EffectColumn, FloatArray], ...] = field(default_factory=tuple)
     until: float | None = None
     discretisation: Discretisation | None = None
 
@@ -166,7 +166,7 @@ class Batch:
             found["discretisation"] = self.discretisation.content()
         return found
 
-    def read(self) -> Floats:
+    def read(self) -> FloatArray:
         """(flag, place, window, observable), NaN where a window does not show one or a flag diverged."""
         own = self.discretisation
         mesh = self.flag.mesh(self.columns) if own is None else own.mesh(self.flag.mesh(self.columns))
@@ -182,7 +182,7 @@ class Batch:
                     )
         return found
 
-    def positions(self, mesh: Mesh, *, rate: float = RATE) -> Floats:
+    def positions(self, mesh: Mesh, *, rate: float = RATE) -> FloatArray:
         """(frame, vertex, 3, flag) [m] of the film's frames, `rate` a second [Hz]."""
         system, state, integrator = self._assembled(mesh)
         simulated = batch.Batch(system=system, state=state, integrator=integrator, divergence=batch.Divergence.KEEP)
@@ -272,7 +272,7 @@ def mean_bending(material: Material) -> float:
 
 def windows(
     positions: NDArray[np.floating], *, mesh: Mesh, flag: Flag, view: View, rate: float, observables: Sequence[str]
-) -> Floats:
+) -> FloatArray:
     """(window, observable) of a flag (frame, vertex, 3) [m] in the wind along +x, seen from a place.
 
     Args:

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import BoolArray
-from measure.calibrate.prior import Floats
+from flagdata.arrays import BoolArray, FloatArray
 
 SHOWN = 0.6
 """Share of the windows that are to show an observable."""
@@ -32,17 +31,17 @@ class Projection:
         changes: whether slopes are taken: not where the wind is constant.
     """
 
-    speed: Floats
+    speed: FloatArray
     changes: bool
 
     @property
-    def regressors(self) -> Floats:
+    def regressors(self) -> FloatArray:
         """(window, 1 or 2)."""
         relative = np.log(self.speed / np.exp(np.log(self.speed).mean()))
         constant = np.ones_like(relative)
         return np.stack([constant, relative], axis=1) if self.changes else constant[:, None]
 
-    def of(self, readings: Floats) -> Floats:
+    def of(self, readings: FloatArray) -> FloatArray:
         """(…, 1 or 2, observable) of readings (…, window, observable); NaN where too few windows show one."""
         x = self.regressors
         there = np.isfinite(readings)
@@ -54,11 +53,11 @@ class Projection:
         found = np.linalg.solve(products, right[..., None])[..., 0]
         return np.swapaxes(np.where(enough[..., None], found, np.nan), -1, -2)
 
-    def at(self, summaries: Floats) -> Floats:
+    def at(self, summaries: FloatArray) -> FloatArray:
         """(…, window, observable) that summaries stand for."""
         return np.einsum("wi,...ik->...wk", self.regressors, summaries)
 
 
-def shown(readings: Floats) -> BoolArray:
+def shown(readings: FloatArray) -> BoolArray:
     """(observable,) whether enough windows (window, observable) show it."""
     return np.asarray(np.isfinite(readings).mean(axis=0) >= SHOWN)

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.clock import ClockModel
 from flagdata.errors import InputError
 from flagdata.findings import Finding
@@ -24,7 +25,6 @@ from flagdata.signals import Instants, WindSeries
 from flagdata.timebase import NANOSECONDS
 from measure.calibrate.columns import COUNT, DURATION, SIGMA, TIME, WIND, Columns, read
 from measure.calibrate.observed import LONGEST, Observed
-from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.summary import LEAST_WINDOWS
 from measure.calibrate.wind import Log
@@ -133,7 +133,7 @@ def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | 
     middles = (times[1:] + times[:-1]) / 2
     low = np.maximum(times - step / 2, np.concatenate([[begin], middles]))
     high = np.minimum(times + step / 2, np.concatenate([middles, [times[-1] + step / 2]]))
-    edges: Floats = begin + WINDOW * np.arange(int((float(high[-1]) - begin) / WINDOW + 1e-6) + 1, dtype=np.float64)
+    edges: FloatArray = begin + WINDOW * np.arange(int((float(high[-1]) - begin) / WINDOW + 1e-6) + 1, dtype=np.float64)
     if beside is None:
         there = np.isfinite(table[WIND])
         if there.sum() < _FEWEST_ROWS:
@@ -157,7 +157,9 @@ def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | 
     )
 
 
-def _windows(edges: Floats, low: Floats, high: Floats, values: Floats, *, quadratic: bool) -> Floats:
+def _windows(
+    edges: FloatArray, low: FloatArray, high: FloatArray, values: FloatArray, *, quadratic: bool
+) -> FloatArray:
     """(window,) means of values (n,) that hold from `low` to `high`; NaN where they cover too little."""
     there = np.isfinite(values)
     if not there.any():
@@ -165,7 +167,7 @@ def _windows(edges: Floats, low: Floats, high: Floats, values: Floats, *, quadra
     low, high, held = low[there], high[there], np.square(values[there]) if quadratic else values[there]
     places = np.stack([low, high], axis=1).ravel()
 
-    def between(height: Floats) -> Floats:
+    def between(height: FloatArray) -> FloatArray:
         """Integral of a step function over each window."""
         total = np.concatenate([[0.0], np.cumsum(height * (high - low))])
         return np.diff(np.interp(edges, places, np.repeat(total, 2)[1:-1]))
@@ -196,7 +198,7 @@ def _against_wind(table: Columns, *, name: str, identity: str) -> tuple[Observed
     recordings = []
     for row, (line, wind) in enumerate(zip(table.lines, table[WIND].tolist(), strict=True)):
         count = min(int(windows[row] + 1e-6), most)
-        steady: Floats = WINDOW * np.arange(count + 1, dtype=np.float64)
+        steady: FloatArray = WINDOW * np.arange(count + 1, dtype=np.float64)
         recordings.append(
             Observed(
                 name=f"{name}, {wind:g} m/s (line {line})",
@@ -210,7 +212,7 @@ def _against_wind(table: Columns, *, name: str, identity: str) -> tuple[Observed
     return tuple(recordings)
 
 
-def _mean(values: Floats) -> float:
+def _mean(values: FloatArray) -> float:
     """Of what is stated; 0 where nothing is."""
     return float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
 

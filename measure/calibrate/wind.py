@@ -27,8 +27,6 @@ from flagdata.timebase import NANOSECONDS
 from sim.effects.anemometer_lag import AnemometerLag
 from sim.wind.spectral import VonKarman
 
-Floats = FloatArray
-
 RATE = 10.0
 """Samples of the wind that blows in a simulation [Hz]; it is linear between them."""
 LATERAL, VERTICAL = 0.78, 0.52
@@ -62,9 +60,9 @@ class Log:
         InputError: shapes that disagree, fewer than four samples, no wind.
     """
 
-    times: Floats
-    speed: Floats
-    turn: Floats | None = None
+    times: FloatArray
+    speed: FloatArray
+    turn: FloatArray | None = None
     distance: float | None = None
     averaging: float = 0.0
     clock: float = 0.0
@@ -168,20 +166,20 @@ class Log:
         speed = _undone(self.times, self.speed[:, None], lag=self.distance / float(self.speed.mean()))[:, 0]
         return replace(self, speed=np.maximum(speed, 0.0), distance=0.0)
 
-    def velocity(self, distance: float) -> Floats:
+    def velocity(self, distance: float) -> FloatArray:
         """(n, 2) along the mean wind and to its left at `times`, a lag of that distance constant undone [m/s]."""
         turn = np.zeros_like(self.speed) if self.turn is None else self.turn
         parts = np.stack([self.speed * np.cos(turn), self.speed * np.sin(turn)], axis=1)
         return _undone(self.times, parts, lag=distance / float(self.speed.mean()))
 
-    def mean_speed(self, starts: NDArray[np.floating], ends: NDArray[np.floating]) -> Floats:
+    def mean_speed(self, starts: NDArray[np.floating], ends: NDArray[np.floating]) -> FloatArray:
         """(k,) mean speed over windows [s], linear between samples [m/s]."""
         grid = np.arange(0, round((float(ends.max()) - float(starts.min())) * RATE) + 1) / RATE + float(starts.min())
         values = np.interp(grid, self.times, self.speed)
         return np.array([values[(grid >= a) & (grid <= b)].mean() for a, b in zip(starts, ends, strict=True)])
 
 
-def blown(log: Log, *, before: float, duration: float, distance: float, eddies: float, seed: int) -> Floats:
+def blown(log: Log, *, before: float, duration: float, distance: float, eddies: float, seed: int) -> FloatArray:
     """One wind that an anemometer would have logged so.
 
     Args:
@@ -226,7 +224,7 @@ def blown(log: Log, *, before: float, duration: float, distance: float, eddies: 
     return out
 
 
-def _read(times: Floats, values: Floats, log: Log, *, distance: float) -> Floats:
+def _read(times: FloatArray, values: FloatArray, log: Log, *, distance: float) -> FloatArray:
     """What the instrument of a log reads of winds (n, k) at the log's instants: (m, k)."""
     lagged = AnemometerLag(distance=distance).read(torch.from_numpy(times), torch.from_numpy(values)).numpy()
     size = max(1, round(log.averaging * RATE))
@@ -238,7 +236,7 @@ def _read(times: Floats, values: Floats, log: Log, *, distance: float) -> Floats
     return np.stack([np.interp(log.times, times, column) for column in lagged.T], axis=1)
 
 
-def _undone(times: Floats, values: Floats, *, lag: float) -> Floats:
+def _undone(times: FloatArray, values: FloatArray, *, lag: float) -> FloatArray:
     """Samples (n, k) with τ dm/dt added, the slope taken over bins of at least `_BIN`."""
     if lag == 0:
         return values

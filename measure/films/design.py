@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import IntArray
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.rng import child_seed, stream
 from measure.calibrate.design import Design
 from measure.calibrate.discretisation import LITTLE, Discretisation
-from measure.calibrate.prior import CLOTH, Floats, draws
+from measure.calibrate.prior import CLOTH, draws
 from measure.calibrate.simulation import Batch
 from measure.films.library import Weighable
 from measure.observables.observable import WINDOW
@@ -53,7 +53,7 @@ class Pairs:
 
     effect: Weighable
     places: IntArray
-    strengths: Floats
+    strengths: FloatArray
     batches: tuple[Batch, ...]
 
 
@@ -127,7 +127,7 @@ def _little() -> float:
     return math.log(max(LITTLE / low, 1.0)) / math.log(high / low)
 
 
-def _damping(drawn: Floats, *, explicit: bool) -> Floats:
+def _damping(drawn: FloatArray, *, explicit: bool) -> FloatArray:
     """Dampings of the prior as those of the part below `LITTLE`, or of the part above it [s]."""
     low, high = _DAMPING.at(np.array([0.0, 1.0])).tolist()
     shares, edge = np.log(drawn / low) / math.log(high / low), _little()

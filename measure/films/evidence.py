@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import gammaln, logsumexp, ndtr
 
 from flagdata.arrays import FloatArray
-from measure.calibrate.prior import Floats, Uncertain
+from measure.calibrate.prior import Uncertain
 from measure.calibrate.scatter import Scatter, scatter
 from measure.calibrate.sights import Placed, dimension, values
 from measure.films.model import Model
@@ -55,15 +55,15 @@ class Experiments:
         sigma: standard uncertainty of these, as a share.
     """
 
-    summaries: tuple[Floats, ...]
-    stated: Floats | None = None
+    summaries: tuple[FloatArray, ...]
+    stated: FloatArray | None = None
     sigma: float = 0.0
 
     def __len__(self) -> int:
         return len(self.summaries[0])
 
     @cached_property
-    def whole(self) -> Floats:
+    def whole(self) -> FloatArray:
         """(n, k) of all recordings side by side."""
         return np.concatenate(self.summaries, axis=1)
 
@@ -75,7 +75,7 @@ class Experiments:
             stated=None if self.stated is None else np.repeat(self.stated, times),
         )
 
-    def off(self, weight: Floats) -> Floats:
+    def off(self, weight: FloatArray) -> FloatArray:
         """(n,) by how many standard deviations stated weights are off from (n,) [kg/m²]; 0 where none was stated."""
         return np.zeros(len(weight)) if self.stated is None else np.log(self.stated / weight) / self.sigma
 
@@ -91,10 +91,10 @@ class Fit:
         weights: (n, draw) of them, of sum 1.
     """
 
-    evidence: Floats
-    misfit: Floats
-    scores: Floats
-    weights: Floats
+    evidence: FloatArray
+    misfit: FloatArray
+    scores: FloatArray
+    weights: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,12 +119,14 @@ class Hypothesis:
         """Of the scores: cloth, then each recording's place, then the strength."""
         return dimension(self.sights) + (self.effect is not None)
 
-    def values(self, scores: Floats) -> tuple[dict[str, Floats], list[dict[str, Floats]], Floats | None]:
+    def values(
+        self, scores: FloatArray
+    ) -> tuple[dict[str, FloatArray], list[dict[str, FloatArray]], FloatArray | None]:
         """Cloths, places of each recording, and strengths beyond null, at normal scores (n, dimension)."""
         cloth, places = values(scores, self.sights)
         return cloth, places, None if self.effect is None else self.effect.at(ndtr(scores[:, -1]))
 
-    def predicted(self, scores: Floats) -> tuple[Floats, Floats, Floats]:
+    def predicted(self, scores: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Means (n, k) of all recordings' summaries, factors (n,) of their scatter, area weights (n,) [kg/m²]."""
         cloth, places, strength = self.values(scores)
         name = None if self.effect is None else self.effect.name
@@ -135,7 +137,7 @@ class Hypothesis:
         mean = np.concatenate([own for own, _ in found], axis=1)
         return mean, np.mean([own for _, own in found], axis=0), cloth["area_weight"]
 
-    def log_posterior(self, scores: Floats, observed: Experiments) -> Floats:
+    def log_posterior(self, scores: FloatArray, observed: Experiments) -> FloatArray:
         """(n,) logarithm of likelihood times prior, but for a constant of stated weights."""
         mean, stretch, weight = self.predicted(scores)
         total = -0.5 * np.square(scores).sum(axis=1) - 0.5 * scores.shape[1] * np.log(2 * np.pi)
@@ -167,11 +169,11 @@ class Hypothesis:
             weights=np.exp(ratio - logsumexp(ratio, axis=1, keepdims=True)),
         )
 
-    def misfit(self, observed: Experiments) -> Floats:
+    def misfit(self, observed: Experiments) -> FloatArray:
         """(n,) that of `fit`, without the rest of it."""
         return np.array([misfit for _, _, misfit in self._modes(observed)]).min(axis=0)
 
-    def _modes(self, observed: Experiments) -> list[tuple[Floats, Floats, Floats]]:
+    def _modes(self, observed: Experiments) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
         """Of the posterior, from each start, as `_climbed`."""
         found = []
         for begin in _STARTS if self.effect is not None else (0.0,):
@@ -181,7 +183,7 @@ class Hypothesis:
             found.append(self._climbed(at, observed))
         return found
 
-    def _climbed(self, at: Floats, observed: Experiments) -> tuple[Floats, Floats, Floats]:
+    def _climbed(self, at: FloatArray, observed: Experiments) -> tuple[FloatArray, FloatArray, FloatArray]:
         """A mode (n, d) from a start, the curvature there (n, d, d), and the misfit (n,)."""
         value, damping = self.log_posterior(at, observed), np.full(len(at), 1.0)
         for _ in range(_STEPS):
@@ -197,7 +199,7 @@ class Hypothesis:
         misfit = np.square(at).sum(axis=1) + np.square(observed.off(weight))
         return at, curvature, misfit + self.scatter.distance(observed.whole - mean, stretch)
 
-    def _slope(self, at: Floats, observed: Experiments) -> tuple[Floats, Floats]:
+    def _slope(self, at: FloatArray, observed: Experiments) -> tuple[FloatArray, FloatArray]:
         """Gradient (n, d) and Gauss–Newton's curvature (n, d, d) of minus the logarithm, at scores (n, d)."""
         n, d = at.shape
         moved = at[:, None] + _DIFFERENCE * np.concatenate([np.zeros((1, d)), np.eye(d)])
@@ -218,7 +220,7 @@ class Hypothesis:
         return gradient, curvature
 
 
-def _log_t(offset: Floats, precision: Floats) -> Floats:
+def _log_t(offset: FloatArray, precision: FloatArray) -> FloatArray:
     """(n, m) logarithm of multivariate t with `_TAIL` degrees of freedom, at offsets (n, m, d) from its middle."""
     d = offset.shape[2]
     distance = np.einsum("nmi,nij,nmj->nm", offset, precision, offset)
@@ -227,7 +229,7 @@ def _log_t(offset: Floats, precision: Floats) -> Floats:
     return constant + 0.5 * determinant[:, None] - 0.5 * (_TAIL + d) * np.log1p(distance / _TAIL)
 
 
-def quantiles(values: Floats, weights: Floats, shares: Sequence[float]) -> list[float]:
+def quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) -> list[float]:
     """Of weighted draws (m,)."""
     order = np.argsort(values)
     total: FloatArray = np.cumsum(weights[order])

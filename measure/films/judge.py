@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from flagdata.arrays import IntArray
-from measure.calibrate.prior import Floats
+from flagdata.arrays import FloatArray, IntArray
 from measure.films.score_test import Scored
 from measure.films.weigh import Misfits, Weighing
 from measure.nulls.clustered import ClusteredNulls
@@ -50,8 +49,8 @@ class Judged:
     conclusion: Conclusion
     named: tuple[int, ...]
     confident: tuple[int, ...]
-    probability: Floats
-    leftover: Floats
+    probability: FloatArray
+    leftover: FloatArray
     scored: Scored
     open: tuple[str, ...] = ()
 

@@ -19,9 +19,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from flagdata.arrays import BoolArray
+from flagdata.arrays import BoolArray, FloatArray
 from measure.calibrate.emulator import Emulator
-from measure.calibrate.prior import Floats
 from measure.films.library import Weighable
 
 _RIDGE = 1e-3
@@ -48,14 +47,14 @@ class Response:
 
     effect: Weighable
     logarithmic: bool
-    coefficients: Floats
-    inverse: Floats
+    coefficients: FloatArray
+    inverse: FloatArray
     residual: float
     excess: float
     expected: float
-    change: Floats
+    change: FloatArray
 
-    def features(self, strength: Floats, weight: Floats) -> Floats:
+    def features(self, strength: FloatArray, weight: FloatArray) -> FloatArray:
         """z (n, 3) at strengths beyond null (n,) and area weights (n,) [kg/m²]."""
         return _features(self.effect, self.logarithmic, strength, weight)
 
@@ -78,8 +77,8 @@ class Model:
         return self.base.used
 
     def predict(
-        self, values: Mapping[str, Floats], effect: str | None = None, strength: Floats | None = None
-    ) -> tuple[Floats, Floats]:
+        self, values: Mapping[str, FloatArray], effect: str | None = None, strength: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Means (n, k) of the used summaries, and factors (n,) of the scatter."""
         mean, stretch = self.base.predict(values)
         if effect is None or strength is None:
@@ -91,7 +90,12 @@ class Model:
 
 
 def responded(
-    model: Model, effect: Weighable, strengths: Floats, values: Mapping[str, Floats], with_it: Floats, without: Floats
+    model: Model,
+    effect: Weighable,
+    strengths: FloatArray,
+    values: Mapping[str, FloatArray],
+    with_it: FloatArray,
+    without: FloatArray,
 ) -> Response | None:
     """What an effect changes, by pairs; None where too few of them show the flag.
 
@@ -133,7 +137,7 @@ def responded(
     )
 
 
-def _features(effect: Weighable, logarithmic: bool, strength: Floats, weight: Floats) -> Floats:
+def _features(effect: Weighable, logarithmic: bool, strength: FloatArray, weight: FloatArray) -> FloatArray:
     most = max(abs(effect.low), abs(effect.high))
     u = strength / most
     if logarithmic:

@@ -6,11 +6,11 @@ import json
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.pages.render import render
 from flagdata.rng import stream
 from measure.calibrate.observed import Observed
 from measure.calibrate.panels import Band, against_wind
-from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.films.evidence import Fit, Sight
 from measure.films.library import Weighable
@@ -66,13 +66,13 @@ def page(verdict: Verdict, outcome: Outcome) -> str:
 def bands(
     sight: Sight,
     observed: Observed,
-    values: dict[str, Floats],
-    weights: Floats,
+    values: dict[str, FloatArray],
+    weights: FloatArray,
     effect: Weighable | None,
-    strength: Floats | None,
+    strength: FloatArray | None,
     *,
     seed: int,
-) -> Floats:
+) -> FloatArray:
     """(3, window, observable) lower end, middle and upper end of what a model of the posterior shows in the windows'
     winds, without the scatter among windows; NaN of observables that are not used. A change with the wind that is not
     used is drawn as none.

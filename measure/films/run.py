@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.provenance import code_version
 from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.observed import Observed, constant_wind
-from measure.calibrate.prior import CLOTH, Floats
+from measure.calibrate.prior import CLOTH
 from measure.calibrate.scatter import TAKEN_APART
 from measure.ends import Bound, span
 from measure.films.departures import Departure, departures, root_mean_square
@@ -50,7 +51,7 @@ SEEN = 2.0
 _DIFFERENCE = 1e-3
 
 
-def sensitivity(sights: Sequence[Sight], effects: Sequence[Weighable], base: Fit, observed: Experiments) -> Floats:
+def sensitivity(sights: Sequence[Sight], effects: Sequence[Weighable], base: Fit, observed: Experiments) -> FloatArray:
     """(effect,) standard errors by which the strong effect moves the summaries, what a change of cloth, view and
     anemometer makes up for left out.
 
@@ -161,7 +162,7 @@ class Outcome:
     base: Fit
     best: tuple[Weighable, Fit] | None
     departures: tuple[Departure, ...]
-    sensitivity: Floats
+    sensitivity: FloatArray
     together: bool
     left_out: tuple[Finding, ...] = ()
 
@@ -354,7 +355,7 @@ def _cloths(outcome: Outcome, effect: Weighable | None, fit: Fit) -> list[tuple[
     return [_marginal(own[one.name], fit.weights[0], one.unit) for one in CLOTH]
 
 
-def _marginal(values: Floats, weights: Floats, unit: str) -> tuple[Estimate, float]:
+def _marginal(values: FloatArray, weights: FloatArray, unit: str) -> tuple[Estimate, float]:
     tail = (1 - CRITERIA.interval) / 2
     low, middle, high = quantiles(values, weights, (tail, 0.5, 1 - tail))
     mean = float(weights @ values)
@@ -382,7 +383,9 @@ def strength_of(effect: Weighable, fit: Fit) -> Estimate:
     )
 
 
-def _bound(effect: Weighable, strengths: Floats, shares: Floats, weights: Floats, *, whole: float) -> Estimate | None:
+def _bound(
+    effect: Weighable, strengths: FloatArray, shares: FloatArray, weights: FloatArray, *, whole: float
+) -> Estimate | None:
     """A strength that is known on one side only; None of one with two ends.
 
     Args:

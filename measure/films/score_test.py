@@ -23,8 +23,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, IntArray
-from measure.calibrate.prior import Floats
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from measure.films.evidence import Experiments
 from measure.nulls.clustered import ClusteredNulls
 from models.outliers import shrunk_covariance
@@ -44,18 +43,18 @@ class Directions:
         suspected: place and sign of the one that was suspected beforehand; None to look along all.
     """
 
-    changes: Floats
+    changes: FloatArray
     signs: IntArray
     suspected: tuple[int, int] | None = None
 
-    def far(self, z: Floats) -> Floats:
+    def far(self, z: FloatArray) -> FloatArray:
         """(n, direction) of standardised z (n, effect + 1): how far each goes in the direction that counts."""
         if self.suspected is not None:
             place, sign = self.suspected
             return sign * z[:, place : place + 1]
         return np.concatenate([self.along(z), z[:, -1:]], axis=1)
 
-    def along(self, z: Floats) -> Floats:
+    def along(self, z: FloatArray) -> FloatArray:
         """(n, effect) of each effect's, whether suspected or not."""
         own = z[:, :-1]
         return np.where(self.signs == 0, np.abs(own), own)
@@ -70,11 +69,11 @@ class Axes:
         white: (k, k) from residuals to coordinates in which V is one.
     """
 
-    weights: Floats
-    white: Floats
+    weights: FloatArray
+    white: FloatArray
 
     @classmethod
-    def of(cls, residuals: Floats, changes: Floats) -> Axes:
+    def of(cls, residuals: FloatArray, changes: FloatArray) -> Axes:
         """From residuals (n, k) and changes (effect, k)."""
         spread = residuals.std(axis=0)
         covariance, _ = shrunk_covariance(residuals / spread)
@@ -84,7 +83,7 @@ class Axes:
         # An effect that changes nothing has no direction, and a z of 0.
         return cls(weights=white.T @ (along / np.where(length > 0, length, 1.0)), white=white)
 
-    def z(self, residuals: Floats) -> Floats:
+    def z(self, residuals: FloatArray) -> FloatArray:
         """(n, effect + 1) z_e, and z_0."""
         k = self.white.shape[0]
         misfit = np.square(residuals @ self.white.T).sum(axis=1)
@@ -102,10 +101,10 @@ class Standing:
     """
 
     axes: Axes
-    centre: Floats
-    spread: Floats
+    centre: FloatArray
+    spread: FloatArray
 
-    def of(self, residuals: Floats) -> Floats:
+    def of(self, residuals: FloatArray) -> FloatArray:
         """(n, effect + 1) standardised z_e and z_0 of residuals (n, k)."""
         return (self.axes.z(residuals) - self.centre) / self.spread
 
@@ -122,16 +121,16 @@ class Scene:
         changes: (effect, k).
     """
 
-    own: Floats
-    base: Floats
-    null: Floats
+    own: FloatArray
+    base: FloatArray
+    null: FloatArray
     kinds: IntArray
     alike: Mask
-    changes: Floats
+    changes: FloatArray
     _known: dict[frozenset[int], Axes] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, own: Experiments, base: Experiments, nulls: Experiments, kinds: IntArray, changes: Floats) -> Scene:
+    def of(cls, own: Experiments, base: Experiments, nulls: Experiments, kinds: IntArray, changes: FloatArray) -> Scene:
         """From summaries and weights as scales read them."""
         at = [_logarithm(each, own) for each in (own, base, nulls)]
         coefficients = np.linalg.lstsq(_regressors(at[1]), base.whole, rcond=None)[0]
@@ -186,14 +185,14 @@ class Scored:
         alike: (null,) which null flags these are.
     """
 
-    z: Floats
+    z: FloatArray
     whole: float
     statistic: float
     nulls: ClusteredNulls
-    alone: Floats
-    family: Floats
-    power: Floats
-    tested: Floats
+    alone: FloatArray
+    family: FloatArray
+    power: FloatArray
+    tested: FloatArray
     pointed: bool
     alike: Mask
 
@@ -253,7 +252,7 @@ def score(
     )
 
 
-def _power(scene: Scene, apart: dict[int, Standing], directions: Directions, critical: float | None) -> Floats:
+def _power(scene: Scene, apart: dict[int, Standing], directions: Directions, critical: float | None) -> FloatArray:
     """(effect,) share of null flags that are beyond a critical value once each effect acts on them."""
     found = np.zeros(len(directions.changes))
     if critical is None:
@@ -272,11 +271,11 @@ def _power(scene: Scene, apart: dict[int, Standing], directions: Directions, cri
     return found
 
 
-def _logarithm(each: Experiments, own: Experiments) -> Floats:
+def _logarithm(each: Experiments, own: Experiments) -> FloatArray:
     """(n,) of area weights as a scale read them over the stated one; 0 where none was stated, so that all are alike."""
     return np.zeros(len(each)) if each.stated is None or own.stated is None else np.log(each.stated / own.stated[0])
 
 
-def _regressors(logarithm: Floats) -> Floats:
+def _regressors(logarithm: FloatArray) -> FloatArray:
     """(n, 3) quadratic in it."""
     return np.stack([np.ones_like(logarithm), logarithm, logarithm**2], axis=1)

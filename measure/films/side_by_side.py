@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from flagdata.arrays import UInt8Array
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.pages.pictures import moving, still
 from flagdata.rng import child_seed
-from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import RATE, Batch
 from measure.films.library import Weighable
 from measure.films.run import Outcome
@@ -103,10 +102,10 @@ def _flown(
     outcome: Outcome,
     place: int,
     number: int,
-    values: dict[str, Floats],
+    values: dict[str, FloatArray],
     effect: Weighable | None,
-    strength: Floats | None,
-) -> tuple[ClothWindow, Floats]:
+    strength: FloatArray | None,
+) -> tuple[ClothWindow, FloatArray]:
     """One flag in the wind of a window, as its place sees it, and how far away (frame, vertex) its cloth is [m].
 
     Args:
@@ -145,7 +144,7 @@ def _flown(
     return window, positions @ view.axes(0.0)[2]
 
 
-def drawn(cloth: ClothWindow, depth: Floats, film: FilmWindow, colour: tuple[int, int, int]) -> list[UInt8Array]:
+def drawn(cloth: ClothWindow, depth: FloatArray, film: FilmWindow, colour: tuple[int, int, int]) -> list[UInt8Array]:
     """Frames (size, size, 3) of cloth as large and where the film has its own, at a pole.
 
     Args:

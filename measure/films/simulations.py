@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, IntArray
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
 from measure.calibrate.calibrate import Options as Calibrating
@@ -18,7 +18,6 @@ from measure.calibrate.emulator import Emulator, informative
 from measure.calibrate.leaving_out import usable
 from measure.calibrate.numerics import Correction, Finer
 from measure.calibrate.observed import Observed, check_in_all
-from measure.calibrate.prior import Floats
 from measure.calibrate.sights import first_of
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.summary import Projection, shown
@@ -44,11 +43,11 @@ class Simulations:
     """
 
     designs: tuple[Design, ...]
-    base: tuple[Floats, ...]
-    pairs: tuple[tuple[tuple[Pairs, Floats], ...], ...]
-    nulls: tuple[Floats, ...]
+    base: tuple[FloatArray, ...]
+    pairs: tuple[tuple[tuple[Pairs, FloatArray], ...], ...]
+    nulls: tuple[FloatArray, ...]
     kinds: IntArray
-    weights: Floats
+    weights: FloatArray
     corrections: tuple[Correction, ...]
 
     def of(self, places: Sequence[int]) -> Simulations:
@@ -88,7 +87,7 @@ def gathered(
     made = [[pairs(design, effect, until=until) for effect in effects] for design in designs]
     null = nulls(designs, first_of([one.place for one in recordings]), kinds=kinds, seed=options.seed)
 
-    def all_of(what: str, batches: list) -> Floats:
+    def all_of(what: str, batches: list) -> FloatArray:
         total, done = sum(len(batch.seeds) for batch in batches), 0
 
         def advance(more: int) -> None:
@@ -170,8 +169,8 @@ def sights_of(
 def sight(
     observed: Observed,
     design: Design,
-    base: Floats,
-    own: Sequence[tuple[Pairs, Floats]],
+    base: FloatArray,
+    own: Sequence[tuple[Pairs, FloatArray]],
     correction: Correction,
     *,
     windows: slice | None = None,
@@ -230,10 +229,10 @@ def part_of(observed: Observed, windows: slice) -> Observed:
 class _Part(Observed):
     """Windows of a recording, with the winds of these."""
 
-    speeds: Floats
+    speeds: FloatArray
 
     @property
-    def speed(self) -> Floats:
+    def speed(self) -> FloatArray:
         return self.speeds
 
     @property
@@ -304,7 +303,7 @@ def of_base(
 
 def _weighed(
     made: Experiments,
-    weights: Floats,
+    weights: FloatArray,
     which: BoolArray,
     weighed: tuple[float, float] | None,
     *,

@@ -14,9 +14,9 @@ from itertools import permutations
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from measure.calibrate.observed import Observed
-from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.summary import LEAST_WINDOWS
 from measure.films.evidence import Sight
@@ -41,11 +41,11 @@ class Prediction:
         windows: how many.
     """
 
-    observed: Floats
-    before: Floats
-    after: Floats | None
-    control: Floats | None
-    scatter: Floats
+    observed: FloatArray
+    before: FloatArray
+    after: FloatArray | None
+    control: FloatArray | None
+    scatter: FloatArray
     windows: int
 
 
@@ -132,7 +132,7 @@ def _predicted(
     seen = of_recordings(sights, [own for _, own in task.fitted], weighed)
     rng = stream(seed, "films", "places")
 
-    def means(which: Weighable | None) -> list[Floats]:
+    def means(which: Weighable | None) -> list[FloatArray]:
         """(observable,) of each predicted sight."""
         found = fitted(sights, seen, which, seed=seed)
         own, places, strength = hypothesis(sights, which).values(found.scores[0])
@@ -181,7 +181,7 @@ def _comparison(
     observed, scatter = (np.array([getattr(one, key)[place] for one in own]) for key in ("observed", "scatter"))
     noise = scatter * stream(seed, "films", "unseen", words).standard_normal((_DRAWS, len(own)))
 
-    def errors(predicted: Sequence[Floats]) -> tuple[float, Floats]:
+    def errors(predicted: Sequence[FloatArray]) -> tuple[float, FloatArray]:
         off = observed - np.array([one[place] for one in predicted])
         return float(np.sqrt(np.square(off).mean())), np.sqrt(np.square(off + noise).mean(axis=1))
 
@@ -205,7 +205,7 @@ def _comparison(
     )
 
 
-def _estimate(found: tuple[float, Floats] | None, unit: str) -> Estimate:
+def _estimate(found: tuple[float, FloatArray] | None, unit: str) -> Estimate:
     if found is None:
         return Estimate(value=math.nan, low=math.nan, high=math.nan, unit=unit, level=CRITERIA.interval)
     value, draws = found

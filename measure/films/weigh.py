@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from measure.calibrate.prior import Floats
 from measure.films.evidence import Experiments, Fit, Hypothesis, Sight
 from measure.films.library import Weighable
 from measure.films.score_test import Directions
@@ -25,8 +25,8 @@ class Misfits:
         left: (n, effect) of the model with each.
     """
 
-    base: Floats
-    left: Floats
+    base: FloatArray
+    left: FloatArray
 
     def rows(self, which: Sequence[int]) -> Misfits:
         """Of some experiments."""
@@ -45,7 +45,7 @@ class Weighing:
     """
 
     effects: tuple[Weighable, ...]
-    factors: Floats
+    factors: FloatArray
     misfits: Misfits
 
     def rows(self, which: Sequence[int]) -> Weighing:
@@ -86,7 +86,7 @@ def misfits(sights: Sequence[Sight], observed: Experiments, effects: Sequence[We
     return Misfits(base=hypothesis(sights, None).misfit(observed), left=_side_by_side(left, len(observed)))
 
 
-def _side_by_side(columns: Sequence[Floats], count: int) -> Floats:
+def _side_by_side(columns: Sequence[FloatArray], count: int) -> FloatArray:
     """(count, column), also of none."""
     return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
-from measure.observe.trajectory import Experiment, Floats, Specimen, Trajectory
+from measure.observe.trajectory import Experiment, Specimen, Trajectory
 
 _CALM = 0.3
 """Wind below which the flag, not the log, says where the wind goes [m/s]."""
@@ -40,7 +41,7 @@ def aligned(experiment: Experiment) -> Experiment:
     return Experiment(specimen=moved, recordings=recordings)
 
 
-def _turn(recording: Trajectory, lowest: int, base: Floats) -> Floats:
+def _turn(recording: Trajectory, lowest: int, base: FloatArray) -> FloatArray:
     """Computes the rotation about z, (3, 3), that takes the mean wind, or in calm the cloth's mean direction from its
     lowest attachment, to +x."""
     toward = recording.wind.velocity.mean(axis=0)[:2]

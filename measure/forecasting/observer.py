@@ -39,8 +39,6 @@ from sim.state import State
 from sim.system import InapplicableError, System
 from sim.wind.sampled import Beyond, Even, SampledWind
 
-Floats = FloatArray
-
 WIDEST = 400
 """Members of a batch: beyond, a member costs as much as before. Steps of a flag of 176 vertices side by side in 40
 segments take 34 s by 72 members at a time, 20 s by 400 (with 486 vertices 54 and 41 s)."""
@@ -62,7 +60,7 @@ class Forecaster:
     """
 
     specimen: Specimen
-    markers: Floats
+    markers: FloatArray
     integrator: SplitEuler
     dtype: torch.dtype = torch.float32
     device: torch.device | str = "cpu"
@@ -83,7 +81,7 @@ class Forecaster:
         """The same in double precision."""
         return replace(self, dtype=torch.float64)
 
-    def _real(self, values: Floats) -> Tensor:
+    def _real(self, values: FloatArray) -> Tensor:
         return torch.tensor(values, dtype=self.dtype, device=self.device)
 
     def system(self, segments: Segments, calibrations: Sequence[Calibration]) -> tuple[System, State]:
@@ -277,7 +275,7 @@ def _name(parameter: Column | int) -> str:
     return THETA[parameter][0] if isinstance(parameter, int) else parameter.name
 
 
-def _tied_to_anchors(start: Floats, vertices: Sequence[int], anchors: Floats) -> Floats:
+def _tied_to_anchors(start: FloatArray, vertices: Sequence[int], anchors: FloatArray) -> FloatArray:
     position = start.copy()
     position[list(vertices)] = anchors
     return position

@@ -27,8 +27,6 @@ from sim.effects.parameter import Parameter
 from sim.state import State
 from sim.system import System
 
-Floats = FloatArray
-
 
 class Column(ABC):
     """One direction.
@@ -135,7 +133,7 @@ class FieldColumn(StepColumn):
     def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         return "m/s²"
 
-    def acceleration(self, rest: Floats) -> Tensor:
+    def acceleration(self, rest: FloatArray) -> Tensor:
         """Computes the acceleration (vertex, 3, 1) of a step, at rest coordinates (vertex, 2) [m/s²]."""
         field = torch.zeros((len(rest), 3, 1), dtype=torch.float64)
         field[:, self.axis, 0] = self.step * torch.as_tensor(cosine(self.mode, rest, rest))
@@ -192,7 +190,7 @@ class WrittenColumn(Column):
 
     mode: tuple[int, int]
 
-    def sensitivity(self, markers: Floats, rest: Floats, observed: Tensor, period: float) -> Tensor:
+    def sensitivity(self, markers: FloatArray, rest: FloatArray, observed: Tensor, period: float) -> Tensor:
         """Computes the sensitivity (frame − 2, marker, 3, segment) [m per unit] of observed markers (frame, marker, 3,
         segment), from the third frame on.
 
@@ -262,7 +260,7 @@ def _travelled(observed: Tensor) -> Tensor:
     return (observed[2:] - observed[:-2]) / 2
 
 
-def cosine(mode: tuple[int, int], places: Floats, rest: Floats) -> Floats:
+def cosine(mode: tuple[int, int], places: FloatArray, rest: FloatArray) -> FloatArray:
     """Computes cos(π i u/W) cos(π j v/H) at rest coordinates (place, 2) of a cloth (vertex, 2) [m], (place,)."""
     low = rest.min(axis=0)
     share = (places - low) / (rest.max(axis=0) - low)

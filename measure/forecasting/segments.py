@@ -16,8 +16,6 @@ from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from measure.observe.trajectory import Trajectory, WindTrack
 
-Floats = FloatArray
-
 HORIZON = 0.04
 """About this long a prediction is [s]: 25 frames a second, the paper's rate."""
 _SEGMENT = 2.0  # s
@@ -86,12 +84,12 @@ class Segment:
 
     recording: int
     start: float
-    positions: Floats
+    positions: FloatArray
     wind: WindTrack
     noise: float
-    anchors: Floats | None = None
+    anchors: FloatArray | None = None
     seen: BoolArray | None = None
-    attachments: Floats | None = None
+    attachments: FloatArray | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,7 +103,7 @@ class Segments:
     """
 
     items: tuple[Segment, ...]
-    markers: Floats
+    markers: FloatArray
     cut: Cut
 
     @classmethod
@@ -161,7 +159,7 @@ class Segments:
                 )
         return cls(items=tuple(items), markers=first.markers, cut=cut)
 
-    def tied(self, anchors: Sequence[Floats]) -> Segments:
+    def tied(self, anchors: Sequence[FloatArray]) -> Segments:
         """Ties the segments' cloths where each recording's (held, 3) are [m]; but those that are carried."""
         return replace(
             self,
@@ -181,12 +179,12 @@ class Segments:
         return np.array([item.recording for item in self.items])
 
     @cached_property
-    def noise(self) -> Floats:
+    def noise(self) -> FloatArray:
         """(segment,) of a coordinate [m]."""
         return np.array([item.noise for item in self.items])
 
     @cached_property
-    def positions(self) -> Floats:
+    def positions(self) -> FloatArray:
         """(frame, marker, 3, segment), warm-up included [m]."""
         return np.stack([item.positions for item in self.items], axis=-1)
 
@@ -212,7 +210,7 @@ class Segments:
         return self.seen[first:] & self.seen[first - 1 : -1] & self.seen[first - 2 : -2]
 
     @cached_property
-    def tracked(self) -> Floats:
+    def tracked(self) -> FloatArray:
         """(segment,) share of the predictions that are compared."""
         return np.ones(len(self)) if self.counted is None else self.counted.mean(axis=(0, 1))
 

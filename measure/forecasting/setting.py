@@ -15,7 +15,6 @@ from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Experiment
 from sim.integrate.split import SplitEuler
 
-Floats = FloatArray
 Stage = Callable[[str, int, int], object]
 """Called with what is under way, how much is done, and of how much."""
 
@@ -65,7 +64,7 @@ class Setting:
         return cls(experiment=turned, segments=segments, forecaster=forecaster, calibration=Calibration())
 
     @property
-    def speeds(self) -> Floats:
+    def speeds(self) -> FloatArray:
         """(recording,) mean logged wind [m/s]."""
         return np.array([r.wind.speed for r in self.experiment.recordings])
 
@@ -98,7 +97,7 @@ class Setting:
         )
 
     @property
-    def prior(self) -> Floats:
+    def prior(self) -> FloatArray:
         """(theta,) standard deviations of the calibrated parameters."""
         specimen = self.experiment.specimen
         return prior(specimen.density_uncertainty) if specimen.mass_known else PRIOR_WITHOUT_MASS

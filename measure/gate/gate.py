@@ -22,8 +22,6 @@ from measure.gate.features import MOVES
 from measure.gate.tail_probability import ExponentialTails
 from models.outliers import conformal_p, shrunk_covariance, whitening
 
-Vector = FloatArray
-
 _SIDED = tuple(
     (name, place, sign, kind)
     for place, (name, check) in enumerate(CHECKS.items())
@@ -90,17 +88,17 @@ class Gate:
         statistics: (n, len(CHECKS)) of the calibration clips.
     """
 
-    centre: Vector
-    scale: Vector
-    whitening: Vector
-    directions: Vector
-    offsets: Vector
+    centre: FloatArray
+    scale: FloatArray
+    whitening: FloatArray
+    directions: FloatArray
+    offsets: FloatArray
     tails: ExponentialTails
-    calibration: Vector
-    statistics: Vector
+    calibration: FloatArray
+    statistics: FloatArray
 
     @classmethod
-    def of(cls, plain: Vector, distorted: Mapping[str, Vector], calibration: Vector) -> Gate:
+    def of(cls, plain: FloatArray, distorted: Mapping[str, FloatArray], calibration: FloatArray) -> Gate:
         """Learn it from feature vectors (see `Features.vector`).
 
         Args:
@@ -140,11 +138,11 @@ class Gate:
         )
         return gate._calibrated(rest, calibration)
 
-    def _calibrated(self, rest: Vector, calibration: Vector) -> Gate:
+    def _calibrated(self, rest: FloatArray, calibration: FloatArray) -> Gate:
         gate = replace(self, tails=ExponentialTails.of(self.scores(rest), _RESOLUTION))
         return replace(gate, calibration=np.sort(gate.surprises(calibration).max(axis=1)))
 
-    def scores(self, vectors: Vector) -> Vector:
+    def scores(self, vectors: FloatArray) -> FloatArray:
         """(n, len(SCORES)) of feature vectors (n, f); high is suspicious."""
         z = squashed(vectors, self.centre, self.scale)
         sided = np.stack([sign * vectors[:, place] for _, place, sign, _ in _SIDED], axis=1)
@@ -152,7 +150,7 @@ class Gate:
         everything = np.log10(np.linalg.norm(z @ self.whitening.T, axis=1, keepdims=True)) * 10
         return np.concatenate([sided, distances, everything, z @ self.directions.T - self.offsets], axis=1)
 
-    def surprises(self, vectors: Vector) -> Vector:
+    def surprises(self, vectors: FloatArray) -> FloatArray:
         """(n, len(SCORES)) of feature vectors (n, f): scores on the scale of their tails."""
         return self.tails.surprise(self.scores(vectors))
 
@@ -161,6 +159,6 @@ class Gate:
         return float(conformal_p(self.calibration, surprise))
 
 
-def squashed(vectors: Vector, centre: Vector, scale: Vector) -> Vector:
+def squashed(vectors: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatArray:
     """Feature vectors (n, f) standardised, their far tails drawn in as a logarithm does: asinh."""
     return np.arcsinh((vectors - centre) / scale)

@@ -14,14 +14,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import UInt8Array
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
 from measure.gate.checks import CHECKS
 from measure.gate.clip_statistics import LEAST_DEVIATION, ClipStatistics
 from measure.gate.counted import COUNTED
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.features import features_of
-from measure.gate.gate import SCORES, Gate, Vector
+from measure.gate.gate import SCORES, Gate
 from measure.gate.motion import LEAST_AREA
 from measure.gate.reasons import REASONS
 from measure.gate.tail_probability import level
@@ -209,7 +209,7 @@ def _too_few(count: int, wanted: int) -> Reason:
     return Reason(kind="too-few-frames", what=what, p=None, fix=row.fix, check="frames", value=count)
 
 
-def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float, *, still: bool) -> tuple[Reason, ...]:
+def _reasons(gate: Gate, scores: FloatArray, surprises: FloatArray, at: float, *, still: bool) -> tuple[Reason, ...]:
     """Each kind once, of those whose scores would refuse the clip alone. Of a still clip none is about what moves.
 
     A fault shows in many scores. The kinds are in the order of two voices: the surprise of the kind's weightiest score

@@ -17,7 +17,6 @@ from measure.probes.rows import StatisticRows
 from measure.probes.statistics import Statistics
 from measure.probes.wind_log import DIRECTION, NUISANCES, by_recording
 
-Floats = FloatArray
 Chosen = Sequence[int]
 
 _HERE = (0.0,) * len(THETA)
@@ -48,19 +47,21 @@ class Evidence(StatisticRows):
     _WHOLE: ClassVar = frozenset({"columns", "logged", "prior"})
 
     recording: IntArray
-    curvature: Floats
-    score: Floats
-    energy: Floats
+    curvature: FloatArray
+    score: FloatArray
+    energy: FloatArray
     columns: int
     logged: int = 0
-    lines: Floats | None = None
+    lines: FloatArray | None = None
     turning: Evidence | None = None
     course: Course | None = None
-    settled: Floats | None = None
-    prior: Floats = field(default_factory=PRIOR.copy)
+    settled: FloatArray | None = None
+    prior: FloatArray = field(default_factory=PRIOR.copy)
 
     @classmethod
-    def of(cls, statistics: Statistics, speeds: Floats, null: NullModel, *, further: Floats | None = None) -> Evidence:
+    def of(
+        cls, statistics: Statistics, speeds: FloatArray, null: NullModel, *, further: FloatArray | None = None
+    ) -> Evidence:
         """Computes the evidence of segments with their wind's speed (segment,) [m/s].
 
         Args:
@@ -85,7 +86,7 @@ class Evidence(StatisticRows):
         return replace(evidence, turning=cls.of(statistics.turning, speeds, null.turning))
 
     @classmethod
-    def _of(cls, r: Floats, statistics: Statistics, speeds: Floats, null: NullModel) -> Evidence:
+    def _of(cls, r: FloatArray, statistics: Statistics, speeds: FloatArray, null: NullModel) -> Evidence:
         residuals = r - null.mean(speeds)
         shifts = np.broadcast_to(null.shifts.T, (len(residuals), *null.shifts.T.shape))
         response = np.concatenate([statistics.response, shifts], axis=2)
@@ -114,26 +115,26 @@ class Evidence(StatisticRows):
         return [*range(len(THETA)), *range(self.columns, self.score.shape[1])]
 
     @property
-    def swing(self) -> Floats | None:
+    def swing(self) -> FloatArray | None:
         """(part,) of the wind's course; None where it is not looked at."""
         return None if self.course is None else self.course.swing(self.recording)
 
     @property
-    def settles(self) -> Floats | None:
+    def settles(self) -> FloatArray | None:
         """(quantity,) what recordings settle at less what the model does, the mean over recordings; None where it is
         not looked at."""
         if self.settled is None:
             return None
         return self.settled[np.unique(self.recording, return_index=True)[1]].mean(axis=0)
 
-    def _total(self) -> tuple[Floats, Floats, float]:
+    def _total(self) -> tuple[FloatArray, FloatArray, float]:
         """Sums over the segments, with the priors of the nuisance columns."""
         curvature = self.curvature.sum(axis=0)
         prior = np.concatenate([self.prior**-2, np.ones(self.score.shape[1] - self.columns)])
         curvature[self.nuisance, self.nuisance] += prior
         return curvature, self.score.sum(axis=0), float(self.energy.sum())
 
-    def fit(self, chosen: Chosen, *, centre: Sequence[float] | Floats = _HERE) -> CoefficientFit:
+    def fit(self, chosen: Chosen, *, centre: Sequence[float] | FloatArray = _HERE) -> CoefficientFit:
         """Fits the nuisance columns by generalised least squares, under their priors, and the chosen ones.
 
         Args:
@@ -183,12 +184,12 @@ class Evidence(StatisticRows):
         score[:, places] = 0.0
         return replace(self, curvature=curvature, score=score)
 
-    def drops(self, along: Chosen = ()) -> Floats:
+    def drops(self, along: Chosen = ()) -> FloatArray:
         """Computes how much each column, added to the nuisances and to some more, lowers the squared distance,
         (column,)."""
         return np.square(self.pulls(along))
 
-    def pulls(self, along: Chosen = ()) -> Floats:
+    def pulls(self, along: Chosen = ()) -> FloatArray:
         """Computes the roots of `drops`, each with the sign of the column's coefficient, (column,)."""
         active = [*self.nuisance, *along]
         curvature, score, _ = self._total()
@@ -210,7 +211,7 @@ class Evidence(StatisticRows):
             turning=None if self.turning is None else self.turning.moved(column, coefficient),
         )
 
-    def with_one_more(self, active: Chosen, columns: Chosen) -> tuple[Floats, Floats, Floats]:
+    def with_one_more(self, active: Chosen, columns: Chosen) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Computes how a fit of some columns moves with one more, for each of others: (column,) its coefficients, (all,
         column) how all coefficients go with it, (all,) those of the fit without."""
         curvature, score, _ = self._total()
@@ -224,13 +225,13 @@ class Evidence(StatisticRows):
         step = (score[candidates] - across.T @ solved[:, -1]) / np.maximum(information, np.maximum(1e-9 * total, _TINY))
         return step, moved, fitted
 
-    def left_out(self, outside: BoolArray, chosen: Chosen = ()) -> Floats:
+    def left_out(self, outside: BoolArray, chosen: Chosen = ()) -> FloatArray:
         """Computes half misfits of some segments, when the nuisances and chosen columns are fitted to the others,
         (segment,)."""
         fit = self.select(~outside).fit(chosen)
         return self.select(outside).misfit(fit.active, fit.value) / 2
 
-    def misfit(self, active: Chosen, value: Floats) -> Floats:
+    def misfit(self, active: Chosen, value: FloatArray) -> FloatArray:
         """Computes what coefficients leave of each segment, (segment,)."""
         places = list(active)
         quadratic = np.einsum("a,sab,b->s", value, self.curvature[:, places][:, :, places], value)
@@ -242,11 +243,11 @@ class CoefficientFit:
     """Coefficients of some columns, with their covariance, and the squared distance they leave, prior included."""
 
     active: tuple[int, ...]
-    value: Floats
-    covariance: Floats
+    value: FloatArray
+    covariance: FloatArray
     remainder: float
 
-    def in_errors(self, columns: Sequence[int]) -> Floats:
+    def in_errors(self, columns: Sequence[int]) -> FloatArray:
         """Computes some coefficients in their standard errors, (column,)."""
         return np.array([value / error for value, error in map(self.of, columns)])
 
@@ -263,7 +264,7 @@ def left_together(recording: IntArray) -> IntArray:
     return (np.arange(len(recording)) >= len(recording) / 2).astype(np.int64)
 
 
-def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
+def gains(evidence: Evidence, choices: Sequence[Chosen]) -> FloatArray:
     """Computes how much better each choice of columns predicts segments it was not fitted to: (choice, segment).
 
     Each recording is left out in turn (of a single recording, each half), the model is fitted to the others, and the

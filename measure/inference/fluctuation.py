@@ -9,8 +9,6 @@ import numpy as np
 from flagdata.arrays import FloatArray
 from measure.inference.evidence import Chosen, Evidence, left_together
 
-Floats = FloatArray
-
 
 @dataclass(frozen=True, kw_only=True)
 class Fluctuation:
@@ -40,7 +38,7 @@ def fluctuation(evidence: Evidence, column: int, along: Chosen = ()) -> Fluctuat
     across = fit.remainder - float((score**2 / curvature).sum())
     size = across / (len(score) * (evidence.columns - 1))
     score, curvature = score / size, curvature / size
-    grid: Floats = np.concatenate([np.zeros(1), np.geomspace(1e-3, 10.0, 200)]) ** 2
+    grid: FloatArray = np.concatenate([np.zeros(1), np.geomspace(1e-3, 10.0, 200)]) ** 2
     likelihood = _restricted(grid, score, curvature)
     best = int(np.argmax(likelihood))
     deviation = float(np.sqrt(grid[best]))
@@ -50,7 +48,7 @@ def fluctuation(evidence: Evidence, column: int, along: Chosen = ()) -> Fluctuat
     return Fluctuation(deviation=deviation, error=error, likelihood=float(likelihood[best]))
 
 
-def fluctuation_gains(evidence: Evidence, column: int) -> Floats:
+def fluctuation_gains(evidence: Evidence, column: int) -> FloatArray:
     """Computes the log likelihood of each left-out recording's segments under the others' constant and fluctuation,
     over their constant alone, (segment,)."""
     folds = left_together(evidence.recording)
@@ -67,7 +65,7 @@ def fluctuation_gains(evidence: Evidence, column: int) -> Floats:
     return result
 
 
-def _restricted(variances: Floats, score: Floats, curvature: Floats) -> Floats:
+def _restricted(variances: FloatArray, score: FloatArray, curvature: FloatArray) -> FloatArray:
     """Computes the restricted log likelihood of coefficients s/h ± 1/√h that vary by τ² about a constant, over none,
     (variance,)."""
     single = score / curvature

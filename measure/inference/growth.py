@@ -11,10 +11,8 @@ import numpy as np
 
 from flagdata.arrays import FloatArray
 
-Floats = FloatArray
 
-
-def power(sizes: Floats, damping: Floats) -> float:
+def power(sizes: FloatArray, damping: FloatArray) -> float:
     """Estimates by which power of the damping sizes grow: least squares of their logarithms, taken back toward 0 by
     what chance makes of it. It is 0 within two standard errors, so that few experiments of extreme damping lead
     nowhere, and where the damping does not vary.

@@ -24,8 +24,6 @@ from measure.inference.growth import power
 from measure.probes.rows import StatisticRows
 from measure.probes.statistics import Statistics
 
-Floats = FloatArray
-
 _SHIFTS = 16
 """Number of shifts. In 112 null experiments, drops of columns fell by a fifth from 8 to 16, by a twentieth to 32."""
 
@@ -43,11 +41,11 @@ class NullModel:
         prior: (theta,) standard deviations of the calibrated parameters about the nominal ones, in units of `THETA`.
     """
 
-    coefficients: Floats
-    covariance: Floats
-    shifts: Floats
+    coefficients: FloatArray
+    covariance: FloatArray
+    shifts: FloatArray
     turning: NullModel | None = None
-    prior: Floats = field(default_factory=PRIOR.copy)
+    prior: FloatArray = field(default_factory=PRIOR.copy)
 
     @classmethod
     def fit(cls, nulls: Nulls, design: Design) -> NullModel:
@@ -80,11 +78,11 @@ class NullModel:
             turning=None if turning is None else cls.fit(replace(nulls, statistics=turning), design),
         )
 
-    def under(self, prior: Floats) -> NullModel:
+    def under(self, prior: FloatArray) -> NullModel:
         """Replaces the prior of the calibrated parameters."""
         return replace(self, prior=prior, turning=None if self.turning is None else self.turning.under(prior))
 
-    def mean(self, speeds: Floats) -> Floats:
+    def mean(self, speeds: FloatArray) -> FloatArray:
         """Predicts the mean (segment, column)."""
         return _features(speeds) @ self.coefficients
 
@@ -104,11 +102,11 @@ class Nulls(StatisticRows):
     """
 
     statistics: Statistics
-    speeds: Floats
-    calibration: Floats
+    speeds: FloatArray
+    calibration: FloatArray
     numerics: IntArray
-    noise: Floats
-    period: Floats
+    noise: FloatArray
+    period: FloatArray
     cloth: NDArray[np.str_]
 
     @cached_property
@@ -129,7 +127,7 @@ class Nulls(StatisticRows):
             ]
         )
 
-    def beyond(self, design: Design) -> Floats:
+    def beyond(self, design: Design) -> FloatArray:
         """Computes by how much squared noise [mm²] and period [10 ms] differ from a design's, where they vary,
         (segment, k)."""
         beyond = np.stack([1e6 * (self.noise**2 - design.noise**2), 100 * (self.period - design.period)], axis=1)
@@ -161,11 +159,13 @@ def _power_of_damping(nulls: Nulls) -> float:
     return power(np.sqrt(sizes), nulls.calibration[first, DAMPING])
 
 
-def _features(speeds: Floats) -> Floats:
+def _features(speeds: FloatArray) -> FloatArray:
     return np.stack([np.ones_like(speeds), speeds, speeds**2], axis=1)
 
 
-def _by_cloth(means: Floats, kinds: IntArray, cloths: NDArray[np.str_], covariance: Floats) -> dict[str, Floats]:
+def _by_cloth(
+    means: FloatArray, kinds: IntArray, cloths: NDArray[np.str_], covariance: FloatArray
+) -> dict[str, FloatArray]:
     """Predicts for each cloth, (column,), what the nulls of one nominal cloth have in common, beyond that of all.
 
     A random effect of the cloth beside one of the numerics, predicted linearly (Henderson, Biometrics 31:423, 1975).
@@ -193,7 +193,7 @@ def _by_cloth(means: Floats, kinds: IntArray, cloths: NDArray[np.str_], covarian
     return {name: share * centres[name] for name, share in zip(names, shrunk, strict=True)}
 
 
-def _principal(means: Floats, covariance: Floats) -> Floats:
+def _principal(means: FloatArray, covariance: FloatArray) -> FloatArray:
     """Computes directions with most of the variance of the means, in units of the covariance: (shift, column)."""
     factor = np.linalg.cholesky(covariance)
     whitened = np.linalg.solve(factor, (means - means.mean(axis=0)).T)
@@ -203,7 +203,7 @@ def _principal(means: Floats, covariance: Floats) -> Floats:
     return (factor @ (directions[:, :count] * scale)).T
 
 
-def _inflation(residuals: Floats, recording: IntArray, covariance: Floats) -> float:
+def _inflation(residuals: FloatArray, recording: IntArray, covariance: FloatArray) -> float:
     """Computes how much more recordings' means vary than those of as many independent segments, at least 1."""
     sums = np.stack(
         [
@@ -215,7 +215,7 @@ def _inflation(residuals: Floats, recording: IntArray, covariance: Floats) -> fl
     return float(max(1.0, np.median(ratio)))
 
 
-def _shrunk(covariance: Floats, count: int) -> Floats:
+def _shrunk(covariance: FloatArray, count: int) -> FloatArray:
     """Shrinks the covariance toward its diagonal, by the share that chance correlations have at this count."""
     share = min(1.0, len(covariance) / count)
     return (1 - share) * covariance + share * np.diag(np.diag(covariance))

@@ -12,8 +12,6 @@ from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel
 from measure.probes.statistics import Projection, Statistics
 
-Floats = FloatArray
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WhitenedMisfit:
@@ -31,7 +29,7 @@ class WhitenedMisfit:
     statistics: Statistics
     projection: Projection
     null: NullModel
-    speeds: Floats
+    speeds: FloatArray
     origin: Calibration = field(default_factory=Calibration)
 
     def of(self, errors: Tensor) -> Evidence:

@@ -19,8 +19,6 @@ from measure.inference.random_effect import NullModel
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.probes.statistics import Statistics, reduced
 
-Floats = FloatArray
-
 ROUNDS = 3
 _FEW = 8
 """Shifts of the numerics that are fitted beside the few columns of a model: with 16, they take the columns' place."""
@@ -62,7 +60,7 @@ class Refined:
     origin: Model
     anchor: Calibration
     null: NullModel
-    speeds: Floats
+    speeds: FloatArray
     stays: bool
 
     def without(self, outside: BoolArray) -> Model:
@@ -163,7 +161,7 @@ def _round(
     segments: Segments,
     origin: Model,
     null: NullModel,
-    speeds: Floats,
+    speeds: FloatArray,
     chosen: tuple[int, ...],
     *,
     anchor: Calibration,
@@ -193,7 +191,7 @@ def _round(
     )
 
 
-def cut(step: Floats) -> tuple[float, ...]:
+def cut(step: FloatArray) -> tuple[float, ...]:
     """Cuts a step along the calibrated parameters and strengths to no further than the linear model reaches."""
     longest = np.concatenate([_LONGEST * PRIOR, np.full(len(step) - len(PRIOR), np.inf)])
     return tuple(float(v) for v in np.clip(step, -longest, longest))
@@ -216,8 +214,8 @@ def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Sta
 
 
 def _step(
-    statistics: Statistics, null: NullModel, speeds: Floats, model: Model, anchor: Calibration
-) -> tuple[Floats, Floats]:
+    statistics: Statistics, null: NullModel, speeds: FloatArray, model: Model, anchor: Calibration
+) -> tuple[FloatArray, FloatArray]:
     """Takes one step of generalised least squares from here, under the prior about a calibration; with standard
     errors."""
     count = statistics.r.shape[1]

@@ -58,9 +58,9 @@ class Profile:
     """
 
     column: EffectColumn
-    sizes: Floats
+    sizes: FloatArray
     sign: int
-    misfit: Floats
+    misfit: FloatArray
 
     def estimate(self, *, larger: float) -> Estimate | None:
         """Estimates the strength as a bound; None where the profile has two ends, and the fit says more, or where
@@ -133,7 +133,7 @@ def one_sided(described: Parameter) -> bool:
     return low * high >= 0
 
 
-def across(column: EffectColumn, coefficient: float) -> tuple[Floats, int]:
+def across(column: EffectColumn, coefficient: float) -> tuple[FloatArray, int]:
     """Spaces distances from null, (n,), ascending, from well below what is expected and what was fitted to well beyond,
     as far as the effect may have them; returns them with the sign of the strengths."""
     described = column.described
@@ -143,9 +143,6 @@ def across(column: EffectColumn, coefficient: float) -> tuple[Floats, int]:
     sizes = [*(expected if single else expected[-1:]), *([abs(coefficient)] if coefficient * sign > 0 else [])]
     farthest = abs(described.nearest(described.null + sign * BEYOND * max(sizes)) - described.null)
     return np.geomspace(min(sizes) / BEYOND, _WITHIN_THE_END * farthest, COUNT), sign
-
-
-Floats = FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -160,7 +157,7 @@ class Fits:
     forecaster: Forecaster
     segments: Segments
     whitened: WhitenedMisfit
-    settling: Callable[[Model], Floats] | None = None
+    settling: Callable[[Model], FloatArray] | None = None
     _made: dict[tuple[int, ...], Refined | None] = field(default_factory=dict)
     _left: dict[tuple[tuple[int, ...], bytes], LeftOut] = field(default_factory=dict)
     _errors: dict[tuple[int, ...], Tensor] = field(default_factory=dict)
@@ -228,7 +225,7 @@ class Refit:
     """
 
     coefficient: float
-    gains: Floats
+    gains: FloatArray
     leftover: float
     evidence: Evidence
     profile: Profile | None = None
@@ -244,7 +241,7 @@ def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, worker
     together = left_together(fits.whitened.statistics.recording)
     parts = [together == index for index in np.unique(together)]
 
-    def misfits_of(fitted: Refined) -> list[Floats]:
+    def misfits_of(fitted: Refined) -> list[FloatArray]:
         return [fold.misfit for fold in fits.left_out(fitted, parts)]
 
     def refit_of(column: int) -> Refit | None:

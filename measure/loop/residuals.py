@@ -11,7 +11,6 @@ from measure.loop.validation import Predictions
 from measure.observe.trajectory import Experiment
 from measure.verdict.record import Residual
 
-Floats = FloatArray
 _SHOWN = 50
 """Frames in motion: two seconds at 25 a second."""
 
@@ -61,12 +60,12 @@ def residuals(
     return tuple(residuals_of)
 
 
-def _joined(values: Floats, places: IntArray) -> Floats:
+def _joined(values: FloatArray, places: IntArray) -> FloatArray:
     """Joins one recording's segments one after another, (frame, marker, 3)."""
     return np.concatenate([values[..., segment] for segment in places])
 
 
-def _over(errors: Floats, counted: BoolArray, axis: int) -> Floats:
+def _over(errors: FloatArray, counted: BoolArray, axis: int) -> FloatArray:
     """Computes the root mean square distance over frames (0) or markers (1) [m], of what was tracked; NaN where nothing
     was."""
     count = counted.sum(axis=axis)
@@ -74,11 +73,11 @@ def _over(errors: Floats, counted: BoolArray, axis: int) -> Floats:
     return np.sqrt(np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0))
 
 
-def _spectrum(errors: Floats, period: float) -> tuple[Floats, Floats]:
+def _spectrum(errors: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and mean one-sided power density of the errors' coordinates, summed over axes [m²/Hz]."""
     frequencies, density = welch(errors, fs=1 / period, axis=0, nperseg=min(50, len(errors)))
     return frequencies[1:], density.sum(axis=2).mean(axis=1)[1:]
 
 
-def _list(values: Floats) -> list[float]:
+def _list(values: FloatArray) -> list[float]:
     return [float(v) for v in values]

@@ -123,7 +123,6 @@ def _damping(value: float, half: float) -> Estimate:
     return Estimate(value=value, low=max(0.0, low), high=high, unit="s", level=CRITERIA.interval)
 
 
-Floats = FloatArray
 _FLOOR_COPIES = 4
 _LOOKS = 4
 """At most: a damping of 30 ms is reached from 2.5 ms in two or three."""
@@ -365,7 +364,7 @@ def _settling(setting: Setting, fits: Fits, seed: int) -> Fits:
         seed=child_seed(seed, "settled"),
     )
 
-    def settling(model: Model) -> Floats:
+    def settling(model: Model) -> FloatArray:
         batch = replace(plain, calibrations=(model.calibration,) * len(recordings), effects=model.acting)
         return settled_off(recordings, batch)[setting.recording]
 
@@ -403,7 +402,7 @@ def _trial(solved: Solved, options: LoopOptions) -> Trial:
         tried = list(pool.map(left_out_by, fitted))
         of_recording, floor = simulated.result()
     comparisons: list[Comparison] = []
-    differences: list[Floats] = []
+    differences: list[FloatArray] = []
     places: list[IntArray] = []
     squared = 0.0
     frames = len(setting.segments.items[0].positions) - setting.segments.first

@@ -33,8 +33,6 @@ from measure.verdict.quantity import number
 from measure.verdict.record import Candidate, Conclusion, Estimate
 from sim.effects import EFFECTS
 
-Floats = FloatArray
-
 GUST_COLUMN = -1
 """Stands for gusts, which are no column: only their size can be found, not their course."""
 _FIRST = len(THETA)
@@ -66,7 +64,7 @@ class Weighed:
     column: int
     candidate: Candidate
     error: float
-    gains: Floats
+    gains: FloatArray
     recording: IntArray
     admissible: bool
     unlike: str = ""
@@ -268,7 +266,7 @@ def _confidence_set(ranking: Sequence[Weighed], evidence: Evidence) -> list[Weig
     return [w for w in able if not _leads(best, w.gains, evidence.recording) and _leads(w.gains, 0 * best, w.recording)]
 
 
-def _leads(first: Floats, second: Floats, recording: IntArray) -> bool:
+def _leads(first: FloatArray, second: FloatArray, recording: IntArray) -> bool:
     """Returns whether held-out scores (segment,) are better by more than `Criteria.lead` standard errors of the
     difference."""
     return bool((first - second).sum() > CRITERIA.lead * total_error(first - second, recording))
@@ -417,8 +415,8 @@ def _weigh(
     reference: Reference,
     column: int,
     effect: EffectColumn,
-    linear: Floats,
-    statistics: Floats,
+    linear: FloatArray,
+    statistics: FloatArray,
     refitted: Refit | None,
     *,
     lost: bool,

@@ -27,7 +27,6 @@ from measure.observe.anchors import as_seen
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Comparison, Estimate
 
-Floats = FloatArray
 _DURATION = 4.5  # s: two segments of each recording
 _ENOUGH = 3
 """Segments of a recording beyond which two may be left out."""
@@ -54,7 +53,7 @@ class Trial:
     """
 
     comparisons: tuple[Comparison, ...] = ()
-    apart: Floats | None = None
+    apart: FloatArray | None = None
     recording: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     rises: bool = False
 
@@ -64,7 +63,7 @@ class Trial:
         return None if self.apart is None else a_segment(self.apart, self.recording)
 
 
-def total_error(values: Floats, recording: IntArray) -> float:
+def total_error(values: FloatArray, recording: IntArray) -> float:
     """Computes the standard error of a sum over segments (segment,) that are drawn within recordings.
 
     Recordings are strata: that an effect helps more in strong wind than in light wind is no chance. Where one has a
@@ -75,7 +74,7 @@ def total_error(values: Floats, recording: IntArray) -> float:
     return math.sqrt(sum(len(part) * float(np.var(part, ddof=1)) for part in _strata(values, recording)))
 
 
-def _strata(values: Floats, recording: IntArray) -> list[Floats]:
+def _strata(values: FloatArray, recording: IntArray) -> list[FloatArray]:
     strata = [values[recording == index] for index in np.unique(recording)]
     return strata if min(len(part) for part in strata) > 1 else [values]
 
@@ -84,11 +83,11 @@ def _strata(values: Floats, recording: IntArray) -> list[Floats]:
 class Predictions:
     """What one model says of segments: errors and predicted markers (frame, marker, 3, segment) [m]."""
 
-    errors: Floats
-    predicted: Floats
+    errors: FloatArray
+    predicted: FloatArray
 
     @property
-    def squared(self) -> Floats:
+    def squared(self) -> FloatArray:
         """(segment,) mean squared distance [m²]."""
         return _squared(self.errors)
 
@@ -122,7 +121,7 @@ def predict(
     return Predictions(errors=_array(errors), predicted=_array(predicted))
 
 
-def _array(values: torch.Tensor) -> Floats:
+def _array(values: torch.Tensor) -> FloatArray:
     return values.double().cpu().numpy()
 
 
@@ -130,8 +129,8 @@ def _array(values: torch.Tensor) -> Floats:
 class LeftOut:
     """What a model leaves of segments it was not fitted to: (segment,) mean squared distances [m²], half misfits."""
 
-    squared: Floats
-    misfit: Floats
+    squared: FloatArray
+    misfit: FloatArray
 
 
 def left_out(
@@ -168,7 +167,7 @@ def measured(
     ]
 
 
-def _squared(errors: Floats) -> Floats:
+def _squared(errors: FloatArray) -> FloatArray:
     """Computes the mean squared distance, (segment,) [m²]."""
     return (errors**2).sum(axis=2).mean(axis=(0, 1))
 
@@ -182,7 +181,7 @@ def compare(
     after: LeftOut,
     control: LeftOut | None,
     control_name: str,
-    floor: Floats,
+    floor: FloatArray,
 ) -> Comparison:
     """Errors of the segments left out.
 
@@ -206,7 +205,7 @@ def compare(
     )
 
 
-def share_removed(before: Floats, after: Floats, floor: Floats) -> float | None:
+def share_removed(before: FloatArray, after: FloatArray, floor: FloatArray) -> float | None:
     """Computes the share of the mean square above the floor that is gone after; None where there is hardly anything
     above it.
 
@@ -218,7 +217,7 @@ def share_removed(before: Floats, after: Floats, floor: Floats) -> float | None:
     return float(before.mean() - after.mean()) / above if above > CRITERIA.room * most else None
 
 
-def a_segment(values: Floats, recording: IntArray) -> Estimate:
+def a_segment(values: FloatArray, recording: IntArray) -> Estimate:
     """Averages misfits over segments, drawn within recordings, with Student's interval [nat]."""
     value, reach = float(values.mean()), math.inf
     if len(values) > 1:
@@ -228,7 +227,7 @@ def a_segment(values: Floats, recording: IntArray) -> Estimate:
     return Estimate(value=value, low=value - reach, high=value + reach, unit="1", level=CRITERIA.interval)
 
 
-def root(squared: Floats) -> Estimate:
+def root(squared: FloatArray) -> Estimate:
     """Computes the root of the mean over segments, with Student's interval of the mean, through the root [m]."""
     mean = float(squared.mean())
     reach = _reach(squared)
@@ -241,7 +240,7 @@ def root(squared: Floats) -> Estimate:
     )
 
 
-def paired(before: Floats, after: Floats) -> Estimate:
+def paired(before: FloatArray, after: FloatArray) -> Estimate:
     """Computes the difference of roots of means, paired by segment: linear in the squares, for which Student's interval
     is valid."""
     slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))
@@ -249,7 +248,7 @@ def paired(before: Floats, after: Floats) -> Estimate:
     return Estimate(value=value, low=value - reach, high=value + reach, unit="m", level=CRITERIA.interval)
 
 
-def _reach(values: Floats) -> float:
+def _reach(values: FloatArray) -> float:
     if len(values) < 2:
         return math.inf
     quantile = float(student.ppf(0.5 + CRITERIA.interval / 2, len(values) - 1))
@@ -258,7 +257,7 @@ def _reach(values: Floats) -> float:
 
 def numerical_floor(
     setting: Setting, recordings: IntArray, model: Model, *, copies: int, seed: int
-) -> tuple[IntArray, Floats]:
+) -> tuple[IntArray, FloatArray]:
     """Computes errors of segments simulated from a model by other numerics and predicted by it.
 
     Args:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import read_arrays
+from flagdata.arrays import FloatArray, read_arrays
 from flagdata.errors import CorruptError, NotFoundError, UsageError
 from flagdata.lake.durable import put_if_absent
 from flagdata.provenance import code_version
@@ -33,7 +33,7 @@ from measure.nulls.free_run import mistaken, settled_off
 from measure.nulls.reference import NullBank
 from measure.nulls.simulation import NullBatch
 from measure.observe.anchors import as_seen
-from measure.observe.trajectory import Floats, Specimen, Trajectory
+from measure.observe.trajectory import Specimen, Trajectory
 from measure.probes.course import Course
 from measure.probes.statistics import Statistics, statistics
 from sim.integrate.split import SplitEuler
@@ -84,7 +84,7 @@ def around(slowest: float, fastest: float) -> tuple[float, float]:
 def prior_batch(
     specimen: Specimen,
     *,
-    markers: Floats,
+    markers: FloatArray,
     rate: float,
     duration: float,
     noise: float,
@@ -138,7 +138,7 @@ def evaluate(batch: NullBatch, numerics: int, along: Sequence[Column]) -> tuple[
     return nulls, segments.duration
 
 
-def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]:
+def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[FloatArray]:
     """Computes anchors (held, 3) for each recording [m]; where they are not given, taken from all recordings of its
     cloth."""
     cloths: dict[Calibration, list[Trajectory]] = {}

@@ -29,8 +29,6 @@ from flagdata.arrays import FloatArray, IntArray
 from measure.nulls.conformal import MOST_KINDS
 from measure.shares import clopper_pearson
 
-Floats = FloatArray
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClusteredNulls:
@@ -41,7 +39,7 @@ class ClusteredNulls:
         kinds: (flag,) of numerics.
     """
 
-    null: Floats
+    null: FloatArray
     kinds: IntArray
 
     @cached_property

@@ -24,8 +24,6 @@ import numpy as np
 from flagdata.arrays import FloatArray, IntArray
 from measure.shares import clopper_pearson
 
-Floats = FloatArray
-
 MOST_KINDS = 1000
 """Kinds of numerics beyond which none are proposed: 1,000 take some six hours of a core."""
 
@@ -44,7 +42,7 @@ class GroupedConformal:
         kinds: (group,) of numerics.
     """
 
-    null: Floats
+    null: FloatArray
     kinds: IntArray
 
     @cached_property
@@ -103,7 +101,7 @@ class GroupedConformal:
         return float(self._weight[self.null >= value].sum())
 
     @cached_property
-    def _weight(self) -> Floats:
+    def _weight(self) -> FloatArray:
         """Weighs each group by one over how many groups its kind has, (group,)."""
         _, kind, counts = np.unique(self.kinds, return_inverse=True, return_counts=True)
         return 1 / counts[kind]

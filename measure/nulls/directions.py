@@ -17,8 +17,6 @@ from flagdata.arrays import FloatArray
 from measure.forecasting.strengths import on_markers
 from measure.inference.evidence import Evidence
 
-Floats = FloatArray
-
 APPEARS = 0.25
 """Share of a shift that the fit's mesh expects of an effect which appears in recordings of other meshes: the median of
 twelve, 0 to 0.55 (decision 062). Most of the sensitivity of a forecast is the mesh's own chaos."""
@@ -56,7 +54,7 @@ def moves(columns: tuple[str, ...]) -> list[Move]:
     ]
 
 
-def pulled(evidence: Evidence) -> Floats:
+def pulled(evidence: Evidence) -> FloatArray:
     """Computes the root of each column's drop over what is left with it, with the sign of its coefficient, (column,
     part); parts are the errors', and their moments' about the pole where these are looked at."""
     parts = [evidence] if evidence.turning is None else [evidence, evidence.turning]
@@ -64,18 +62,18 @@ def pulled(evidence: Evidence) -> Floats:
     return np.stack([np.sign(pulls) * np.sqrt(shares_of(pulls**2, remainder)) for pulls, remainder in fits], axis=1)
 
 
-def standardised(pulls: Floats, centre: Floats, width: Floats) -> Floats:
+def standardised(pulls: FloatArray, centre: FloatArray, width: FloatArray) -> FloatArray:
     """Standardises (…, column, part) pulls: less what is usual, over how much they vary; −∞ where nothing is seen."""
     return np.where(width > np.cbrt(NOTHING), (pulls - centre) / np.maximum(width, np.cbrt(NOTHING)), -np.inf)
 
 
-def directed(pulls: Floats, column: int, sign: int) -> Floats:
+def directed(pulls: FloatArray, column: int, sign: int) -> FloatArray:
     """Computes how far standardised pulls (group, column, part) go the way of one effect, by the farther part,
     (group,)."""
     of_column = pulls[:, column]
     return np.where(np.isfinite(of_column), sign * of_column, -np.inf).max(axis=1)
 
 
-def shares_of(drops: Floats, misfit: float) -> Floats:
+def shares_of(drops: FloatArray, misfit: float) -> FloatArray:
     """Divides drops by what is left with each."""
     return drops / np.maximum(misfit - drops, 1e-9)

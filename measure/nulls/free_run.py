@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed, stream
 from measure.forecasting.calibration import Calibration
 from measure.nulls.simulation import NullBatch
-from measure.observe.trajectory import Floats, Trajectory
+from measure.observe.trajectory import Trajectory
 from measure.probes.settled import settled
 from measure.verdict.criteria import CRITERIA
 
@@ -18,7 +19,7 @@ _COPIES = 2
 """Runs of the model for each recording, from other starts: the mean of two differs by chance less than one does."""
 
 
-def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> Floats:
+def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> FloatArray:
     """Computes what recordings settle at less what a model does in the same winds, held where they show it to be held,
     (recording, quantity).
 

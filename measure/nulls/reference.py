@@ -26,7 +26,6 @@ from measure.probes.lines import Lines, SpectralLine, strongest
 from measure.probes.rows import StatisticRows
 from measure.verdict.criteria import CRITERIA
 
-Floats = FloatArray
 _GROUPS = 400
 GUSTS = "air-density.change"
 """The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
@@ -120,7 +119,7 @@ class NullBank:
         errors_alone = replace(self.nulls.statistics, turning=None, course=None, settled=None)
         return replace(self, nulls=replace(self.nulls, statistics=errors_alone))
 
-    def reference(self, segments: int, *, noise: float, seed: int, prior: Floats = PRIOR) -> Reference:
+    def reference(self, segments: int, *, noise: float, seed: int, prior: FloatArray = PRIOR) -> Reference:
         """Computes statistics of groups like the data: so many segments of recordings of one null experiment, by a null
         model that has seen none of its numerics.
 
@@ -177,17 +176,17 @@ class _NullGroups(StatisticRows):
         damping: (group,) logarithm of its ratio to the nominal one.
     """
 
-    shares: Floats
-    pulls: Floats
-    left: Floats
-    gained: Floats
-    swings: Floats
-    settled: Floats
-    lines: Floats | None
-    deviations: Floats
-    noise: Floats
+    shares: FloatArray
+    pulls: FloatArray
+    left: FloatArray
+    gained: FloatArray
+    swings: FloatArray
+    settled: FloatArray
+    lines: FloatArray | None
+    deviations: FloatArray
+    noise: FloatArray
     kinds: IntArray
-    damping: Floats
+    damping: FloatArray
 
     @classmethod
     def of(cls, evidence: Evidence, columns: tuple[str, ...], segment: Nulls) -> _NullGroups:
@@ -220,14 +219,14 @@ class _NullGroups(StatisticRows):
 class _Usual:
     """What the statistics of some null groups are like: see `Reference`."""
 
-    spread: Floats
-    centre: Floats
-    width: Floats
+    spread: FloatArray
+    centre: FloatArray
+    width: FloatArray
     lines: Lines | None
-    powers: Floats
-    degrees: Floats
-    pull: Floats
-    pull_width: Floats
+    powers: FloatArray
+    degrees: FloatArray
+    pull: FloatArray
+    pull_width: FloatArray
 
     @classmethod
     def of(cls, groups: _NullGroups) -> _Usual:
@@ -245,12 +244,12 @@ class _Usual:
             pull_width=groups.pulls.std(axis=0),
         )
 
-    def pulled(self, pulls: Floats) -> Floats:
+    def pulled(self, pulls: FloatArray) -> FloatArray:
         """Computes how far each column pulls more than it does in nulls, in their standard deviations, (group, column,
         part)."""
         return standardised(pulls, self.pull, self.pull_width)
 
-    def far(self, groups: _NullGroups) -> Floats:
+    def far(self, groups: _NullGroups) -> FloatArray:
         """Computes how far groups are from their mean, in deviations by each one's own tail, (group, column + 2 to
         11)."""
         distances = as_normal((_roots(groups, self.lines, self.powers) - self.centre) / self.width, self.degrees)
@@ -260,7 +259,7 @@ class _Usual:
         return distances
 
 
-def _roots(groups: _NullGroups, lines: Lines | None, powers: Floats) -> Floats:
+def _roots(groups: _NullGroups, lines: Lines | None, powers: FloatArray) -> FloatArray:
     swings = groups.swings * np.exp(-np.outer(groups.damping, powers))
     roots = np.c_[np.cbrt(np.c_[groups.shares, groups.left, groups.gained]), swings, groups.settled]
     return roots if lines is None or groups.lines is None else np.c_[roots, lines.standing_out(groups.lines)]
@@ -314,19 +313,19 @@ class Reference:
             test along all.
     """
 
-    scaled: Floats
-    spread: Floats
-    far: Floats
+    scaled: FloatArray
+    spread: FloatArray
+    far: FloatArray
     kinds: IntArray
-    deviations: Floats
-    centre: Floats
-    width: Floats
-    degrees: Floats
-    pulled: Floats
-    pull: Floats
-    pull_width: Floats
+    deviations: FloatArray
+    centre: FloatArray
+    width: FloatArray
+    degrees: FloatArray
+    pulled: FloatArray
+    pull: FloatArray
+    pull_width: FloatArray
     lines: Lines | None = None
-    powers: Floats = field(default_factory=lambda: np.zeros(0))
+    powers: FloatArray = field(default_factory=lambda: np.zeros(0))
     damping: float = 0.0
     beside_gusts: Reference | None = None
     columns: tuple[str, ...] = ()
@@ -418,7 +417,7 @@ class Reference:
         return GroupedConformal(null=self.far.max(axis=1), kinds=self.kinds)
 
     @cached_property
-    def reach(self) -> Floats:
+    def reach(self) -> FloatArray:
         """Computes standard errors, as Σ has them, to either side of an interval of the calibrated parameters: as many
         as hold the true ones in a share of the kinds of numerics, themselves and one more counted, that is the
         intervals' level, (theta,)."""
@@ -460,9 +459,9 @@ class Reference:
         return tuple((signs[0], float(np.mean([shares[move] for move in signs]))) for signs in by_column.values())
 
     @cached_property
-    def _acting(self) -> dict[Move, Floats]:
+    def _acting(self) -> dict[Move, FloatArray]:
         """Computes the statistic of nulls on which each effect that is tested for acts, as far as appears, (group,)."""
-        statistics_of: dict[Move, Floats] = {}
+        statistics_of: dict[Move, FloatArray] = {}
         for move in moves(self.columns):
             if self.suspected is None or (move.column, move.sign) == self.suspected:
                 acted = [group.evidence.moved(move.column, APPEARS * move.strength) for group in self.groups]
@@ -478,7 +477,7 @@ class Reference:
             return float(usual.far(_NullGroups.of(evidence, self.columns, segment)).max())
         return float(directed(usual.pulled(pulled(evidence)[None]), *self.suspected)[0])
 
-    def statistics(self, evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> Floats:
+    def statistics(self, evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> FloatArray:
         """Computes (column,) statistics of data, as `scaled` has them, where some columns are fitted already."""
         shares = unscaled(evidence, columns, along)
         return shares / self.spread[: len(shares)]
@@ -532,7 +531,7 @@ class Reference:
         damped = observed * np.exp(-self.damping * self.powers)
         return float(np.abs(self._by_tail(damped, columns)).max())
 
-    def settles(self, evidence: Evidence) -> Floats | None:
+    def settles(self, evidence: Evidence) -> FloatArray | None:
         """Computes how far each quantity of data lies that recordings settle at, (quantity,); None where they are not
         looked at.
 
@@ -567,11 +566,11 @@ class Reference:
         line = self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
         return replace(line, far=float(as_normal(np.array(line.far), self.degrees[-1])))
 
-    def _distance(self, values: Floats | float, columns: int | slice) -> Floats:
+    def _distance(self, values: FloatArray | float, columns: int | slice) -> FloatArray:
         """Computes how far shares, what is left or the best gain lie, as `far` has it."""
         return self._by_tail(np.cbrt(values), columns)
 
-    def _by_tail(self, values: Floats | float, columns: int | slice) -> Floats:
+    def _by_tail(self, values: FloatArray | float, columns: int | slice) -> FloatArray:
         """Computes how far roots lie, as they are."""
         return as_normal((values - self.centre[columns]) / self.width[columns], self.degrees[columns])
 
@@ -582,7 +581,7 @@ def _uncounted(columns: tuple[str, ...]) -> list[int]:
     return [columns.index(TURNED)] if TURNED in columns else []
 
 
-def unscaled(evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> Floats:
+def unscaled(evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> FloatArray:
     """Computes each column's drop over what is left with it in some segments, and the likelihood ratio of gusts; where
     moments about the pole are looked at, then the same drops of these, and what they leave.
 

@@ -35,8 +35,6 @@ from sim.scene import Scene, assemble
 from sim.system import System
 from sim.wind.sampled import Beyond, Even, SampledWind
 
-Floats = FloatArray
-
 SETTLE = 3.0  # s, before the first frame; a flag of 1.5 m has forgotten a start from rest after two swings
 _FINER = (1.3, 1.75)
 _STEPS = (1e-3, 2e-3)  # s, of backward Euler
@@ -69,7 +67,7 @@ class NullBatch:
     """
 
     specimen: Specimen
-    markers: Floats
+    markers: FloatArray
     rate: float
     duration: float
     noise: float
@@ -121,7 +119,7 @@ class NullBatch:
         nearest = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
         return flat, tuple(nearest)
 
-    def _frames(self, flat: Mesh, attached: tuple[int, ...]) -> Floats:
+    def _frames(self, flat: Mesh, attached: tuple[int, ...]) -> FloatArray:
         """Computes positions (frame, vertex, 3, recording) [m], after the start has been forgotten.
 
         Cloth that is stretched beyond what a stable step is estimated for diverges; it is run anew in smaller steps.
@@ -139,7 +137,7 @@ class NullBatch:
             fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
         )
 
-    def as_fitted(self) -> Floats:
+    def as_fitted(self) -> FloatArray:
         """Computes the same by the mesh and the steps of the fit, without noise, (frame, marker, 3, recording) [m].
 
         Raises:
@@ -156,7 +154,7 @@ class NullBatch:
             ) from None
         return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), frames)
 
-    def _run(self, flat: Mesh, attached: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
+    def _run(self, flat: Mesh, attached: tuple[int, ...], integrator: Integrator, damped: float) -> FloatArray:
         """Runs the flags by a method that damps by itself so much [s].
 
         Raises:
@@ -202,7 +200,7 @@ class NullBatch:
         """When the recording's first frame is, since the start of the run [s]."""
         return after(SETTLE, self.duration, self.rate).start / self.rate
 
-    def _times(self, period: float) -> Floats:
+    def _times(self, period: float) -> FloatArray:
         """Lists times (n,) of a run, so far apart, since the recording's first frame [s]."""
         return np.arange(math.ceil((SETTLE + self.duration) / period) + 2, dtype=np.float64) * period - self._begins
 
@@ -230,7 +228,7 @@ class NullBatch:
         return SplitEuler(base=base) if self.effects else base, step
 
 
-def _hung(rest: Floats, seats: Floats, anchors: Floats) -> Floats:
+def _hung(rest: FloatArray, seats: FloatArray, anchors: FloatArray) -> FloatArray:
     """Hangs a plane upright cloth below or beside its anchors (held, 3) [m], turned about the vertical as they are,
     (vertex, 3); one that is held along a vertical stands along +x.
 

@@ -16,21 +16,19 @@ import numpy as np
 
 from flagdata.arrays import FloatArray
 
-Floats = FloatArray
-
 _NORMAL = 1e6
 """Degrees of freedom from which a tail is the normal's."""
 _TINY = float(np.finfo(np.float64).tiny)
 
 
-def freedom(values: Floats) -> Floats:
+def freedom(values: FloatArray) -> FloatArray:
     """Estimates degrees of freedom by the kurtosis of nulls (group, statistic), from 4 on, (statistic,)."""
     about = values - values.mean(axis=0)
     kurtosis = (about**4).mean(axis=0) / np.maximum((about**2).mean(axis=0) ** 2, _TINY) - 3
     return np.minimum(4 + 6 / np.maximum(kurtosis, 6 / _NORMAL), _NORMAL)
 
 
-def as_normal(deviations: Floats, degrees: Floats | np.float64) -> Floats:
+def as_normal(deviations: FloatArray, degrees: FloatArray | np.float64) -> FloatArray:
     """Deviations of statistics of unit variance, brought to normal ones that are as rare, to 2 % (Wallace, Annals of
     Mathematical Statistics 30:1121, 1959); their signs are kept."""
     squared = deviations**2 * degrees / (degrees - 2)

@@ -14,10 +14,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from measure.nulls.simulation import CARRIED, SETTLE
 from measure.observe.interpolation import onto
-from measure.observe.trajectory import AttachmentTrack, Floats, Trajectory
+from measure.observe.trajectory import AttachmentTrack, Trajectory
 
 _TURN = 1.0
 """In which a way that ends slows down and turns back [s], so that it has no jump of its velocity."""
@@ -27,7 +28,7 @@ _HALVINGS = 40
 
 
 def like(
-    recordings: Sequence[Trajectory], seats: Floats, count: int, *, duration: float, seed: int
+    recordings: Sequence[Trajectory], seats: FloatArray, count: int, *, duration: float, seed: int
 ) -> tuple[AttachmentTrack, ...]:
     """Draws so many ways of attachments; none where those of the recordings are held still.
 
@@ -54,7 +55,7 @@ def like(
     return tuple(drawn)
 
 
-def smoothed(recording: Trajectory, seats: Floats) -> CubicSpline:
+def smoothed(recording: Trajectory, seats: FloatArray) -> CubicSpline:
     """Smooths the way of a recording's attachments (held, 3) [m] over its time [s], free of the noise of the markers.
 
     It is the smoothest, by its third differences, that lies as far from the tracked one as the noise does (Whittaker,
@@ -79,7 +80,7 @@ def smoothed(recording: Trajectory, seats: Floats) -> CubicSpline:
     return CubicSpline(recording.times, smooth.reshape(tracked.shape))
 
 
-def _roughness(count: int) -> Floats:
+def _roughness(count: int) -> FloatArray:
     """Computes the bands (4, count) of the sum of squared third differences of so many values, the diagonal last."""
     factors = np.array([-1.0, 3.0, -3.0, 1.0])
     bands = np.zeros((4, count))
@@ -90,7 +91,7 @@ def _roughness(count: int) -> Floats:
     return bands
 
 
-def _smooth(values: Floats, weight: float, bands: Floats) -> Floats:
+def _smooth(values: FloatArray, weight: float, bands: FloatArray) -> FloatArray:
     """Minimises squared distances from values, and a weight times their roughness, (frame, coordinate).
 
     Args:

@@ -9,7 +9,6 @@ from scipy.interpolate import make_interp_spline
 from flagdata.arrays import FloatArray
 from measure.observables.unseen import UnseenError
 
-Floats = FloatArray
 RATE = 25.0
 """Rate [Hz] at which courses are compared: films of 25 fps and more have it."""
 LOWEST, HIGHEST = 0.4, 8.0
@@ -20,7 +19,7 @@ _LARGEST_GAP = 0.25
 """Gap between frames [s] from which on a course is not interpolated."""
 
 
-def even(times: Floats, course: Floats) -> tuple[Floats, Floats]:
+def even(times: FloatArray, course: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Times and course (n, …) at `RATE`, by a cubic spline.
 
     Raises:
@@ -34,7 +33,7 @@ def even(times: Floats, course: Floats) -> tuple[Floats, Floats]:
     return at, make_interp_spline(times, course, k=3)(at)
 
 
-def speed(times: Floats, course: Floats) -> float:
+def speed(times: FloatArray, course: FloatArray) -> float:
     """Root mean square speed of a course (n, 2) by central differences over 2/`RATE` seconds [its unit per s].
 
     Raises:
@@ -45,7 +44,7 @@ def speed(times: Floats, course: Floats) -> float:
     return float(np.sqrt(np.square(steps).sum(axis=1).mean()))
 
 
-def spectrum(times: Floats, course: Floats) -> tuple[Floats, Floats]:
+def spectrum(times: FloatArray, course: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] of the band and power of a course (n, d) there, summed over its axes; a Hann window without the
     straight line through the course.
 
@@ -59,7 +58,7 @@ def spectrum(times: Floats, course: Floats) -> tuple[Floats, Floats]:
     return frequency[band], np.square(np.abs(transform[band])).sum(axis=1)
 
 
-def transformed(at: Floats, places: Floats) -> NDArray[np.complex128]:
+def transformed(at: FloatArray, places: FloatArray) -> NDArray[np.complex128]:
     """Fourier transform (f, d) of a course (n, d) at even instants less its straight line, under a Hann window."""
     line = np.polynomial.polynomial.polyvander(at - at.mean(), 1)
     residual = places - line @ np.linalg.lstsq(line, places, rcond=None)[0]

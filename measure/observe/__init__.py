@@ -26,7 +26,6 @@ if TYPE_CHECKING:
         DENSITY_UNCERTAINTY,
         AttachmentTrack,
         Experiment,
-        Floats,
         Specimen,
         Trajectory,
         WindTrack,

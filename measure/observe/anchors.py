@@ -11,11 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from measure.observe.interpolation import onto
-from measure.observe.trajectory import Floats, Specimen, Trajectory
+from measure.observe.trajectory import Specimen, Trajectory
 
 
-def anchors_of(recordings: Sequence[Trajectory], seats: Floats) -> Floats:
+def anchors_of(recordings: Sequence[Trajectory], seats: FloatArray) -> FloatArray:
     """Locates points (held, 2) of the cloth on the average, (held, 3) [m], recordings counting alike.
 
     Each marker counts by the frames in which it was tracked.
@@ -24,13 +25,13 @@ def anchors_of(recordings: Sequence[Trajectory], seats: Floats) -> Floats:
     return np.mean(means, axis=0)
 
 
-def carried(recording: Trajectory, seats: Floats) -> Trajectory:
+def carried(recording: Trajectory, seats: FloatArray) -> Trajectory:
     """Moves the recording's attachments where its markers say that points (held, 2) of the cloth go."""
     attachments = np.einsum("sm,fmi->fsi", onto(recording.markers, seats), recording.positions)
     return replace(recording, attachments=attachments)
 
 
-def _tracked_mean(recording: Trajectory) -> Floats:
+def _tracked_mean(recording: Trajectory) -> FloatArray:
     """Averages each marker over the frames in which it was tracked, (marker, 3) [m]; over all frames where none was."""
     if recording.seen is None:
         return recording.positions.mean(axis=0)

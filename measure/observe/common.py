@@ -13,11 +13,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial import KDTree
 
-from flagdata.arrays import IntArray
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe.interpolation import onto
-from measure.observe.trajectory import Floats, Trajectory
+from measure.observe.trajectory import Trajectory
 
 _SAME = 1e-6
 """Share of the cloth's size within which places are the same: rest coordinates are often kept in single precision."""
@@ -63,7 +63,7 @@ def at_same_rate(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ..
 
 
 def at_same_points(
-    recordings: Sequence[Trajectory], points: Floats
+    recordings: Sequence[Trajectory], points: FloatArray
 ) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]]:
     """Resamples the recordings to these points (point, 2) [m]; returns them as they are if their markers are the same.
 
@@ -143,5 +143,5 @@ def _shared(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], t
     return tuple(selected), (finding,)
 
 
-def _same_markers(first: Floats, second: Floats) -> bool:
+def _same_markers(first: FloatArray, second: FloatArray) -> bool:
     return first.shape == second.shape and bool(np.abs(first - second).max() <= _SAME * np.ptp(first, axis=0).max())

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from flagdata.ingest.meshes.store import scene_wind
 from flagdata.lake import Artifact
 from measure.observe.observation import Known
-from measure.observe.trajectory import Floats, WindTrack
+from measure.observe.trajectory import WindTrack
 from sim import handles
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.arcsim import STAGES
@@ -23,7 +24,7 @@ from sim.handles import ARCSIM_STIFFNESS
 from sim.material import BENDING_SHAPE, MATERIALS, STRETCHING_SHAPE, Material, named
 
 
-def of_arcsim(scene: Mapping[str, Any], rest: Floats, *, where: str) -> tuple[Known, tuple[Finding, ...]]:
+def of_arcsim(scene: Mapping[str, Any], rest: FloatArray, *, where: str) -> tuple[Known, tuple[Finding, ...]]:
     """Reads what an ArcSim scene says, and what it ran with that no model here has.
 
     The material is looked up in the catalog under its file's name: output folders name the file, but do not hold it.
@@ -51,7 +52,7 @@ def of_arcsim(scene: Mapping[str, Any], rest: Floats, *, where: str) -> tuple[Kn
     return description, _arcsim_findings(scene, entry, where)
 
 
-def of_simulation(artifact: Artifact, rest: Floats) -> Known:
+def of_simulation(artifact: Artifact, rest: FloatArray) -> Known:
     """Reads what the row of a mesh sequence says that was simulated here; silent for any other.
 
     Its effects are left aside: the search for missing effects must not know them.
@@ -93,7 +94,7 @@ def of_simulation(artifact: Artifact, rest: Floats) -> Known:
         ) from None
 
 
-def _simulated_pins(scene: Mapping[str, Any], rest: Floats) -> Floats | None:
+def _simulated_pins(scene: Mapping[str, Any], rest: FloatArray) -> FloatArray | None:
     """Locates the pins of the recipe's shape; None for an ArcSim scene, whose handles are not in the row."""
     if scene["shape"] == "flag":
         vertices = handles.full_hoist(rest) if scene["attachment"] == "hoist" else handles.corners(rest)
@@ -121,7 +122,7 @@ def _arcsim_material(entry: Mapping[str, Any], where: str) -> Material | None:
     )
 
 
-def _arcsim_pins(scene: Mapping[str, Any], rest: Floats, where: str) -> Floats | None:
+def _arcsim_pins(scene: Mapping[str, Any], rest: FloatArray, where: str) -> FloatArray | None:
     nodes: list[int] = []
     for handle in scene.get("handles", []):
         listed = _table(handle, where).get("nodes", [])

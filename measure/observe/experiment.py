@@ -34,7 +34,7 @@ from measure.observe.common import at_same_points, at_same_rate
 from measure.observe.gaps import fill_positions
 from measure.observe.observation import Known, Observation
 from measure.observe.setup import Hold, Setup
-from measure.observe.trajectory import Experiment, Floats, Specimen, Trajectory
+from measure.observe.trajectory import Experiment, Specimen, Trajectory
 from sim import handles
 from sim.air import QuadraticNormal
 from sim.handles import ARCSIM_STIFFNESS
@@ -153,7 +153,7 @@ _NEAR = 1e-6
 """Share of the cloth's size: what is nearer than this is in one place."""
 
 
-def hold(mesh: Mesh, pins: Hold | Floats) -> tuple[Mesh, tuple[int, ...]]:
+def hold(mesh: Mesh, pins: Hold | FloatArray) -> tuple[Mesh, tuple[int, ...]]:
     """Moves a vertex of the mesh to each pin; returns the mesh and those vertices.
 
     Args:
@@ -249,7 +249,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     return Observed(experiment=experiment, findings=findings)
 
 
-def _prepared(observation: Observation, corners: Floats) -> Observation:
+def _prepared(observation: Observation, corners: FloatArray) -> Observation:
     """Prepares a recording with even frames and no gaps, its noise settled, its lengths those of the rest shape.
 
     Wrong values become NaN and are reported; then all NaN are filled or left out together.
@@ -342,7 +342,7 @@ def _stiffness(descriptions: Sequence[Known], setup: Setup) -> float:
     return _agreed([k.stiffness for k in descriptions], setup.stiffness, ARCSIM_STIFFNESS, "stiffness of the pins")
 
 
-def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[Floats, tuple[Finding, ...]]:
+def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[FloatArray, tuple[Finding, ...]]:
     """Finds the cloth's outline, as the set-up states it, as the meshes have it, or as far as the markers reach."""
     if setup.outline is not None:
         corners = np.asarray(setup.outline, dtype=np.float64)
@@ -365,7 +365,7 @@ def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[Floats,
     return (corners if cloth.area(corners) > 0 else corners[::-1]), ()
 
 
-def _trajectory(observation: Observation, low: Floats) -> Trajectory:
+def _trajectory(observation: Observation, low: FloatArray) -> Trajectory:
     where = f"recording {observation.name!r}"
     if observation.wind is None:
         raise InputError("no wind is known", where=where, fix="give its velocity, or an anemometer's log (--wind)")
@@ -406,7 +406,7 @@ def _material(descriptions: Sequence[Known], setup: Setup) -> Material:
     return first
 
 
-def _pins(descriptions: Sequence[Known], setup: Setup, low: Floats) -> Hold | Floats:
+def _pins(descriptions: Sequence[Known], setup: Setup, low: FloatArray) -> Hold | FloatArray:
     """Returns (pin, 2) in the mesh's coordinates, or a name."""
     if isinstance(setup.pins, Hold):
         return setup.pins

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from flagdata.arrays import BoolArray, IntArray
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
-from measure.observe.trajectory import Floats, Trajectory
+from measure.observe.trajectory import Trajectory
 
 LONGEST = 0.12
 """Longest gap that the marker's own motion fills [s]: three frames at 25 a second."""
@@ -40,7 +40,7 @@ class Filled:
 
     frames: slice
     markers: BoolArray
-    positions: Floats
+    positions: FloatArray
     seen: BoolArray | None
     findings: tuple[Finding, ...]
 
@@ -69,7 +69,7 @@ def fill(trajectory: Trajectory) -> tuple[Trajectory, tuple[Finding, ...]]:
     return complete, filled.findings
 
 
-def fill_positions(positions: Floats, markers: Floats, *, period: float, where: str) -> Filled:
+def fill_positions(positions: FloatArray, markers: FloatArray, *, period: float, where: str) -> Filled:
     """Fills the NaN of positions (frame, marker, 3).
 
     The recording is cut to begin and end with frames in which about as many markers were tracked as usually. A marker
@@ -147,7 +147,7 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
     return Filled(frames=frames, markers=markers_used, positions=complete, seen=tracked_used, findings=tuple(findings))
 
 
-def _filled(positions: Floats, tracked: BoolArray, markers: Floats, longest: int) -> Floats:
+def _filled(positions: FloatArray, tracked: BoolArray, markers: FloatArray, longest: int) -> FloatArray:
     """Fills (frame, marker, 3)."""
     complete = np.array(positions)
     index = np.arange(len(complete))
@@ -155,7 +155,7 @@ def _filled(positions: Floats, tracked: BoolArray, markers: Floats, longest: int
     for marker in np.flatnonzero(~tracked.all(axis=0)).tolist():
         of_marker = tracked[:, marker]
         spline = CubicSpline(index[of_marker], positions[of_marker, marker])
-        carried: Floats | None = None
+        carried: FloatArray | None = None
         for begin, end in _gaps(of_marker):
             inner = begin > 0 and end < len(of_marker)
             if (inner and end - begin <= longest) or tracked[begin:end].sum(axis=1).min() < _NEIGHBOURS:
@@ -167,7 +167,7 @@ def _filled(positions: Floats, tracked: BoolArray, markers: Floats, longest: int
     return complete
 
 
-def _long_gap(track: Floats, carried: Floats, gap: IntArray) -> Floats:
+def _long_gap(track: FloatArray, carried: FloatArray, gap: IntArray) -> FloatArray:
     """Fills a gap (gap, 3) of a marker (frame, 3), by its own positions at the gap's ends or by where its neighbours
     take it."""
     off, half = track - carried, max(1, (len(gap) + 1) // 2)
@@ -175,14 +175,14 @@ def _long_gap(track: Floats, carried: Floats, gap: IntArray) -> Floats:
     return moved if _swing(off, half) < _swing(track, half) and np.isfinite(moved).all() else _across(track, gap)
 
 
-def _across(series: Floats, gap: IntArray) -> Floats:
+def _across(series: FloatArray, gap: IntArray) -> FloatArray:
     """Interpolates a series (frame, 3) in a gap, (gap, 3): it changes evenly between its ends, and stays beyond a
     single one."""
     ends = [frame for frame in (gap[0] - 1, gap[-1] + 1) if 0 <= frame < len(series)]
     return np.stack([np.interp(gap, ends, series[ends, axis]) for axis in range(3)], axis=-1)
 
 
-def _swing(series: Floats, half: int) -> float:
+def _swing(series: FloatArray, half: int) -> float:
     """Computes the mean square by which a series (frame, 3) is off the mean of itself so many frames before and after.
 
     It is what filling a gap of twice as many frames from its ends costs where the series is known; infinite where it
@@ -193,7 +193,9 @@ def _swing(series: Floats, half: int) -> float:
     return float((finite**2).sum(axis=1).mean()) if len(finite) else np.inf
 
 
-def _carried(positions: Floats, tracked: BoolArray, markers: Floats, neighbours: IntArray, marker: int) -> Floats:
+def _carried(
+    positions: FloatArray, tracked: BoolArray, markers: FloatArray, neighbours: IntArray, marker: int
+) -> FloatArray:
     """Maps a marker by the quadratic map of its nearest tracked neighbours, (frame, 3) [m].
 
     It is not finite in frames in which hardly a marker was tracked.
@@ -214,7 +216,7 @@ def _carried(positions: Floats, tracked: BoolArray, markers: Floats, neighbours:
     return positions_by_neighbours
 
 
-def _weights(arms: Floats) -> Floats:
+def _weights(arms: FloatArray) -> FloatArray:
     """Computes weights (neighbour,) by which places add up to that of a marker, arms (neighbour, 2) from it [m]."""
     u, v = (arms / np.abs(arms).max()).T
     basis = np.stack([np.ones(len(u)), u, v, u * u, u * v, v * v], axis=1)

@@ -8,11 +8,11 @@ from enum import StrEnum
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, IntArray
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe.cloth import outline
-from measure.observe.trajectory import Floats, WindTrack
+from measure.observe.trajectory import WindTrack
 from sim.air import AirForce
 from sim.material import Material
 
@@ -53,7 +53,7 @@ class Known:
     """
 
     material: Material | None = None
-    pins: Floats | None = None
+    pins: FloatArray | None = None
     stiffness: float | None = None
     gravity: tuple[float, float, float] | None = None
     air: AirForce | None = None
@@ -82,10 +82,10 @@ class Observation:
     """
 
     name: str
-    markers: Floats
-    positions: Floats
-    times: Floats
-    outline: Floats | None = None
+    markers: FloatArray
+    positions: FloatArray
+    times: FloatArray
+    outline: FloatArray | None = None
     wind: WindTrack | None = None
     noise: float | None = None
     source: str = ""
@@ -123,8 +123,8 @@ class Observation:
 def from_arrays(
     *,
     name: str,
-    positions: Floats,
-    rest: Floats,
+    positions: FloatArray,
+    rest: FloatArray,
     rate: float,
     faces: IntArray | None = None,
     wind: WindTrack | None = None,

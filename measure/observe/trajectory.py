@@ -16,8 +16,6 @@ from sim.material import Material
 from sim.mesh import Mesh
 from sim.scene import GRAVITY
 
-Floats = FloatArray
-
 GAIN = 0.03
 """Share: calibrated cups and sonics are good to 1 to 3 % (IEC 61400-12-1, annex I, classes them so)."""
 DIRECTION = math.radians(5.0)
@@ -43,8 +41,8 @@ class WindTrack:
         InputError: shapes that disagree, values that are not finite, times that do not increase, a negative deviation.
     """
 
-    times: Floats
-    velocity: Floats
+    times: FloatArray
+    velocity: FloatArray
     gain: float = GAIN
     direction: float = DIRECTION
     clock: float = CLOCK
@@ -96,7 +94,7 @@ class WindTrack:
         """Shifts the wind's times to an instant that many seconds later."""
         return replace(self, times=self.times - seconds)
 
-    def at(self, times: Floats) -> Floats:
+    def at(self, times: FloatArray) -> FloatArray:
         """Interpolates velocities (k, 3) [m/s] at times (k,) [s]; outside the log its first and last sample."""
         return np.stack([np.interp(times, self.times, self.velocity[:, axis]) for axis in range(3)], axis=-1)
 
@@ -113,8 +111,8 @@ class AttachmentTrack:
         InputError: shapes that disagree, values that are not finite, times that do not increase.
     """
 
-    times: Floats
-    places: Floats
+    times: FloatArray
+    places: FloatArray
 
     def __post_init__(self) -> None:
         times, places = _frozen(self.times), _frozen(self.places)
@@ -133,7 +131,7 @@ class AttachmentTrack:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "places", places)
 
-    def at(self, times: Floats) -> Floats:
+    def at(self, times: FloatArray) -> FloatArray:
         """Interpolates (k, held, 3) [m] at times (k,) [s]."""
         flat = self.places.reshape(len(self.times), -1)
         interpolated = np.stack([np.interp(times, self.times, values) for values in flat.T], axis=-1)
@@ -161,14 +159,14 @@ class Trajectory:
     """
 
     name: str
-    markers: Floats
-    positions: Floats
+    markers: FloatArray
+    positions: FloatArray
     rate: float
     wind: WindTrack
     noise: float = 0.0
     source: str = ""
     seen: BoolArray | None = None
-    attachments: Floats | None = None
+    attachments: FloatArray | None = None
 
     def __post_init__(self) -> None:
         markers, positions = _frozen(self.markers), _frozen(self.positions)
@@ -209,7 +207,7 @@ class Trajectory:
         object.__setattr__(self, "positions", positions)
 
     @property
-    def times(self) -> Floats:
+    def times(self) -> FloatArray:
         """(frame,) since the first frame [s]."""
         return np.arange(len(self.positions)) / self.rate
 
@@ -242,7 +240,7 @@ class Specimen:
     mesh: Mesh
     material: Material
     held: tuple[int, ...]
-    anchors: Floats
+    anchors: FloatArray
     stiffness: float = ARCSIM_STIFFNESS
     anchors_given: bool = True
     mass_known: bool = True
@@ -261,7 +259,7 @@ class Specimen:
         object.__setattr__(self, "anchors", anchors)
 
     @property
-    def seats(self) -> Floats:
+    def seats(self) -> FloatArray:
         """(held, 2) where the attachments are on the flat cloth [m]."""
         return self.mesh.rest[list(self.held)]
 
@@ -308,7 +306,7 @@ class Experiment:
                 )
 
 
-def _frozen(values: Floats) -> Floats:
+def _frozen(values: FloatArray) -> FloatArray:
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array

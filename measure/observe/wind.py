@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer import WindOptions, read_log
@@ -22,7 +23,7 @@ from flagdata.record.parent import open_parent
 from flagdata.schema import UNUSABLE, Kind
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS, iso
-from measure.observe.trajectory import Floats, WindTrack
+from measure.observe.trajectory import WindTrack
 
 _LONG_GAP = 5.0  # s without a usable sample are reported
 _COMPONENTS = ("wind_x", "wind_y", "wind_z")
@@ -155,7 +156,7 @@ def from_artifact(lake: Lake, artifact: Artifact, placement: LogPlacement) -> tu
     return track(series, placement, where=where)
 
 
-def _velocity(series: WindSeries, placement: LogPlacement, *, where: str) -> Floats:
+def _velocity(series: WindSeries, placement: LogPlacement, *, where: str) -> FloatArray:
     """Computes where the air goes to, (n, 3) [m/s]; NaN where a channel has no value."""
     channels = series.channels
     if placement.axis is not None:
@@ -189,7 +190,7 @@ def _velocity(series: WindSeries, placement: LogPlacement, *, where: str) -> Flo
     )
 
 
-def _speed(series: WindSeries, where: str) -> Floats:
+def _speed(series: WindSeries, where: str) -> FloatArray:
     """Computes the horizontal speed, (n,) [m/s]."""
     channels = series.channels
     if "wind_speed" in channels:

@@ -27,8 +27,6 @@ from flagdata.arrays import FloatArray, IntArray
 from measure.probes.rows import StatisticRows
 from measure.verdict.criteria import CRITERIA
 
-Floats = FloatArray
-
 ALONG, LEFT = 0, 1
 _WINDOW = 0.2
 """s: most of what a whipping edge does is slower, most of what noise does faster."""
@@ -45,11 +43,11 @@ class Course(StatisticRows):
             is known.
     """
 
-    score: Floats
-    curvature: Floats
-    log: Floats | None = None
+    score: FloatArray
+    curvature: FloatArray
+    log: FloatArray | None = None
 
-    def swing(self, recording: IntArray) -> Floats:
+    def swing(self, recording: IntArray) -> FloatArray:
         """Computes Σ √(h h') c c' over neighbouring windows, c about its recording's mean, a segment, (part,).
 
         In units of the errors' scale, so that errors that are larger all over leave no larger ones.
@@ -73,22 +71,22 @@ class Course(StatisticRows):
         return Variation(total=total, fast=fast, error=error)
 
     @property
-    def _together(self) -> Floats:
+    def _together(self) -> FloatArray:
         """(segment, window − 1, part) weights of products of neighbours."""
         return np.sqrt(self._diagonal[:, :-1]) * np.sqrt(
             self._diagonal[:, 1:]
         )  # a product of two that are tiny is none
 
     @property
-    def _diagonal(self) -> Floats:
+    def _diagonal(self) -> FloatArray:
         """Returns h, (segment, window, part)."""
         return np.maximum(np.einsum("swpp->swp", self.curvature), np.finfo(np.float64).tiny)
 
-    def _mean(self, value: Floats) -> Floats:
+    def _mean(self, value: FloatArray) -> FloatArray:
         """Averages over the windows, (segment, 1, part)."""
         return (self._diagonal * value).sum(axis=1, keepdims=True) / self._diagonal.sum(axis=1, keepdims=True)
 
-    def _about(self, recording: IntArray) -> Floats:
+    def _about(self, recording: IntArray) -> FloatArray:
         """Computes c less its recording's mean, and less what its log may be off by, (segment, window, part)."""
         value = self._centred(self.score, recording)
         if self.log is None:
@@ -103,7 +101,7 @@ class Course(StatisticRows):
             )
         return value
 
-    def _centred(self, score: Floats, recording: IntArray) -> Floats:
+    def _centred(self, score: FloatArray, recording: IntArray) -> FloatArray:
         """Computes scores over h, less their recording's mean, (segment, window, part)."""
         value = score / self._diagonal
         for index in np.unique(recording):
@@ -122,9 +120,9 @@ class Variation:
         error: (part,) standard errors of `total`, by how segments differ; none where they are not known.
     """
 
-    total: Floats
-    fast: Floats
-    error: Floats = field(default_factory=lambda: np.zeros(3))
+    total: FloatArray
+    fast: FloatArray
+    error: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def turbulent(self) -> bool:
@@ -187,7 +185,7 @@ class Gauge:
         curvature = torch.einsum("spfk,sqfk->sfpq", self.moved, self.moved)
         return Course(score=self._windows(score), curvature=self._windows(curvature))
 
-    def _windows(self, values: Tensor) -> Floats:
+    def _windows(self, values: Tensor) -> FloatArray:
         """Sums (segment, frame, …) over windows, (segment, window, …); frames beyond the last whole window are left
         out."""
         count = values.shape[1] // self.window

@@ -18,9 +18,7 @@ from torch import Tensor
 from flagdata.arrays import FloatArray, IntArray
 from measure.forecasting.regressors import cosine
 
-Floats = FloatArray
-
-REDUCED: Floats = np.geomspace(1.0, 4.0, 70)
+REDUCED: FloatArray = np.geomspace(1.0, 4.0, 70)
 """f/U [1/m]: bodies 5 to 20 cm wide. Below are the harmonics of the flutter of a flag of 1.5 m, at about 0.3, by which
 nulls of some numerics stand out. 2 % apart: less than the lines' own width."""
 SHAPES = tuple((i, 0) for i in range(5))
@@ -44,24 +42,24 @@ class Spectrum:
         period: between the frames [s].
     """
 
-    shapes: Floats
-    speeds: Floats
+    shapes: FloatArray
+    speeds: FloatArray
     period: float
 
     @classmethod
-    def of(cls, markers: Floats, rest: Floats, speeds: Floats, period: float) -> Spectrum:
+    def of(cls, markers: FloatArray, rest: FloatArray, speeds: FloatArray, period: float) -> Spectrum:
         """Makes the shapes of markers (marker, 2) on a cloth (vertex, 2) [m]."""
         shapes = np.stack([cosine(mode, markers, rest) for mode in SHAPES]) / len(markers)
         return cls(shapes=shapes, speeds=speeds, period=period)
 
-    def prominence(self, errors: Tensor) -> Floats:
+    def prominence(self, errors: Tensor) -> FloatArray:
         """Computes the prominence (segment, reduced frequency, shape · axis) of errors (frame, marker, 3, segment) [m];
         NaN where the frames are too few a second."""
         power, frequency = self._power(errors), self._frequency
         around = np.stack([np.median(power[np.abs(frequency - f) <= _NEAR], axis=0) for f in frequency])
         return self._with_the_wind(power / np.maximum(around, np.finfo(np.float64).tiny))
 
-    def _power(self, errors: Tensor) -> Floats:
+    def _power(self, errors: Tensor) -> FloatArray:
         """Computes the power (frequency, segment, shape · axis) [m²]."""
         frames, segments = errors.shape[0], errors.shape[3]
         shapes = torch.as_tensor(self.shapes, dtype=errors.dtype, device=errors.device)
@@ -71,11 +69,11 @@ class Spectrum:
         return spectrum.real**2 + spectrum.imag**2
 
     @property
-    def _frequency(self) -> Floats:
+    def _frequency(self) -> FloatArray:
         """Frequencies of the transforms [Hz]."""
         return np.asarray(np.fft.rfftfreq(_POINTS, self.period), dtype=np.float64)
 
-    def _with_the_wind(self, values: Floats) -> Floats:
+    def _with_the_wind(self, values: FloatArray) -> FloatArray:
         """Selects (segment, reduced frequency, shape · axis) of (frequency, segment, shape · axis); NaN where the
         frames are too few a second, or where there is no wind that anything could be shed in."""
         frequency = self._frequency
@@ -115,20 +113,20 @@ class Lines:
         mean, deviation: (shape · axis,) of the logarithm of the most prominent line's power.
     """
 
-    mean: Floats
-    deviation: Floats
+    mean: FloatArray
+    deviation: FloatArray
 
     @classmethod
-    def of(cls, groups: Floats) -> Lines:
+    def of(cls, groups: FloatArray) -> Lines:
         """Describes the lines of null groups (group, shape · axis): see `strongest`."""
         return cls(mean=groups.mean(axis=0), deviation=np.maximum(groups.std(axis=0), 1e-6))
 
-    def standing_out(self, groups: Floats) -> Floats:
+    def standing_out(self, groups: FloatArray) -> FloatArray:
         """Computes how far each group is from nulls' mean, in their standard deviations, at the shape and axis where it
         is farthest, (group,)."""
         return ((groups - self.mean) / self.deviation).max(axis=1)
 
-    def line(self, prominence: Floats, *, centre: float, width: float) -> SpectralLine:
+    def line(self, prominence: FloatArray, *, centre: float, width: float) -> SpectralLine:
         """Finds the line in some segments (segment, reduced frequency, shape · axis).
 
         Args:
@@ -142,13 +140,13 @@ class Lines:
         )
 
 
-def strongest(prominence: Floats) -> Floats:
+def strongest(prominence: FloatArray) -> FloatArray:
     """Computes the logarithm of the most prominent line's power, (shape · axis,), its mean over segments (segment,
     reduced frequency, shape · axis); only frequencies that at least half of them can show."""
     return _strongest(prominence)[0]
 
 
-def _strongest(prominence: Floats) -> tuple[Floats, IntArray]:
+def _strongest(prominence: FloatArray) -> tuple[FloatArray, IntArray]:
     resolved = np.flatnonzero(np.isfinite(prominence[:, :, 0]).mean(axis=0) >= 0.5)
     if not len(resolved):  # too few frames a second for any: as prominent as its neighbourhood
         return np.zeros(prominence.shape[2]), np.zeros(prominence.shape[2], dtype=np.int64)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from measure.observe.trajectory import Floats
+from flagdata.arrays import FloatArray
 
 NAMES = ("droop", "extension", "speed", "amplitude", "hoist amplitude")
 """Droop: angle below the horizontal of the line from the middle of the hoist to the middle of the free edge, the mean
@@ -24,7 +24,7 @@ _LEAST = 1e-4
 """Of the cloth's size: what moves less moves as much, so that a hoist that stands still has a finite logarithm."""
 
 
-def settled(markers: Floats, positions: Floats, *, period: float, noise: float = 0.0) -> Floats:
+def settled(markers: FloatArray, positions: FloatArray, *, period: float, noise: float = 0.0) -> FloatArray:
     """Computes what the markers settle at, (quantity,) as `NAMES` has them.
 
     Args:

@@ -29,13 +29,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import BoolArray, IntArray
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import Column, winds
 from measure.forecasting.segments import Segments
 from measure.observe.interpolation import onto
-from measure.observe.trajectory import Floats, Specimen
+from measure.observe.trajectory import Specimen
 from measure.probes.course import Course, Gauge
 from measure.probes.lines import Spectrum
 from measure.probes.rows import StatisticRows
@@ -80,7 +80,7 @@ class PoleMoment:
         return cls(arms=torch.cat([p.arms for p in parts], dim=-1), scale=torch.cat([p.scale for p in parts]))
 
 
-def shares(specimen: Specimen, markers: Floats) -> Floats:
+def shares(specimen: Specimen, markers: FloatArray) -> FloatArray:
     """Shares the cloth's area [m²] among markers (marker, 2) [m], that of the vertices brought onto them, (marker,)."""
     return specimen.mesh.vertex_areas @ onto(markers, specimen.mesh.rest)
 
@@ -120,15 +120,15 @@ class Statistics(StatisticRows):
     """
 
     recording: IntArray
-    r: Floats
-    response: Floats
-    error: Floats
-    marker_error: Floats
-    lines: Floats | None = None
+    r: FloatArray
+    response: FloatArray
+    error: FloatArray
+    marker_error: FloatArray
+    lines: FloatArray | None = None
     turning: Statistics | None = None
     course: Course | None = None
-    log: Floats | None = None
-    settled: Floats | None = None
+    log: FloatArray | None = None
+    settled: FloatArray | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -159,12 +159,12 @@ class Projection:
         moved /= moved.norm(dim=2, keepdim=True).clamp(min=torch.finfo(moved.dtype).tiny)
         return cls(directions=moved, scale=scale)
 
-    def of(self, errors: Tensor) -> Floats:
+    def of(self, errors: Tensor) -> FloatArray:
         """Computes r of errors (frame, marker, 3, segment) [m], (segment, column)."""
         clipped = _clipped(errors, self.scale).flatten(1).to(self.directions)
         return torch.einsum("sck,sk->sc", self.directions, clipped).double().cpu().numpy()
 
-    def turned(self, errors: Tensor) -> Floats | None:
+    def turned(self, errors: Tensor) -> FloatArray | None:
         """Computes r of the moment of errors (frame, marker, 3, segment) [m], (segment, column); None where not looked
         at."""
         if self.pole_moment is None or self.turning is None:
@@ -176,12 +176,12 @@ class Projection:
         """Computes the wind's course by the errors (frame, marker, 3, segment) [m]; None where not asked for."""
         return None if self.gauge is None else self.gauge.course(_clipped(errors, self.scale))
 
-    def lines(self, errors: Tensor) -> Floats | None:
+    def lines(self, errors: Tensor) -> FloatArray | None:
         """Computes the prominence of the errors' spectra, (segment, reduced frequency, direction): see `lines`; None
         where not looked at."""
         return None if self.spectrum is None else self.spectrum.prominence(errors)
 
-    def response(self, changes: Sequence[Tensor]) -> Floats:
+    def response(self, changes: Sequence[Tensor]) -> FloatArray:
         """Computes how r moves with k sensitivities (frame, marker, 3, segment) [m per unit], (segment, column, k)."""
         moved = torch.stack([_plain(change, self.scale).flatten(1) for change in changes], dim=2)
         return (self.directions @ moved).double().cpu().numpy()
@@ -321,7 +321,7 @@ def _chunks(recording: IntArray) -> list[IntArray]:
     return [np.array(chunk) for chunk in chunks if chunk]
 
 
-def error_scale(base: Tensor, recording: IntArray, noise: Floats, counted: BoolArray | None = None) -> Tensor:
+def error_scale(base: Tensor, recording: IntArray, noise: FloatArray, counted: BoolArray | None = None) -> Tensor:
     """Computes root mean square errors of a marker in the recording, beyond what its noise explains, (marker, segment)
     [m].
 
@@ -357,7 +357,7 @@ def reduced(
     base: Tensor,
     changes: Sequence[Tensor],
     recording: IntArray,
-    noise: Floats,
+    noise: FloatArray,
     counted: BoolArray | None = None,
 ) -> Statistics:
     """Computes statistics of segments: errors, sensitivities (frame, marker, 3, segment) and the noise of their markers

@@ -25,8 +25,6 @@ from measure.forecasting.segments import Segments
 from measure.observe.trajectory import WindTrack
 from measure.probes.course import ALONG, Course
 
-Floats = FloatArray
-
 NUISANCES, DIRECTION = 3, 1
 """How many there are for each recording, and the place of the direction among them."""
 
@@ -104,7 +102,7 @@ def lags(course: Course, segments: Segments) -> tuple[float, ...]:
     return tuple(lags_found)
 
 
-def _late(wind: WindTrack, times: Floats, lag: float, count: int) -> Floats:
+def _late(wind: WindTrack, times: FloatArray, lag: float, count: int) -> FloatArray:
     """Computes the share by which the wind is stronger than a log that lags, at times (segment, frame) [s], (segment,
     window)."""
     logged, true = (wind.at((times + shift).ravel())[:, 0].reshape(times.shape) for shift in (0.0, lag))
@@ -112,12 +110,12 @@ def _late(wind: WindTrack, times: Floats, lag: float, count: int) -> Floats:
     return share.reshape(len(times), count, -1).mean(axis=2)
 
 
-def _misfit(value: Floats, weight: Floats, expected: Floats) -> float:
+def _misfit(value: FloatArray, weight: FloatArray, expected: FloatArray) -> float:
     off = value - expected
     return float((weight * (off - (weight * off).sum() / weight.sum()) ** 2).sum())
 
 
-def by_recording(moved: Floats, recording: IntArray) -> Floats:
+def by_recording(moved: FloatArray, recording: IntArray) -> FloatArray:
     """Spreads (segment, row, nuisance) to (segment, row, nuisance · recording): each moves its own recording alone."""
     numbers = np.unique(recording)
     of_recording = (recording[:, None] == numbers).astype(np.float64)

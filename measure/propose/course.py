@@ -19,8 +19,6 @@ from measure.propose.outcome import PeriodogramLine, StrengthCourse
 from measure.verdict.record import Estimate
 from sim.effects import apply
 
-Floats = FloatArray
-
 BIN = 0.2
 """Duration of a stretch [s]: five frames at 25 a second."""
 _LEVEL = 0.9
@@ -35,9 +33,9 @@ def course(setting: Setting, model: Model, effect: int) -> StrengthCourse:
     column, fitted = model.effects[effect]
     amplitudes, period = _amplitudes(setting, model, column, fitted)
     stretch = max(1, round(BIN / period))
-    binned: list[Floats] = []
+    binned: list[FloatArray] = []
     lines: list[PeriodogramLine] = []
-    times: list[Floats] = []
+    times: list[FloatArray] = []
     segments = setting.segments
     for index in range(len(setting.speeds)):
         of_recording = np.flatnonzero(setting.recording == index)
@@ -71,7 +69,7 @@ def course(setting: Setting, model: Model, effect: int) -> StrengthCourse:
 
 def _amplitudes(
     setting: Setting, model: Model, column: EffectColumn, fitted: float
-) -> tuple[tuple[Floats, Floats], float]:
+) -> tuple[tuple[FloatArray, FloatArray], float]:
     """Computes Σ e·s and Σ s² over the markers, (frame, segment), and the time between frames [s]."""
     forecaster, segments = setting.forecaster, setting.segments
     base = forecaster.errors(*model.system(forecaster, segments), segments)
@@ -83,7 +81,7 @@ def _amplitudes(
     return (top.double().cpu().numpy(), bottom.double().cpu().numpy()), segments.period
 
 
-def _mean(values: Floats, unit: str) -> Estimate:
+def _mean(values: FloatArray, unit: str) -> Estimate:
     """Averages, with an interval from blocks of five stretches, which hardly know of one another."""
     blocks = values[: len(values) // 5 * 5].reshape(-1, 5).mean(axis=1) if len(values) >= 10 else values
     reach = float(student.ppf(0.5 + _LEVEL / 2, len(blocks) - 1) * blocks.std(ddof=1) / math.sqrt(len(blocks)))
@@ -91,7 +89,7 @@ def _mean(values: Floats, unit: str) -> Estimate:
     return Estimate(value=value, low=value - reach, high=value + reach, unit=unit, level=_LEVEL)
 
 
-def line(values: Floats, period: float) -> PeriodogramLine:
+def line(values: FloatArray, period: float) -> PeriodogramLine:
     """Finds the largest line of the periodogram, of three periods or more (Fisher, Proc. R. Soc. A 125, 1929).
 
     Args:

@@ -20,8 +20,6 @@ from measure.nulls.reference import left_out_groups
 from measure.probes.statistics import Statistics
 from measure.propose.projected import evidence
 
-Floats = FloatArray
-
 _NOTHING = 1e-6
 """Mean share below which a term has no projected response."""
 _NOISE_TOLERANCE = 5e-4
@@ -41,7 +39,7 @@ class Family:
         shares: (group, column) of null groups.
     """
 
-    shares: Floats
+    shares: FloatArray
 
     @classmethod
     def of(cls, nulls: Nulls, statistics: Statistics, *, noise: float, seed: int) -> Family:
@@ -57,7 +55,7 @@ class Family:
         count, columns = statistics.response.shape[0], statistics.response.shape[2]
         similar = nulls.select(np.abs(nulls.noise - noise) <= _NOISE_TOLERANCE)
         pool = similar if len(similar.noise) and len(np.unique(similar.experiment)) >= _LEAST else nulls
-        shares: list[Floats] = []
+        shares: list[FloatArray] = []
         for left_out in left_out_groups(nulls, pool, count, seed=seed):
             for chosen in left_out.groups:
                 placed = replace(statistics, r=left_out.outside.statistics.r[chosen])
@@ -66,14 +64,14 @@ class Family:
         return cls(shares=result[:, :columns])
 
     @cached_property
-    def _spread(self) -> Floats:
+    def _spread(self) -> FloatArray:
         return np.maximum(self.shares.mean(axis=0), _NOTHING)
 
     @cached_property
-    def _scaled(self) -> Floats:
+    def _scaled(self) -> FloatArray:
         return self.shares[:, len(THETA) :] / self._spread[len(THETA) :]
 
-    def statistics(self, evidence_of_data: Evidence, along: Sequence[int] = ()) -> Floats:
+    def statistics(self, evidence_of_data: Evidence, along: Sequence[int] = ()) -> FloatArray:
         """Computes (column,) statistics of data, where some columns are fitted already."""
         return _shares(evidence_of_data, along) / self._spread
 
@@ -83,6 +81,6 @@ class Family:
         return float((1 + (largest >= statistic).sum()) / (1 + len(largest)))
 
 
-def _shares(evidence_of_data: Evidence, along: Sequence[int]) -> Floats:
+def _shares(evidence_of_data: Evidence, along: Sequence[int]) -> FloatArray:
     drops, remainder = evidence_of_data.drops(along), evidence_of_data.fit(along).remainder
     return drops / np.maximum(remainder - drops, 1e-9)

@@ -111,8 +111,6 @@ def _bundle(
     }
 
 
-Floats = FloatArray
-
 _TOGETHER = 40
 """Columns reduced at a time: bounds memory."""
 
@@ -150,7 +148,7 @@ class ProjectedSegments:
             directions=tuple(direction[..., chosen] for direction in self.directions),
         )
 
-    def whitened(self, null: NullModel, of_recordings: Floats) -> WhitenedMisfit:
+    def whitened(self, null: NullModel, of_recordings: FloatArray) -> WhitenedMisfit:
         """Makes the misfit of the projected errors, whitened by the null model; `of_recordings` are wind speeds
         [m/s]."""
         recording, noise = self.segments.recording, self.segments.noise
@@ -192,11 +190,11 @@ class ProjectedSegments:
             both_responses, r=both_responses.r[:, :count], response=both_responses.response[:, :count, count:]
         )
 
-    def speeds(self, of_recordings: Floats) -> Floats:
+    def speeds(self, of_recordings: FloatArray) -> FloatArray:
         """Returns the wind speed of each segment [m/s], (segment,), of speeds by recording."""
         return of_recordings[self.segments.recording]
 
 
-def evidence(statistics: Statistics, speeds: Floats, null: NullModel) -> Evidence:
+def evidence(statistics: Statistics, speeds: FloatArray, null: NullModel) -> Evidence:
     """Computes the evidence in projected statistics; its columns are those of the response."""
     return replace(Evidence.of(statistics, speeds, null), columns=statistics.response.shape[2])

@@ -104,7 +104,7 @@ class FittedModel:
 def fit(
     projected: ProjectedSegments,
     null: NullModel,
-    speeds: Floats,
+    speeds: FloatArray,
     columns: Sequence[EffectColumn],
     start: Sequence[float],
 ) -> FittedModel:
@@ -124,7 +124,9 @@ def fit(
     return FittedModel(model=model.moved(tuple(step)), errors=tuple(float(e) for e in errors))
 
 
-def _step(projected: ProjectedSegments, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
+def _step(
+    projected: ProjectedSegments, null: NullModel, speeds: FloatArray, model: Model
+) -> tuple[FloatArray, FloatArray]:
     """Takes one step of generalised least squares from a model, under the prior about the nominal calibration, and
     returns its standard errors."""
     projected_evidence = evidence(projected.at(model), speeds, null)
@@ -190,8 +192,6 @@ def data_hash(segments: Segments) -> str:
             digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
     return digest.hexdigest()
 
-
-Floats = FloatArray
 
 _CALM = 0.3
 """Wind below which its direction is not known well enough for terms along it [m/s]."""
@@ -358,7 +358,7 @@ class _Tried:
 def _tried(
     projected: ProjectedSegments,
     null: NullModel,
-    speeds: Floats,
+    speeds: FloatArray,
     candidates: Sequence[EffectColumn],
     fixed: Sequence[EffectColumn],
 ) -> _Tried:

@@ -27,15 +27,13 @@ BINS = 10
 BAND = 0.99
 """Share of a binomial within the rank histogram's band: Talts et al. show 99 %."""
 
-Array = FloatArray
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cells:
     """The rank of the truth among the draws: `low`, `high` (n,) between 0 and 1, low < high."""
 
-    low: Array
-    high: Array
+    low: FloatArray
+    high: FloatArray
 
     @classmethod
     def of(cls, truth: NDArray, draws: NDArray) -> Cells:
@@ -45,11 +43,11 @@ class Cells:
         up_to = (draws <= truth[:, None]).sum(axis=1)
         return cls(low=below / size, high=(up_to + 1) / size)
 
-    def below(self, level: float) -> Array:
+    def below(self, level: float) -> FloatArray:
         """Computes the share (n,) of each cell below a level."""
         return np.clip((level - self.low) / (self.high - self.low), 0.0, 1.0)
 
-    def central(self, level: float) -> Array:
+    def central(self, level: float) -> FloatArray:
         """Computes the share (n,) of each cell inside the central interval of a level."""
         return self.below((1 + level) / 2) - self.below((1 - level) / 2)
 
@@ -106,13 +104,13 @@ def _draws(predictions: Predictions) -> Float32Array:
     return predictions.samples
 
 
-def coverage_values(predictions: Predictions, target: str, level: float, resamples: Resamples) -> Array:
+def coverage_values(predictions: Predictions, target: str, level: float, resamples: Resamples) -> FloatArray:
     """Computes (1 + draws,): share of clips whose central interval of a level has the truth, in the data and in each
     draw."""
     return _mean(cells(predictions, target).central(level), resamples)
 
 
-def _mean(share: Array, resamples: Resamples) -> Array:
+def _mean(share: FloatArray, resamples: Resamples) -> FloatArray:
     sums = resamples.sums(np.column_stack([share, np.ones_like(share)]))
     return sums[:, 0] / sums[:, 1]
 
@@ -126,7 +124,7 @@ def coverage(
     return tuple(_covered(level, [of.central(level) for of in ranks], resamples) for level in levels)
 
 
-def _covered(level: float, shares: list[Array], resamples: Resamples) -> Coverage:
+def _covered(level: float, shares: list[FloatArray], resamples: Resamples) -> Coverage:
     values = np.mean([_mean(share, resamples) for share in shares], axis=0)
     return Coverage(level=level, share=estimate(values, clips=len(shares[0]), groups=resamples.groups))
 
@@ -181,7 +179,7 @@ def tarp(
     return tuple(_covered(level, [of.below(level) for of in ranks], resamples) for level in levels)
 
 
-def _ball(predictions: Predictions, reference: Array) -> Cells:
+def _ball(predictions: Predictions, reference: FloatArray) -> Cells:
     """Ranks the truth's distance from the reference (n, t) among the draws'."""
     draws = _draws(predictions).astype(np.float64)
     low, high = predictions.truth.min(axis=0), predictions.truth.max(axis=0)

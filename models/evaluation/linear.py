@@ -21,8 +21,6 @@ from models.evaluation.scores import SCORES
 COMPONENTS = 50
 """Principal components the paper keeps."""
 
-Array = FloatArray
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Readout:
@@ -37,8 +35,8 @@ class Readout:
     """
 
     targets: tuple[str, ...]
-    truth: Array
-    predicted: Array
+    truth: FloatArray
+    predicted: FloatArray
     pearson: tuple[ScoreEstimate, ...]
     components: int
     findings: tuple[Finding, ...]
@@ -46,7 +44,7 @@ class Readout:
 
 def bouman(
     embedding: NDArray[np.floating],
-    quantities: Mapping[str, Array],
+    quantities: Mapping[str, FloatArray],
     *,
     group: IntArray,
     generator: np.random.Generator,
@@ -122,7 +120,9 @@ def _admissible(embedding: NDArray[np.floating], group: IntArray, components: in
     return most, (Finding.of("fewer-components", text, value=float(most)),)
 
 
-def leave_one_group_out(embedding: NDArray[np.floating], truth: Array, *, group: IntArray, components: int) -> Array:
+def leave_one_group_out(
+    embedding: NDArray[np.floating], truth: FloatArray, *, group: IntArray, components: int
+) -> FloatArray:
     """Predicts (n, t) for each group by principal component regression on all others.
 
     PCA and regression are both fitted without the group. The other groups' scatter and cross moments are the whole's

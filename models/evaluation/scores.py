@@ -21,8 +21,6 @@ TOLERANCE = 0.5
 BIN = 1.0
 """Width of the bins of the error against wind [m/s]."""
 
-Array = FloatArray
-
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
@@ -33,42 +31,42 @@ class Score:
         value: sums (m, k) → scores (m,).
     """
 
-    terms: Callable[[Array, Array], Array]
-    value: Callable[[Array], Array]
+    terms: Callable[[FloatArray, FloatArray], FloatArray]
+    value: Callable[[FloatArray], FloatArray]
 
-    def __call__(self, truth: Array, mean: Array) -> float:
+    def __call__(self, truth: FloatArray, mean: FloatArray) -> float:
         """Computes the score of clips themselves."""
         return float(self.value(self.terms(truth, mean).sum(axis=0, keepdims=True))[0])
 
-    def values(self, predictions: Predictions, target: str, resamples: Resamples) -> Array:
+    def values(self, predictions: Predictions, target: str, resamples: Resamples) -> FloatArray:
         """Computes (1 + draws,): the score of the data, then of each draw."""
         column = predictions.column(target)
         return self.value(resamples.sums(self.terms(predictions.truth[:, column], predictions.mean[:, column])))
 
 
-def _errors(truth: Array, mean: Array) -> Array:
+def _errors(truth: FloatArray, mean: FloatArray) -> FloatArray:
     error = mean - truth
     return np.column_stack([np.ones_like(error), error, error**2, (np.abs(error) <= TOLERANCE).astype(np.float64)])
 
 
-def _moments(truth: Array, mean: Array) -> Array:
+def _moments(truth: FloatArray, mean: FloatArray) -> FloatArray:
     """Tabulates the moments 1, y, y², e², m, m², ym with y and m less their means, on which no score of them
     depends."""
     y, m, error = truth - truth.mean(), mean - mean.mean(), mean - truth
     return np.column_stack([np.ones_like(y), y, y**2, error**2, m, m**2, y * m])
 
 
-def _variance(sums: Array, first: int, second: int) -> Array:
+def _variance(sums: FloatArray, first: int, second: int) -> FloatArray:
     """Computes n times the variance, 0 where rounding makes it less than 1e-12 of the sum of squares."""
     scatter = sums[:, second] - sums[:, first] ** 2 / sums[:, 0]
     return np.where(scatter > 1e-12 * sums[:, second], scatter, 0.0)
 
 
-def _relative(sums: Array) -> Array:
+def _relative(sums: FloatArray) -> FloatArray:
     return np.sqrt(ratio(sums[:, 3], _variance(sums, 1, 2)))
 
 
-def _pearson(sums: Array) -> Array:
+def _pearson(sums: FloatArray) -> FloatArray:
     together = sums[:, 6] - sums[:, 1] * sums[:, 4] / sums[:, 0]
     return ratio(together, np.sqrt(_variance(sums, 1, 2) * _variance(sums, 4, 5)))
 

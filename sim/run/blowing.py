@@ -16,7 +16,7 @@ from flagdata.provenance import canonical, digest
 from flagdata.series import Wind
 from flagdata.signals import WindSeries
 from flagdata.tables import Angle, value
-from sim.wind.sampled import Beyond, Floats, SampledWind, about_mean, usable
+from sim.wind.sampled import Beyond, SampledWind, about_mean, usable
 
 Logs: TypeAlias = Callable[[str], tuple[str, WindSeries]]
 """The artifact and the samples of a log of the lake, by its name or id."""
@@ -32,8 +32,8 @@ class WindSamples:
         artifact: the log's in the lake; empty for none.
     """
 
-    times: Floats
-    velocity: Floats
+    times: FloatArray
+    velocity: FloatArray
     artifact: str = ""
 
     def mean(self, frames: int, rate: float) -> FloatArray:
@@ -126,7 +126,7 @@ def _log(log: Any, logs: Logs | None, *, where: str) -> tuple[str, WindSeries | 
     return logs(name)
 
 
-def _velocity(values: Mapping[str, Any], series: WindSeries | Wind, *, where: str) -> tuple[Floats, Floats]:
+def _velocity(values: Mapping[str, Any], series: WindSeries | Wind, *, where: str) -> tuple[FloatArray, FloatArray]:
     """Returns times (n,) [s] and velocities (n, 3) [m/s] of a log whose vector mean goes where `toward` says."""
     start = int(series.time[0]) if isinstance(series, WindSeries) else 0
     if isinstance(series, WindSeries):
@@ -143,7 +143,7 @@ def _velocity(values: Mapping[str, Any], series: WindSeries | Wind, *, where: st
     return times - values.get("log-start", 0.0), np.stack([toward.real, toward.imag, 0.0 * times], axis=1)
 
 
-def _array(samples: Any, *, where: str) -> tuple[Floats, Floats]:
+def _array(samples: Any, *, where: str) -> tuple[FloatArray, FloatArray]:
     try:
         rows = np.array(samples, dtype=np.float64)
     except (TypeError, ValueError):

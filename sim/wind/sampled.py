@@ -23,8 +23,6 @@ from flagdata.schema import UNUSABLE
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
 
-Floats: TypeAlias = FloatArray
-
 _LONGEST_GAP = 5.0
 """Longest gap of a log that is bridged [s]: large eddies last a few seconds."""
 
@@ -132,7 +130,7 @@ class SampledWind:
         return between(self.samples, *place(self.times, time, self.beyond, where="sampled wind"))
 
 
-def usable(series: WindSeries, *, start: int, where: str) -> tuple[Floats, Floats, Floats | None]:
+def usable(series: WindSeries, *, start: int, where: str) -> tuple[FloatArray, FloatArray, FloatArray | None]:
     """Returns (n,) times [s], speeds [m/s] and, where logged, directions [rad] of the usable samples of a log.
 
     Args:
@@ -153,7 +151,7 @@ def usable(series: WindSeries, *, start: int, where: str) -> tuple[Floats, Float
 
 def about_mean(
     time: ArrayLike, speed: ArrayLike, direction: ArrayLike | None, *, where: str
-) -> tuple[Floats, float, NDArray[np.complex128]]:
+) -> tuple[FloatArray, float, NDArray[np.complex128]]:
     """Returns times (n,) [s], the speed of the vector mean [m/s], and deviations from it as shares of it: (n,) complex,
     along the mean wind and, imaginary, to its left.
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flagdata.arrays import BoolArray
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe import cloth
 from measure.observe.interpolation import onto
-from measure.observe.trajectory import Experiment, Floats, Specimen, Trajectory
+from measure.observe.trajectory import Experiment, Specimen, Trajectory
 
 # A pin's root-mean-square motion over that of the median marker. Held by springs of 1 kN/m in 8 m/s: below 0.01.
 _LOOSE, _FREE = 0.05, 0.3
@@ -105,7 +105,7 @@ def hoist_stands_still(experiment: Experiment) -> bool:
     return True
 
 
-def _still(recording: Trajectory, specimen: Specimen) -> tuple[BoolArray, Floats]:
+def _still(recording: Trajectory, specimen: Specimen) -> tuple[BoolArray, FloatArray]:
     """Masks the markers that stand still, (marker,), and measures how far each is from the nearest pin [m], 0 of one
     that is beside it."""
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())
@@ -137,17 +137,17 @@ def check_places(recordings: Sequence[Trajectory], specimen: Specimen) -> None:
             )
 
 
-def centre_of_pins(recording: Trajectory, specimen: Specimen) -> Floats:
+def centre_of_pins(recording: Trajectory, specimen: Specimen) -> FloatArray:
     """Computes the pins' mean position, (3,) [m]."""
     return _tracks(recording, specimen.mesh.rest[list(specimen.held)]).mean(axis=(0, 1))
 
 
-def _tracks(recording: Trajectory, seats: Floats) -> Floats:
+def _tracks(recording: Trajectory, seats: FloatArray) -> FloatArray:
     """Tracks points of the cloth, (frame, seat, 3) [m]."""
     return np.einsum("sm,fmi->fsi", onto(recording.markers, seats), recording.positions)
 
 
-def _motion(positions: Floats, sigma: float | Floats) -> Floats:
+def _motion(positions: FloatArray, sigma: float | FloatArray) -> FloatArray:
     """Computes the root-mean-square distance of each point from its mean, without the noise's part, (point,) [m]."""
     return np.sqrt(np.maximum(positions.var(axis=0).sum(axis=1) - 3 * sigma**2, 0.0))
 

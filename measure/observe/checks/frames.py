@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe.gaps import LONGEST, frames_of
 from measure.observe.observation import Observation
-from measure.observe.trajectory import Floats
 
 SHORTEST = 2.0
 """Seconds that a recording must last."""
@@ -166,7 +166,7 @@ def without_stuck_markers(observation: Observation) -> Observation:
     return replace(observation, positions=positions, findings=(*observation.findings, finding))
 
 
-def check_motion(positions: Floats, sigma: float, size: float, *, where: str) -> None:
+def check_motion(positions: FloatArray, sigma: float, size: float, *, where: str) -> None:
     """Refuses a cloth that stands still.
 
     Args:
@@ -187,7 +187,7 @@ def check_motion(positions: Floats, sigma: float, size: float, *, where: str) ->
         )
 
 
-def lost_frames(positions: Floats, *, where: str) -> tuple[Finding, ...]:
+def lost_frames(positions: FloatArray, *, where: str) -> tuple[Finding, ...]:
     """Steps nearly twice as long as those on either side: a frame was lost there, and nothing says so.
 
     Found only where the motion is well sampled: where the ratio of steps hardly varies otherwise.
@@ -215,7 +215,7 @@ def lost_frames(positions: Floats, *, where: str) -> tuple[Finding, ...]:
     )
 
 
-def _steps(positions: Floats) -> Floats:
+def _steps(positions: FloatArray) -> FloatArray:
     """Computes the mean squared step of the tracked markers (frame − 1,) [m²]; NaN where none is tracked on both
     sides."""
     square = (np.diff(positions, axis=0) ** 2).sum(axis=2)
@@ -225,7 +225,7 @@ def _steps(positions: Floats) -> Floats:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-def _neighbourhood(values: Floats) -> Floats:
+def _neighbourhood(values: FloatArray) -> FloatArray:
     """Computes the median of the values around each, itself left out, (n,)."""
     usual = np.empty_like(values)
     for k in range(len(values)):

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.findings import Finding
 from measure.observe.interpolation import onto
-from measure.observe.trajectory import Floats, Specimen, Trajectory
+from measure.observe.trajectory import Specimen, Trajectory
 
 _PERIOD = 0.03  # s: frames closer than this are left out, since differences of noise grow with the square of the rate
 _LINE = 0.02  # of the cloth's size: pins that are further from a line have reactions with a moment about it
@@ -42,11 +43,11 @@ class MarkerMotion:
         mass: (vertex,) nominal [kg].
     """
 
-    times: Floats
-    position: Floats
-    velocity: Floats
-    acceleration: Floats
-    mass: Floats
+    times: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    mass: FloatArray
 
     @classmethod
     def of(cls, recording: Trajectory, specimen: Specimen) -> MarkerMotion:
@@ -160,7 +161,7 @@ def _check_swing(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ..
     )
 
 
-def _axis(recording: Trajectory, specimen: Specimen) -> tuple[Floats, Floats] | None:
+def _axis(recording: Trajectory, specimen: Specimen) -> tuple[FloatArray, FloatArray] | None:
     """Fits the line through the pins, a point of it and its direction; the vertical through a single one; None if no
     line."""
     seats = onto(recording.markers, specimen.mesh.rest[list(specimen.held)])
@@ -173,5 +174,5 @@ def _axis(recording: Trajectory, specimen: Specimen) -> tuple[Floats, Floats] | 
     return None if spread[1] > _LINE * size else (origin, directions[0])
 
 
-def _centred(values: Floats) -> Floats:
+def _centred(values: FloatArray) -> FloatArray:
     return values - values.mean()

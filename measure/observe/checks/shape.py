@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import Delaunay, KDTree, QhullError
 
-from flagdata.arrays import BoolArray, IntArray
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe import cloth
 from measure.observe.observation import Observation
-from measure.observe.trajectory import Floats
 
 FEWEST = 30
 """Markers that a recording must have."""
@@ -39,10 +38,10 @@ class Edges:
     """Neighbouring markers: (edge, 2) indices and (edge,) distances at rest [m]."""
 
     ends: IntArray
-    rest: Floats
+    rest: FloatArray
 
     @classmethod
-    def between(cls, markers: Floats, *, where: str) -> Edges:
+    def between(cls, markers: FloatArray, *, where: str) -> Edges:
         """Finds the edges of the Delaunay triangulation of the flat cloth, those along its hollows left out.
 
         Raises:
@@ -78,7 +77,7 @@ class Edges:
         short = rest < 2 * np.median(rest)
         return cls(ends=pairs[short].astype(np.int64), rest=rest[short])
 
-    def lengths(self, positions: Floats) -> Floats:
+    def lengths(self, positions: FloatArray) -> FloatArray:
         """Computes the edges' lengths (frame, edge) [m]; NaN where an end was not tracked."""
         return np.linalg.norm(positions[:, self.ends[:, 0]] - positions[:, self.ends[:, 1]], axis=2)
 
@@ -151,7 +150,7 @@ def without_strays(observation: Observation, edges: Edges, sigma: float) -> Obse
     return replace(observation, positions=positions, findings=(*observation.findings, finding))
 
 
-def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Finding, ...]:
+def check_cover(markers: FloatArray, corners: FloatArray, *, where: str) -> tuple[Finding, ...]:
     """Reports parts of the cloth that are far from any marker.
 
     Args:
@@ -177,7 +176,7 @@ def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Findin
     )
 
 
-def _taut(lengths: Floats, sigma: float) -> tuple[Floats, BoolArray]:
+def _taut(lengths: FloatArray, sigma: float) -> tuple[FloatArray, BoolArray]:
     """Computes the upper decile of each length over its frames without the noise's part, (edge,), and masks the edges
     that have one.
 

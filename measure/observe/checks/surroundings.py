@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe.checks.attachment import centre_of_pins
-from measure.observe.trajectory import Floats, Specimen, Trajectory, WindTrack
+from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 
 _FLIES = 0.15  # of the cloth's size: a mean offset from the pins that is less says nothing of the wind's direction
 _BLOWS = 1.0  # of the ratio ρU²/(m g): wind that is weaker does not set the direction
@@ -184,7 +185,7 @@ def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
         )
 
 
-def _centre(recording: Trajectory) -> Floats:
+def _centre(recording: Trajectory) -> FloatArray:
     """Averages the markers' positions over all frames, (3,) [m]."""
     return recording.positions.mean(axis=(0, 1))
 
@@ -200,7 +201,7 @@ def _ratio(specimen: Specimen, wind: WindTrack) -> float:
     return _pressure(specimen, wind) / weight if weight else math.inf
 
 
-def _sagging(offset: Floats, size: float, wind: WindTrack) -> str:
+def _sagging(offset: FloatArray, size: float, wind: WindTrack) -> str:
     """Advises on the vertical: the axis against which the cloth is off its pins, the wind's left aside."""
     blown = np.abs(wind.velocity.mean(axis=0))
     candidates = np.abs(offset) / size - 2.0 * (blown > 0.5 * blown.max()) * (blown.max() > 0)

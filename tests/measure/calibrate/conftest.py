@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed, stream
-from measure.calibrate import MEASURED, OBSERVED, Design, Floats, calibrate, posterior
+from measure.calibrate import MEASURED, OBSERVED, Design, calibrate, posterior
 from measure.observables import WINDOW
 
 NOISE = 0.02
 """Scatter of a window's readings."""
 
 
-def readings(values: dict[str, Floats], speed: Floats, *, seed: int) -> Floats:
+def readings(values: dict[str, FloatArray], speed: FloatArray, *, seed: int) -> FloatArray:
     """(flag, window, observable): the first follows weight over dynamic pressure, the second the damping, others none
     of the cloth."""
     rng = stream(seed, "tests", "readings")
@@ -28,7 +29,7 @@ def readings(values: dict[str, Floats], speed: Floats, *, seed: int) -> Floats:
     return out
 
 
-def known(design: Design, *, folder: Path, workers: int, advance: object) -> Floats:
+def known(design: Design, *, folder: Path, workers: int, advance: object) -> FloatArray:
     """What a design's simulations show: `readings`."""
     del folder, workers, advance
     starts = np.arange(round(design.duration / WINDOW)) * WINDOW
@@ -44,7 +45,7 @@ def cheap() -> Iterator[list[Design]]:
     """`simulated` replaced by `known`, and few walkers; the designs that were asked for."""
     asked: list[Design] = []
 
-    def simulated(design: Design, *, folder: Path, workers: int, advance: object) -> Floats:
+    def simulated(design: Design, *, folder: Path, workers: int, advance: object) -> FloatArray:
         asked.append(design)
         return known(design, folder=folder, workers=workers, advance=advance)
 

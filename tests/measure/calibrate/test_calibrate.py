@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, RefusedError
 from flagdata.stated import parse
 from flagdata.tables import Range
@@ -20,7 +21,6 @@ from measure.calibrate import (
     Calibration,
     Design,
     Flag,
-    Floats,
     Log,
     Normal,
     Observed,
@@ -43,7 +43,7 @@ _OPTIONS = Options(flag=Flag(length=1.5, height=1.0), azimuth=_AZIMUTH, simulati
 _GUSTY = 5.0 + 1.5 * np.sin(np.arange(-60.0, 130.0) / 4)
 
 
-def _observed(weight: float, *, gain: float = 1.0, speed: Floats = _GUSTY, seed: int = 9) -> Observed:
+def _observed(weight: float, *, gain: float = 1.0, speed: FloatArray = _GUSTY, seed: int = 9) -> Observed:
     log = Log(times=np.arange(-60.0, 130.0), speed=speed).cut(0.0, 120.0)
     starts = np.arange(48) * 2.5
     values = {
@@ -228,7 +228,7 @@ def test_the_answer_is_stated_as_measure_takes_it(plain: Calibration) -> None:
 
 
 def test_too_few_simulations_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    def failed(design: Design, **_: object) -> Floats:
+    def failed(design: Design, **_: object) -> FloatArray:
         return np.full((design.count, 48, len(OBSERVED)), np.nan)
 
     monkeypatch.setattr(module, "simulated", failed)
@@ -243,7 +243,7 @@ def test_a_recording_that_simulations_do_not_show_is_left_out_of_two_and_named(
     """The weight is that of the other alone."""
     cheaply = module.simulated
 
-    def half(design: Design, **given: Any) -> Floats:
+    def half(design: Design, **given: Any) -> FloatArray:
         every = cheaply(design, **given)
         return np.full_like(every, np.nan) if "0.3" in design.recording else every
 
@@ -259,7 +259,7 @@ def test_a_recording_that_simulations_do_not_show_is_left_out_of_two_and_named(
 def test_what_is_left_has_to_be_long_enough_too(monkeypatch: pytest.MonkeyPatch) -> None:
     cheaply = module.simulated
 
-    def half(design: Design, **given: Any) -> Floats:
+    def half(design: Design, **given: Any) -> FloatArray:
         every = cheaply(design, **given)
         return np.full_like(every, np.nan) if "0.3" in design.recording else every
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.calibrate import (
@@ -14,7 +15,6 @@ from measure.calibrate import (
     Design,
     Emulator,
     Flag,
-    Floats,
     Log,
     Observed,
     Options,
@@ -38,7 +38,7 @@ def _designs(seed: int) -> list[Design]:
     ]
 
 
-def _shown(seed: int) -> tuple[Floats, list[Floats]]:
+def _shown(seed: int) -> tuple[FloatArray, list[FloatArray]]:
     """Weights (flag,), and what each recording shows of these (flag, 1): the weight's logarithm, with an error that all
     recordings of a flag have in common and one of its own."""
     rng = stream(seed, "tests", "shown")

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from measure.calibrate import OBSERVED, TABLES, Batch, Design, Flag, Floats, Log, mean_bending, simulated
+from flagdata.arrays import FloatArray
+from measure.calibrate import OBSERVED, TABLES, Batch, Design, Flag, Log, mean_bending, simulated
 from measure.calibrate.simulation import cloth
 from sim.integrate import BackwardEuler, Symplectic
 from sim.material import named
@@ -99,7 +100,7 @@ def test_a_clock_moves_the_wind() -> None:
 def test_kept_simulations_are_not_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
 
-    def read(batch: Batch) -> Floats:
+    def read(batch: Batch) -> FloatArray:
         made.append(len(batch.seeds))
         return batch.values["area_weight"][:, None, None, None] * np.ones((1, 1, 2, len(OBSERVED)))
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
-from measure.calibrate import OBSERVED, Batch, Design, Flag, Floats, Log, Normal, Observed, Uncertain
+from measure.calibrate import OBSERVED, Batch, Design, Flag, Log, Normal, Observed, Uncertain
 from measure.calibrate import Options as Calibrating
 from measure.films import Options, design, simulations, weighable
 from measure.observables import WINDOW
@@ -26,7 +27,7 @@ AZIMUTH = Uncertain(
 )
 
 
-def readings(batch: Batch, *, foreign: float = 0.0) -> Floats:
+def readings(batch: Batch, *, foreign: float = 0.0) -> FloatArray:
     """(flag, window, observable): droop follows weight over dynamic pressure, extension the damping, the third the
     azimuth, the fourth bending; each effect moves others by a share of its strongest strength.
 
@@ -71,7 +72,7 @@ def simulate_cheaply(patch: pytest.MonkeyPatch) -> list[int]:
     """Batches of two, simulated as `readings`; how many flags were asked for, each time."""
     asked: list[int] = []
 
-    def read(batches: Sequence[Batch], *, folder: Path, workers: int, advance: object) -> Floats:
+    def read(batches: Sequence[Batch], *, folder: Path, workers: int, advance: object) -> FloatArray:
         asked.append(sum(len(batch.seeds) for batch in batches))
         return np.concatenate([readings(batch) for batch in batches])[:, None]
 

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
-from measure.calibrate import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Emulator, Flag, Floats, draws
+from measure.calibrate import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Emulator, Flag, draws
 from measure.calibrate.emulator import regressors
 from measure.films import weighable
 from measure.films.model import Model, Response, responded
@@ -32,7 +33,7 @@ def response(rng: np.random.Generator, *, own: float, again: bool) -> Response:
     strengths = DRAG.prior.at(rng.random(PAIRS))
     effect = 3 * (strengths / DRAG.high)[:, None] + math.sqrt(own) * rng.standard_normal((PAIRS, SUMMARIES))
     with_it = exact[:PAIRS] + (other if again else noise)[:PAIRS] + effect
-    paired: dict[str, Floats] = {name: drawn[:PAIRS] for name, drawn in values.items()}
+    paired: dict[str, FloatArray] = {name: drawn[:PAIRS] for name, drawn in values.items()}
     found = responded(model, DRAG, strengths, paired, with_it, (exact + noise)[:PAIRS])
     assert found is not None
     return found

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from measure.calibrate import Batch, Floats
+from flagdata.arrays import FloatArray
+from measure.calibrate import Batch
 from measure.calibrate import design as designs
 from measure.films import close_loop, design, simulations
 from measure.report import as_document
@@ -23,7 +24,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Flags of each batch that was simulated; a negative first number is after how many batches it breaks off."""
     counted: list[int] = []
 
-    def read(self: Batch) -> Floats:
+    def read(self: Batch) -> FloatArray:
         if counted and counted[0] < 0 and len(counted) > -counted[0]:
             raise KeyboardInterrupt
         counted.append(len(self.seeds))

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
-from measure.calibrate import Batch, Floats, Observed
+from measure.calibrate import Batch, Observed
 from measure.films import close_loop, simulations, solve, verdict_of, weighable
 from measure.films.evidence import Fit
 from measure.films.run import strength_of
@@ -202,7 +203,7 @@ def test_a_recording_whose_simulations_show_something_else_is_left_out_with_the_
     """The verdict is that of the others, and says so."""
     usual = simulations.read
 
-    def read(batches: list[Batch], **given: Any) -> Floats:
+    def read(batches: list[Batch], **given: Any) -> FloatArray:
         """Of the third recording's flags none is seen."""
         found = usual(batches, **given)
         return np.full_like(found, np.nan) if batches[0].log.speed.mean() > 8 else found

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import binomtest, chi2, kstest, norm
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
-from measure.calibrate import Floats
 from measure.films import Experiments, score
 from measure.films.score_test import ALIKE, Directions, Scene, Scored
 
@@ -25,7 +25,7 @@ MIDDLE, SIGMA = 0.2, 0.03
 LEVEL = 0.05
 
 
-def law(weights: Floats) -> Floats:
+def law(weights: FloatArray) -> FloatArray:
     """Means of the summaries by the area weight."""
     away = np.log(weights / MIDDLE)[:, None]
     return UNITS * (np.arange(SIZE) + away * np.arange(1, SIZE + 1) - 0.5 * away**2)
@@ -39,14 +39,14 @@ def flags(rng: np.random.Generator, count: int, *, weight: float | None = None, 
     return Experiments(summaries=(law(weights) + noise,), stated=stated, sigma=sigma)
 
 
-def moved(one: Experiments, by: Floats) -> Experiments:
+def moved(one: Experiments, by: FloatArray) -> Experiments:
     return replace(one, summaries=tuple(own + by for own in one.summaries))
 
 
 KIND: NDArray[np.int64] = np.repeat(np.arange(KINDS), EACH)
 
 
-def scene(own: Experiments, *, seed: int = 1, sigma: float = SIGMA, shift: Floats | None = None) -> Scene:
+def scene(own: Experiments, *, seed: int = 1, sigma: float = SIGMA, shift: FloatArray | None = None) -> Scene:
     """Flags beside base and null flags.
 
     Args:
@@ -57,7 +57,7 @@ def scene(own: Experiments, *, seed: int = 1, sigma: float = SIGMA, shift: Float
     return Scene.of(own, base, null if shift is None else moved(null, shift), KIND, CHANGES)
 
 
-def judged(own: Experiments, *, seed: int = 1, along: Directions = ALONG, shift: Floats | None = None) -> Scored:
+def judged(own: Experiments, *, seed: int = 1, along: Directions = ALONG, shift: FloatArray | None = None) -> Scored:
     """One flag by base and null flags, as `scene`."""
     rng = stream(seed, "score test")
     base, null = flags(rng, BASE), flags(rng, KINDS * EACH)

@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from flagdata.arrays import FloatArray
 from measure.nulls import SETTLE, tracks
 from measure.nulls.simulation import CARRIED
-from measure.observe import Floats, Trajectory, WindTrack, carried
+from measure.observe import Trajectory, WindTrack, carried
 
 RATE, SECONDS, FAR, FREQUENCY = 25.0, 8.0, 0.15, 0.7
 MARKERS = np.array([[0.0, 0.0], [0.4, 0.0], [0.0, 0.4], [0.4, 0.4]])
@@ -28,7 +29,7 @@ def swinging(noise: float = 0.0, *, name: str = "swung", height: float = 0.0) ->
     return carried(plain, SEATS)
 
 
-def velocity(places: Floats) -> Floats:
+def velocity(places: FloatArray) -> FloatArray:
     return np.diff(places, axis=0) / CARRIED
 
 

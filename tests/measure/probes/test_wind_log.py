@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flagdata.arrays import FloatArray
 from measure.forecasting import THETA, Calibration, Cut, Forecaster, Segments, library
 from measure.forecasting.segments import Segment
 from measure.inference import Evidence, NullModel
-from measure.observe import Floats, Trajectory, WindTrack
+from measure.observe import Trajectory, WindTrack
 from measure.probes import Course, Statistics, by_recording, lags, projected
 from measure.probes.wind_log import misread
 
@@ -43,7 +44,7 @@ def null() -> NullModel:
     return NullModel(coefficients=np.zeros((3, COUNT)), covariance=np.eye(COUNT), shifts=np.zeros((0, COUNT)))
 
 
-def looked_at(forecaster: Forecaster, recording: Trajectory) -> tuple[Statistics, Floats]:
+def looked_at(forecaster: Forecaster, recording: Trajectory) -> tuple[Statistics, FloatArray]:
     segments = Segments.of([recording])
     found, _ = projected(forecaster, segments, [Calibration()] * len(segments), COLUMNS)
     return replace(found, turning=None, course=None), np.full(len(segments), 4.0)

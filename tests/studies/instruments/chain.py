@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import torch
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
-from measure.calibrate import Floats
 from sim.effects import SENSOR_EFFECTS, AnemometerEffect, Parameter
 
 CLOCK = "clock-offset"
@@ -43,7 +43,7 @@ class Chain:
         """What the log's clock is ahead of the table's [s]."""
         return self.strengths.get(CLOCK, 0.0)
 
-    def read(self, times: Floats, wind: Floats) -> Floats:
+    def read(self, times: FloatArray, wind: FloatArray) -> FloatArray:
         """(n,) readings of a wind (n,) [m/s] at ascending times (n,) [s], the clock aside."""
         reading = torch.from_numpy(wind.copy())[:, None]
         time = torch.from_numpy(times.copy())

@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.stated import Stated
-from measure.calibrate import Floats
 from tests.studies.instruments.chain import Chain, about
 
 Mask = NDArray[np.bool_]
@@ -60,9 +60,9 @@ class Rows:
         InputError: shapes that disagree, times that do not ascend, or values that are not finite.
     """
 
-    times: Floats
+    times: FloatArray
     span: float
-    values: Floats
+    values: FloatArray
     rest: float = 0.0
 
     def __post_init__(self) -> None:
@@ -78,7 +78,7 @@ class Rows:
             )
 
     @property
-    def excess(self) -> Floats:
+    def excess(self) -> FloatArray:
         """(n,) above what is there at rest."""
         return np.sqrt(np.maximum(np.square(self.values) - self.rest**2, 0.0))
 
@@ -92,15 +92,15 @@ class Readings:
         speed: (m,) as it was logged [m/s].
     """
 
-    times: Floats
-    speed: Floats
+    times: FloatArray
+    speed: FloatArray
 
     @cached_property
-    def _run(self) -> Floats:
+    def _run(self) -> FloatArray:
         steps = np.diff(self.times)
         return np.concatenate([[0.0], np.cumsum(steps * (self.speed[1:] + self.speed[:-1]) / 2)])
 
-    def means(self, middles: Floats, span: float) -> Floats:
+    def means(self, middles: FloatArray, span: float) -> FloatArray:
         """(n,) means over spans of its own clock, linear between samples; NaN where the log does not cover one."""
         low, high = middles - span / 2, middles + span / 2
         mean = (np.interp(high, self.times, self._run) - np.interp(low, self.times, self._run)) / span
@@ -121,7 +121,7 @@ class Law:
     exponent: float
     reference: float = 1.0
 
-    def wind(self, excess: Floats) -> Floats:
+    def wind(self, excess: FloatArray) -> FloatArray:
         """(n,) [m/s]."""
         return self.scale * (excess / self.reference) ** self.exponent
 
@@ -141,11 +141,11 @@ class Disagreement:
     floor: float = 0.0
     share: float = 0.0
 
-    def deviation(self, rows: Rows) -> Floats:
+    def deviation(self, rows: Rows) -> FloatArray:
         """(n,) standard deviation of each row's error [m/s]."""
         return np.hypot(self.floor, self.share * self.law.wind(rows.excess))
 
-    def errors(self, rows: Rows, log: Readings) -> Floats:
+    def errors(self, rows: Rows, log: Readings) -> FloatArray:
         """(n,) reading that the flag stands for less the log's, over each row [m/s]; NaN where the log is silent."""
         predicted = self.chain.read(rows.times, self.law.wind(rows.excess))
         return predicted - log.means(rows.times + self.chain.clock, rows.span)
@@ -188,12 +188,12 @@ def fit(
     middle = math.log(max(speed, _STILL))
     bounds = [(middle - 4.0, middle + 2.0), _EXPONENTS, *_NOISE, *(_range(name, known.get(name)) for name in effects)]
 
-    def made(vector: Floats) -> Disagreement:
+    def made(vector: FloatArray) -> Disagreement:
         law = Law(scale=math.exp(vector[0]), exponent=float(vector[1]), reference=reference)
         chain = Chain(strengths=dict(zip(effects, vector[4:].tolist(), strict=True)))
         return Disagreement(law=law, chain=chain, floor=math.exp(vector[2]), share=math.exp(vector[3]))
 
-    def objective(vector: Floats) -> float:
+    def objective(vector: FloatArray) -> float:
         tried = made(vector)
         errors, deviation = tried.errors(rows, log)[own], tried.deviation(rows)[own]
         there = np.isfinite(errors)
@@ -215,8 +215,8 @@ def fit(
 
 
 def _descended(
-    objective: Callable[[Floats], float], start: Floats, bounds: Sequence[tuple[float, float]]
-) -> tuple[Floats, float]:
+    objective: Callable[[FloatArray], float], start: FloatArray, bounds: Sequence[tuple[float, float]]
+) -> tuple[FloatArray, float]:
     """Where a search from `start` ends, and the objective there: by lines, then by a simplex, which follows valleys
     between the axes, until neither gains anything."""
     place, value = start, math.inf
@@ -240,7 +240,7 @@ def jackknife(
     blocks: NDArray[np.int64],
     use: Mask | None = None,
     known: Mapping[str, Stated] | None = None,
-) -> tuple[Mapping[str, float], Floats]:
+) -> tuple[Mapping[str, float], FloatArray]:
     """Standard errors of scale, exponent and the strengths, and errors (n,) of each row by the fit without its block
     [m/s]; NaN outside `use`.
 

@@ -34,8 +34,9 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed, stream
-from measure.calibrate import CLOTH, COLUMNS, NUISANCES, OBSERVED, Batch, Flag, Floats, draws
+from measure.calibrate import CLOTH, COLUMNS, NUISANCES, OBSERVED, Batch, Flag, draws
 from measure.calibrate.prior import FABRIC
 from measure.observables import OBSERVABLES
 from sim.assets import Assets
@@ -153,7 +154,7 @@ def cloths(seed: int, film: int) -> tuple[dict[str, float], dict[str, float]]:
     return truth, fitted
 
 
-def moved(cloth: Mapping[str, float], wind: float, mesh: Mesh, seconds: float, seed: int) -> Floats:
+def moved(cloth: Mapping[str, float], wind: float, mesh: Mesh, seconds: float, seed: int) -> FloatArray:
     """(frame, vertex, 3) [m] of a cloth in a wind of a mean [m/s], with a frame beyond the last window."""
     batch = Batch(
         flag=FLAG,
@@ -172,12 +173,12 @@ def _errors(film: Filmed) -> list[list[float | None]]:
     return [[None if math.isnan(value) else value for value in row] for row in apart.tolist()]
 
 
-def arrays(some: Sequence[Mapping[str, Any]], key: str) -> list[Floats]:
+def arrays(some: Sequence[Mapping[str, Any]], key: str) -> list[FloatArray]:
     """(window, observable) of each film that has them; NaN where a window shows nothing."""
     return [np.array(row[key], dtype=np.float64) for row in some if row[key] is not None]
 
 
-def vtk(films: Sequence[Mapping[str, Any]]) -> list[Floats]:
+def vtk(films: Sequence[Mapping[str, Any]]) -> list[FloatArray]:
     """Errors of the films by VTK, the product's bias taken off; films of one window among them."""
     found = []
     for row in films:
@@ -196,7 +197,7 @@ def vtk(films: Sequence[Mapping[str, Any]]) -> list[Floats]:
     return found
 
 
-def split(films: Sequence[Floats]) -> tuple[Floats, Floats]:
+def split(films: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """(observable,) variance of what lasts in a film and of what passes: analysis of variance of unequal groups."""
     lasting, passing = np.full(len(OBSERVED), np.nan), np.full(len(OBSERVED), np.nan)
     for k in range(len(OBSERVED)):
@@ -212,26 +213,26 @@ def split(films: Sequence[Floats]) -> tuple[Floats, Floats]:
     return lasting, passing
 
 
-def _means(films: Sequence[Floats]) -> Floats:
+def _means(films: Sequence[FloatArray]) -> FloatArray:
     """(observable,) mean over films of their mean errors."""
     each = [[own[np.isfinite(own[:, k]), k] for own in films] for k in range(len(OBSERVED))]
     return np.array([float(np.mean([own.mean() for own in some if len(own)])) for some in each])
 
 
-def share(films: Sequence[Floats]) -> Floats:
+def share(films: Sequence[FloatArray]) -> FloatArray:
     """(observable,) share of the variance that lasts, 0 at least."""
     lasting, passing = split(films)
     return np.maximum(lasting, 0.0) / (np.maximum(lasting, 0.0) + passing)
 
 
-def interval(films: Sequence[Any], statistic: Callable[[Sequence[Any]], Floats], seed: int) -> Floats:
+def interval(films: Sequence[Any], statistic: Callable[[Sequence[Any]], FloatArray], seed: int) -> FloatArray:
     """(2, …) 90 % by a bootstrap of films or looks."""
     rng = stream(seed, "looks", "bootstrap")
     drawn = [statistic([films[k] for k in rng.integers(len(films), size=len(films))]) for _ in range(400)]
     return np.nanquantile(drawn, (0.05, 0.95), axis=0)
 
 
-def common(some: Sequence[Mapping[str, Any]]) -> Floats:
+def common(some: Sequence[Mapping[str, Any]]) -> FloatArray:
     """(observable,) share of what lasts in a film that is common to both films of its look: their covariance over the
     variance of what lasts, clipped to 0 to 1."""
     pairs = paired(some)
@@ -251,7 +252,7 @@ def common_of_all(some: Sequence[Mapping[str, Any]]) -> float:
     return float(together.sum() / np.maximum(lasting, 0.0).sum())
 
 
-def paired(some: Sequence[Mapping[str, Any]]) -> Floats:
+def paired(some: Sequence[Mapping[str, Any]]) -> FloatArray:
     """(look, 2, observable) mean errors of the films of looks, both of which show all."""
     means = {}
     for row in some:
@@ -275,13 +276,13 @@ def of_looks(some: Sequence[Mapping[str, Any]], statistic: Callable[[Sequence[An
     return interval(each, of, SEED)
 
 
-def correlated(films: Sequence[Floats]) -> Floats:
+def correlated(films: Sequence[FloatArray]) -> FloatArray:
     """(observable, observable) correlation of films' mean errors."""
     means = np.array([np.nanmean(own, axis=0) for own in films if np.isfinite(own).any(axis=0).all()])
     return np.corrcoef(means.T)
 
 
-def means_of(some: Sequence[Mapping[str, Any]]) -> tuple[Floats, Floats]:
+def means_of(some: Sequence[Mapping[str, Any]]) -> tuple[FloatArray, FloatArray]:
     """(film, observable) mean errors of films and of their fitted flags', of those that show all in both."""
     errors, again = [], []
     for row in some:
@@ -294,16 +295,16 @@ def means_of(some: Sequence[Mapping[str, Any]]) -> tuple[Floats, Floats]:
     return np.array(errors), np.array(again)
 
 
-def factors(errors: Floats, again: Floats) -> Floats:
+def factors(errors: FloatArray, again: FloatArray) -> FloatArray:
     """(observable,) by which the fitted flag's errors predict a film's, 0 to 1."""
     x, y = again - again.mean(axis=0), errors - errors.mean(axis=0)
     return np.clip((x * y).sum(axis=0) / np.square(x).sum(axis=0), 0.0, 1.0)
 
 
-def judged(errors: Floats, again: Floats, factor: Floats) -> dict[str, Any]:
+def judged(errors: FloatArray, again: FloatArray, factor: FloatArray) -> dict[str, Any]:
     """Variance of mean errors after over before, by observable, and the mean of its logarithm with its error."""
 
-    def ratio(which: Sequence[int]) -> Floats:
+    def ratio(which: Sequence[int]) -> FloatArray:
         own = list(which)
         return (errors[own] - factor * again[own]).var(axis=0, ddof=1) / errors[own].var(axis=0, ddof=1)
 

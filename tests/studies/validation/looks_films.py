@@ -11,10 +11,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import FlagdataError
 from flagdata.film_array import Frames
 from flagdata.record import decode
-from measure.calibrate import OBSERVED, Flag, Floats
+from measure.calibrate import OBSERVED, Flag
 from measure.film import ConditionedFilm, FlagSize
 from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, edges_of, watched
 from sim.assets import Assets
@@ -59,7 +60,7 @@ class Place:
             wide=float(rng.uniform(*_WIDE)),
         )
 
-    def put(self, zeta: RenderParameters, positions: Floats, upper: int, length: float) -> RenderParameters:
+    def put(self, zeta: RenderParameters, positions: FloatArray, upper: int, length: float) -> RenderParameters:
         """A look with its camera here: the axis goes through the middle of the flag's box.
 
         Args:
@@ -88,8 +89,8 @@ class Filmed:
         found: the film as it was made fit.
     """
 
-    pixels: Floats
-    geometry: Floats
+    pixels: FloatArray
+    geometry: FloatArray
     windows: tuple[FilmWindow | None, ...]
     found: ConditionedFilm
 
@@ -105,7 +106,7 @@ def look(seed: int, *, light: int) -> RenderParameters:
     return replace(own, **shown, width=width, height=height, raster_samples=4, cycles_samples=4, cycles_bounces=2)
 
 
-def meshes_of(positions: Floats, mesh: Mesh) -> Meshes:
+def meshes_of(positions: FloatArray, mesh: Mesh) -> Meshes:
     """Of (frame, vertex, 3) [m] in a wind along +x."""
     uv = torch.tensor(mesh.rest / mesh.rest.max(axis=0), dtype=torch.float32)
     hoist, _ = edges_of(mesh.rest)
@@ -119,7 +120,7 @@ def meshes_of(positions: Floats, mesh: Mesh) -> Meshes:
 
 
 def filmed(
-    positions: Floats,
+    positions: FloatArray,
     mesh: Mesh,
     flag: Flag,
     zeta: RenderParameters,
@@ -140,7 +141,7 @@ def filmed(
     return read(pictures, places(meshes, zeta), mesh, flag)
 
 
-def read(pictures: NDArray[np.uint8], projected: Floats, mesh: Mesh, flag: Flag) -> Filmed | None:
+def read(pictures: NDArray[np.uint8], projected: FloatArray, mesh: Mesh, flag: Flag) -> Filmed | None:
     """Read pictures (frame, height, width), and the geometry (frame, vertex, 2) [px] of the same windows."""
     times = np.arange(len(pictures)) / RATE
     film = ConditionedFilm(Frames(images=pictures, time=times), aspect=flag.length / flag.height)
@@ -160,14 +161,14 @@ def read(pictures: NDArray[np.uint8], projected: Floats, mesh: Mesh, flag: Flag)
     return Filmed(pixels=pixels, geometry=geometry, windows=seen.windows, found=film)
 
 
-def places(meshes: Meshes, zeta: RenderParameters) -> Floats:
+def places(meshes: Meshes, zeta: RenderParameters) -> FloatArray:
     """(frame, vertex, 2) in the picture [px], the first pixel's middle at 0.5."""
     placed = stage(meshes, zeta)
     world = meshes.positions.double() + torch.tensor(placed.shift).double()
     return placed.camera.project(world)[0].numpy().reshape(len(meshes), -1, 2)
 
 
-def window_of(projected: Floats, times: Floats, mesh: Mesh, flag: Flag) -> ClothWindow:
+def window_of(projected: FloatArray, times: FloatArray, mesh: Mesh, flag: Flag) -> ClothWindow:
     """Of (frame, vertex, 2) in the picture [px], its scale from the hoist's known height."""
     hoist, free = edges_of(mesh.rest)
     points = projected * np.array([1.0, -1.0])

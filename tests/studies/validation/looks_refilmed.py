@@ -12,8 +12,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
-from measure.calibrate import Flag, Floats
+from measure.calibrate import Flag
 from measure.observables import FilmWindow, edges_of
 from models.conditioning import HALVED
 from sim.assets import Assets
@@ -63,7 +64,7 @@ class Look:
 
     cloth: NDArray[np.uint8]
     behind: NDArray[np.uint8]
-    hoist: Floats
+    hoist: FloatArray
     side: float
     noise: float
 
@@ -82,7 +83,7 @@ class Look:
         )
 
 
-def refilmed(look: Look, positions: Floats, mesh: Mesh, flag: Flag, place: Place, *, seed: int) -> Filmed | None:
+def refilmed(look: Look, positions: FloatArray, mesh: Mesh, flag: Flag, place: Place, *, seed: int) -> Filmed | None:
     """A flag (frame, vertex, 3) [m] filmed in a look, and read; None where its film is refused."""
     texture = np.repeat(look.cloth[:, :, None], 3, axis=2)
     texture = cv2.resize(texture, (256, 192), interpolation=cv2.INTER_NEAREST)
@@ -115,7 +116,9 @@ def refilmed(look: Look, positions: Floats, mesh: Mesh, flag: Flag, place: Place
     return read(noisy, places(meshes, zeta), mesh, flag)
 
 
-def aimed(zeta: RenderParameters, ends: Callable[[RenderParameters], Floats], wanted: Floats) -> RenderParameters:
+def aimed(
+    zeta: RenderParameters, ends: Callable[[RenderParameters], FloatArray], wanted: FloatArray
+) -> RenderParameters:
     """With the hoist's ends where they are wanted [px], by the angle of view and the picture's place."""
     for _ in range(2):
         now = ends(zeta)
@@ -130,7 +133,7 @@ def aimed(zeta: RenderParameters, ends: Callable[[RenderParameters], Floats], wa
     return zeta
 
 
-def _exposure(shown: NDArray[np.uint8], projected: Floats, mesh: Mesh, look: Look) -> float:
+def _exposure(shown: NDArray[np.uint8], projected: FloatArray, mesh: Mesh, look: Look) -> float:
     """Stops by which pictures of the cloth are to be lighter, so that it is on average as light as in the film."""
     levels = []
     for picture, corners in zip(shown, projected, strict=True):

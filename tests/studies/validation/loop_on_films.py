@@ -27,8 +27,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed, stream
-from measure.calibrate import Batch, Design, Discretisation, Finer, Flag, Floats, Log, Normal, Observed, Uncertain
+from measure.calibrate import Batch, Design, Discretisation, Finer, Flag, Log, Normal, Observed, Uncertain
 from measure.calibrate.design import read
 from measure.films import TOGETHER, Experiments, lasting, nulls, pairs, score, weighable
 from measure.films.judge import Judged, judge
@@ -102,7 +103,7 @@ def truths(effect: Weighable, number: int) -> list[list[Batch]]:
     ]
 
 
-def stronger(effect: Weighable, seed: int) -> Floats:
+def stronger(effect: Weighable, seed: int) -> FloatArray:
     """(flag,) strengths from the stronger half of those that are weighed."""
     rng = stream(seed, "strengths")
     shares = 0.5 + 0.5 * (np.arange(TOGETHER) + rng.random(TOGETHER)) / TOGETHER
@@ -117,7 +118,7 @@ def simulations(folder: Path) -> Simulations:
     own, workers = designs(), len(os.sched_getaffinity(0))
     null = nulls(own, (0, 1), kinds=KINDS, seed=SEED)
 
-    def seen(batches: Sequence[Batch]) -> Floats:
+    def seen(batches: Sequence[Batch]) -> FloatArray:
         return read(batches, folder=folder, workers=workers)[:, 0]
 
     finer = [Finer.of(own[place]) for place in chosen()]

@@ -21,13 +21,13 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from measure.calibrate import (
     OBSERVED,
     Batch,
     Design,
     Discretisation,
     Flag,
-    Floats,
     Log,
     Normal,
     Projection,
@@ -89,7 +89,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return sheet
 
 
-def _about(change: Floats) -> dict[str, Any]:
+def _about(change: FloatArray) -> dict[str, Any]:
     """Mean and standard deviation of differences (flag, 2, observable), and how many flags show all."""
     whole = change[np.isfinite(change).all(axis=(1, 2))]
     return {"flags": len(whole), "bias": whole.mean(axis=0).tolist(), "sigma": whole.std(axis=0, ddof=1).tolist()}

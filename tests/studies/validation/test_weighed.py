@@ -10,24 +10,25 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from measure.calibrate import OBSERVED, Design, Floats, posterior
+from flagdata.arrays import FloatArray
+from measure.calibrate import OBSERVED, Design, posterior
 from measure.observables import WINDOW
 from tests.measure.calibrate.conftest import readings
 from tests.studies.validation import weighed
 
 
-def _winds(design: Design) -> Floats:
+def _winds(design: Design) -> FloatArray:
     starts = np.arange(round(design.duration / WINDOW)) * WINDOW
     return design.log.mean_speed(starts, starts + WINDOW)
 
 
-def _geometry(truth: Mapping[str, Any], at: Path) -> Floats:
+def _geometry(truth: Mapping[str, Any], at: Path) -> FloatArray:
     del at
     values = {name: np.array([truth[name]]) for name in ("area_weight", "gain", "damping", "azimuth")}
     return readings(values, _winds(weighed.design()), seed=truth["seed"])[0]
 
 
-def _finer(design: Design) -> tuple[Floats, NDArray[np.int64]]:
+def _finer(design: Design) -> tuple[FloatArray, NDArray[np.int64]]:
     places = np.arange(16)
     values = {name: own[places] for name, own in design.values().items()}
     return readings(values, _winds(design), seed=2) + 0.01, places

@@ -41,20 +41,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
-from measure.calibrate import (
-    MEASURED,
-    OBSERVED,
-    Design,
-    Flag,
-    Floats,
-    Log,
-    Normal,
-    Observed,
-    Options,
-    Uncertain,
-    simulated,
-)
+from measure.calibrate import MEASURED, OBSERVED, Design, Flag, Log, Normal, Observed, Options, Uncertain, simulated
 from measure.calibrate.calibrate import answered
 from measure.calibrate.simulation import BATCH, RATE, windows
 from measure.observables import View
@@ -99,7 +88,7 @@ _WIND_RATE = 10.0  # Hz
 FLAG = Flag(length=1.5, height=1.0)
 
 
-def wind() -> tuple[Floats, Floats]:
+def wind() -> tuple[FloatArray, FloatArray]:
     """Times (n,) since the film's first frame [s], and (n, 3) the wind at the anemometer [m/s]."""
     rng = stream(SEED, "weighed", "wind")
     count = round((_BEFORE + DURATION + 2) * _WIND_RATE)
@@ -173,7 +162,7 @@ def mesh(code: str) -> Mesh:
     return grid(width=FLAG.length, height=FLAG.height, columns=columns, rows=rows, diagonals=list(Diagonals)[1])
 
 
-def by_kernel(*, explicit: bool) -> dict[int, Floats]:
+def by_kernel(*, explicit: bool) -> dict[int, FloatArray]:
     """Number → (frame, vertex, 3) at `FILM_RATE` from the film's first frame on [m], of the kernel's truths below 1 ms
     of damping or of the others, simulated together."""
     own = mesh("kernel")
@@ -190,7 +179,7 @@ def by_kernel(*, explicit: bool) -> dict[int, Floats]:
     return {truth["number"]: together[..., place] for place, truth in enumerate(some)}
 
 
-def by_mujoco(truth: Mapping[str, Any]) -> Floats:
+def by_mujoco(truth: Mapping[str, Any]) -> FloatArray:
     """(frame, vertex, 3) of one of MuJoCo's: bending and stretching are the nominal ones by its factors."""
     own = mesh("mujoco")
     sheet = Sheet(
@@ -219,7 +208,7 @@ def by_mujoco(truth: Mapping[str, Any]) -> Floats:
     return flight.positions
 
 
-def readings(positions: Floats, truth: Mapping[str, Any]) -> Floats:
+def readings(positions: FloatArray, truth: Mapping[str, Any]) -> FloatArray:
     """(window, observable) of a truth seen from its place."""
     view = View(azimuth=truth["azimuth"], elevation=truth["elevation"], distance=truth["distance"])
     every = round(FILM_RATE / RATE)
@@ -233,7 +222,7 @@ def readings(positions: Floats, truth: Mapping[str, Any]) -> Floats:
     )
 
 
-def _start(own: Mesh, truth: Mapping[str, Any]) -> Floats:
+def _start(own: Mesh, truth: Mapping[str, Any]) -> FloatArray:
     along = own.rest[:, 0]
     start = np.stack([along * math.cos(0.2), along * math.sin(0.2), own.rest[:, 1]], axis=1)
     rough = np.random.default_rng(truth["seed"]).normal(0.0, 1e-3, start.shape)
@@ -254,7 +243,7 @@ def _scene(own: Mesh, truth: Mapping[str, Any], *, damped: float) -> Scene:
     return Scene(mesh=own, position=_start(own, truth), material=material, handles=held)
 
 
-def kept(path: Path, make: Callable[[], Floats]) -> Floats:
+def kept(path: Path, make: Callable[[], FloatArray]) -> FloatArray:
     """An array from a file, or made into it."""
     if not path.exists():
         made = make()
@@ -271,12 +260,12 @@ def folder() -> Path:
     return path
 
 
-def simulations(at: Path) -> Floats:
+def simulations(at: Path) -> FloatArray:
     """(simulation, window, observable) of the design."""
     return simulated(design(), folder=at / "batches", workers=int(os.environ.get("FLAGDATA_WORKERS", "1")))
 
 
-def positions(truth: Mapping[str, Any], at: Path) -> Floats:
+def positions(truth: Mapping[str, Any], at: Path) -> FloatArray:
     """(frame, vertex, 3) of a truth, from the folder or simulated into it."""
     path = at / f"truth-{truth['number']}.npy"
     if truth["code"] == "mujoco":
@@ -287,18 +276,18 @@ def positions(truth: Mapping[str, Any], at: Path) -> Floats:
     return np.load(path)
 
 
-def geometry(truth: Mapping[str, Any], at: Path) -> Floats:
+def geometry(truth: Mapping[str, Any], at: Path) -> FloatArray:
     """(window, observable) of a truth from its place, kept."""
     return kept(at / f"geometry-{truth['number']}.npy", lambda: readings(positions(truth, at), truth))
 
 
-def film(truth: Mapping[str, Any], at: Path) -> Floats:
+def film(truth: Mapping[str, Any], at: Path) -> FloatArray:
     """The same of its film."""
     own = mesh(truth["code"])
     return kept(at / f"film-{truth['number']}.npy", lambda: filmed(truth, positions(truth, at), own, at))
 
 
-def finer(design: Design) -> tuple[Floats, NDArray[np.int64]]:
+def finer(design: Design) -> tuple[FloatArray, NDArray[np.int64]]:
     """(flag, window, observable) of flags of the fourth to the last batch on a finer mesh, and their
     places in the design's order. Those before have shorter steps."""
     places = np.arange(4 * BATCH, design.count, 4)[:BATCH]
@@ -325,7 +314,13 @@ def options() -> Options:
 
 
 def weigh(
-    name: str, found: Floats, base: Floats, *, sigma: Floats, truth: Mapping[str, Any], of: tuple[Design, Options]
+    name: str,
+    found: FloatArray,
+    base: FloatArray,
+    *,
+    sigma: FloatArray,
+    truth: Mapping[str, Any],
+    of: tuple[Design, Options],
 ) -> Row:
     """What `measure.calibrate` answers to a truth's readings (window, observable).
 

@@ -24,12 +24,12 @@ from typing import Any
 import numpy as np
 import torch
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from measure.calibrate import (
     MEASURED,
     OBSERVED,
     Emulator,
-    Floats,
     Observed,
     Options,
     Sight,
@@ -80,7 +80,7 @@ def truths() -> list[Mapping[str, Any]]:
     return found
 
 
-def wind(number: int) -> Floats:
+def wind(number: int) -> FloatArray:
     """(n, 3) from `_SETTLE` before the film on: the horizontal speed behind the log, and a truth's own direction."""
     mean = loop.MEANS[WIND]
     count = round((loop._BEFORE + loop.DURATION + 2) * loop._RATE)
@@ -100,7 +100,7 @@ def wind(number: int) -> Floats:
     return whole[round((loop._BEFORE - _SETTLE) * loop._RATE) :]
 
 
-def moved() -> Floats:
+def moved() -> FloatArray:
     """(truth, frame, vertex, 3) at `large.FILM_RATE` from the film's first frame on [m]."""
     own, some = large.mesh("kernel"), truths()
     system, state = assemble([large._scene(own, truth, damped=_STEP) for truth in some])

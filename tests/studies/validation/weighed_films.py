@@ -13,8 +13,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
-from measure.calibrate import OBSERVED, Floats
+from measure.calibrate import OBSERVED
 from measure.film import FlagSize, Reading, subjects
 from measure.observables import OBSERVABLES, watched
 from sim.assets import Assets
@@ -30,7 +31,7 @@ _NOISE = 1.5  # gray levels
 _QUALITY = "20"  # constant rate factor
 
 
-def filmed(truth: Mapping[str, Any], positions: Floats, mesh: Mesh, at: Path) -> Floats:
+def filmed(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh, at: Path) -> FloatArray:
     """(window, observable) of a truth's film; NaN where a window does not show one.
 
     Args:
@@ -51,7 +52,7 @@ def filmed(truth: Mapping[str, Any], positions: Floats, mesh: Mesh, at: Path) ->
     )
 
 
-def pictures(truth: Mapping[str, Any], positions: Floats, mesh: Mesh) -> NDArray[np.uint8]:
+def pictures(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh) -> NDArray[np.uint8]:
     """(frame, height, width, 3) of a look that is drawn, from the truth's place."""
     assets = Assets()
     zeta = placed(prior.named("flags").draw(truth["seed"], assets), truth, positions, mesh)
@@ -72,7 +73,7 @@ def pictures(truth: Mapping[str, Any], positions: Floats, mesh: Mesh) -> NDArray
         return Raster(assets=assets).render(meshes, zeta).numpy()
 
 
-def placed(drawn: RenderParameters, truth: Mapping[str, Any], positions: Floats, mesh: Mesh) -> RenderParameters:
+def placed(drawn: RenderParameters, truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh) -> RenderParameters:
     """A look with the camera where the truth has it: the axis goes through the middle of the flag's box."""
     box = np.stack([positions.min(axis=(0, 1)), positions.max(axis=(0, 1))]).mean(axis=0)
     below = float(positions[0, _upper(mesh), 2] - box[2])
