@@ -257,12 +257,10 @@ class McapFile:
         if not self._chunk.messages:
             return
         done, self._chunk = self._chunk, _OpenChunk()
-        size = len(done.data)
-        offset = self._at
-        crc, length = zlib.crc32(done.data), CHUNK.size - RECORD_HEAD + size
-        self._write(CHUNK.pack(Opcode.CHUNK, length, done.start, done.end, size, crc, 0, size))
+        offset, size = self._at, len(done.data)
+        length, crc = CHUNK.size + size, zlib.crc32(done.data)
+        self._write(CHUNK.pack(Opcode.CHUNK, length - RECORD_HEAD, done.start, done.end, size, crc, 0, size))
         self._write(done.data)  # never copied: one message may be of hundreds of megabytes
-        length = self._at - offset
         places: dict[int, int] = {}
         first = self._at
         for channel, notes in done.notes.items():
