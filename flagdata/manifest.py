@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +13,23 @@ from flagdata.provenance import file_hash
 MANIFEST = "manifest.json"
 
 
-def write_manifest(folder: Path, about: Mapping[str, Any]) -> dict[str, Any]:
-    """Write manifest.json: `about`, and path, size and SHA-256 of every file. Returns its content.
+def _entry(path: Path, folder: Path) -> dict[str, Any]:
+    return {"path": path.relative_to(folder).as_posix(), "bytes": path.stat().st_size, "sha256": file_hash(path)}
+
+
+def write_manifest(
+    folder: Path, about: Mapping[str, Any], describe: Callable[[Mapping[str, Any]], Path | None] = lambda content: None
+) -> dict[str, Any]:
+    """Writes manifest.json: `about`, and path, size and SHA-256 of every file. Returns its content.
 
     It holds no time of day, so that the same files give the same bytes.
+
+    Args:
+        describe: writes another file about the content, which is then listed as well; returns its path.
     """
-    paths = sorted(path for path in folder.rglob("*") if path.is_file())
-    files = [
-        {"path": path.relative_to(folder).as_posix(), "bytes": path.stat().st_size, "sha256": file_hash(path)}
-        for path in paths
-    ]
-    content = {**about, "files": files}
+    content = {**about, "files": [_entry(path, folder) for path in sorted(folder.rglob("*")) if path.is_file()]}
+    if (description := describe(content)) is not None:
+        content["files"] = sorted([*content["files"], _entry(description, folder)], key=lambda entry: entry["path"])
     text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
     return content

@@ -9,6 +9,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,6 +20,7 @@ from flagdata.dataset.lineage import superseded
 from flagdata.dataset.resolve import clips_on_side
 from flagdata.dataset.splits import HashedSplit
 from flagdata.errors import NotFoundError, UsageError
+from flagdata.export.croissant import write_croissant
 from flagdata.export.source import Source
 from flagdata.lake import Lake
 from flagdata.lake.labels import columns
@@ -203,6 +205,7 @@ class Prepared:
                     "kinds": dict(sorted(Counter(rows["kind"].to_pylist()).items())),
                     **content,
                 },
+                describe=partial(write_croissant, folder),
             )
         return ExportResult(folder=target, manifest=manifest)
 
