@@ -44,6 +44,7 @@ ALLOWED = {
     "flagdata/export/mcap.py": INSIDE,
     "flagdata/export/mp4.py": INSIDE,
     "flagdata/export/parquet.py": INSIDE,
+    "flagdata/export/croissant.py": INSIDE,
     "flagdata/export/webdataset.py": INSIDE,
     "flagdata/export/lerobot.py": INSIDE,
     "flagdata/export/zarr_groups.py": INSIDE,
