@@ -37,11 +37,11 @@ def local_path(text: Path | str) -> Path:
         return Path(text)
     scheme = found["scheme"].lower()
     if scheme == "file":
-        what, fix = "a file: address, not a path", f"give the path: /{found['rest'].lstrip('/')}"
+        message, fix = "a file: address, not a path", f"give the path: /{found['rest'].lstrip('/')}"
     else:
         noun, fix = _KINDS.get(scheme, _ELSEWHERE)
-        what = f"the address of {noun}, not a local path"
-    raise UsageError(what, where=str(text), fix=fix)
+        message = f"the address of {noun}, not a local path"
+    raise UsageError(message, where=str(text), fix=fix)
 
 
 def lake_place(text: Place | str) -> Place:

@@ -64,8 +64,8 @@ def _refused(value: object, name: str, noun: str, fix: str) -> Iterator[None]:
             raise TypeError
         yield
     except (TypeError, RuntimeError, ValueError):
-        what = f"{name} is {_shown(value)}, which is no {noun}"
-        raise UsageError(what, fix=fix) from None
+        message = f"{name} is {_shown(value)}, which is no {noun}"
+        raise UsageError(message, fix=fix) from None
 
 
 def plain(value: Any) -> Any:
@@ -151,8 +151,8 @@ def _several(values: object, name: str, *, each: Callable[[object, str], Any], c
     except TypeError:
         found = ()
     if len(found) != count:
-        what = f"{name} is {_shown(values)}, not {count} numbers"
-        raise UsageError(what, fix=f"give {count} in parentheses, separated by commas")
+        message = f"{name} is {_shown(values)}, not {count} numbers"
+        raise UsageError(message, fix=f"give {count} in parentheses, separated by commas")
     return tuple(each(value, name) for value in found)
 
 
@@ -168,14 +168,14 @@ def _table(value: object, name: str) -> Any:
     """A table, or a text that stands for one."""
     if isinstance(value, str | Mapping):
         return plain(value)
-    what = f"{name} is {_shown(value)}, which is no table of names and values"
-    raise UsageError(what, fix='give one such as {"name": value}')
+    message = f"{name} is {_shown(value)}, which is no table of names and values"
+    raise UsageError(message, fix='give one such as {"name": value}')
 
 
 def _texts(values: Any, name: str) -> list[str]:
     if isinstance(values, str | bytes) or not hasattr(values, "__iter__"):
-        what = f"{name} is {_shown(values)}, not a list of texts"
-        raise UsageError(what, fix=f"give a list, such as [{str(values)!r}]")
+        message = f"{name} is {_shown(values)}, not a list of texts"
+        raise UsageError(message, fix=f"give a list, such as [{str(values)!r}]")
     return [_text(value, name) for value in values]
 
 

@@ -199,9 +199,9 @@ def foreseen(error: Exception) -> FlagdataError:
     if isinstance(error, ImportError) and (lacking := missing(error)) is not None:
         return lacking
     if isinstance(error, OSError):
-        what = " ".join((error.strerror or str(error)).split())  # without strerror where a library of C++ raised it
+        message = " ".join((error.strerror or str(error)).split())  # without strerror where a library of C++ raised it
         return FlagdataError(
-            f"the system refused: {what}",
+            f"the system refused: {message}",
             where=None if error.filename is None else str(error.filename),
             fix=error.fix
             if isinstance(error, StoreError)
@@ -211,9 +211,9 @@ def foreseen(error: Exception) -> FlagdataError:
         return LimitError("there is not enough memory for this", fix="ask for less at a time, or use a larger machine")
     frames = traceback.extract_tb(error.__traceback__)
     places = [place for frame in frames if (place := _own_place(frame)) is not None]
-    what = " ".join(f"{type(error).__name__}: {error}".split())
+    message = " ".join(f"{type(error).__name__}: {error}".split())
     return UnforeseenError(
-        f"unforeseen error: {what[:300]}",
+        f"unforeseen error: {message[:300]}",
         where=places[-1] if places else None,
         fix="this is a defect of flagdata: please report it, with what --debug before the command's name says",
     )

@@ -71,9 +71,9 @@ def check_input(path: Path, *, noun: str = "file", limit: int | None = None) -> 
         why = "" if isinstance(error, FileNotFoundError) else f" ({getattr(error, 'strerror', None) or error})"
         raise NotFoundError(f"there is no such {noun}{why}", where=shown, fix="check the path") from None
     if not stat.S_ISREG(status.st_mode):
-        what = "a folder" if stat.S_ISDIR(status.st_mode) else "a pipe or device"
+        message = "a folder" if stat.S_ISDIR(status.st_mode) else "a pipe or device"
         fix = f"give a {noun}" if stat.S_ISDIR(status.st_mode) else "write what it gives to a file first"
-        raise InputError(f"{what}, not a {noun}", where=shown, fix=fix)
+        raise InputError(f"{message}, not a {noun}", where=shown, fix=fix)
     if not status.st_size:
         raise InputError(f"the {noun} is empty", where=shown, fix="copy or export it again")
     if limit is not None and status.st_size > limit:

@@ -36,6 +36,6 @@ def plain_text(data: bytes, *, noun: str, where: str) -> str:
     except UnicodeDecodeError as error:
         line = data[: error.start].decode(codec, errors="replace").count("\n") + 1
         fix = "save it as UTF-8 (a spreadsheet's CSV UTF-8; Notepad's encoding UTF-8)"
-        what = f"the {noun} is not {codec.removesuffix('-sig').upper()}, as line {line} shows"
-        raise InputError(what, where=where, fix=fix) from None
+        message = f"the {noun} is not {codec.removesuffix('-sig').upper()}, as line {line} shows"
+        raise InputError(message, where=where, fix=fix) from None
     return text if "\n" in text else text.replace("\r", "\n")

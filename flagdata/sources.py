@@ -76,8 +76,8 @@ def named(
         raise UnknownNameError.of(noun, source, {row["name"] for row in rows})
     if len(found) > 1:
         several = ", ".join(f"{row['kind']} {row['artifact'][:SHORT]}" for row in found[:4])
-        what = f"{source!r} names {len(found)} of the lake: {several}"
-        raise UsageError(what, where="SOURCE", fix="give the id of one")
+        message = f"{source!r} names {len(found)} of the lake: {several}"
+        raise UsageError(message, where="SOURCE", fix="give the id of one")
     return lake.artifact(found[0]["artifact"], at=at)
 
 

@@ -235,8 +235,8 @@ def parse(text: str, *, default: tzinfo | None = None, where: str | None = None)
         # A wall-clock time: its zone is attached below.
         wall = datetime(int(year), int(month), int(day), int(hour or 0), int(minute or 0), int(second or 0))  # noqa: DTZ001
     except ValueError:
-        what = f"{text!r} is no day or time of the calendar"
-        raise TimeError(what, where=where, fix="correct the date") from None
+        message = f"{text!r} is no day or time of the calendar"
+        raise TimeError(message, where=where, fix="correct the date") from None
     nanosecond = int((fraction or "").ljust(9, "0"))
     place = zone(offset, where=where) if offset else default
     if place is None:

@@ -270,9 +270,9 @@ def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | 
     """What speaks against an estimate, and what the user should know of it."""
     curve = estimate.curve
     score = curve.score
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if estimate.chance > search.chance:
-        found.append(
+        findings.append(
             _error(
                 "accidental-peak",
                 f"unrelated winds reach such a peak with probability {estimate.chance:.2g} (limit {search.chance:g})",
@@ -280,7 +280,7 @@ def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | 
             )
         )
     if rival is not None and score[rival] > search.rival * score[best]:
-        found.append(
+        findings.append(
             _error(
                 "ambiguous-offset",
                 f"{curve.offset[rival]:+.1f} s fits {100 * score[rival] / score[best]:.0f} % as well as"
@@ -290,7 +290,7 @@ def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | 
         )
     usable = np.flatnonzero(np.isfinite(score))
     if min(best - usable[0], usable[-1] - best) < 2 * STEPS:
-        found.append(
+        findings.append(
             _error(
                 "offset-at-edge",
                 f"the best offset {curve.offset[best]:+.1f} s is at the edge of the"
@@ -299,14 +299,14 @@ def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | 
             )
         )
     if not estimate.sigma <= search.sigma:
-        found.append(
+        findings.append(
             _error(
                 "wide-offset",
                 f"the offset is known to {estimate.sigma:.2f} s only (limit {search.sigma:g} s)",
                 estimate.sigma if math.isfinite(estimate.sigma) else None,
             )
         )
-    return found
+    return findings
 
 
 def _no_gusts(bins: LagBins, search: LagSearch) -> Finding:

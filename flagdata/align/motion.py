@@ -175,10 +175,10 @@ def _quiet(residual: FloatArray, least: float) -> tuple[BoolArray, float]:
 
 
 def _findings(energies: list[float], shifts: list[float], gains: list[float]) -> tuple[Finding, ...]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     shake = math.sqrt(float(np.mean(np.square(shifts)))) if shifts else 0.0
     if shake > _SHAKE:
-        found.append(
+        findings.append(
             Finding.of(
                 "camera-shake",
                 f"the whole picture moves by {shake:.1f} pixels a frame (rms); taken out to first order",
@@ -187,7 +187,7 @@ def _findings(energies: list[float], shifts: list[float], gains: list[float]) ->
         )
     flicker = float(np.std(gains)) if gains else 0.0
     if flicker > 0.02:
-        found.append(
+        findings.append(
             Finding.of(
                 "brightness-flicker",
                 f"the brightness of the whole picture varies by {100 * flicker:.1f} % a frame; taken out",
@@ -195,5 +195,5 @@ def _findings(energies: list[float], shifts: list[float], gains: list[float]) ->
             )
         )
     if energies and not np.nanmax(np.array([0.0, *energies])) > 0:
-        found.append(Finding.of("no-motion", "no motion is found in the picture"))
-    return tuple(found)
+        findings.append(Finding.of("no-motion", "no motion is found in the picture"))
+    return tuple(findings)

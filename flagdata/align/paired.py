@@ -225,7 +225,7 @@ def _first_after(late: Series, starts: IntArray, block: int, before: float, afte
 def _findings(model: ClockModel, delay: float, worst: float) -> tuple[Finding, ...]:
     first = model.segments[0]
     half = NINETY * first.sigma_offset
-    found = [
+    findings = [
         Finding.of(
             "clocks-paired",
             f"{model.device} clock {first.offset:+.4f} s [{first.offset - half:.4f}, {first.offset + half:.4f}]"
@@ -238,7 +238,7 @@ def _findings(model: ClockModel, delay: float, worst: float) -> tuple[Finding, .
         elapsed = (after.start - before.origin) / NANOSECONDS
         step = after.offset + after.drift * (after.start - after.origin) / NANOSECONDS
         step -= before.offset + before.drift * elapsed
-        found.append(
+        findings.append(
             Finding.of(
                 "clock-jump",
                 f"the {model.device} and {model.reference} clocks step apart by {step:+.3f} s",
@@ -246,7 +246,7 @@ def _findings(model: ClockModel, delay: float, worst: float) -> tuple[Finding, .
                 value=step,
             )
         )
-    return tuple(found)
+    return tuple(findings)
 
 
 def host_clock(series: WindSeries) -> PairedClocks | None:

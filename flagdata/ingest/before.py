@@ -34,7 +34,7 @@ def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping
         recipe: all that shapes the result now.
     """
     now = _options(recipe)
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for artifact in others:
         before = _options(artifact.recipe)
         if artifact.source_hash != source_hash or any(before.get(name) != now.get(name) for name in _CHOOSES):
@@ -42,16 +42,16 @@ def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping
         names = sorted(name for name in before.keys() | now.keys() if before.get(name) != now.get(name))
         changed = ", ".join(f"{name} {before.get(name)!s}, now {now.get(name)!s}" for name in names)
         if changed:
-            what = f"the same file is in the lake by other options as {artifact.id[:SHORT]} ({changed}); both stay"
+            message = f"the same file is in the lake by other options as {artifact.id[:SHORT]} ({changed}); both stay"
         elif artifact.recipe.get("plan") != recipe.get("plan"):
             mean = json.loads(artifact.report or "{}").get("mean_speed")
             said = "" if mean is None else f", mean speed {mean:.4g} m/s"
-            what = f"the same file was understood otherwise before, as {artifact.id[:SHORT]}{said}; both stay"
+            message = f"the same file was understood otherwise before, as {artifact.id[:SHORT]}{said}; both stay"
         else:
             continue
         fix = f"if that one is wrong, take it off: flagdata withdraw {artifact.id[:SHORT]} -m 'read otherwise'"
-        found.append(Finding.of("ingested-before", what, fix=fix))
-    return tuple(found)
+        findings.append(Finding.of("ingested-before", message, fix=fix))
+    return tuple(findings)
 
 
 def earlier(

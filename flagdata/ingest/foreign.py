@@ -88,11 +88,11 @@ def examine(path: Path) -> Examination:
         return _mcap(path)
     if is_lerobot(path):
         return _lerobot(path)
-    what, fix = other_bag(path) or (
+    message, fix = other_bag(path) or (
         "neither an MCAP file nor a LeRobot data set",
         "flagdata ingest --sniff looks at others",
     )
-    raise InputError(what, where=str(path), fix=fix)
+    raise InputError(message, where=str(path), fix=fix)
 
 
 def _mcap(path: Path) -> Examination:
@@ -155,19 +155,19 @@ def _lerobot(folder: Path) -> Examination:
                 )
     findings += _lost_pictures(streams if found else [])
     if not timed:
-        what = "no instants: LeRobot counts frame / fps, so gaps, jitter and the date of the camera are not in it"
-        findings.append(_lost("instants", what))
+        message = "no instants: LeRobot counts frame / fps, so gaps, jitter and the date of the camera are not in it"
+        findings.append(_lost("instants", message))
     own = {TIME, "timestamp", "frame_index", "episode_index", "index", "task_index", *found}
     others = sorted(set(info["features"]) - own)
     if others:
         findings.append(_lost("features", f"features that are no pictures: {', '.join(others)}"))
     missing = [name for name in ("tasks.parquet", "stats.json") if not (folder / "meta" / name).is_file()]
     if missing:
-        what = f"meta/ lacks {', '.join(missing)}"
-        findings.append(Finding.of("files-missing", what, fix="copy it again"))
+        message = f"meta/ lacks {', '.join(missing)}"
+        findings.append(Finding.of("files-missing", message, fix="copy it again"))
     if len(streams) != info.get("total_episodes", len(streams)):
-        what = f"{len(streams)} episodes are there, its description states {info['total_episodes']}"
-        findings.append(Finding.of("episodes-missing", what, fix="copy it again"))
+        message = f"{len(streams)} episodes are there, its description states {info['total_episodes']}"
+        findings.append(Finding.of("episodes-missing", message, fix="copy it again"))
     return Examination(format=f"LeRobot {info['codebase_version']}", streams=tuple(streams), findings=tuple(findings))
 
 

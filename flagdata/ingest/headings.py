@@ -109,5 +109,5 @@ def check_columns(
             raise UnknownNameError.of("column", name, [*needed, *optional], where=where)
     missing = [name for name in needed if name not in names]
     if missing or len(set(names)) < len(names):
-        what = f"columns missing: {', '.join(missing)}" if missing else "a column is there twice"
-        raise InputError(what, where=where, fix=fix)
+        message = f"columns missing: {', '.join(missing)}" if missing else "a column is there twice"
+        raise InputError(message, where=where, fix=fix)

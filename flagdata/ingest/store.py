@@ -389,7 +389,7 @@ def _beside(lake: Lake, series: WindSeries, session: str | None, others: Sequenc
         and min(end, artifact.end) - max(start, artifact.start) > 0
     ]
     near.sort(key=lambda artifact: max(start, artifact.start or 0) - min(end, artifact.end or 0))
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for artifact in near[:NEIGHBOURS]:
         try:
             other = Record.open(lake.record_place(str(artifact.object))).wind()
@@ -397,8 +397,8 @@ def _beside(lake: Lake, series: WindSeries, session: str | None, others: Sequenc
             continue  # damage of another artifact is found by verify; it does not keep this log out
         finding = hours_off(series, other, name=artifact.name) if other is not None else None
         if finding is not None:
-            found.append(finding)
-    return tuple(found)
+            findings.append(finding)
+    return tuple(findings)
 
 
 def find(lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], labels: Labels, *, branch: str) -> Present:

@@ -352,8 +352,8 @@ class Catalog:
     def _stated(self, version: int, entry: Entry) -> dict[str, Any]:
         """What the log says of a version."""
         own = {k.removeprefix(_INFO_PREFIX): v for k, v in entry.info.items() if k.startswith(_INFO_PREFIX)}
-        what = {key: entry.info.get(key) for key in ("timestamp", "operation")}
-        stated = {"version": version, **what, **own, "files": list(entry.files)}
+        message = {key: entry.info.get(key) for key in ("timestamp", "operation")}
+        stated = {"version": version, **message, **own, "files": list(entry.files)}
         if not is_stated(stated, version):
             raise self._entries.damaged(version)
         return stated
@@ -430,12 +430,12 @@ class Catalog:
         checkpoint = self._log / f"{newest:020d}{CHECKPOINT}"
         for place in (self._log / _HINT, checkpoint):
             if isinstance(place, Path) and place.exists() and not place.is_file():  # of a pipe it would wait for ever
-                what = f"{place.name} of the catalog's log is no regular file"
-                raise CorruptError(what, where=str(place), fix=_DELETE)
+                message = f"{place.name} of the catalog's log is no regular file"
+                raise CorruptError(message, where=str(place), fix=_DELETE)
         noted = self._summaries.checkpoints.get(newest)
         if noted is not None and file_hash(checkpoint) != noted:
-            what = "a checkpoint of the catalog's log has changed since it was written"
-            raise CorruptError(what, where=str(checkpoint), fix=_DELETE)
+            message = "a checkpoint of the catalog's log has changed since it was written"
+            raise CorruptError(message, where=str(checkpoint), fix=_DELETE)
         if newest + 1 < self._summaries.covered:
             history = self.history()
             *_, last = self._entries.entries(range(newest + 1, version + 1), head=history[0]["version"]) or [None]

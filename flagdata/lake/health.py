@@ -231,8 +231,8 @@ _ROW_FIX = "withdraw the artifact and ingest its source again"
 def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign: Collection[Path]) -> list[Finding]:
     where = f"{row['kind']} {row['name']!r}, artifact {row['artifact']}, ref {ref}"
 
-    def error(kind: str, what: str, fix: str) -> Finding:
-        return Finding(kind=kind, severity=Severity.ERROR, what=what, where=where, fix=fix)
+    def error(kind: str, message: str, fix: str) -> Finding:
+        return Finding(kind=kind, severity=Severity.ERROR, what=message, where=where, fix=fix)
 
     if int(str(row["format_version"])) > FORMAT_VERSION:
         return [error("newer-format", f"written by format {row['format_version']}", "install the newer flagdata")]
@@ -258,9 +258,9 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
             and not _is_among(lake.objects.path(artifact.object), foreign)  # of which a finding says more
             and (size := lake.objects.size(artifact.object)) != artifact.object_bytes
         ):
-            what = f"its object has {size} bytes instead of {artifact.object_bytes}"
+            message = f"its object has {size} bytes instead of {artifact.object_bytes}"
             findings.append(
-                error("object-size", what, f"{again}. flagdata recover saves what a cut-off record still has")
+                error("object-size", message, f"{again}. flagdata recover saves what a cut-off record still has")
             )
     return findings
 
@@ -430,10 +430,10 @@ def _beside(lake: Lake) -> list[Finding]:
     )
     if not found:
         return []
-    what = f"{counted(len(found), 'file')} of an operating system, as .DS_Store: passed over"
+    message = f"{counted(len(found), 'file')} of an operating system, as .DS_Store: passed over"
     fix = "none needed; they may be deleted"
     note = Severity.NOTE
-    return [Finding(kind="files-beside", severity=note, what=what, where=found[0], count=len(found), fix=fix)]
+    return [Finding(kind="files-beside", severity=note, what=message, where=found[0], count=len(found), fix=fix)]
 
 
 def _abandoned(state: LeaseState) -> Finding:

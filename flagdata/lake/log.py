@@ -310,16 +310,16 @@ class Log:
         newest = max(present)
         names = ", ".join(self.path(version).name for version in missing)
         more = max(newest, acknowledged) + 1 - len(present) - len(missing)
-        what = f"an entry of the catalog's log is missing: {names}{f' and {more} more' if more > 0 else ''}"
+        message = f"an entry of the catalog's log is missing: {names}{f' and {more} more' if more > 0 else ''}"
         fix = "restore it from a copy, and run neither gc nor another program on the lake before"
         if missing[0] > newest:  # what is left is a whole, older catalog
             mark = next(path for path in self.marks.iterdir() if _MARK(path.name) and int(path.name) == acknowledged)
-            what += f"; {mark} says that version {acknowledged} was committed"
+            message += f"; {mark} says that version {acknowledged} was committed"
             fix += f"; if it never was, or to give up what was committed after version {newest}, delete {mark}"
         elif newest - missing[0] >= len(present):  # more of them than there are: rather is the last name wrong
-            what += f", before {self.path(newest).name}"
+            message += f", before {self.path(newest).name}"
             fix += f"; if this lake never had so many versions, move {self.path(newest)} away"
-        return LogGapError(what, where=str(self.path(missing[0])), fix=fix)
+        return LogGapError(message, where=str(self.path(missing[0])), fix=fix)
 
 
 def is_stated(version: object, number: int) -> bool:

@@ -51,8 +51,8 @@ class Marked:
         """
         for finding in (*self.findings, *more):
             if finding.severity is Severity.ERROR:
-                what = f"which objects are needed is unknown{outcome}: {finding.what}"
-                raise CorruptError(what, where=finding.where, fix=fix or finding.fix or "run flagdata doctor")
+                message = f"which objects are needed is unknown{outcome}: {finding.what}"
+                raise CorruptError(message, where=finding.where, fix=fix or finding.fix or "run flagdata doctor")
 
 
 def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
@@ -68,8 +68,8 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
         lake.catalog.history()
     except FlagdataError as error:
         kind = error.kind if isinstance(error, LogGapError) else "log-damaged"
-        found = Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
-        return Marked(refs={}, objects=frozenset(), findings=(found,))
+        finding = Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
+        return Marked(refs={}, objects=frozenset(), findings=(finding,))
     try:
         names = [MAIN, *lake.refs.branches(), *lake.refs.tags()]
     except FlagdataError as error:
@@ -107,8 +107,8 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
             findings.append(_damaged("catalog-file-missing", "a file of the catalog is missing", path))
             continue
         except OSError as error:
-            what = f"a file of the catalog cannot be read: {error.strerror}"
-            findings.append(_damaged("catalog-file-unreadable", what, path))
+            message = f"a file of the catalog cannot be read: {error.strerror}"
+            findings.append(_damaged("catalog-file-unreadable", message, path))
             continue
         if noted is not None and found != noted:
             findings.append(_damaged("catalog-file-changed", "a file of the catalog has changed", path))

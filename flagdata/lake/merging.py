@@ -163,13 +163,13 @@ def _check_parents(
     for row in matching(other, {"artifact": list(added)}).to_pylist():
         for parent in row["parents"]:
             if parent not in after:
-                what = f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}"
+                message = f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}"
                 if parent not in known:
                     raise NotFoundError(
-                        f"{what}, a parent that is not there", where=f"branch {branch}", fix="run flagdata doctor"
+                        f"{message}, a parent that is not there", where=f"branch {branch}", fix="run flagdata doctor"
                     )
                 raise ConflictError(
-                    f"{what}, which was withdrawn from {into!r}",
+                    f"{message}, which was withdrawn from {into!r}",
                     where=f"branch {branch}",
                     fix=_apart(parent, gone=into, there=branch),
                 )

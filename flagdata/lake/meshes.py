@@ -330,13 +330,13 @@ def read_part(group: zarr.Group, name: str, first: int | None, last: int | None,
         raise TypeError(f"{name} is no array")
     shape = (len(range(*slice(first, last).indices(array.shape[0]))), *array.shape[1:]) if array.ndim else ()
     blocks = [array.chunks] if array.shards is None else [array.chunks, array.shards]
-    for what, size, most in (
+    for message, size, most in (
         ("bytes", math.prod(shape) * array.dtype.itemsize, ARRAY_BYTES),
         ("bytes a chunk", max(math.prod(block) for block in blocks) * array.dtype.itemsize, CHUNK_BYTES),
         ("chunks", math.prod(-(-side // part) for side, part in zip(array.shape, array.chunks, strict=True)), CHUNKS),
     ):
         if size > most:
-            raise LimitError(f"{name} has {size} {what}", where=where, fix=f"at most {most} are read")
+            raise LimitError(f"{name} has {size} {message}", where=where, fix=f"at most {most} are read")
     return np.asarray(array[first:last])
 
 

@@ -224,8 +224,8 @@ class Refs:
         newest = max(part.version for part in ref.view)
         if newest > head:
             path = self.root / kind / f"{ref.name}.json"
-            what = f"the {_NOUNS[kind]} {ref.name!r} shows version {newest}, but the newest is {head}"
-            raise CorruptError(what, where=str(path), fix=_PULL)
+            message = f"the {_NOUNS[kind]} {ref.name!r} shows version {newest}, but the newest is {head}"
+            raise CorruptError(message, where=str(path), fix=_PULL)
         return ref.view
 
     def remove(self, kind: str, name: str) -> None:

@@ -513,11 +513,11 @@ def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
         if name in mark(lake, grace=timedelta(0)).objects:
             return missing
         gone = removals(lake.catalog.history())
-        for what, went in reasons:
+        for message, went in reasons:
             for removal in filter(went, gone):
                 restored = f"use a tag, or a version from {removal.version} on; {_RESTORE}"
                 return NotFoundError(
-                    f"{name} {what.format(removal)}",
+                    f"{name} {message.format(removal)}",
                     where=missing.where,
                     fix=_LEAVE_OUT if name in removal.erased.values() else restored,
                 )

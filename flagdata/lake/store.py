@@ -160,8 +160,8 @@ class Store:
             suggestion = f"did you mean {close[0]!r}? {listed}" if close else listed
             raise NotFoundError(f"no artifact {artifact!r}", where=where, fix=suggestion)
         several = ", ".join(f"{row['kind']} {row['artifact'][:SHORT]}" for row in found[:4])
-        what = f"{artifact!r} may mean {len(found)} artifacts: {several}{', …' if len(found) > 4 else ''}"
-        raise NotFoundError(what, where=where, fix=f"give the id of one: {listed}")
+        message = f"{artifact!r} may mean {len(found)} artifacts: {several}{', …' if len(found) > 4 else ''}"
+        raise NotFoundError(message, where=where, fix=f"give the id of one: {listed}")
 
     def view(self, at: str | None) -> View:
         """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""

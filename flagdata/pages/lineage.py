@@ -65,15 +65,15 @@ def detail_lines(relative: Relative) -> list[str]:
 
 def _single(relative: Relative, *, details: bool, link: Callable[[str], str] | None, marked: bool) -> Box:
     known = relative.kind is not None
-    what = detail_lines(relative)
+    message = detail_lines(relative)
     return Box(
         key=relative.artifact,
         column=relative.generation,
         kind=relative.kind,
         marked=marked,
         title=relative.name or "not at this version",
-        lines=[f"{relative.kind or 'artifact'} {relative.artifact[:SHORT]}", *(what if details else ())],
-        about="\n".join([relative.name or "", relative.artifact, *what]),
+        lines=[f"{relative.kind or 'artifact'} {relative.artifact[:SHORT]}", *(message if details else ())],
+        about="\n".join([relative.name or "", relative.artifact, *message]),
         link=link(relative.artifact) if link is not None and known else None,
     )
 

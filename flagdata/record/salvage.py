@@ -311,7 +311,7 @@ class _Copy:
         losses = [finding.what for finding in self.findings if finding.severity is not Severity.NOTE]
         if losses:
             name = f"{SALVAGE}/{self._salvaged + 1}"
-            self._writer.add_metadata(name, {str(i): what for i, what in enumerate(losses)})
+            self._writer.add_metadata(name, {str(i): message for i, message in enumerate(losses)})
         self._writer.finish()
 
 

@@ -62,13 +62,13 @@ def _joined(pieces: Iterator[bytes], stated: int, *, where: str | None) -> bytea
         for piece in pieces:
             held += piece
             if len(held) > stated:
-                what = f"the chunk unpacks to more than the {stated} bytes that it states"
-                raise CorruptError(what, where=where, fix=_FIX)
+                message = f"the chunk unpacks to more than the {stated} bytes that it states"
+                raise CorruptError(message, where=where, fix=_FIX)
     except (zstandard.ZstdError, RuntimeError) as error:  # the second is LZ4's
         raise CorruptError(f"the chunk does not unpack: {error}", where=where, fix=_FIX) from None
     if len(held) < stated:
-        what = f"the chunk unpacks to {len(held)} of the {stated} bytes that it states"
-        raise CorruptError(what, where=where, fix=_FIX)
+        message = f"the chunk unpacks to {len(held)} of the {stated} bytes that it states"
+        raise CorruptError(message, where=where, fix=_FIX)
     return held
 
 

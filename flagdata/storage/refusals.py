@@ -179,8 +179,8 @@ def refusal(error: BaseException, *, bucket: str, where: str) -> StoreError:
     if cause is None:
         cause = _of_status(status, needs)
     said = plain(error) if cause.what == "" or "<Message>" in text else "" if state is None else state[0]
-    what = f"{cause.what} ({said})" if cause.what and said else cause.what or said
-    found = _error(cause, what, where)
+    message = f"{cause.what} ({said})" if cause.what and said else cause.what or said
+    found = _error(cause, message, where)
     found.passing = passing
     return found
 
@@ -294,11 +294,11 @@ def _abroad(region: str | None) -> Cause:
 
 def _skewed(ahead: float | None) -> Cause:
     if ahead is None or abs(ahead) < _AHEAD:
-        what = "this machine's clock differs from the store's"
+        message = "this machine's clock differs from the store's"
     else:
         side = "ahead of" if ahead > 0 else "behind"
-        what = f"this machine's clock is {abs(ahead) / 60:.0f} min {side} the store's"
-    return Cause(what=what, fix="set this machine's clock (by NTP)", kind=CredentialsError)
+        message = f"this machine's clock is {abs(ahead) / 60:.0f} min {side} the store's"
+    return Cause(what=message, fix="set this machine's clock (by NTP)", kind=CredentialsError)
 
 
 def _denied(needs: str) -> Cause:

@@ -173,9 +173,11 @@ def _unreachable(reason: Any, url: str) -> Unreachable:
     host = parts.hostname or ""
     proxy = urllib.request.getproxies().get(parts.scheme)
     if proxy is not None and not urllib.request.proxy_bypass(host):
-        what = f"there was no answer of {host} through the proxy {redacted(proxy)}: {_said(reason)}"
+        message = f"there was no answer of {host} through the proxy {redacted(proxy)}: {_said(reason)}"
         variable = f"{parts.scheme.upper()}_PROXY"
-        return Unreachable(what=what, fix=f"check {variable}, or name {host} in NO_PROXY to reach it without a proxy")
+        return Unreachable(
+            what=message, fix=f"check {variable}, or name {host} in NO_PROXY to reach it without a proxy"
+        )
     end_point = "check the end point (AWS_ENDPOINT_URL)"
     if isinstance(reason, socket.gaierror):
         return Unreachable(
@@ -190,13 +192,13 @@ def _unreachable(reason: Any, url: str) -> Unreachable:
     if isinstance(reason, ssl.SSLError):
         return Unreachable(what=f"{host} does not speak TLS: {_said(reason)}", fix=f"{end_point}: http:// or https://")
     if isinstance(reason, ConnectionRefusedError):
-        what = f"{host} refuses connections to port {parts.port or (443 if parts.scheme == 'https' else 80)}"
-        return Unreachable(what=what, fix=f"{end_point}, and that the store runs")
+        message = f"{host} refuses connections to port {parts.port or (443 if parts.scheme == 'https' else 80)}"
+        return Unreachable(what=message, fix=f"{end_point}, and that the store runs")
     if isinstance(reason, TimeoutError):
         return Unreachable(what=f"{host} did not answer in time", fix=f"{end_point}, the network and its firewall")
-    what = f"there was no answer of {host}: {_said(reason)}"
+    message = f"there was no answer of {host}: {_said(reason)}"
     broken = isinstance(reason, HTTPException | ConnectionError)
-    return Unreachable(what=what, fix=f"{end_point} and the network", broken=broken)
+    return Unreachable(what=message, fix=f"{end_point} and the network", broken=broken)
 
 
 def _said(reason: object) -> str:

@@ -98,10 +98,12 @@ def sniff(path: Path | str, *, encoding: str | None = None) -> tuple[Guess, ...]
         return (_other_mesh(f"the file is a {mesh} mesh"),)
     other = None if is_workbook(path, head) else signature(head)
     if other is not None:
-        what, fix = other
-        kind: GuessKind = "camera" if "video" in what else "record" if "MCAP" in what else "other"
-        reason = f"this is {what}: its first bytes are {head[:8].hex(' ')}"
-        return (Guess(format="video" if kind == "camera" else what, score=0.99, reasons=(reason,), kind=kind, fix=fix),)
+        message, fix = other
+        kind: GuessKind = "camera" if "video" in message else "record" if "MCAP" in message else "other"
+        reason = f"this is {message}: its first bytes are {head[:8].hex(' ')}"
+        return (
+            Guess(format="video" if kind == "camera" else message, score=0.99, reasons=(reason,), kind=kind, fix=fix),
+        )
     if path.suffix.lower() in _MESHES:
         reason = f"the name ends in {path.suffix}"
         return (Guess(format="mesh", score=0.9, reasons=(reason,), kind="meshes", fix="ingest the folder it is in"),)

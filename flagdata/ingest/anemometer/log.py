@@ -129,10 +129,10 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         if options.date is None:
             day = untimed.year_alone(source)
             lacking = "dates without a year" if day else "times of day without a date"
-            what = f"the lines of an instrument stand after {lacking}"
+            message = f"the lines of an instrument stand after {lacking}"
             example = f"YYYY-{day}, with its year in place of YYYY" if day else "2026-05-01"
             fix = f"give the day of the first: --date {example}, and its --zone"
-            raise TimeError(what, where=str(path), fix=fix)
+            raise TimeError(message, where=str(path), fix=fix)
         source, options = untimed.dated(source, options.date), replace(options, date=None)
     name, options, reasons = _choose(source, options)
     reader: Format = FORMATS[name]()
@@ -216,13 +216,13 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     )
     counts = ((flag, int(((reading.flags & flag) != 0).sum())) for flag in UNUSABLE)
     why = ", ".join(f"{count} {flag.name.lower().replace('_', ' ')}" for flag, count in counts if count and flag.name)
-    what = f"not one value of the wind in {len(reading.time)} rows can be used{f' ({why})' if why else ''}"
+    message = f"not one value of the wind in {len(reading.time)} rows can be used{f' ({why})' if why else ''}"
     if not others:
         fix = "check the sensor, and which columns are read"
         below = any((values < 0).any() for name, values in reading.channels.items() if name in rules.SPEEDS)
         fix += "; if calm air reads below zero, give --zero-offset" if below else ""
-        raise NothingMeasuredError(f"nothing to measure: {what}", where=f"{where}, line {reading.line[0]}", fix=fix)
-    text = f"{what}; kept for {', '.join(others)}: no ground truth comes of it"
+        raise NothingMeasuredError(f"nothing to measure: {message}", where=f"{where}, line {reading.line[0]}", fix=fix)
+    text = f"{message}; kept for {', '.join(others)}: no ground truth comes of it"
     return (
         Finding.of(
             "no-usable-wind",
@@ -249,8 +249,8 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
     if not guesses:
         if drafted(source, options) is None:
             other = unknown(source)
-            what = f"not a log of a known format: {'; '.join(other.reasons)}"
-            raise InputError(what, where=str(source.path), fix=other.fix or "describe it by a recipe")
+            message = f"not a log of a known format: {'; '.join(other.reasons)}"
+            raise InputError(message, where=str(source.path), fix=other.fix or "describe it by a recipe")
         return Delimited.name, options, ()
     best = guesses[0]
     return best.format, replace(options, recipe=best.recipe), best.reasons

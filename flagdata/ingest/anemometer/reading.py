@@ -110,7 +110,7 @@ class Reading:
         if not rows.any():
             return self
         count = int(rows.sum())
-        found = Finding(
+        finding = Finding(
             kind=kind,
             severity=severity,
             count=count,
@@ -119,7 +119,7 @@ class Reading:
             where=f"line {self.line[rows][0]}",
             what=what.replace("{n}", str(count)),
         )
-        return self.with_findings((found,), flags=np.where(rows, self.flags | flag, self.flags))
+        return self.with_findings((finding,), flags=np.where(rows, self.flags | flag, self.flags))
 
     def without(
         self,

@@ -122,11 +122,11 @@ def _of_year(match: re.Match[str], before: dt.date, *, first: bool, where: str) 
     try:
         found = dt.date(year, month, int(match["day"]))
     except ValueError:
-        what = f"{match['month']} {match['day']} is no day of {year}"
-        raise TimeError(what, where=where, fix="give --date with the year in which the log began") from None
+        message = f"{match['month']} {match['day']} is no day of {year}"
+        raise TimeError(message, where=where, fix="give --date with the year in which the log began") from None
     if first and found != before:
-        what = f"the first line is of {match['month']} {match['day']}, not of {before.isoformat()}"
-        raise TimeError(what, where=where, fix=f"give its day with its year, such as --date {found.isoformat()}")
+        message = f"the first line is of {match['month']} {match['day']}, not of {before.isoformat()}"
+        raise TimeError(message, where=where, fix=f"give its day with its year, such as --date {found.isoformat()}")
     return found
 
 
@@ -152,18 +152,22 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
         text.append(f"{day.isoformat()}T{clock} {match['rest']}")
     days = (day - date).days
     if year_alone(source):
-        what = f"dates without a year before each line; the first is of {date.isoformat()}, as given"
-        return TableText.of(source, text, [Finding.of("date-given", what)])
-    what = f"times of day before each line; the first is of {date.isoformat()}, as given, and {days} midnights follow"
-    found = Finding.of("date-given", what)
-    return TableText.of(source, text, [found])
+        message = f"dates without a year before each line; the first is of {date.isoformat()}, as given"
+        return TableText.of(source, text, [Finding.of("date-given", message)])
+    message = (
+        f"times of day before each line; the first is of {date.isoformat()}, as given, and {days} midnights follow"
+    )
+    finding = Finding.of("date-given", message)
+    return TableText.of(source, text, [finding])
 
 
 def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, found: Sequence[Finding] = ()) -> TextFile:
     """The file with these lines, and the finding that says whose clock they are on beside others."""
     often = f"at {rate:g} Hz" if rate >= 1 else f"every {1 / rate:g} s"
-    what = f"its rows carry no time: counted {often} from {iso(start)}, as given; rows that were lost are not noticed"
-    return TableText.of(source, text, [Finding(kind=RATE_GIVEN, severity=Severity.WARNING, what=what), *found])
+    message = (
+        f"its rows carry no time: counted {often} from {iso(start)}, as given; rows that were lost are not noticed"
+    )
+    return TableText.of(source, text, [Finding(kind=RATE_GIVEN, severity=Severity.WARNING, what=message), *found])
 
 
 def _runs(lines: Iterable[str]) -> bool:
@@ -233,15 +237,15 @@ def _table(source: TextFile, rate: float, start: int, where: str) -> tuple[list[
             kept.append([*_points(row[:width], layout), _stamp(start, at, rate)])
         else:
             others += 1
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if others:
-        what = f"{others} lines have another number of columns than the table; left out, each counted as a reading"
-        found.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=others, what=what))
+        message = f"{others} lines have another number of columns than the table; left out, each counted as a reading"
+        findings.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=others, what=message))
     names = [
         f"{name} [{unit.strip('[]()')}]" if unit else name
         for name, unit in zip(layout.names, layout.units, strict=True)
     ]
-    return _written([*names, _CLOCK], kept), found
+    return _written([*names, _CLOCK], kept), findings
 
 
 def _single(source: TextFile, rate: float, start: int, where: str) -> list[str]:

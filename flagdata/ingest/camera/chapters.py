@@ -56,11 +56,11 @@ def chapter_of(path: Path) -> Chapter | None:
     for name in earlier:
         found = _header(path.with_name(name))
         if found is None or found[1] is None:
-            what = (
+            message = (
                 f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it begins "
                 f"after the earlier chapters, of which {name} is not beside it or cannot be read"
             )
-            return _not_placed(what, fix="put the earlier chapters into its folder, or give --start")
+            return _not_placed(message, fix="put the earlier chapters into its folder, or give --start")
         if found[0] != own[0]:
             return None
         before += found[1]

@@ -413,8 +413,8 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
                     fix="cut the file into parts, or raise the limit",
                 )
     except av.error.FFmpegError as error:
-        what = f"the container cannot be read any further ({error.strerror})"
-        tally.problem = cut_off(what, tally.frames, 1)
+        message = f"the container cannot be read any further ({error.strerror})"
+        tally.problem = cut_off(message, tally.frames, 1)
     except IndexError:
         tally.problem = Finding.of(
             "stream-appeared",

@@ -27,11 +27,11 @@ def white(brightest: int, *, which: str, otherwise: str = "") -> tuple[float, tu
     if not brightest or bits == _DEPTHS[-1]:
         return WHITE, ()
     most = 2**bits - 1
-    found = Finding.of(
+    finding = Finding.of(
         "depth-by-content",
         f"no pixel of {which}, of 16 bits, is brighter than {brightest}: they are read as gray of {bits} bits, 0 "
         f"to {most}",
         value=float(bits),
         fix=f"if they are only dark, convert them to 8 bits first{otherwise}",
     )
-    return float(most), (found,)
+    return float(most), (finding,)

@@ -110,7 +110,7 @@ class JoinedSource:
                 raise self._apart(path, "frame rate", *rates)
         for path, part in zip(self._paths[1:], self._parts[1:], strict=True):
             own = part.facts
-            for what, mine, theirs in (
+            for message, mine, theirs in (
                 ("size of the pictures", f"{own.width} × {own.height}", f"{first.width} × {first.height}"),
                 ("shape of a pixel", own.aspect, first.aspect),
                 ("coding", own.codec, first.codec),
@@ -119,7 +119,7 @@ class JoinedSource:
                 ("unit of time stamps", own.timing.tick, first.timing.tick),
             ):
                 if mine != theirs:
-                    raise self._apart(path, what, mine, theirs)
+                    raise self._apart(path, message, mine, theirs)
         for path, part in zip(self._paths, self._parts, strict=True):
             if part.facts.timing.end is not None or part.facts.sequence:
                 raise InputError(

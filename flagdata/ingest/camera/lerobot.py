@@ -69,8 +69,8 @@ def described(folder: Path) -> Mapping[str, Any]:
     fps = info.get("fps")
     known = isinstance(info.get("features"), dict) and isinstance(info.get("data_path"), str)
     if not known or not isinstance(fps, int | float) or fps <= 0:
-        what = "LeRobot's description lacks its features, paths or frame rate"
-        raise CorruptError(what, where=str(where), fix="copy it again")
+        message = "LeRobot's description lacks its features, paths or frame rate"
+        raise CorruptError(message, where=str(where), fix="copy it again")
     return info
 
 
@@ -278,8 +278,8 @@ def _chosen(found: Mapping[str, str], wanted: str | None, where: str) -> tuple[s
             raise UnknownNameError.of("camera", wanted, found, where=where)
         return wanted, found[wanted]
     if len(found) != 1:
-        what = f"{len(found)} cameras: {', '.join(found)}" if found else "a LeRobot data set without a camera"
-        raise InputError(what, where=where, fix="choose one: --topic NAME" if found else "there is no film in it")
+        message = f"{len(found)} cameras: {', '.join(found)}" if found else "a LeRobot data set without a camera"
+        raise InputError(message, where=where, fix="choose one: --topic NAME" if found else "there is no film in it")
     return next(iter(found.items()))
 
 

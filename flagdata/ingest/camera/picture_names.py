@@ -104,8 +104,10 @@ def _problem(*, overnight: bool, loose: bool, mark: str | None) -> tuple[str, st
             "put the date before the time in the names, as 20260501_235959",
         )
     if loose and mark in (".", ","):
-        what = f"the numbers behind the seconds and {mark!r} are of several lengths: fractions or counts is not known"
-        return what, "write them with the same number of digits, as 12-00-00.520"
+        message = (
+            f"the numbers behind the seconds and {mark!r} are of several lengths: fractions or counts is not known"
+        )
+        return message, "write them with the same number of digits, as 12-00-00.520"
     return None
 
 
@@ -435,8 +437,8 @@ def _undecided(columns: Sequence[_Column], names: Sequence[str], where: str) -> 
     first: dict[tuple[int, ...], str] = {}
     for key, name in zip(zip(*(column.values for column in columns), strict=True), names, strict=True):
         if key in first:
-            what = f"{first[key]} and {name} have the same number: which of them is the frame is not known"
-            return InputError(what, where=where, fix="keep one of them, or give each a number of its own")
+            message = f"{first[key]} and {name} have the same number: which of them is the frame is not known"
+            return InputError(message, where=where, fix="keep one of them, or give each a number of its own")
         first[key] = name
     return _open_order(names, where)
 

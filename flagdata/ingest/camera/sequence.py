@@ -197,8 +197,8 @@ class SequenceSource:
         try:
             files = sorted(path for path in folder.iterdir() if not is_beside(path.name) and path.is_file())
         except OSError as error:
-            what = f"the folder cannot be read ({error.strerror})"
-            raise InputError(what, where=self._where, fix="check its rights") from error
+            message = f"the folder cannot be read ({error.strerror})"
+            raise InputError(message, where=self._where, fix="check its rights") from error
         paths = [path for path in files if path.suffix.lower() in PICTURES]
         others = Counter(path.suffix.lower() or "no ending" for path in files if path.suffix.lower() not in PICTURES)
         beside = ", ".join(f"{count} of {ending}" for ending, count in others.most_common(5))

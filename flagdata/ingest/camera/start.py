@@ -99,8 +99,8 @@ def find_start(
             else:
                 found = _checked(parse(text, default=default, where=where), key, _WHOLE_SECOND)
         except TimeError as error:
-            what = f"{key} {text!r} is unusable ({error.what})"
-            passed_over.append(Finding.of("start-passed-over", what))
+            message = f"{key} {text!r} is unusable ({error.what})"
+            passed_over.append(Finding.of("start-passed-over", message))
             continue
         return replace(found, findings=(*passed_over, *found.findings))
     tried = "; ".join(finding.what for finding in passed_over) or "its metadata name none"
@@ -113,13 +113,13 @@ def find_start(
 
 
 def _from_gps(instant: int, sigma: float, *, created: str | None, default: tzinfo | None) -> Start:
-    what = "the start is by the GPS time in the camera's telemetry"
+    message = "the start is by the GPS time in the camera's telemetry"
     if created:
         with suppress(TimeError):  # it is not used
             beside = (parse(created, default=default) - instant) / NANOSECONDS
-            what += f"; the camera's own clock, creation_time {created}, is {abs(beside):.1f} s "
-            what += "ahead" if beside > 0 else "behind"
-    finding = Finding.of("start-by-gps", what, value=sigma)
+            message += f"; the camera's own clock, creation_time {created}, is {abs(beside):.1f} s "
+            message += "ahead" if beside > 0 else "behind"
+    finding = Finding.of("start-by-gps", message, value=sigma)
     return Start(instant=instant, source="telemetry: GPS", sigma=sigma, findings=(finding,))
 
 

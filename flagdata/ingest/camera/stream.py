@@ -272,20 +272,20 @@ def _proposed(proposal: CropProposal) -> Finding:
 
 
 def _rescaled(variable: bool, scale: Fraction, true_fps: float, container: float) -> Finding:
-    what = (
+    message = (
         f"the camera ran at {true_fps:g} Hz, the container states {container:g}: times are scaled by {float(scale):.6g}"
     )
     if variable:
         return Finding.of(
             "true-rate-of-variable",
-            f"{what}; its frame rate varies, so the mean of it was set to the true one",
+            f"{message}; its frame rate varies, so the mean of it was set to the true one",
             value=float(scale),
         )
-    return Finding.of("true-rate", what, value=float(scale))
+    return Finding.of("true-rate", message, value=float(scale))
 
 
 def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
-    found = [
+    findings = [
         Finding.of(
             "resampled",
             f"{report.picks} frames at {rate:g} Hz out of {report.sources}, the nearest by time stamp; worst "
@@ -295,7 +295,7 @@ def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
         )
     ]
     if report.repeats:
-        found.append(
+        findings.append(
             Finding.of(
                 "frames-repeated",
                 f"{report.repeats} frames show the same source frame as the one before: the camera is slower than "
@@ -304,14 +304,14 @@ def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
             )
         )
     if report.used and report.unused > report.sources // 2:
-        found.append(
+        findings.append(
             Finding.of(
                 "frames-dropped",
                 f"{report.unused} of {report.sources} source frames are left out at this rate; --rate native keeps all",
                 count=report.unused,
             )
         )
-    return found
+    return findings
 
 
 def _gap_findings(report: GridReport) -> list[Finding]:
@@ -354,8 +354,8 @@ def open_source(path: Path, options: CameraOptions) -> Source:
     """
     if options.chapters:
         if options.episode is not None or options.topic is not None:
-            what = "an episode" if options.episode is not None else "a topic"
-            raise UsageError(f"{what} of joined video files, which have none", where=str(path), fix="leave it out")
+            message = "an episode" if options.episode is not None else "a topic"
+            raise UsageError(f"{message} of joined video files, which have none", where=str(path), fix="leave it out")
         check_films((path, *options.chapters))
         return JoinedSource((path, *options.chapters), options)
     if is_lerobot(path):

@@ -163,14 +163,14 @@ class VideoSource:
         """The error of a file of which no frame came."""
         packets_there, damaged = self._timing.count + self._timing.missing, "copy it from the camera again"
         if packets_there:
-            what = f"not one frame could be decoded of {packets_there} packets"
+            message = f"not one frame could be decoded of {packets_there} packets"
             fix = f"the file is damaged beyond reading; {damaged}"
         elif self._stream.frames and edits(self._path, self._stream.id) and not is_cut(self._path):
-            what = f"the file's edit list shows none of its {self._stream.frames} frames"
+            message = f"the file's edit list shows none of its {self._stream.frames} frames"
             fix = "write the film without it: ffmpeg -ignore_editlist 1 -i IN -c copy OUT"
         else:
-            what, fix = "the file ends before its first frame", f"the rest of it is missing; {damaged}"
-        return InputError(what, where=str(self._path), fix=fix)
+            message, fix = "the file ends before its first frame", f"the rest of it is missing; {damaged}"
+        return InputError(message, where=str(self._path), fix=fix)
 
     def _open(self) -> tuple[InputContainer, VideoStream]:
         options = self._options

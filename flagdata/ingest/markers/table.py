@@ -202,9 +202,9 @@ def _table_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError, KeyError) as error:
-        what = (str(error).splitlines() or [type(error).__name__])[0]
+        message = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(
-            f"the Parquet file cannot be read: {what}", where=str(path), fix="export the table again"
+            f"the Parquet file cannot be read: {message}", where=str(path), fix="export the table again"
         ) from None
 
 

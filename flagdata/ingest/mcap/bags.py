@@ -53,8 +53,8 @@ def parts_of(path: Path) -> tuple[Path, ...]:
                 fix=f"copy it again; or read the parts that are there: rm {path / _DESCRIPTION}",
             )
         if not is_mcap(one):
-            what, fix = other_bag(one) or (f"{one.name} is no MCAP file", "copy it again")
-            raise InputError(f"a part of the bag is not read: {what}", where=str(one), fix=fix)
+            message, fix = other_bag(one) or (f"{one.name} is no MCAP file", "copy it again")
+            raise InputError(f"a part of the bag is not read: {message}", where=str(one), fix=fix)
     if not found:
         raise InputError("the bag's folder has no part", where=str(path), fix="copy it again")
     return tuple(found)

@@ -168,18 +168,18 @@ def clock_findings(stamps: IntArray, logged: IntArray, *, unset: int, unstated: 
     """
     count = len(stamps)
     if unset or 0 < unstated < count:
-        what = f"{unset + unstated} of {count} messages state no instant (a stamp of 0, or none that is a date): "
+        message = f"{unset + unstated} of {count} messages state no instant (a stamp of 0, or none that is a date): "
         yield Finding(
             kind="dated-by-log",
             severity=Severity.WARNING,
             where=where,
             count=unset + unstated,
-            what=f"{what}they are dated by when they were logged, which is later by an unknown delay",
+            what=f"{message}they are dated by when they were logged, which is later by an unknown delay",
             fix="set the stamp where the messages are made; or align the recording by its contents",
         )
     elif unstated:
-        what = "its messages have no stamp: they are dated by when they were logged"
-        yield Finding(kind="dated-by-log", severity=Severity.NOTE, where=where, count=count, what=what)
+        message = "its messages have no stamp: they are dated by when they were logged"
+        yield Finding(kind="dated-by-log", severity=Severity.NOTE, where=where, count=count, what=message)
     if not count:
         return
     apart = float(np.abs(stamps.astype(float) - logged).max()) / NANOSECONDS

@@ -85,11 +85,11 @@ class Layout:
         lost = sum(count for channel, count in self.counts.items() if channel not in self.channels)
         if not lost:
             return ()
-        what = f"{lost} messages are of a channel that the file does not define, and were not read"
+        message = f"{lost} messages are of a channel that the file does not define, and were not read"
         return (
             Finding.of(
                 "messages-undefined",
-                what,
+                message,
                 count=lost,
                 where=self.path.name,
                 fix="copy the file again, or write it again with the program that made it",
@@ -242,14 +242,14 @@ class _Scan:
         if opcode == Opcode.SCHEMA:
             schema = parse(Schema.read, bytes(record), where=where)
             known = self.schemas.setdefault(schema.id, schema)
-            same, what = (known.name, known.data) == (schema.name, schema.data), f"schema {schema.id}"
+            same, message = (known.name, known.data) == (schema.name, schema.data), f"schema {schema.id}"
         else:
             channel = parse(Channel.read, bytes(record), where=where)
             one = self.channels.setdefault(channel.id, channel)
-            same, what = (one.topic, one.schema_id) == (channel.topic, channel.schema_id), f"channel {channel.id}"
+            same, message = (one.topic, one.schema_id) == (channel.topic, channel.schema_id), f"channel {channel.id}"
         if not same:
             raise CorruptError(
-                f"{what} is defined twice, as different things",
+                f"{message} is defined twice, as different things",
                 where=where,
                 fix="write the files that it was made of again, each by itself, or merge them: mcap merge",
             )

@@ -151,9 +151,9 @@ class TopicSource:
         which = f"the {len(looked)} pictures looked at"
         white, found = depth.white(brightest, which=which, otherwise="; if they are depths, choose another topic")
         if found and not pixel_format.startswith(DEEP):
-            what = f"{which} are of 16 bits, and none of their pixels is brighter than {brightest}"
+            message = f"{which} are of 16 bits, and none of their pixels is brighter than {brightest}"
             raise InputError(
-                f"{what}: they would be next to black", where=self._where, fix="write them with 8 bits a colour"
+                f"{message}: they would be next to black", where=self._where, fix="write them with 8 bits a colour"
             )
         self._white = white if found else None
         return found

@@ -210,13 +210,13 @@ def choose(found: Sequence[Topic], wanted: str | None, *, where: str, noun: str)
         typed = [topic for topic in found if topic.plain == wanted]
         if not typed:
             raise UnknownNameError.of(f"topic of {noun}", wanted, [topic.name for topic in found], where=where)
-        what = f"messages of several types are on {wanted}, which are no one series: {', '.join(map(str, typed))}"
-        raise InputError(what, where=where, fix=f"choose one by its type: --topic {typed[0].name}")
+        message = f"messages of several types are on {wanted}, which are no one series: {', '.join(map(str, typed))}"
+        raise InputError(message, where=where, fix=f"choose one by its type: --topic {typed[0].name}")
     if len(found) == 1:
         return found[0]
     listed = ", ".join(map(str, found))
-    what = f"{len(found)} topics hold {noun}: {listed}" if found else f"no topic holds {noun}"
-    raise InputError(what, where=where, fix="choose one: --topic NAME" if found else "see flagdata doctor FILE")
+    message = f"{len(found)} topics hold {noun}: {listed}" if found else f"no topic holds {noun}"
+    raise InputError(message, where=where, fix="choose one: --topic NAME" if found else "see flagdata doctor FILE")
 
 
 def messages(path: Path, topic: str, *, found: Index | None = None) -> Iterator[Decoded]:
@@ -370,8 +370,10 @@ def _readable(path: Path) -> Iterator[None]:
     except FlagdataError:
         raise
     except _UNREADABLE as error:
-        what = f"the MCAP file is damaged or cut off: {type(error).__name__} {error}".strip()
-        raise CorruptError(what, where=str(path), fix="salvage what is whole: flagdata recover FILE NEW.mcap") from None
+        message = f"the MCAP file is damaged or cut off: {type(error).__name__} {error}".strip()
+        raise CorruptError(
+            message, where=str(path), fix="salvage what is whole: flagdata recover FILE NEW.mcap"
+        ) from None
 
 
 def _decoder(schema: Schema | None, channel: Channel) -> Callable[[bytes], Mapping[str, Any]]:

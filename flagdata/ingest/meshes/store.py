@@ -368,12 +368,12 @@ def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
         Finding(
             kind=kind,
             severity=Severity.WARNING,
-            what=f"{count} {what}",
+            what=f"{count} {message}",
             count=count,
             where=f"frame {first[kind]}",
             fix="look at the export's texture coordinates",
         )
-        for kind, count, what in kinds
+        for kind, count, message in kinds
         if count
     )
     return (*odd, *continuity(sequence), *in_pieces(sequence), *slits(sequence), *t_joints(sequence))

@@ -45,11 +45,11 @@ def as_table(source: TextFile) -> TableText:
         raise InputError(
             "no row in the JSON lines", where=str(source.path), fix="check that the logger recorded anything"
         )
-    found = [Finding.of("json-lines", "lines are counted with the names as the first")]
+    findings = [Finding.of("json-lines", "lines are counted with the names as the first")]
     if left_out:
-        what = f"{left_out} lines are no JSON object; left out"
-        found.append(Finding(kind="malformed-lines", severity=Severity.WARNING, count=left_out, what=what))
-    return TableText.of(source, lines, found)
+        message = f"{left_out} lines are no JSON object; left out"
+        findings.append(Finding(kind="malformed-lines", severity=Severity.WARNING, count=left_out, what=message))
+    return TableText.of(source, lines, findings)
 
 
 def _text(value: object) -> str:

@@ -79,8 +79,8 @@ def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
     timed = zip(found.stamps.tolist(), (rows[number] for number in found.rows.tolist()), strict=True)
     lines = [",".join(["time", *(headings.get(one, one) for one in names)])]
     lines += [",".join([iso(stamp), *(row.get(one, "") for one in names)]) for stamp, row in timed]
-    what = f"the topic {topic.name}: {len(rows)} messages of {topic.schema or topic.encoding}, a row each"
-    read = Finding.of("topic-read", what, count=len(rows))
+    message = f"the topic {topic.name}: {len(rows)} messages of {topic.schema or topic.encoding}, a row each"
+    read = Finding.of("topic-read", message, count=len(rows))
     return TableText(path=path, encoding="utf-8", lines=len(lines), findings=(read, *found.findings), text=tuple(lines))
 
 

@@ -88,9 +88,9 @@ def since(attributes: Mapping[str, Any], *, where: str) -> Since:
     """
     units, calendar = str(attributes["units"]), str(attributes.get("calendar", "standard")).lower()
     if calendar not in _CALENDARS:
-        what = f"the times are of the calendar {calendar!r}, whose days are not those of clocks in UTC"
+        message = f"the times are of the calendar {calendar!r}, whose days are not those of clocks in UTC"
         fix = f"write them in one of the calendars {', '.join(_CALENDARS)}, or export the readings as CSV"
-        raise TimeError(what, where=where, fix=fix)
+        raise TimeError(message, where=where, fix=fix)
     match = _SINCE.fullmatch(units)
     unit = _UNITS.get(name := match["unit"].lower()) or _UNITS.get(name.removesuffix("s")) if match else None
     if match is None or unit is None:
@@ -107,8 +107,8 @@ def since(attributes: Mapping[str, Any], *, where: str) -> Since:
     except ValueError:
         raise TimeError(f"the times are in {units!r}, which is no date", where=where, fix=fix) from None
     if calendar != "proleptic_gregorian" and zero.date() < _REFORM:
-        what = f"the times are in {units!r}: of days before {_REFORM} it does not say whether they are Julian"
-        raise TimeError(what, where=where, fix="state the calendar proleptic_gregorian, or write a later date")
+        message = f"the times are in {units!r}: of days before {_REFORM} it does not say whether they are Julian"
+        raise TimeError(message, where=where, fix="state the calendar proleptic_gregorian, or write a later date")
     return Since(unit=unit, zero=from_datetime(zero, nanosecond=int((date["f"] or "").ljust(9, "0"))))
 
 
@@ -133,14 +133,14 @@ def instants(values: AnyArray, attributes: Mapping[str, Any], *, where: str) -> 
         rest = np.zeros(len(values)) if kept.dtype.kind in "iu" else np.round((kept - whole) * float(count.unit))
         units, further = divmod(count.zero, count.unit)  # the nanoseconds from year 1 do not fit into 64 bits
         time = (whole + units) * count.unit + further + rest.astype(np.int64)
-    found: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     step = float(np.spacing(np.abs(kept).max(initial=0))) * count.unit if kept.dtype.kind == "f" else 0.0
     time = snapped(time, 1_000_000, round(step)) if step <= 1_000 else time
     if step > NANOSECONDS / 1000:
-        what = f"the times are numbers of {8 * kept.dtype.itemsize} bits, which are {step / NANOSECONDS:.3g} s apart"
+        message = f"the times are numbers of {8 * kept.dtype.itemsize} bits, which are {step / NANOSECONDS:.3g} s apart"
         fix = "write them as numbers of 64 bits"
-        found = (Finding.of("coarse-stamps", what, value=step / NANOSECONDS, fix=fix),)
-    return np.where(absent, NOT_A_TIME, time), found
+        findings = (Finding.of("coarse-stamps", message, value=step / NANOSECONDS, fix=fix),)
+    return np.where(absent, NOT_A_TIME, time), findings
 
 
 _HDF = b"\x89HDF"
@@ -168,16 +168,16 @@ def open_dataset(path: Path, *, limits: Limits) -> TableText:
     xarray: Any = importlib.import_module("xarray")
     with path.open("rb") as stream:  # opened here: scipy leaves a damaged file open
         if stream.read(4) == _HDF and not {"h5netcdf", "netcdf4"} & set(xarray.backends.list_engines()):
-            what = "this is netCDF-4 or another HDF5 file, and no library that reads it is installed"
+            message = "this is netCDF-4 or another HDF5 file, and no library that reads it is installed"
             fix = "pip install h5netcdf; or convert it, nccopy -k classic FILE OTHER.nc; or export it as CSV"
-            raise InputError(what, where=where, fix=fix)
+            raise InputError(message, where=where, fix=fix)
         stream.seek(0)
         try:
             raw = xarray.open_dataset(stream, decode_cf=False)
             data = xarray.decode_cf(raw, decode_times=False).squeeze()
         except Exception as error:  # noqa: BLE001 - a damaged file makes its libraries raise anything
-            what = f"this netCDF or HDF5 file cannot be read: {type(error).__name__}"
-            raise InputError(what, where=where, fix="copy it again, or export it as CSV") from None
+            message = f"this netCDF or HDF5 file cannot be read: {type(error).__name__}"
+            raise InputError(message, where=where, fix="copy it again, or export it as CSV") from None
         with raw:
             return _table(data, raw, path, limits)
 
@@ -208,13 +208,13 @@ def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
     if not any("wind" in heading for heading in columns):
         fix = "give the variables of wind their standard names and one dimension, time; or export them as CSV"
         raise InputError("no variable of wind along time alone", where=where, fix=fix)
-    stamps, found = instants(raw[time].squeeze().values, raw[time].attrs, where=f"{where}, variable {time}")
+    stamps, findings = instants(raw[time].squeeze().values, raw[time].attrs, where=f"{where}, variable {time}")
     rows = zip(stamps.tolist(), *(values.tolist() for values in columns.values()), strict=True)
     lines = [",".join(["time", *columns])]
     lines += [
         ",".join(["" if stamp == NOT_A_TIME else iso(stamp), *("" if value != value else repr(value) for value in row)])
         for stamp, *row in rows
     ]
-    what = f"variables that are not read: {', '.join(left)}"
-    found = (*found, Finding.of("columns-not-read", what)) if left else found
-    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=tuple(lines))
+    message = f"variables that are not read: {', '.join(left)}"
+    findings = (*findings, Finding.of("columns-not-read", message)) if left else findings
+    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=findings, text=tuple(lines))

@@ -36,8 +36,8 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
     with zipfile.ZipFile(path) as archive:  # is_workbook has read its directory
         size = sum(item.file_size for item in archive.infolist())
     if size > limits.size:
-        what = f"the workbook unpacks to {size} bytes, more than {limits.size}"
-        raise LimitError(what, where=where, fix="save the sheet as CSV")
+        message = f"the workbook unpacks to {size} bytes, more than {limits.size}"
+        raise LimitError(message, where=where, fix="save the sheet as CSV")
     if find_spec("python_calamine") is None:
         raise InputError(
             "this is an Excel workbook, and the library that reads it is not installed",
@@ -47,17 +47,17 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
     sheet = _read(where, limits)
     if sheet is None:
         raise InputError("no sheet with two rows", where=where, fix="check that the workbook holds the log")
-    found: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     if sheet.others:
         count = 1 + len(sheet.others)
         text = f"the sheet {sheet.title!r} is read, the first of {count}; not {', '.join(map(repr, sheet.others))}"
         fix = "save another sheet as a file of its own to read it"
-        found = (Finding.of("several-sheets", text, count=count, fix=fix),)
+        findings = (Finding.of("several-sheets", text, count=count, fix=fix),)
     if sheet.of_1904:
         text = "the workbook counts days from 1904-01-01: so its dates are read, and so is excel-days"
-        found = (*found, Finding.of("days-since-1904", text))
+        findings = (*findings, Finding.of("days-since-1904", text))
     lines, days = tuple(sheet.text.splitlines()), "excel-days-1904" if sheet.of_1904 else "excel-days"
-    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=lines, serial_days=days)
+    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=findings, text=lines, serial_days=days)
 
 
 def _read(where: str, limits: Limits) -> Sheet | None:
@@ -67,7 +67,9 @@ def _read(where: str, limits: Limits) -> Sheet | None:
     except EndedError as ended:
         if ended.late:
             raise LimitError(f"reading it takes longer than {_SECONDS:g} s", where=where, fix=_FIX) from None
-        what = f"its sheets take more than {_MEMORY >> 20} MiB: cells count from the first to the last, filled or not"
-        raise LimitError(what, where=where, fix=_FIX) from None
+        message = (
+            f"its sheets take more than {_MEMORY >> 20} MiB: cells count from the first to the last, filled or not"
+        )
+        raise LimitError(message, where=where, fix=_FIX) from None
     finally:
         child.close()

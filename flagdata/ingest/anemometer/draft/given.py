@@ -76,8 +76,8 @@ def given_columns(text: str, shape: Shape) -> GivenColumns:
         name, detail = match["name"], (match["detail"] or "").strip()
         index = _index(match["column"].strip(), shape) if by_name else number - 1
         if index >= len(shape.names):
-            what = f"entry {number} is beyond the {len(shape.names)} columns of the table"
-            raise InputError(what, where=_WHERE, fix="count the columns, or name them: COLUMN=NAME[UNIT]")
+            message = f"entry {number} is beyond the {len(shape.names)} columns of the table"
+            raise InputError(message, where=_WHERE, fix="count the columns, or name them: COLUMN=NAME[UNIT]")
         if name in _TIMES:
             times.append((index, name, detail))
             continue

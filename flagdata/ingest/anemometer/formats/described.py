@@ -336,9 +336,9 @@ def _with_units(
             shown = _whole(cells, stated["whole"]) or _whole(speeds, stated["whole"])
             text = options.unit or shown or ""
             if not text:
-                what = f"the file states no unit of {column.name!r}, and its values do not show one"
+                message = f"the file states no unit of {column.name!r}, and its values do not show one"
                 fix = "give the one that was set: --unit m/s (or km/h, mph, kn)"
-                raise InputError(what, where=f"{where}, line {heading.at + 1}", fix=fix)
+                raise InputError(message, where=f"{where}, line {heading.at + 1}", fix=fix)
             if options.unit is None:
                 inferred = f"{column.name!r} in {text}: inferred, its values are whole {stated['whole']} converted"
         borrowed = borrowed or (text if not written and "{" in other else "")
@@ -351,13 +351,13 @@ def _with_units(
     short = len(heading.cells) - len(heading.below)
     if strange and (short > 0 or any("wind" in one for one in strange)):
         fewer = f", {short} fewer of them," if short > 0 else ""
-        what = f"the units{fewer} do not stand below their names: {', '.join(strange[:3])}"
+        message = f"the units{fewer} do not stand below their names: {', '.join(strange[:3])}"
         fix = f'mend the line of units; or, since they are the same in every such file: --columns "{",".join(always)}"'
-        raise InputError(what, where=f"{where}, line {heading.at + 2}", fix=fix)
+        raise InputError(message, where=f"{where}, line {heading.at + 2}", fix=fix)
     notes: list[Finding] = []
     if borrowed:
-        what = f"speeds carry no unit: taken to be in {borrowed}, which is stated above the heading"
-        notes.append(Finding.of("unit-from-preamble", what))
+        message = f"speeds carry no unit: taken to be in {borrowed}, which is stated above the heading"
+        notes.append(Finding.of("unit-from-preamble", message))
     if repaired:
         text = "; ".join(repaired)
         notes.append(Finding.of("units-repaired", text, count=len(repaired)))
@@ -398,16 +398,16 @@ def _assigned(
         name = _known(column.unit)
         if name is None or unit(name).si != CHANNELS[channel].unit:
             if channel.startswith("wind_") or not channels[channel].get("optional"):
-                what = f"{column.name!r} is {channel}, but its unit is {column.unit!r}"
-                raise InputError(what, where=at_units, fix=_FIX)
+                message = f"{column.name!r} is {channel}, but its unit is {column.unit!r}"
+                raise InputError(message, where=at_units, fix=_FIX)
             unread.append(column)
             continue
         taken[channel] = replace(column, unit=name)
     listed = ", ".join(column.name for column in columns[:40] if column.name)
     for channel in channels:
         if channel not in taken and not channels[channel].get("optional"):
-            what = f"no column of {channel.replace('_', ' ')} among {listed}"
-            raise InputError(what, where=at_names, fix=f"{_FIX}; or let its columns be drafted: --as delimited")
+            message = f"no column of {channel.replace('_', ' ')} among {listed}"
+            raise InputError(message, where=at_names, fix=f"{_FIX}; or let its columns be drafted: --as delimited")
     if not {name for name in taken if name.startswith("wind_") and CHANNELS[name].unit == "m/s"}:
         fix = "let its columns be drafted, and confirm them: --as delimited; or describe the file by a recipe"
         raise InputError(f"no column of wind speed among {listed}", where=at_names, fix=fix)
@@ -433,10 +433,10 @@ def _checks(checks: Sequence[Mapping[str, Any]], heading: Heading) -> list[dict[
 
 def column_findings(done: Completed) -> tuple[Finding, ...]:
     """What is to be said of the columns that are not read, anemometers first."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if done.rivals:
         used = next(done.channels[name].name for name in ("wind_speed", "wind_x") if name in done.channels)
-        found.append(
+        findings.append(
             Finding.of(
                 "several-anemometers",
                 f"wind is read from {used!r}, the first of {len(done.rivals) + 1} columns of wind; not from "
@@ -451,9 +451,9 @@ def column_findings(done: Completed) -> tuple[Finding, ...]:
         # Columns that speak of the wind come first, so that none of them is lost among a hundred others.
         names = sorted((column.name for column in done.unread), key=lambda name: "wind" not in name.lower())
         more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-        what = ", ".join(name[:_WIDE] for name in names[:_NAMED]) + more
-        found.append(Finding.of("columns-not-read", what, count=len(names)))
-    return tuple(found)
+        message = ", ".join(name[:_WIDE] for name in names[:_NAMED]) + more
+        findings.append(Finding.of("columns-not-read", message, count=len(names)))
+    return tuple(findings)
 
 
 Davis = partial(Described, "davis")

@@ -190,21 +190,21 @@ class TimeLine:
         kind = self._kind(where)
         at = np.array(self.line[kind], dtype=np.int64)
         clock = np.array(self.clock[kind], dtype=np.int64)
-        found: list[Finding] = []
+        findings: list[Finding] = []
         # More than half a day back is midnight; less is disorder.
         day = np.cumsum(np.concatenate(([0], np.diff(clock) < -DAY // 2)).astype(np.int64))
         if day[-1]:
             text = f"{day[-1]} times the clock passes midnight: the day is counted on"
-            found.append(Finding.of("midnight", text, count=int(day[-1])))
+            findings.append(Finding.of("midnight", text, count=int(day[-1])))
         marks = (self._start(at, clock, day, date, where) + day) * DAY + clock
         marks, reported = _one_clock(marks, at, choice)
-        found.extend(reported)
+        findings.extend(reported)
         rising = marks > np.concatenate(([np.iinfo(np.int64).min], np.maximum.accumulate(marks)[:-1]))
         behind = np.concatenate(([False], np.diff(marks) < -DISORDER))
         if behind.any():
             count = int(behind.sum())
-            what = f"{count} times the stream's clock runs backwards; marks behind earlier ones are not used"
-            found.append(_backwards(count, f"line {at[behind][0]}", what))
+            message = f"{count} times the stream's clock runs backwards; marks behind earlier ones are not used"
+            findings.append(_backwards(count, f"line {at[behind][0]}", message))
         at, marks = at[rising], marks[rising]
         if len(marks) < 2:
             raise TimeError(
@@ -219,7 +219,7 @@ class TimeLine:
             spacing=spacing,
             marks=len(marks),
             kind=kind,
-            findings=tuple(found),
+            findings=tuple(findings),
             bursts=time is not None,
         )
 
@@ -235,12 +235,12 @@ class TimeLine:
         clock = np.array(self.clock[kind], dtype=np.int64)
         mark = self._start(at, clock, np.zeros(1, dtype=np.int64), date, where) * DAY + int(clock[0])
         pace = NANOSECONDS // (_reach(lines, int(at[0])) + 1)
-        what = (
+        message = (
             f"the stream carries one time, in line {at[0]}: {len(lines)} wind sentences are taken as of the second "
             "about it, in their order"
         )
-        found = (Finding.of("one-time", what, count=len(lines), fix=_STEADY_FIX),)
-        return Placed(time=mark + (lines - at[0]) * pace, spacing=1.0, marks=1, kind=kind, findings=found)
+        findings = (Finding.of("one-time", message, count=len(lines), fix=_STEADY_FIX),)
+        return Placed(time=mark + (lines - at[0]) * pace, spacing=1.0, marks=1, kind=kind, findings=findings)
 
     def _kind(self, where: str) -> str:
         counts = {kind: len(lines) for kind, lines in self.line.items()}
@@ -291,8 +291,8 @@ def _one_clock(marks: Instants, at: IntArray, choice: ClockChoice | None) -> tup
     found = clocks.report(marks[settled], jumps, at[settled], choice)
     if stray.any():
         out[stray] = out[settled[np.maximum(np.searchsorted(settled, np.flatnonzero(stray)) - 1, 0)]]
-        what = f"{int(stray.sum())} times of the stream leave its course and come back to it; not used"
-        found = (*found, _backwards(int(stray.sum()), f"line {at[stray][0]}", what))
+        message = f"{int(stray.sum())} times of the stream leave its course and come back to it; not used"
+        found = (*found, _backwards(int(stray.sum()), f"line {at[stray][0]}", message))
     return out, found
 
 

@@ -170,16 +170,16 @@ def gathered(
     _leave_silent(stream)
     if not stream.line:
         by = f" of the talker {options.talker}" if options.talker is not None else ""
-        what = f"no valid sentence of wind ({', '.join(WINDS)}){by}{_others_seen(stream.kinds)}"
+        message = f"no valid sentence of wind ({', '.join(WINDS)}){by}{_others_seen(stream.kinds)}"
         fix = "have the instrument send MWV, or check its baud rate if sentences are broken"
-        raise InputError(what, where=where, fix=fix)
+        raise InputError(message, where=where, fix=fix)
     talkers = Counter(stream.talkers)
     if len(talkers) > 1:
-        what = f"several talkers send wind: {', '.join(sorted(talkers))}; they are different instruments"
+        message = f"several talkers send wind: {', '.join(sorted(talkers))}; they are different instruments"
         fix = f"choose one, e.g. --talker {talkers.most_common(1)[0][0]}"
         if not timed and not stream.times.line:
-            raise InputError(f"{what}, and {NO_TIME}", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
-        raise InputError(what, where=where, fix=fix)
+            raise InputError(f"{message}, and {NO_TIME}", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
+        raise InputError(message, where=where, fix=fix)
     if options.clock == "sort":
         fix = "give --clock first or --clock last, or leave it out"
         raise UsageError("the lines of a stream are in the order in which they came", where=where, fix=fix)
@@ -195,13 +195,13 @@ def reading_of(stream: Stream, time: Instants, options: WindOptions, *, where: s
     """
     line = np.array(stream.line, dtype=np.int64)
     channels: dict[str, Series] = {}
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for name in _CHANNELS:
         values = np.array([row.get(name, np.nan) for row in stream.values], dtype=np.float64)
         if name.endswith(("direction", "magnetic")):
             angle, impossible = rules.direction(name, values, line)
             values = np.mod(angle, 2 * np.pi)
-            found.extend(impossible)
+            findings.extend(impossible)
         if np.isfinite(values).any():
             channels[name] = values
     if not channels:
@@ -217,7 +217,7 @@ def reading_of(stream: Stream, time: Instants, options: WindOptions, *, where: s
         sensor=Sensor(name=f"NMEA 0183 talker {stream.talkers[0]}"),
         step=NANOSECONDS,
         stamped=False,
-        findings=(*_kinds(stream, time), *_findings(stream), *found, about),
+        findings=(*_kinds(stream, time), *_findings(stream), *findings, about),
     )
 
 
@@ -371,26 +371,29 @@ def _placed(count: int, placed: Placed) -> tuple[Finding, ...]:
     """Finding on sentences that have their time from others."""
     if placed.marks < 2:
         return placed.findings
-    kind, what = (
+    kind, message = (
         "time-interpolated",
         f"interpolated between {placed.marks} {placed.kind} marks {placed.spacing:g} s apart",
     )
     if placed.bursts:
-        kind, what = "time-of-burst", f"sentences come in bursts {placed.spacing:g} s apart, with one {placed.kind} in "
-        what += f"each, and each has the time of the {placed.kind} of its burst"
-    what = f"{count} wind sentences carry no time: {what}"
-    found = Finding(kind=kind, severity=Severity.WARNING, count=count, value=placed.spacing, what=what)
-    return (found, *placed.findings)
+        kind, message = (
+            "time-of-burst",
+            f"sentences come in bursts {placed.spacing:g} s apart, with one {placed.kind} in ",
+        )
+        message += f"each, and each has the time of the {placed.kind} of its burst"
+    message = f"{count} wind sentences carry no time: {message}"
+    finding = Finding(kind=kind, severity=Severity.WARNING, count=count, value=placed.spacing, what=message)
+    return (finding, *placed.findings)
 
 
 def _findings(stream: Stream) -> tuple[Finding, ...]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
 
-    def note(rows: Sequence[int] | int, kind: str, severity: Severity, what: str) -> None:
+    def note(rows: Sequence[int] | int, kind: str, severity: Severity, message: str) -> None:
         count, at = (rows, None) if isinstance(rows, int) else (len(rows), rows[0] if rows else None)
         if count:
             where = None if at is None else f"line {at}"
-            found.append(Finding(kind=kind, severity=severity, count=count, where=where, what=f"{count} {what}"))
+            findings.append(Finding(kind=kind, severity=severity, count=count, where=where, what=f"{count} {message}"))
 
     before = f"sentences follow text that is not a timestamp, as in {stream.first_before[:60]!r}; the text was not read"
     note(stream.before, "text-before-sentences", Severity.WARNING, before)
@@ -400,18 +403,18 @@ def _findings(stream: Stream) -> tuple[Finding, ...]:
     note(stream.not_sentences, "malformed-lines", Severity.WARNING, "lines that are no sentence; left out")
     note(stream.invalid, "malformed-sentences", Severity.ERROR, "wind sentences with fields missing; left out")
     faults = sum(bool(flag & SampleFlag.SENSOR_FAULT) for flag in stream.flags)
-    what = "wind sentences that the instrument itself marks invalid; left out of averages"
-    note(faults, "sensor-fault", Severity.WARNING, what)
+    message = "wind sentences that the instrument itself marks invalid; left out of averages"
+    note(faults, "sensor-fault", Severity.WARNING, message)
     note(stream.unchecked, "no-checksum", Severity.WARNING, "sentences without a checksum; taken as they are")
     note(stream.unstated, "no-status", Severity.WARNING, "MWV sentences without a status; taken as valid")
     for kind, number_of in stream.beside.items():
-        what = f"{kind} sentences are not read: {_NEWER[_OTHERS[kind]]} is read for that wind"
-        note(number_of, "sentences-not-read", Severity.NOTE, what)
-    what = "MWD sentences without a direction: no wind over ground, not read"
-    note(stream.undirected, "mwd-without-direction", Severity.NOTE, what)
+        message = f"{kind} sentences are not read: {_NEWER[_OTHERS[kind]]} is read for that wind"
+        note(number_of, "sentences-not-read", Severity.NOTE, message)
+    message = "MWD sentences without a direction: no wind over ground, not read"
+    note(stream.undirected, "mwd-without-direction", Severity.NOTE, message)
     missing = sum(bool(flag & SampleFlag.MISSING) for flag in stream.flags)
     note(missing, "missing-values", Severity.WARNING, "wind sentences without a speed")
-    return tuple(found)
+    return tuple(findings)
 
 
 _OFF = 60.0
@@ -438,9 +441,11 @@ class StampedNmea:
         if len(kinds) < max(1, len(lines) // 2):
             return None
         wind = sum(kind in WINDS for kind in kinds)
-        what = f"NMEA 0183 sentences; {GIVEN_CLOCK}" if head.counted else "a computer's stamp and an NMEA 0183 sentence"
+        message = (
+            f"NMEA 0183 sentences; {GIVEN_CLOCK}" if head.counted else "a computer's stamp and an NMEA 0183 sentence"
+        )
         reasons = (
-            f"{len(kinds)} of the first {len(lines)} lines are {what}",
+            f"{len(kinds)} of the first {len(lines)} lines are {message}",
             f"{wind} of them are wind ({', '.join(WINDS)})",
         )
         fix = None if wind else no_wind([raw for _, raw in lines], self.name)
@@ -465,7 +470,7 @@ class StampedNmea:
             raise InputError("no NMEA 0183 sentence after a stamp", where=where, fix="name another format by --as")
         stamps = stamps_of(list(texts.values()))
         line = np.array(list(texts), dtype=np.int64)[stamps.valid]
-        time, found = instants(
+        time, findings = instants(
             stamps.ns[stamps.valid], stamps.utc[stamps.valid], line=line, zone_name=options.zone, where=where
         )
         at = dict(zip(line.tolist(), time.tolist(), strict=True))
@@ -473,11 +478,11 @@ class StampedNmea:
         dropped = len(stream.line) - len(timed)
         keep(stream, timed)
         if dropped:
-            what = f"{dropped} wind sentences without a stamp; left out"
-            found = (*found, Finding.of("no-stamp", what, count=dropped))
+            message = f"{dropped} wind sentences without a stamp; left out"
+            findings = (*findings, Finding.of("no-stamp", message, count=dropped))
         reading = reading_of(stream, np.array([at[number] for number in stream.line], np.int64), options, where=where)
-        found = (*found, *reading.findings, *_receiver(at, marks))
-        return replace(reading, step=stamps.step, findings=found)
+        findings = (*findings, *reading.findings, *_receiver(at, marks))
+        return replace(reading, step=stamps.step, findings=findings)
 
 
 def _mark(text: str) -> int | None:

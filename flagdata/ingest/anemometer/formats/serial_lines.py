@@ -313,7 +313,7 @@ def _gather(source: TextFile, instrument: Instrument) -> _Gathered:
 
 def _channels(gathered: _Gathered, line: IntArray, keep: BoolArray) -> tuple[dict[str, FloatArray], list[Finding]]:
     channels: dict[str, FloatArray] = {}
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for name, column in gathered.channels.items():
         values = np.frombuffer(column, dtype=np.float64)[keep].copy()
         if not np.isfinite(values).any():
@@ -321,9 +321,9 @@ def _channels(gathered: _Gathered, line: IntArray, keep: BoolArray) -> tuple[dic
         if CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from"):
             values, beyond = rules.direction(name, values, line[keep])
             values = np.mod(values, 2 * np.pi)
-            found.extend(beyond)
+            findings.extend(beyond)
         channels[name] = values
-    return channels, found
+    return channels, findings
 
 
 def _missing(channels: dict[str, FloatArray]) -> NDArray[np.uint16]:
@@ -340,16 +340,16 @@ def _missing(channels: dict[str, FloatArray]) -> NDArray[np.uint16]:
 def _findings(
     gathered: _Gathered, instrument: Instrument, flags: NDArray[np.uint16], line: IntArray, unreadable: int
 ) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     places = {defect: [n for n in numbers if n > 1] for defect, numbers in gathered.defects.items()}
     if places[Defect.CUT] and places[Defect.CUT][-1] == gathered.last:
         text = "the last line is incomplete, as when the logger lost power; left out"
-        found.append(Finding.of("cut-off", text, where=f"line {places[Defect.CUT].pop()}"))
+        findings.append(Finding.of("cut-off", text, where=f"line {places[Defect.CUT].pop()}"))
 
     def note(numbers: Sequence[int], kind: str, severity: Severity, what: str) -> None:
         if len(numbers):
             text = f"{len(numbers)} {what}"
-            found.append(
+            findings.append(
                 Finding(kind=kind, severity=severity, count=len(numbers), where=f"line {numbers[0]}", what=text)
             )
 
@@ -364,5 +364,5 @@ def _findings(
     missing = line[(flags & SampleFlag.MISSING) != 0].tolist()
     note(missing, "missing-values", Severity.WARNING, "readings without a wind speed")
     if instrument.described_by is not None:
-        found.append(described(instrument.described_by))
-    return found
+        findings.append(described(instrument.described_by))
+    return findings

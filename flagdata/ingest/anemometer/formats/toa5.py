@@ -50,20 +50,20 @@ class Toa5(Described):
         done = self.completed(source, options)
         extra = [name for name in names if name == "RECORD" or _DIAGNOSTIC.fullmatch(name)]
         table = self.table(source, done, options, extra)
-        reading, flags, found = table.reading, table.reading.flags.copy(), list[Finding]()
+        reading, flags, findings = table.reading, table.reading.flags.copy(), list[Finding]()
         for name, values in table.extra.items():
             if name == "RECORD":
-                found.extend(_continuity(values, reading.line))
+                findings.extend(_continuity(values, reading.line))
                 continue
             fault = _faults(values)
             flags[fault] |= SampleFlag.SENSOR_FAULT
-            what = f"rows in which {name} reports a fault; left out of averages"
-            found.extend(_report("sensor-fault", fault, reading.line, what))
+            message = f"rows in which {name} reports a fault; left out of averages"
+            findings.extend(_report("sensor-fault", fault, reading.line, message))
         wind = next(column for channel, column in done.channels.items() if channel.startswith("wind_"))
         averaging = _averaging(processed[wind.number - 1], reading.time)
         logger = " ".join(cell for cell in header[0][2:4] if cell) or reading.sensor.name
         label = f"{header[0][1] if len(header[0]) > 1 else ''} on {logger}".strip()
-        reading = reading.with_findings(tuple(found), flags=flags)
+        reading = reading.with_findings(tuple(findings), flags=flags)
         reading = replace(reading, sensor=replace(reading.sensor, name=label, averaging=averaging))
         direction = done.channels.get("wind_direction")
         if direction is not None and processed[direction.number - 1].strip().lower() == "avg":
@@ -77,15 +77,15 @@ class Toa5(Described):
 def _header(source: TextFile) -> list[list[str]]:
     lines, where = source.head(4), str(source.path)
     if len(lines) < 4:
-        what = f"the file ends in line {len(lines)}, before the four header lines do"
-        raise InputError(what, where=where, fix="collect the table from the logger again")
+        message = f"the file ends in line {len(lines)}, before the four header lines do"
+        raise InputError(message, where=where, fix="collect the table from the logger again")
     rows = [[cell.strip() for cell in row] for row in csv.reader(lines)]
     if len(rows) < 4 or not rows[0] or rows[0][0].lstrip("\ufeff") != "TOA5":
         fix = "name another format by --as"
         raise InputError("line 1 does not begin with TOA5", where=f"{where}, line 1", fix=fix)
     if "TIMESTAMP" not in map(str.upper, rows[1]) or len(rows[2]) != len(rows[1]):
-        what = "lines 2 and 3 do not name TIMESTAMP and a unit for each column"
-        raise InputError(what, where=f"{where}, line 2", fix="collect the table as TOA5 with header")
+        message = "lines 2 and 3 do not name TIMESTAMP and a unit for each column"
+        raise InputError(message, where=f"{where}, line 2", fix="collect the table as TOA5 with header")
     return rows
 
 
@@ -103,9 +103,9 @@ def _mean_of_angles(name: str, names: Sequence[str]) -> Finding:
     """Finding on a direction that the logger averaged as a number: 350° and 10° make 180° then."""
     vectors = [other for other in names if other.endswith("WVc(2)")]  # the second of its numbers is the direction
     beside = f"; {', '.join(repr(other) for other in vectors)} may be the mean of vectors" if vectors else ""
-    what = f"{name!r} is the mean of a vane's readings as numbers, which is wrong where they pass north{beside}"
+    message = f"{name!r} is the mean of a vane's readings as numbers, which is wrong where they pass north{beside}"
     fix = "have the program average the wind as a vector (WindVector), or read that column: --as delimited --columns"
-    return Finding.of("direction-mean-of-numbers", what, fix=fix)
+    return Finding.of("direction-mean-of-numbers", message, fix=fix)
 
 
 def _continuity(record: FloatArray, line: IntArray) -> tuple[Finding, ...]:
@@ -113,10 +113,10 @@ def _continuity(record: FloatArray, line: IntArray) -> tuple[Finding, ...]:
     steps = np.diff(record)
     lost, back = steps > 1, steps < 0
     skipped = int((steps[lost] - 1).sum())
-    what = f"record numbers are skipped in {int(lost.sum())} places: rows that the logger made are not in the file"
+    message = f"record numbers are skipped in {int(lost.sum())} places: rows that the logger made are not in the file"
     again = "times the record number goes back: the logger's program was restarted, or files were joined"
     return (
-        *_report("records-lost", lost, line[1:], what, count=skipped),
+        *_report("records-lost", lost, line[1:], message, count=skipped),
         *_report("records-restarted", back, line[1:], again),
     )
 

@@ -217,10 +217,10 @@ def sorted_as_given(time: Instants, line: IntArray, choice: ClockChoice | None) 
     moved = np.ones(len(time), dtype=bool)
     moved[longest_rise(time)] = False
     count = int(moved.sum())
-    what = f"{count} of {len(time)} rows are out of order in the file; sorted by their stamps, as given"
+    message = f"{count} of {len(time)} rows are out of order in the file; sorted by their stamps, as given"
     where = f"line {line[moved][0]}"
-    found = Finding.of("rows-sorted", what, count=count, where=where)
-    return np.argsort(time, kind="stable"), found
+    finding = Finding.of("rows-sorted", message, count=count, where=where)
+    return np.argsort(time, kind="stable"), finding
 
 
 def continued(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None) -> tuple[Instants, BoolArray]:
@@ -253,41 +253,45 @@ def report(
         kept: whether the stamps stay as they are, since so many rows may be missing instead.
         sortable: whether rows have stamps of their own, so that they may be sorted.
     """
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for jump in jumps:
         at = int(line[jump.row])
         follow = f"{iso(int(time[jump.row - 1]))} is followed by {iso(int(time[jump.row]))}"
         rows = len(time) - jump.row
-        what = f"clock {jump.text()} at line {at}: {follow}; "
+        message = f"clock {jump.text()} at line {at}: {follow}; "
         if kept and jump.size > _NEVER_SET:
-            what = f"the clock of the {jump.row} rows before line {at} was not set yet: {follow}"
+            message = f"the clock of the {jump.row} rows before line {at} was not set yet: {follow}"
         elif kept:
-            what = f"an interval is longer than usual by {span(jump.size)}: either the clock was {jump.text()} at line "
-            what += f"{at} ({follow}) and what follows is off by that much, or so many rows are missing"
+            message = (
+                f"an interval is longer than usual by {span(jump.size)}: either the clock was {jump.text()} at line "
+            )
+            message += f"{at} ({follow}) and what follows is off by that much, or so many rows are missing"
         elif choice is None:
-            what += f"all rows are kept, and the {rows} from there on continue the clock of those before; the log does "
-            what += "not say which of the two clocks is right, so either may be off by that much"
+            message += (
+                f"all rows are kept, and the {rows} from there on continue the clock of those before; the log does "
+            )
+            message += "not say which of the two clocks is right, so either may be off by that much"
         else:
             right = "before it" if choice == "first" else "after the last jump"
-            what += f"as given, the stamps {right} are right, and the others continue them"
+            message += f"as given, the stamps {right} are right, and the others continue them"
         fix = f"if the clock was set, {CHOICES}"
         if jump.size > _NEVER_SET:
             fix = "to let those rows end where the others begin: --clock last"
         elif abs(jump.size) == HOUR:
             fix += "; if it is daylight saving, and the stamps state no offset, name the place by --zone Region/City"
         fix += f"; {SORT}" if sortable and jump.size < 0 else ""
-        found.append(
+        findings.append(
             Finding(
                 kind=f"clock-set-{'back' if jump.size < 0 else 'on'}",
                 value=jump.size / NANOSECONDS,
                 where=f"line {at}",
                 severity=Severity.WARNING if choice is None else Severity.NOTE,
                 count=1 if kept else rows,
-                what=what,
+                what=message,
                 fix=fix if choice is None else None,
             )
         )
-    return tuple(found)
+    return tuple(findings)
 
 
 def span(length: int) -> str:

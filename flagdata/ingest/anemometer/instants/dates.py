@@ -112,8 +112,8 @@ def date_form(texts: Sequence[str], *, given: Order | None, where: str) -> tuple
         fix = f"leave out --date-order, it is {' or '.join(fit)}"
         raise TimeError(f"dates are not {given}, as {first} and the others show", where=where, fix=fix)
     if len(chosen) > 1 and not points:
-        what = f"{first} may be {' or '.join(_WORDS[one] for one in chosen)}, and nothing in the log decides it"
-        raise TimeError(what, where=where, fix=f"give --date-order {' or '.join(chosen)}")
+        message = f"{first} may be {' or '.join(_WORDS[one] for one in chosen)}, and nothing in the log decides it"
+        raise TimeError(message, where=where, fix=f"give --date-order {' or '.join(chosen)}")
     reason = f"no other order fits the first {len(dated)} dates"
     if given is not None or points:
         reason = f"the order {given} was given" if given else "dates with points are written with the day first"
@@ -184,15 +184,15 @@ def completed(
         length = (start + np.timedelta64(1, "Y")).astype("datetime64[D]") - start.astype("datetime64[D]")
     lost = np.flatnonzero(into >= length.astype(np.int64))
     if len(lost):
-        what = f"{start[lost[0]]} has no such day as this row's"
+        message = f"{start[lost[0]]} has no such day as this row's"
         fix = "give --date with the year in which the log began"
-        raise TimeError(what, where=f"{where}, line {line[lost[0]]}", fix=fix)
+        raise TimeError(message, where=f"{where}, line {line[lost[0]]}", fix=fix)
     time = (first.astype("datetime64[D]").astype(np.int64) + into) * DAY + wall % DAY
     given = (date - dt.date(1970, 1, 1)).days * DAY
     if not given <= int(time[0]) <= given + DAY:  # 24:00 is of the day that ends
         shown = np.datetime64(int(time[0]), "ns").astype("datetime64[D]")
-        what = f"the first row is of {shown}, if of {date.year}, and not of {date.isoformat()}"
-        raise TimeError(what, where=place, fix=f"give its day with its year, such as --date {shown}")
+        message = f"the first row is of {shown}, if of {date.year}, and not of {date.isoformat()}"
+        raise TimeError(message, where=place, fix=f"give its day with its year, such as --date {shown}")
     return time, _date_given("stamps without a year", date, f"{int(passed.sum())} new years")
 
 
@@ -215,12 +215,12 @@ def since_start(
             where=f"{where}, line {line[0]}",
             fix="give the instant of the first row: --start 2026-05-01T12:00:00+02:00",
         )
-    found: list[Finding] = []
+    findings: list[Finding] = []
     span = _OVERFLOW.get(form)
     over = np.concatenate(([False], np.diff(count) < -0.9 * span if span else np.zeros(len(count) - 1, dtype=bool)))
     if span and over.any():
-        what = f"the counter of 32 bits runs over {int(over.sum())} times; the rows after it go on"
-        found.append(Finding.of("counter-overflow", what, count=int(over.sum()), where=f"line {line[over][0]}"))
+        message = f"the counter of 32 bits runs over {int(over.sum())} times; the rows after it go on"
+        findings.append(Finding.of("counter-overflow", message, count=int(over.sum()), where=f"line {line[over][0]}"))
         count = count + np.cumsum(over) * span
     steps = np.diff(count)
     usual = int(np.median(steps[steps > 0])) if np.any(steps > 0) else 0
@@ -232,9 +232,9 @@ def since_start(
             where=where,
             fix="make a file of each stretch and give each its own --start",
         )
-    what = f"the stamps count from a start; the first row was at {iso(start)}, as given"
+    message = f"the stamps count from a start; the first row was at {iso(start)}, as given"
     if int(count[0]) > max(int(np.diff(count[:2]).max(initial=0)), NANOSECONDS):
-        what += f", its count being {count[0] / NANOSECONDS:g} s; if that was the zero of the count instead, "
-        what += f"give --start {iso(start + int(count[0]))}"
-    found.append(Finding.of("elapsed-time", what))
-    return count - count[0] + start, tuple(found)
+        message += f", its count being {count[0] / NANOSECONDS:g} s; if that was the zero of the count instead, "
+        message += f"give --start {iso(start + int(count[0]))}"
+    findings.append(Finding.of("elapsed-time", message))
+    return count - count[0] + start, tuple(findings)

@@ -62,7 +62,7 @@ def to_utc(wall: IntArray, place: tzinfo, *, lines: IntArray, where: str) -> tup
         return wall.copy(), ()
     first, last = int(wall.min()) - 26 * HOUR, int(wall.max()) + 26 * HOUR
     offset = np.full(len(wall), offset_at(place, first), dtype=np.int64)
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for instant, before, after in _changes(place, first, last):
         start, end = instant + min(before, after), instant + max(before, after)
         rows = np.flatnonzero((wall >= start) & (wall < end))
@@ -77,10 +77,12 @@ def to_utc(wall: IntArray, place: tzinfo, *, lines: IntArray, where: str) -> tup
             )
         late = _second_pass(wall, rows, end - start, place, f"{where}, line {lines[rows[0]]}")
         offset[late] = after
-        what = f"the hour from {_show(start)} occurs twice in {place}; by their order {len(rows) - len(late)} rows are "
-        what += f"of its first pass, {len(late)} of its second"
-        found.append(Finding.of("clocks-set-back", what, count=len(rows), where=f"line {lines[rows[0]]}"))
-    return wall - offset, tuple(found)
+        message = (
+            f"the hour from {_show(start)} occurs twice in {place}; by their order {len(rows) - len(late)} rows are "
+        )
+        message += f"of its first pass, {len(late)} of its second"
+        findings.append(Finding.of("clocks-set-back", message, count=len(rows), where=f"line {lines[rows[0]]}"))
+    return wall - offset, tuple(findings)
 
 
 def _second_pass(wall: IntArray, rows: IntArray, length: int, place: tzinfo, where: str) -> IntArray:
@@ -205,6 +207,6 @@ def contradiction(says: str, theirs: str, given: str, time: Instants) -> tuple[F
     apart = max((offset_at(zone(given), at) - offset_at(zone(theirs), at) for at in ends), key=abs, default=0) / HOUR
     if not apart:
         return ()
-    what = f"{says} that the stamps are of {theirs}; {given} was given and is used, {abs(apart):g} h away"
+    message = f"{says} that the stamps are of {theirs}; {given} was given and is used, {abs(apart):g} h away"
     fix = f"give --zone {theirs}, unless the file is known to be wrong"
-    return (Finding.of("zone-contradicts", what, value=apart, fix=fix),)
+    return (Finding.of("zone-contradicts", message, value=apart, fix=fix),)

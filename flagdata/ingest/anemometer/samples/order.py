@@ -78,8 +78,8 @@ def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None)
     if choice is not None and {"rows-sorted", "clock-set-back", "clock-set-on"}.isdisjoint(
         one.kind for one in reading.findings
     ):
-        what = f"the rows are in the order of their stamps, and no clock was set: --clock {choice} is not used"
-        reading = reading.with_findings((Finding.of("clock-not-set", what),))
+        message = f"the rows are in the order of their stamps, and no clock was set: --clock {choice} is not used"
+        reading = reading.with_findings((Finding.of("clock-not-set", message),))
     return _distinct(reading, where)
 
 
@@ -88,9 +88,9 @@ def _without_empty(reading: Reading) -> Reading:
     steps = np.diff(reading.time)
     stuck = (steps < 0) | (reading.stamped & (steps == 0))
     beside = np.concatenate(([False], stuck)) | np.concatenate((stuck, [False]))
-    what = "{n} empty rows dropped, whose stamps are not after that of the row before"
+    message = "{n} empty rows dropped, whose stamps are not after that of the row before"
     rows = empty & beside if not empty.all() else np.zeros(len(empty), dtype=bool)
-    return reading.without(rows, "empty-rows", what, severity=Severity.NOTE)
+    return reading.without(rows, "empty-rows", message, severity=Severity.NOTE)
 
 
 def _without_copies(reading: Reading) -> Reading:
@@ -107,8 +107,8 @@ def _without_copies(reading: Reading) -> Reading:
         back = (time[1:] <= np.maximum.accumulate(time)[:-1]) & (steps != 0)
         varied = any(len(np.unique(values[again & np.isfinite(values)])) > 1 for values in reading.channels.values())
         if varied and int(again.sum()) >= _AGAIN * int(back.sum()):
-            what = "{n} rows bring earlier stamps and values again, as when downloads of a logger overlap"
-            return _without_copies(reading.without(again, "repeated-stretch", what))
+            message = "{n} rows bring earlier stamps and values again, as when downloads of a logger overlap"
+            return _without_copies(reading.without(again, "repeated-stretch", message))
     shared, differ = steps == 0, _differ(reading, slice(None, -1), slice(1, None))
     twice = np.concatenate(([False], shared & ~differ))
     changes = float(differ[~shared].mean()) * int(shared.sum()) if not shared.all() else 0.0
@@ -119,8 +119,8 @@ def _without_copies(reading: Reading) -> Reading:
         period = clock.usual(time)
         wide = np.concatenate(([False], (steps > 1.5 * period) & (period < _FAST), [False, False]))
         twice &= ~(wide[:-2] | wide[2:]) & (int(shared.sum()) <= max(1.0, _ISOLATED * len(shared)))
-    what = "{n} rows repeat the row before in stamp and in all values that are read: copies"
-    return reading.without(twice, "duplicate-rows", what)
+    message = "{n} rows repeat the row before in stamp and in all values that are read: copies"
+    return reading.without(twice, "duplicate-rows", message)
 
 
 def _differ(reading: Reading, one: IntArray | slice, other: IntArray | slice) -> BoolArray:
@@ -157,10 +157,15 @@ def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> R
     elif jumps and choice is None and clock.disordered(time[~wild]):
         raise _runs_back(reading, where, settable=True)
     first = iso(int(time[np.argmax(wild)]))
-    what = f"{{n}} rows with stamps far from their neighbours' ({first})"
+    message = f"{{n}} rows with stamps far from their neighbours' ({first})"
     worst = float(lag.max()) / NANOSECONDS
     settled = reading.without(
-        wild, "time-backwards", what, severity=Severity.ERROR, value=worst, fix=clock.SORT if reading.stamped else None
+        wild,
+        "time-backwards",
+        message,
+        severity=Severity.ERROR,
+        value=worst,
+        fix=clock.SORT if reading.stamped else None,
     )
     return _continued(settled, jumps, choice)
 
@@ -236,8 +241,10 @@ def _distinct(reading: Reading, where: str) -> Reading:
     if float(shared.mean()) < 0.5:
         time, kind = _in_room(reading.time, runs), "equal-stamps"
         moved, value = time != reading.time, float(np.abs(time - reading.time).max()) / NANOSECONDS
-        what = "{n} rows share a stamp with a neighbour, as rows do that waited in a buffer or whose clock stopped for "
-        what += f"a moment: spread between their neighbours by up to {value:.4g} s, and unsure by as much"
+        message = (
+            "{n} rows share a stamp with a neighbour, as rows do that waited in a buffer or whose clock stopped for "
+        )
+        message += f"a moment: spread between their neighbours by up to {value:.4g} s, and unsure by as much"
     else:
         time, period, hold = _evenly(reading, runs)
         counted = any(one.kind == RATE_GIVEN for one in reading.findings)
@@ -250,14 +257,16 @@ def _distinct(reading: Reading, where: str) -> Reading:
         held, moved = hold > 1.5 * reading.step or hold > _COARSE, np.ones(len(time), dtype=bool)
         kind = "counted-together" if counted else "held-stamps" if held else "coarse-stamps"
         value = (period if held and not counted else reading.step) / NANOSECONDS
-        what = f"stamps {hold / NANOSECONDS:g} s apart for about {int(np.median(runs.rows))} rows each: spread evenly, "
-        what += f"one every {period / NANOSECONDS:.4g} s, so each time is unsure by up to {hold / NANOSECONDS:g} s"
+        message = (
+            f"stamps {hold / NANOSECONDS:g} s apart for about {int(np.median(runs.rows))} rows each: spread evenly, "
+        )
+        message += f"one every {period / NANOSECONDS:.4g} s, so each time is unsure by up to {hold / NANOSECONDS:g} s"
     flags = np.where(moved, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
     rows = np.concatenate(([False], again)) if kind == "counted-together" else moved
-    reading = replace(reading.marked(rows, kind, what, value=value), time=time).with_findings((), flags=flags)
+    reading = replace(reading.marked(rows, kind, message, value=value), time=time).with_findings((), flags=flags)
     stuck = np.concatenate(([False], np.diff(time) <= 0))
-    what = "{n} rows carry the stamp of the row before them and other values"
-    return reading.without(stuck, "duplicate-stamps", what, severity=Severity.ERROR, fix=_STATIONS)
+    message = "{n} rows carry the stamp of the row before them and other values"
+    return reading.without(stuck, "duplicate-stamps", message, severity=Severity.ERROR, fix=_STATIONS)
 
 
 def _in_room(time: IntArray, runs: _Runs) -> IntArray:
@@ -311,7 +320,7 @@ def _even(runs: _Runs, period: float) -> bool:
 def _shared(reading: Reading, runs: _Runs, hold: int, where: str) -> TimeError:
     low, high = int(runs.rows.min()), int(runs.rows.max())
     number, dates = f"{low}" if low == high else f"{low} to {high}", reading.step >= DAY
-    what = (
+    message = (
         "the stamps are dates without a time of day, and stand"
         if dates
         else (f"the stamps are {hold / NANOSECONDS:g} s apart, and stand")
@@ -319,5 +328,5 @@ def _shared(reading: Reading, runs: _Runs, hold: int, where: str) -> TimeError:
     fix = "name the column of the time of day beside that of the date; " if dates else "log a stamp with every row; "
     fix += "if the rows came at a steady rate, read the wind alone (--columns) with --start TIME --rate HZ; "
     return TimeError(
-        f"{what} for {number} rows each: the file does not say when each was read", where=where, fix=fix + _STATIONS
+        f"{message} for {number} rows each: the file does not say when each was read", where=where, fix=fix + _STATIONS
     )

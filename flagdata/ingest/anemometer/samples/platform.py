@@ -148,9 +148,9 @@ def _renamed(
     fix: str | None = None,
 ) -> Reading:
     """The reading with channels under other names, and its findings."""
-    found = Finding(kind=kind, severity=severity, what=what, value=value, fix=fix)
+    finding = Finding(kind=kind, severity=severity, what=what, value=value, fix=fix)
     channels = {names.get(name, name): values for name, values in reading.channels.items()}
-    return replace(reading, channels=channels).with_findings((found,))
+    return replace(reading, channels=channels).with_findings((finding,))
 
 
 def check_corrected(reading: Reading, given: Platform | None, *, where: str) -> None:
@@ -194,8 +194,8 @@ def settled(
     moving = speed is not None and speed > MOVING
     if options.platform == "fixed":
         if moving:
-            what = f"the platform was given as fixed, but moves at {speed:.1f} kn over ground in the median"
-            raise InputError(what, where=where, fix="leave out --platform")
+            message = f"the platform was given as fixed, but moves at {speed:.1f} kn over ground in the median"
+            raise InputError(message, where=where, fix="leave out --platform")
         return _fixed(channels, options, source, where)
     if options.azimuth is not None:
         fix = "add --platform fixed, or leave it out"
@@ -208,14 +208,16 @@ def settled(
     else:
         known, fix = "a platform of unknown motion", "if the sensor is on a mast, give --platform fixed"
     if "wind_speed" not in channels:
-        what = f"wind relative to {known}: no ground truth"
+        message = f"wind relative to {known}: no ground truth"
         kind = "apparent-wind-only"
-        return dict(channels), Finding(kind=kind, severity=Severity.WARNING, value=speed, what=what, fix=fix)
-    what = f"wind over ground ({source}) was computed by the instrument from heading and speed of {known}"
+        return dict(channels), Finding(kind=kind, severity=Severity.WARNING, value=speed, what=message, fix=fix)
+    message = f"wind over ground ({source}) was computed by the instrument from heading and speed of {known}"
     if fix is not None:
-        what = f"wind over ground ({source}): if its platform moves, the instrument computed it from that platform's "
-        what += "heading and speed"
-    return dict(channels), Finding.of("computed-true-wind", what, fix=fix)
+        message = (
+            f"wind over ground ({source}): if its platform moves, the instrument computed it from that platform's "
+        )
+        message += "heading and speed"
+    return dict(channels), Finding.of("computed-true-wind", message, fix=fix)
 
 
 def _fixed(
@@ -229,8 +231,8 @@ def _fixed(
         out["wind_speed"] = out.pop(speed)
     if options.azimuth is not None:
         if stated or angle not in out:
-            what = "the stream states wind over ground itself" if stated else "the stream has no directions"
-            raise UsageError(f"an azimuth was given, but {what}", where=where, fix="leave out --azimuth")
+            message = "the stream states wind over ground itself" if stated else "the stream has no directions"
+            raise UsageError(f"an azimuth was given, but {message}", where=where, fix="leave out --azimuth")
         out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
-    what = f"the wind over ground is that of {source}" if stated else f"{kind} wind is wind over ground"
-    return out, Finding.of("fixed-platform", f"fixed platform, as given: {what}")
+    message = f"the wind over ground is that of {source}" if stated else f"{kind} wind is wind over ground"
+    return out, Finding.of("fixed-platform", f"fixed platform, as given: {message}")

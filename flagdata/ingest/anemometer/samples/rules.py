@@ -65,10 +65,10 @@ def impossible(reading: Reading) -> Reading:
         values, of_wind = reading.channels[name], name in WIND_CHANNELS
         beyond = (values < low) | (values > high)
         bounds = f"{low:g} to {high:g} {CHANNELS[name].unit}"
-        what = f"{{n}} impossible values of {name}, outside {bounds}; left out of averages"
+        message = f"{{n}} impossible values of {name}, outside {bounds}; left out of averages"
         flag = SampleFlag.OUT_OF_RANGE if of_wind else SampleFlag.OK
         known = (reading.flags & flag) != 0
-        reading = reading.marked(beyond & ~known, _OUT, what, flag=flag, fix=_OUT_FIX)
+        reading = reading.marked(beyond & ~known, _OUT, message, flag=flag, fix=_OUT_FIX)
         if not of_wind:
             reading = replace(reading, channels={**reading.channels, name: np.where(beyond, np.nan, values)})
     return reading
@@ -88,24 +88,24 @@ def direction(
     beyond = ((angle < low) | (angle > high)) & ((bare < low) | (bare > high))
     if not beyond.any():
         return angle, ()
-    what = f"{int(beyond.sum())} impossible values of {name}, outside -180° to 360°; left out of averages"
-    found = Finding(
+    message = f"{int(beyond.sum())} impossible values of {name}, outside -180° to 360°; left out of averages"
+    finding = Finding(
         kind=_OUT,
         severity=Severity.WARNING,
         count=int(beyond.sum()),
         where=f"line {line[beyond][0]}",
-        what=what,
+        what=message,
         fix=_OUT_FIX,
     )
-    return np.where(beyond, np.nan, angle), (found,)
+    return np.where(beyond, np.nan, angle), (finding,)
 
 
 def faults(reading: Reading) -> Reading:
     """Rows in which a channel of the recipe's `fault-where-zero` is 0: SENSOR_FAULT."""
     for name in reading.rules.fault_where_zero:
         if name in reading.channels:
-            what = f"{{n}} rows in which {name} is 0"
-            reading = reading.marked(reading.channels[name] == 0, "sensor-fault", what, flag=SampleFlag.SENSOR_FAULT)
+            message = f"{{n}} rows in which {name} is 0"
+            reading = reading.marked(reading.channels[name] == 0, "sensor-fault", message, flag=SampleFlag.SENSOR_FAULT)
     return reading
 
 
@@ -132,11 +132,11 @@ def negative(reading: Reading) -> Reading:
                 fix="name both components, each with its column, as wind_x[m/s] and wind_y[m/s] in --columns, and "
                 "add --azimuth 270 where they are towards east and north",
             )
-        what = f"{{n}} negative values of {name}, down to {lowest:.3g} m/s; left out of averages"
+        message = f"{{n}} negative values of {name}, down to {lowest:.3g} m/s; left out of averages"
         reading = reading.marked(
             below,
             "negative-speed",
-            what,
+            message,
             flag=SampleFlag.OUT_OF_RANGE,
             value=lowest,
             fix="if calm air reads below zero, give --zero-offset",
@@ -184,8 +184,8 @@ def idle(reading: Reading) -> Reading:
         zero = np.zeros(len(values), dtype=bool)
         zero[rows[_within(starts[long], lengths[long])]] = True
         longest = float(span[long].max())
-        what = f"{name} reads exactly 0 in {'all ' if always else ''}{{n}} rows, for {longest:.0f} s on end: "
-        what += (
+        message = f"{name} reads exactly 0 in {'all ' if always else ''}{{n}} rows, for {longest:.0f} s on end: "
+        message += (
             "a calm all along, or a sensor that is not connected or blocked"
             if on_mast
             else "past a platform that may move no air stands so still; the sensor is not connected or blocked; left "
@@ -194,7 +194,7 @@ def idle(reading: Reading) -> Reading:
         reading = reading.marked(
             zero,
             "stays-at-zero",
-            what,
+            message,
             flag=SampleFlag.OK if on_mast else SampleFlag.STALE,
             value=longest,
             fix="check the sensor, its cable and the column",
@@ -210,14 +210,14 @@ def one_direction(reading: Reading) -> Reading:
     if int(known.sum()) < _VANE_ROWS or len(np.unique(towards[known])) > 1:
         return reading
     at = float(np.degrees(towards[known][0]))
-    what = f"wind_direction is {at:g}° in all {{n}} rows"
+    message = f"wind_direction is {at:g}° in all {{n}} rows"
     if not speed[known].any():
-        what += " and wind_speed is 0: calm air all along, or columns that were never filled"
+        message += " and wind_speed is 0: calm air all along, or columns that were never filled"
     elif len(np.unique(speed[known])) >= _VANE_SPEEDS:
-        what += ", while the speed varies: a vane that is stuck, not connected or not set up"
+        message += ", while the speed varies: a vane that is stuck, not connected or not set up"
     else:
         return reading
-    return reading.marked(known, "direction-stays", what, value=at, fix="check the vane, its cable and the column")
+    return reading.marked(known, "direction-stays", message, value=at, fix="check the vane, its cable and the column")
 
 
 def stale(reading: Reading) -> Reading:
@@ -252,9 +252,11 @@ def stale(reading: Reading) -> Reading:
         repeats = np.zeros(len(reading.time), dtype=bool)
         repeats[rows[_within(starts[long] + 1, lengths[long])]] = True
         number, seconds = int(long.sum()), float(span[np.argmax(np.where(long, lengths, 0))]) if len(span) else 0.0
-        what = f"{{n}} rows in {number} {'run' if number == 1 else 'runs'} repeat the {' and '.join(present)} before "
-        what += f"them {text}; the longest run lasts {seconds:.2f} s; left out of averages"
-        reading = reading.marked(repeats, "stale-repeats", what, flag=SampleFlag.STALE, value=seconds, fix=fix)
+        message = (
+            f"{{n}} rows in {number} {'run' if number == 1 else 'runs'} repeat the {' and '.join(present)} before "
+        )
+        message += f"them {text}; the longest run lasts {seconds:.2f} s; left out of averages"
+        reading = reading.marked(repeats, "stale-repeats", message, flag=SampleFlag.STALE, value=seconds, fix=fix)
     return reading
 
 
@@ -329,13 +331,13 @@ def at_nyquist(reading: Reading) -> Reading:
         step = float(np.median(np.diff(high))) if len(high) > 2 else 1.0
         near = values >= limit - max(2 * step, 0.05 * limit)
         typical = float(np.median(values[near])) if near.any() else 0.0
-        what = (
+        message = (
             f"{{n}} values of {name}, median {typical:.2f} Hz in steps of {step:.2f} Hz, lie at the Nyquist limit "
             f"{limit:.2f} Hz of {rate:.1f} frames a second: the true frequency may as well be {rate - typical:.1f} or "
             f"{rate + typical:.1f} Hz"
         )
         fix = f"only a camera faster than {4 * limit:.0f} frames a second can show it"
-        reading = reading.marked(near, "at-nyquist", what, flag=SampleFlag.ALIASED, value=typical, fix=fix)
+        reading = reading.marked(near, "at-nyquist", message, flag=SampleFlag.ALIASED, value=typical, fix=fix)
     return reading
 
 
@@ -362,7 +364,7 @@ def gaps(reading: Reading) -> Reading:
             continue
         longest = int(wide[np.argmax(steps[wide])])
         lost, seconds = float((steps[wide] - usual).sum()) / NANOSECONDS, float(steps[longest]) / NANOSECONDS
-        found = Finding.of(
+        finding = Finding.of(
             "gaps",
             f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'}{of} longer than the usual "
             f"{usual / NANOSECONDS:.4g} s, {lost:.3f} s lost in all; the longest interval, {seconds:.3f} s, ends at "
@@ -371,7 +373,7 @@ def gaps(reading: Reading) -> Reading:
             value=seconds,
             where=f"line {reading.line[rows[longest + 1]]}",
         )
-        reading = reading.with_findings((found,))
+        reading = reading.with_findings((finding,))
     return reading
 
 
@@ -390,19 +392,19 @@ def steady(reading: Reading) -> Reading:
     intensity = float(values.std() / values.mean())
     if intensity >= _INTENSITY:
         return reading
-    what = (
+    message = (
         f"the speed varies by {100 * intensity:.2g} % about its mean of {values.mean():.3g} m/s: as steady as in a "
         "wind tunnel, and steadier than wind outdoors; if it was outdoors, the column is likely another quantity"
     )
-    found = Finding.of("steady-wind", what, value=intensity)
-    return reading.with_findings((found,))
+    finding = Finding.of("steady-wind", message, value=intensity)
+    return reading.with_findings((finding,))
 
 
 def future(reading: Reading, *, now: int) -> Reading:
     """Rows that are stamped more than a day after `now` [UTC ns]; a clock that is a little fast is not reported."""
-    what = f"{{n}} rows are stamped after today, the last {iso(int(reading.time.max()))}: a wrong clock or date"
+    message = f"{{n}} rows are stamped after today, the last {iso(int(reading.time.max()))}: a wrong clock or date"
     fix = "check the logger's clock and the order of day, month and year; years of two digits are taken as 1970 to 2069"
-    return reading.marked(reading.time > now + 86_400 * NANOSECONDS, "stamps-in-future", what, fix=fix)
+    return reading.marked(reading.time > now + 86_400 * NANOSECONDS, "stamps-in-future", message, fix=fix)
 
 
 RULES: tuple[Callable[[Reading], Reading], ...] = (

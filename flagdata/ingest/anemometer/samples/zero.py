@@ -101,9 +101,9 @@ def check(reading: Reading, asked: ZeroOffset | None, *, where: str) -> None:
     if asked is None or asked == "report" or ("wind_speed" in reading.channels and "wind_x" not in reading.channels):
         return
     components = "wind_x" in reading.channels
-    what = "wind components, each with a zero of its own" if components else "no wind speed"
+    message = "wind components, each with a zero of its own" if components else "no wind speed"
     fix = "give each column its offset in a recipe" if components else "leave out --zero-offset"
-    raise UsageError(f"a zero offset was asked for, but the log has {what}", where=where, fix=fix)
+    raise UsageError(f"a zero offset was asked for, but the log has {message}", where=where, fix=fix)
 
 
 def settle(reading: Reading, choice: ZeroOffset) -> Reading:
@@ -130,9 +130,9 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
         shift = zero.offset
     elif choice != "report":
         shift = float(choice)
-        what = f"a zero offset of {shift:+.3f} m/s was given and subtracted from every speed"
-        found = Finding.of("zero-offset-given", what, value=shift, count=len(speed))
-        reading = reading.with_findings((found,))
+        message = f"a zero offset of {shift:+.3f} m/s was given and subtracted from every speed"
+        finding = Finding.of("zero-offset-given", message, value=shift, count=len(speed))
+        reading = reading.with_findings((finding,))
     if zero is not None and abs(zero.offset) > max(0.5 * step, 1e-6):
         reading = _reported(reading, zero, shift)
     corrected = speed - shift
@@ -154,14 +154,14 @@ def _reported(reading: Reading, zero: Zero, shift: float) -> Reading:
         fix = f"correct it: {ways}" if shift else f"subtract it: {ways}"
         left = zero.offset - shift
         done = f"{shift:+.3f} m/s was subtracted, which leaves {left:+.3f} m/s in calm air" if shift else done
-    what = f"calm air reads {zero.offset:+.3f} m/s (σ {zero.sigma:.3f}, {zero.seconds:.0f} s idle); {done}"
+    message = f"calm air reads {zero.offset:+.3f} m/s (σ {zero.sigma:.3f}, {zero.seconds:.0f} s idle); {done}"
     severity = Severity.NOTE if settled else Severity.WARNING
-    reading = reading.marked(zero.idle, "zero-offset", what, severity=severity, value=zero.offset, fix=fix)
+    reading = reading.marked(zero.idle, "zero-offset", message, severity=severity, value=zero.offset, fix=fix)
     if not zero.jump > _LEAST_JUMP:
         return reading
-    what = f"the reading leaves calm in a jump of {zero.jump:.2f} m/s ({{n}} times): lower speeds read as calm"
+    message = f"the reading leaves calm in a jump of {zero.jump:.2f} m/s ({{n}} times): lower speeds read as calm"
     fix = "do not use winds below that jump"
-    reading = reading.marked(np.roll(zero.leaves, 1), "dead-zone-jump", what, value=zero.jump, fix=fix)
+    reading = reading.marked(np.roll(zero.leaves, 1), "dead-zone-jump", message, value=zero.jump, fix=fix)
     if settled and reading.sensor.threshold is None:
         # Calm now reads about 0, and what blows below the jump reads as calm: that is a threshold.
         return replace(reading, sensor=replace(reading.sensor, threshold=zero.jump))

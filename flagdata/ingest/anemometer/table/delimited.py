@@ -134,13 +134,13 @@ def _refuse_new_names(source: TextFile, recipe: Recipe, where: str) -> None:
     names = sorted(heading.split(cut))
     for number, line in enumerate(source.each_line(), start=1):
         if len(line) == len(heading) and line != heading and sorted(line.split(cut)) == names:
-            what = "this line names the columns anew, in another order"
-            raise InputError(what, where=f"{where}, line {number}", fix="split the file before it")
+            message = "this line names the columns anew, in another order"
+            raise InputError(message, where=f"{where}, line {number}", fix="split the file before it")
 
 
 def _unused(found: Draft) -> tuple[Finding, ...]:
-    what = f"columns that are not used: {', '.join(found.unused)}"
-    return (Finding.of("columns-not-read", what),) if found.unused else ()
+    message = f"columns that are not used: {', '.join(found.unused)}"
+    return (Finding.of("columns-not-read", message),) if found.unused else ()
 
 
 def _states_its_unit(recipe: Recipe) -> bool:

@@ -86,16 +86,16 @@ class RowClock:
         steps = np.diff(wall)
         turned = len(steps) > 1 and float((steps < 0).mean()) > NEWEST_FIRST
         order: Order = slice(None, None, -1) if turned else slice(None)
-        found: tuple[Finding, ...] = ()
+        findings: tuple[Finding, ...] = ()
         if turned:
             text = "the newest row comes first: read from the end"
-            found = (Finding.of("newest-first", text, count=len(wall)),)
+            findings = (Finding.of("newest-first", text, count=len(wall)),)
         if dates.is_elapsed(self.form) or dates.needs_date(self.form):
-            return order, found  # the order of the rows is what gives their days
+            return order, findings  # the order of the rows is what gives their days
         sorting = clock.sorted_as_given(wall[order], line[order], choice)
         if sorting is None:
-            return order, found
-        return np.arange(len(wall))[order][sorting[0]], (*found, sorting[1])
+            return order, findings
+        return np.arange(len(wall))[order][sorting[0]], (*findings, sorting[1])
 
     def instants(
         self, order: Order, *, line: IntArray, zone_name: str | None, where: str, given: Given
@@ -107,18 +107,18 @@ class RowClock:
             return dates.since_start(wall, self.form, start=given.start, line=line, where=where)
         if self.form not in stamps.NAMED and "%p" not in self.form and not utc.any():
             dates.refuse_twelve(wall, line=line, where=where)
-        found: tuple[Finding, ...] = ()
+        findings: tuple[Finding, ...] = ()
         if dates.needs_date(self.form):
-            wall, found = dates.completed(wall, self.form, date=given.date, line=line, where=where)
+            wall, findings = dates.completed(wall, self.form, date=given.date, line=line, where=where)
         elif given.start is not None or given.date is not None:
             option = "--start" if given.start is not None else "--date"
             raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")
         if self.bare_dates:
-            what = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
-            bare = Finding.of("bare-dates", what, count=self.bare_dates)
-            found = (*found, bare)
+            message = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
+            bare = Finding.of("bare-dates", message, count=self.bare_dates)
+            findings = (*findings, bare)
         time, further = zones.instants(wall, utc, line=line, zone_name=zone_name, where=where)
-        return time, (*found, *further)
+        return time, (*findings, *further)
 
 
 def cells_of(block: Block, index: int) -> Sequence[str] | pa.StringArray:

@@ -96,9 +96,9 @@ class _Check:
         if not fault.any():
             return fault, ()
         count, values = int(fault.sum()), ", ".join(self.layout.values)
-        what = f"{count} rows whose {self.layout.about} is not {values}; left out of averages"
+        message = f"{count} rows whose {self.layout.about} is not {values}; left out of averages"
         where = f"line {line[fault][0]}"
-        return fault, (Finding.of("sensor-fault", what, count=count, where=where),)
+        return fault, (Finding.of("sensor-fault", message, count=count, where=where),)
 
 
 @dataclass
@@ -285,15 +285,15 @@ def read_table(
         refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
         cells = column.value(order)  # NaN where a cell is no number
         if name in still and name in _SPEEDS:
-            what = "cells of {name} are words for calm air: read as 0 m/s, without a direction"
-            findings.append(_of_cells("calm-in-words", Severity.NOTE, name, still[name], line, what))
+            message = "cells of {name} are words for calm air: read as 0 m/s, without a direction"
+            findings.append(_of_cells("calm-in-words", Severity.NOTE, name, still[name], line, message))
         elif name in still:
             state, cells = np.where(still[name], np.uint8(Cell.CALM), state), np.where(still[name], np.nan, cells)
         value = in_si(cells, layout)
         if column.limit:
             limit = float(in_si(np.array([column.limit]), layout)[0])
-            what = f"cells of {{name}} say no more than that it was below {limit:.3g} m/s: read as 0"
-            below = _of_cells("below-threshold", Severity.WARNING, name, state == Cell.BELOW, line, what)
+            message = f"cells of {{name}} say no more than that it was below {limit:.3g} m/s: read as 0"
+            below = _of_cells("below-threshold", Severity.WARNING, name, state == Cell.BELOW, line, message)
             findings.append(replace(below, value=limit))
             # averages over the ground truth's window know by the threshold what a 0 may hide
             sensor = sensor if sensor.threshold is not None else replace(sensor, threshold=limit)
@@ -304,10 +304,10 @@ def read_table(
             findings.extend(found)
             zero, north = value == 0, np.abs(value - 2 * np.pi) < _ROUND
             if zero.any() and north.any():
-                what = (
+                message = (
                     f"values of {{name}} are 0, and {int(north.sum())} are 360: where 360 is north, 0 may be calm air"
                 )
-                findings.append(_of_cells("zero-beside-360", Severity.WARNING, name, zero, line, what))
+                findings.append(_of_cells("zero-beside-360", Severity.WARNING, name, zero, line, message))
             value = turned(value, layout)
         channels[name] = value
         if name in WIND_CHANNELS:
@@ -434,12 +434,12 @@ def cell_flags(
 ) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
     """Flags and findings about single cells: missing, unreadable, infinite, outside the instrument's range."""
     flags = np.zeros(len(value), dtype=np.uint16)
-    found: list[Finding] = []
+    findings: list[Finding] = []
 
     def note(mask: BoolArray, flag: SampleFlag, kind: str, severity: Severity, what: str) -> None:
         if mask.any():
             flags[mask] |= flag
-            found.append(_of_cells(kind, severity, name, mask, line, f"{what} of {{name}}"))
+            findings.append(_of_cells(kind, severity, name, mask, line, f"{what} of {{name}}"))
 
     note(state == Cell.MISSING, SampleFlag.MISSING, "missing-values", Severity.WARNING, "missing values")
     note(state == Cell.UNREADABLE, SampleFlag.MISSING, "unreadable-values", Severity.ERROR, "unreadable values")
@@ -448,7 +448,7 @@ def cell_flags(
         low, high = (float(unit(layout.unit).to_si(bound)) for bound in layout.range)
         text = f"values outside {layout.range[0]:g} to {layout.range[1]:g} {layout.unit}"
         note((value < low) | (value > high), SampleFlag.OUT_OF_RANGE, "out-of-range", Severity.WARNING, text)
-    return flags, tuple(found)
+    return flags, tuple(findings)
 
 
 def refuse_if_most(bad: int, good: int, what: str, where: str) -> None:

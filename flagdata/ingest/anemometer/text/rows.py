@@ -168,7 +168,7 @@ class RowReader:
         Raises:
             InputError: most lines do not fit.
         """
-        found: list[Finding] = []
+        findings: list[Finding] = []
         malformed = list(self._malformed)
         if len(malformed) > self._read and len(malformed) > 1:
             raise InputError(
@@ -178,7 +178,7 @@ class RowReader:
             )
         if self._last_malformed and malformed:
             last = malformed.pop()
-            found.append(
+            findings.append(
                 Finding.of(
                     "cut-off",
                     "the last line is incomplete, as when the logger lost power; left out",
@@ -186,7 +186,7 @@ class RowReader:
                 )
             )
         if malformed:
-            found.append(
+            findings.append(
                 Finding(
                     kind="malformed-lines",
                     severity=Severity.ERROR,
@@ -195,7 +195,7 @@ class RowReader:
                     what=f"{len(malformed)} lines with another number of columns than the header; left out",
                 )
             )
-        return tuple(found)
+        return tuple(findings)
 
 
 def _is_mark(line: str, delimiter: str) -> bool:

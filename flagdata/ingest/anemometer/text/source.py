@@ -204,9 +204,9 @@ def signature(head: bytes) -> tuple[str, str] | None:
         return "a video (MPEG transport stream)", "ingest it as a camera file"
     if len(head) > 4 + 192 and head[4] == head[4 + 192] == 0x47:
         return "a video (AVCHD, MTS)", "ingest it as a camera file"
-    for at, magic, what, fix in _SIGNATURES:
+    for at, magic, message, fix in _SIGNATURES:
         if head[at : at + len(magic)] == magic:
-            return what, fix
+            return message, fix
     return None
 
 
@@ -372,23 +372,23 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
             if int(spans.max()) > limits.line:
                 at = int(np.append(ends, len(data))[int(np.argmax(spans))])
                 number = before + max(chunk.count(b"\n", 0, at), chunk.count(b"\r", 0, at)) + 1
-                what = f"a line longer than {limits.line} bytes"
-                raise LimitError(what, where=f"{where}, line {number}", fix="check that this is the log")
+                message = f"a line longer than {limits.line} bytes"
+                raise LimitError(message, where=f"{where}, line {number}", fix="check that this is the log")
             before = lines
             last = chunk[-1:]
-    found: list[Finding] = []
+    findings: list[Finding] = []
     kinds = {"LF": unix, "CR LF": windows, "CR": mac}
     if wide:
         return lines, ()
     if sum(1 for count in kinds.values() if count) > 1:
         text = ", ".join(f"{count} {name}" for name, count in kinds.items() if count)
-        found.append(Finding.of("mixed-line-ends", f"line ends of several kinds: {text}"))
+        findings.append(Finding.of("mixed-line-ends", f"line ends of several kinds: {text}"))
     if nul and nul * 3 < size:
-        found.append(
+        findings.append(
             Finding.of(
                 "nul-bytes",
                 f"{nul} NUL bytes, as a logger leaves behind when it loses power; lines holding them are left out",
                 count=nul,
             )
         )
-    return lines, tuple(found)
+    return lines, tuple(findings)
