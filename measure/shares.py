@@ -51,7 +51,7 @@ class Share:
         return cls(hits=hits, count=count, low=low, high=high, level=level)
 
     def as_dict(self) -> dict[str, float | int | None]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "value": self.value,
             "low": self.low,
