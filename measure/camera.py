@@ -40,7 +40,7 @@ def write_film(
     workers: int,
     advance: Callable[[int], object],
 ) -> None:
-    """Film a flag in a wind along +x.
+    """Films a flag in a wind along +x.
 
     Args:
         rate: frames a second; those of the sequence [Hz].

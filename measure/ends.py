@@ -65,7 +65,7 @@ class Span:
     estimated: bool
 
     def phrase(self, digits: int, unit: str = "") -> str:
-        """Its ends in words, "at least 9.4 m/s" or "[3.9, 4.8]", without its level.
+        """Phrases its ends, "at least 9.4 m/s" or "[3.9, 4.8]", without its level.
 
         Args:
             digits: behind the point.
@@ -74,7 +74,7 @@ class Span:
         return self.worded(lambda value: f"{value:.{digits}f}", unit)
 
     def worded(self, number: Callable[[float], str], unit: str = "") -> str:
-        """The same with ends as `number` writes them."""
+        """Phrases the same with ends as `number` writes them."""
         if self.bound is Bound.LEAST:
             return f"at least {number(self.low)}{unit}"
         if self.bound is Bound.MOST:
@@ -82,7 +82,7 @@ class Span:
         return "not constrained" if self.bound else f"[{number(self.low)}, {number(self.high)}]"
 
     def ends(self) -> list[float | None]:
-        """Both ends as JSON values; None for one at infinity."""
+        """Returns both ends as JSON values; None for one at infinity."""
         return [end if math.isfinite(end) else None for end in (self.low, self.high)]
 
 
@@ -92,7 +92,7 @@ def limits_of(name: str) -> tuple[float, float]:
 
 
 def bound_of(places: NDArray[np.floating]) -> Bound | None:
-    """What draws bound.
+    """Decides what draws bound.
 
     Args:
         places: (n,) of draws in their range, 0 at its lower and 1 at its upper end; those beyond it count as at it.
@@ -111,7 +111,7 @@ def span(
     limits: tuple[float, float],
     assumed: tuple[float, float],
 ) -> Span:
-    """The interval of a posterior.
+    """Computes the interval of a posterior.
 
     Args:
         draws: (n,) of it.
@@ -134,8 +134,9 @@ def of_profile(
     limits: tuple[float, float],
     larger: float = 1.0,
 ) -> Span:
-    """The interval of a profile: values whose misfit is less than the least by the quantile of χ² at the level. Where
-    it still holds at an end of the values, the likelihood is flat towards that end, and only the other end is known.
+    """Computes the interval of a profile: values whose misfit is less than the least by the quantile of χ² at the
+    level. Where it still holds at an end of the values, the likelihood is flat towards that end, and only the other end
+    is known.
 
     Args:
         values: (n,) ascending, the whole range that was looked at.
@@ -154,11 +155,11 @@ def of_profile(
     return _ended(low, high, bound, level=level, limits=limits, assumed=(float(values[0]), float(values[-1])))
 
 
-def _crossing(values: NDArray[np.floating], within: NDArray[np.floating], place: int) -> float:
-    """Where a profile crosses zero behind a place: halfway if it is infinite on one side."""
-    before, behind = float(within[place]), float(within[place + 1])
+def _crossing(values: NDArray[np.floating], within: NDArray[np.floating], index: int) -> float:
+    """Finds where a profile crosses zero behind an index: halfway if it is infinite on one side."""
+    before, behind = float(within[index]), float(within[index + 1])
     share = before / (before - behind) if math.isfinite(before) and math.isfinite(behind) else 0.5
-    return float(values[place] + share * (values[place + 1] - values[place]))
+    return float(values[index] + share * (values[index + 1] - values[index]))
 
 
 def _ended(
@@ -170,7 +171,7 @@ def _ended(
     limits: tuple[float, float],
     assumed: tuple[float, float],
 ) -> Span:
-    """The interval that is left of a central one where its ends are not known."""
+    """Computes the interval that is left of a central one where its ends are not known."""
     if bound is None:
         return Span(low=max(low, limits[0]), high=min(high, limits[1]), level=level, bound=None, estimated=True)
     below, above = limits[0] >= assumed[0], limits[1] <= assumed[1]  # the range ends where the quantity does

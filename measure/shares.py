@@ -9,7 +9,7 @@ from scipy.stats import beta
 
 
 def clopper_pearson(hits: float, count: float, *, level: float) -> tuple[float, float]:
-    """The interval of a share, each side (1 − level)/2: Clopper and Pearson, Biometrika 26:404 (1934). 0 to 1
+    """Computes the interval of a share, each side (1 − level)/2: Clopper and Pearson, Biometrika 26:404 (1934). 0 to 1
     of no cases.
 
     Args:
@@ -44,14 +44,14 @@ class Share:
 
     @classmethod
     def of(cls, happened: Iterable[bool], *, level: float = 0.9) -> Share:
-        """From cases."""
+        """Counts cases."""
         cases = [bool(case) for case in happened]
         hits, count = sum(cases), len(cases)
         low, high = clopper_pearson(hits, count, level=level)
         return cls(hits=hits, count=count, low=low, high=high, level=level)
 
     def as_dict(self) -> dict[str, float | int | None]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "value": self.value,
             "low": self.low,

@@ -8,7 +8,8 @@ from multiprocessing import parent_process
 
 
 def single_threaded() -> None:
-    """One thread, since there are as many workers as cores; and no life beyond the parent's, however that ends."""
+    """Limits a worker to one thread, since there are as many workers as cores, and to its parent's life, however that
+    ends."""
     import torch
 
     torch.set_num_threads(1)

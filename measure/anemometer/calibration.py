@@ -63,7 +63,7 @@ class Recording:
         return self.features.whole & self.log.covers(starts, starts + self.features.layout.step)
 
     def winds(self, offset: float) -> FloatArray:
-        """(w,) mean of the log over each window, the log `offset` seconds later than its stamps [m/s]."""
+        """Computes the log's mean over each window, (w,) [m/s], with the log `offset` seconds later than its stamps."""
         starts = self.features.starts - offset
         return self.log.mean_speed(starts, starts + self.features.layout.step)
 
@@ -106,7 +106,7 @@ class Calibrated:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         model, (low, high) = self.model, self.model.range
         return {
             "sentence": self.sentence,
@@ -125,14 +125,14 @@ class Calibrated:
             "features": list(model.names),
             "recordings": [
                 {
-                    "name": one.name,
-                    "artifact": one.identity,
-                    "windows": int(one.usable.sum()),
-                    "anemometer": one.sensor.name,
-                    "accuracy": one.sensor.accuracy,
-                    "distance_constant": one.sensor.distance_constant,
+                    "name": recording.name,
+                    "artifact": recording.identity,
+                    "windows": int(recording.usable.sum()),
+                    "anemometer": recording.sensor.name,
+                    "accuracy": recording.sensor.accuracy,
+                    "distance_constant": recording.sensor.distance_constant,
                 }
-                for one in self.recordings
+                for recording in self.recordings
             ],
             "findings": [finding.as_dict() for finding in self.findings],
         }
@@ -147,7 +147,7 @@ def recorded(
     last: float | None,
     advance: Callable[[int, int], None] | None = None,
 ) -> Recording:
-    """Look at a recording of a lake.
+    """Computes what a recording of a lake shows, window by window, beside its log.
 
     Args:
         first, last: part of the film [s].
@@ -173,7 +173,7 @@ def recorded(
         )
     features = features_of(film, network.estimator, size, first=first, last=last, advance=advance)
     findings = film.findings()
-    if faults := [one for one in findings if one.kind in REASONS]:
+    if faults := [finding for finding in findings if finding.kind in REASONS]:
         raise RefusedError(faults[0].what, where=film.name, fix=faults[0].fix or "give another film")
     return Recording(
         name=film.name,
@@ -186,15 +186,15 @@ def recorded(
 
 
 def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagSize, level: float) -> Calibrated:
-    """Fit a reading model.
+    """Fits a reading model.
 
     Raises:
         InputError: too little film.
         RefusedError: a wind that hardly changes; films of several places; a film that does not show the wind.
     """
     step = recordings[0].features.layout.step
-    usable = [one.usable for one in recordings]
-    count = sum(int(one.sum()) for one in usable)
+    usable = [recording.usable for recording in recordings]
+    count = sum(int(mask.sum()) for mask in usable)
     if count * step < LEAST / 2:
         raise InputError(
             f"only {count * step:.0f} s of film have all their frames and a log beside them",
@@ -204,18 +204,22 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
     _check_wind(recordings, usable)
     names = recordings[0].features.names
     rows, plain = _rows(recordings, usable)
-    numbers = np.repeat(np.arange(len(recordings)), [int(one.sum()) for one in usable])
-    times = np.concatenate([one.features.starts[own] for one, own in zip(recordings, usable, strict=True)])
+    numbers = np.repeat(np.arange(len(recordings)), [int(mask.sum()) for mask in usable])
+    times = np.concatenate(
+        [recording.features.starts[mask] for recording, mask in zip(recordings, usable, strict=True)]
+    )
     blocks = blocks_of(times, numbers)
 
     def winds(offset: float) -> FloatArray:
-        return np.concatenate([one.winds(offset)[own] for one, own in zip(recordings, usable, strict=True)])
+        return np.concatenate(
+            [recording.winds(offset)[mask] for recording, mask in zip(recordings, usable, strict=True)]
+        )
 
-    clock = max(one.log.clock for one in recordings)
-    named = np.array([not name.startswith(SUMMARY) for name in names])
-    offset = _best_offset(plain, winds, blocks, clock, named)
+    clock = max(recording.log.clock for recording in recordings)
+    is_named = np.array([not name.startswith(SUMMARY) for name in names])
+    offset = _best_offset(plain, winds, blocks, clock, is_named)
     logged = winds(offset)
-    checked = validated(rows, logged, blocks, np.tile(named, rows.shape[1] // len(names)))
+    checked = validated(rows, logged, blocks, np.tile(is_named, rows.shape[1] // len(names)))
     spread = float(logged.std())
     if checked.rmse >= spread:
         raise RefusedError(
@@ -235,7 +239,7 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
         errors=logged - checked.predicted,
         block=round(BLOCK / step),
         familiar=Familiar.of(plain, checked.predicted, blocks),
-        places=tuple(one.features.place for one in recordings),
+        places=tuple(recording.features.place for recording in recordings),
     )
     return Calibrated(
         model=model,
@@ -244,15 +248,18 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
         clock=clock,
         level=level,
         uncalibrated=_uncalibrated(recordings, usable, logged),
-        findings=(*(f for one in recordings for f in one.findings), *_noticed(recordings, count * step, offset, clock)),
+        findings=(
+            *(f for recording in recordings for f in recording.findings),
+            *_noticed(recordings, count * step, offset, clock),
+        ),
     )
 
 
 def _check_wind(recordings: Sequence[Recording], usable: Sequence[BoolArray]) -> None:
-    every = np.concatenate([one.winds(0.0)[own] for one, own in zip(recordings, usable, strict=True)])
-    if every.std() < STEADY * every.mean():
+    winds = np.concatenate([recording.winds(0.0)[mask] for recording, mask in zip(recordings, usable, strict=True)])
+    if winds.std() < STEADY * winds.mean():
         raise RefusedError(
-            f"the wind hardly changes ({every.mean():.1f} m/s, its windows within {every.std():.2f} m/s), so that "
+            f"the wind hardly changes ({winds.mean():.1f} m/s, its windows within {winds.std():.2f} m/s), so that "
             "nothing shows how the flag follows it",
             where=recordings[0].name,
             fix="film for longer, or in gusts; several recordings are taken together",
@@ -260,32 +267,34 @@ def _check_wind(recordings: Sequence[Recording], usable: Sequence[BoolArray]) ->
 
 
 def _rows(recordings: Sequence[Recording], usable: Sequence[BoolArray]) -> tuple[FloatArray, FloatArray]:
-    """(n, 3 · column) features with the neighbours', and (n, column) without, of all usable windows."""
-    both = list(zip(recordings, usable, strict=True))
-    rows = np.concatenate([with_neighbours(one.features.values)[own] for one, own in both])
-    return rows, np.concatenate([one.features.values[own] for one, own in both])
+    """Returns features of all usable windows: (n, 3 · column) with the neighbours', and (n, column) without."""
+    pairs = list(zip(recordings, usable, strict=True))
+    rows = np.concatenate([with_neighbours(recording.features.values)[mask] for recording, mask in pairs])
+    return rows, np.concatenate([recording.features.values[mask] for recording, mask in pairs])
 
 
 def _best_offset(
-    plain: FloatArray, winds: Callable[[float], FloatArray], blocks: NDArray[np.int_], clock: float, named: BoolArray
+    plain: FloatArray, winds: Callable[[float], FloatArray], blocks: NDArray[np.int_], clock: float, is_named: BoolArray
 ) -> float:
-    """The most probable error of the clock [s], of windows without their neighbours, which could make up for it."""
+    """Fits the error of the clock [s], by windows without their neighbours, which could make up for it."""
     if clock <= _CLOCK:
         return 0.0
-    errors = [validated(plain, winds(share * clock), blocks, named).rmse for share in _OFFSETS.tolist()]
+    errors = [validated(plain, winds(share * clock), blocks, is_named).rmse for share in _OFFSETS.tolist()]
     misfit = len(plain) * np.log(errors) + np.square(_OFFSETS) / 2
     return float(_OFFSETS[misfit.argmin()]) * clock
 
 
 def _uncalibrated(recordings: Sequence[Recording], usable: Sequence[BoolArray], logged: FloatArray) -> float:
-    own = np.concatenate([one.features.winds[whole] for one, whole in zip(recordings, usable, strict=True)])
-    return float(np.sqrt(np.mean((own - logged) ** 2)))
+    network_winds = np.concatenate(
+        [recording.features.winds[mask] for recording, mask in zip(recordings, usable, strict=True)]
+    )
+    return float(np.sqrt(np.mean((network_winds - logged) ** 2)))
 
 
 def _noticed(recordings: Sequence[Recording], seconds: float, offset: float, clock: float) -> list[Finding]:
-    found = []
+    findings = []
     if seconds < ENOUGH:
-        found.append(
+        findings.append(
             Finding.of(
                 "short-calibration",
                 f"{seconds:.0f} s of film beside a log are few: the intervals rest on {seconds / BLOCK:.0f} "
@@ -295,7 +304,7 @@ def _noticed(recordings: Sequence[Recording], seconds: float, offset: float, clo
             )
         )
     if abs(offset) > 1.5 * clock > 0:
-        found.append(
+        findings.append(
             Finding.of(
                 "clock-at-limit",
                 f"the log fits best {offset:+.2f} s later than its stamps, whose uncertainty is {clock:.2f} s",
@@ -303,16 +312,16 @@ def _noticed(recordings: Sequence[Recording], seconds: float, offset: float, clo
                 fix="check the clocks with flagdata align",
             )
         )
-    accuracy = max((one.sensor.accuracy or 0.0 for one in recordings), default=0.0)
+    accuracy = max((recording.sensor.accuracy or 0.0 for recording in recordings), default=0.0)
     if accuracy:
-        found.append(
+        findings.append(
             Finding.of(
                 "anemometer-accuracy",
                 f"the anemometer states ±{accuracy:g} m/s, which the reading model takes over and no interval contains",
                 value=accuracy,
             )
         )
-    return found
+    return findings
 
 
 def _plain(value: float) -> float | None:

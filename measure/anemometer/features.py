@@ -87,7 +87,7 @@ def features_of(
     last: float | None = None,
     advance: Callable[[int, int], None] | None = None,
 ) -> Features:
-    """Look at a film.
+    """Computes the features of a film's windows.
 
     Args:
         size: of the flag.
@@ -106,7 +106,7 @@ def features_of(
     winds = np.full(layout.count, np.nan)
     clip: UInt8Array | None = None
     hoist = _Hoist()
-    watcher = Watcher(film, size, begin=layout.first, count=layout.count, seconds=layout.step, found=hoist.take)
+    watcher = Watcher(film, size, begin=layout.first, count=layout.count, seconds=layout.step, deliver=hoist.take)
     reader.look = watcher.look
     for window in reader.windows(advance):
         embeddings = model.embeddings(model.inputs(window.clips))
@@ -114,7 +114,7 @@ def features_of(
         if summaries is None:
             summaries, clip = np.full((layout.count, len(summary)), np.nan, np.float32), window.clips[0]
         summaries[window.index] = summary
-        rows[window.index] = np.concatenate([one[0].cpu().numpy() for one in embeddings])
+        rows[window.index] = np.concatenate([embedding[0].cpu().numpy() for embedding in embeddings])
         values = model.learners[0].scaling.values(model.posterior(embeddings).mean().float())
         winds[window.index] = float(values[0, 0]) * scale ** POWERS[WIND]
     if summaries is None or clip is None:
@@ -122,14 +122,14 @@ def features_of(
             "no window of the film has all its frames", where=film.name, fix="choose another part by --start and --end"
         )
     watcher.finish()
-    every = np.full((layout.count, len(next(iter(rows.values())))), np.nan)
-    every[list(rows)] = list(rows.values())
+    features = np.full((layout.count, len(next(iter(rows.values())))), np.nan)
+    features[list(rows)] = list(rows.values())
     return Features(
         film=film.name,
         starts=layout.first + layout.step * np.arange(layout.count, dtype=np.float64),
         layout=layout,
-        values=np.concatenate([every, winds[:, None]], axis=1),
-        names=(*(f"{SUMMARY}{k}" for k in range(every.shape[1])), "network-wind"),
+        values=np.concatenate([features, winds[:, None]], axis=1),
+        names=(*(f"{SUMMARY}{k}" for k in range(features.shape[1])), "network-wind"),
         summaries=summaries,
         winds=winds,
         clip=clip,
@@ -145,23 +145,24 @@ class _Hoist:
         self._side = 0.0
 
     def take(self, windows: Sequence[FilmWindow | None]) -> None:
-        """The next windows."""
+        """Takes the next windows."""
         for window in windows:
             if window is not None:
                 self._ends.append(window.hoist / window.masks.shape[2])
                 self._side += window.side
 
     def found(self) -> tuple[FloatArray, float]:
-        """Its ends (2, 2) in the picture's sides, NaN where no window shows them, and the side the flag flies to."""
+        """Returns the hoist's ends (2, 2) in the picture's sides, NaN where no window shows them, and the side the flag
+        flies to."""
         if not self._ends:
             return np.full((2, 2), np.nan), 0.0
         return np.median(self._ends, axis=0), float(np.sign(self._side))
 
 
 def _place(film: ConditionedFilm, hoist: FloatArray, side: float) -> Place:
-    """The place, of what the last reading of the film found."""
-    found, reference = film.found, film.reference
-    if found is None or reference is None or found.region is None:
+    """Returns the place, as the last reading of the film shows it."""
+    detection, reference = film.found, film.reference
+    if detection is None or reference is None or detection.region is None:
         raise RefusedError(
             "no motion like cloth's was found in the film",
             where=film.name,
@@ -172,10 +173,10 @@ def _place(film: ConditionedFilm, hoist: FloatArray, side: float) -> Place:
     shape = (max(1, round(THUMBNAIL * rows / longer)), max(1, round(THUMBNAIL * columns / longer)))
     background = cv2.resize(reference.astype(np.float32), shape[::-1], interpolation=cv2.INTER_AREA)
     bare = np.ones(shape, bool)
-    for region in found.regions:
-        left, top, right, bottom = (edge / found.scale / longer * THUMBNAIL for edge in region.box)
+    for region in detection.regions:
+        left, top, right, bottom = (edge / detection.scale / longer * THUMBNAIL for edge in region.box)
         bare[max(0, int(top) - 1) : int(np.ceil(bottom)) + 1, max(0, int(left) - 1) : int(np.ceil(right)) + 1] = False
-    square = found.square
+    square = detection.square
     corner = np.array([square.x, square.y], dtype=np.float64)
     return Place(
         hoist=(corner + hoist * square.side) / longer,

@@ -15,8 +15,8 @@ from flagdata.arrays import FloatArray
 
 
 def half_width(errors: FloatArray, level: float) -> float:
-    """Half of the interval that contains the wind with `level` [m/s], of errors (n,); infinite where they are too
-    few."""
+    """Returns half of the interval that contains the wind with probability `level` [m/s], from errors (n,); infinite
+    where they are too few."""
     n = len(errors)
     rank = math.ceil(level * (n + 1))
     return math.inf if rank > n else float(np.sort(np.abs(errors))[rank - 1])
@@ -32,8 +32,8 @@ def mean_errors(
         errors: (n,) in the order of time.
         length: windows of a block.
     """
-    own = min(length, len(errors), count)
-    needed = -(-count // own)
-    starts = generator.integers(len(errors) - own + 1, size=(draws, needed))
-    drawn = errors[starts[:, :, None] + np.arange(own)].reshape(draws, -1)[:, :count]
+    block = min(length, len(errors), count)
+    blocks = -(-count // block)
+    starts = generator.integers(len(errors) - block + 1, size=(draws, blocks))
+    drawn = errors[starts[:, :, None] + np.arange(block)].reshape(draws, -1)[:, :count]
     return drawn.mean(axis=1)

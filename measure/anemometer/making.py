@@ -29,19 +29,22 @@ from measure.film.source import Reading, Subject, subjects
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
 
-def artifact(found: Calibrated, name: str, reading: Reading) -> Artifact:
-    """The row of a reading model, without its object.
+def artifact(result: Calibrated, name: str, reading: Reading) -> Artifact:
+    """Builds the row of a reading model, without its object.
 
     Args:
         name: under which `flagdata measure --model` finds it.
         reading: how films were read.
     """
-    model = found.model
-    spans = [[float(one.features.starts[0]), len(one.features.starts) * model.step] for one in found.recordings]
+    model = result.model
+    spans = [
+        [float(recording.features.starts[0]), len(recording.features.starts) * model.step]
+        for recording in result.recordings
+    ]
     return Artifact(
         kind=Kind.MEASUREMENT,
         name=name,
-        parents=[one.identity for one in found.recordings],
+        parents=[recording.identity for recording in result.recordings],
         recipe={
             CALIBRATED: ANSWER,
             "features": VERSION,
@@ -49,24 +52,24 @@ def artifact(found: Calibrated, name: str, reading: Reading) -> Artifact:
             "network": model.identity,
             "flag_size": [model.size.length, model.size.height],
             "spans": spans,
-            "level": found.level,
+            "level": result.level,
             **reading.recipe(),
         },
-        quality=quality_flags(found.findings),
-        report=canonical({"schema": "flagdata.anemometer-report/1", **found.as_dict()}),
+        quality=quality_flags(result.findings),
+        report=canonical({"schema": "flagdata.anemometer-report/1", **result.as_dict()}),
     )
 
 
-def keep(lake: Lake, found: Calibrated, name: str, reading: Reading, *, branch: str) -> Placed:
-    """Commit a reading model where it is new, see `flagdata.lake.results`.
+def keep(lake: Lake, result: Calibrated, name: str, reading: Reading, *, branch: str) -> Placed:
+    """Commits a reading model where it is new, see `flagdata.lake.results`.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
     return results.keep(
         lake,
-        artifact(found, name, reading),
-        lambda staged: write(staged, found.model, found.as_dict()),
+        artifact(result, name, reading),
+        lambda staged: write(staged, result.model, result.as_dict()),
         f"calibrate {name}",
         branch=branch,
     )
@@ -92,7 +95,7 @@ class Made:
         return None if self.place is None else self.place.artifact.id
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {"name": self.name, "artifact": self.artifact, **self.found.as_dict()}
 
 
@@ -111,7 +114,7 @@ def made(
     level: float,
     advance: Callable[[int], object] | None = None,
 ) -> Made:
-    """Make a reading model of recordings of one flag from one place.
+    """Makes a reading model from recordings of one flag at one place.
 
     Args:
         name: of the model; None for the first recording's with "-anemometer".
@@ -129,13 +132,13 @@ def made(
     def opened(source: str) -> Subject:
         return subjects(source, query=None, lake=lake, at=at, reading=reading)[0]
 
-    found, unopened = usable(sources, opened, name=str)
-    own = network(model, lake=lake, at=at)
-    seconds = sum(min(one.film.duration, math.inf if last is None else last) - first for one in found)
+    opened_subjects, unopened = usable(sources, opened, name=str)
+    reader = network(model, lake=lake, at=at)
+    seconds = sum(min(subject.film.duration, math.inf if last is None else last) - first for subject in opened_subjects)
     if seconds < LEAST:
         raise InputError(
             f"{max(seconds, 0.0):.0f} s of film beside a log",
-            where=found[0].film.name,
+            where=opened_subjects[0].film.name,
             fix=f"give {LEAST:.0f} s or more; {ENOUGH / 60:.0f} minutes are better",
         )
 
@@ -143,11 +146,11 @@ def made(
         if advance is not None:
             advance(count)
 
-    def look(one: Subject) -> Recording:
-        return recorded(one, own, size, first=first, last=last, advance=step)
+    def look(subject: Subject) -> Recording:
+        return recorded(subject, reader, size, first=first, last=last, advance=step)
 
-    recordings, unread = usable(found, look, name=lambda one: one.film.name)
-    result = calibrated(recordings, network=own, size=size, level=level)
+    recordings, unread = usable(opened_subjects, look, name=lambda recording: recording.film.name)
+    result = calibrated(recordings, network=reader, size=size, level=level)
     result = replace(result, findings=(*unopened, *unread, *result.findings))
     title = name if name is not None else f"{recordings[0].name}-anemometer"
     if lake is None or branch is None:

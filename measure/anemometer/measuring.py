@@ -44,9 +44,9 @@ class Familiarity(Verdict):
     @property
     def sentence(self) -> str:
         if self.faults:
-            others = len(self.faults) - 1
-            more = "" if not others else f" ({others} more {'reasons' if others > 1 else 'reason'})"
-            return f"{self.faults[0].what}{more}"
+            further = len(self.faults) - 1
+            suffix = "" if not further else f" ({further} more {'reasons' if further > 1 else 'reason'})"
+            return f"{self.faults[0].what}{suffix}"
         return f"like the film of the calibration: {self.figures}"
 
 
@@ -79,19 +79,19 @@ def measure_by(
 def measured_from(
     film: ConditionedFilm, features: Features, model: ReadingModel, estimator: Estimator, options: Options, *, name: str
 ) -> Measurement:
-    """The same of a film that was looked at."""
+    """Measures a film whose features were computed already."""
     findings = film.findings()
     used = model.used(features)
     winds = model.read(used)
-    shown = np.flatnonzero(np.isfinite(winds))
-    judged = _verdict(film, features, used, winds, model, options, findings)
+    read = np.flatnonzero(np.isfinite(winds))
+    verdict = _verdict(film, features, used, winds, model, options, findings)
     half = half_width(model.errors, options.level)
-    windows = tuple(_window(features, k, float(winds[k]), half, judged, model, options) for k in shown.tolist())
+    windows = tuple(_window(features, k, float(winds[k]), half, verdict, model, options) for k in read.tolist())
     rng = stream(options.seed, "anemometer", "mean")
-    errors = mean_errors(model.errors, count=len(shown), length=model.block, draws=DRAWS, generator=rng)
-    draws = np.maximum(winds[shown].mean() + errors, 0.0)
+    errors = mean_errors(model.errors, count=len(read), length=model.block, draws=DRAWS, generator=rng)
+    draws = np.maximum(winds[read].mean() + errors, 0.0)
     low, high = (float(end) for end in np.quantile(draws, [(1 - options.level) / 2, (1 + options.level) / 2]))
-    own = Quantity(
+    mean_wind = Quantity(
         name=WIND,
         unit="m/s",
         value=float(draws.mean()),
@@ -100,7 +100,7 @@ def measured_from(
         assumed=model.range,
         information=information(draws, model.winds),
     )
-    middle = shown[len(shown) // 2]
+    middle = read[len(read) // 2]
     scale = model.size.scale(trained_on(estimator.targets))
     return Measurement(
         film=film.name,
@@ -110,26 +110,26 @@ def measured_from(
         options=replace(options, size=model.size),
         names=(WIND,),
         draws=draws[:, None],
-        quantities=(own,),
+        quantities=(mean_wind,),
         windows=windows,
-        combined=len(shown),
-        dependence=_dependence(errors, model, len(shown)),
-        verdict=judged,
+        combined=len(read),
+        dependence=_dependence(errors, model, len(read)),
+        verdict=verdict,
         sizes=Sizes(given=model.size, scale=np.array([scale]), draws=np.full((1, DRAWS), scale), findings=()),
         summary=features.summaries[middle],
         clip=features.clip,
-        findings=(*findings, *_about(winds[shown], features, model)),
+        findings=(*findings, *_about(winds[read], features, model)),
         bounds=(),
     )
 
 
 def _check(options: Options, model: ReadingModel) -> None:
-    for where, given in (
+    for where, conflicts in (
         ("--area-weight", options.area_weight is not None),
         ("--refine", options.refine is not None),
         ("--windows", options.step is not None and abs(options.step - model.step) > 1e-6),
     ):
-        if given:
+        if conflicts:
             raise UsageError(
                 f"a reading model knows its flag, and its windows are {model.step:.4g} s long",
                 where=where,
@@ -137,16 +137,19 @@ def _check(options: Options, model: ReadingModel) -> None:
             )
 
 
-def _size_reason(given: FlagSize | None, model: ReadingModel) -> list[Finding]:
-    own = model.size
-    if given is None or max(abs(given.length / own.length - 1), abs(given.height / own.height - 1)) <= _SAME_SIZE:
+def _size_reason(stated_size: FlagSize | None, model: ReadingModel) -> list[Finding]:
+    size = model.size
+    if (
+        stated_size is None
+        or max(abs(stated_size.length / size.length - 1), abs(stated_size.height / size.height - 1)) <= _SAME_SIZE
+    ):
         return []
     return [
         Finding.of(
             "another-size",
-            f"the flag is stated as {given.length:g} m × {given.height:g} m, that of the calibration as "
-            f"{own.length:g} m × {own.height:g} m",
-            value=given.length / own.length,
+            f"the flag is stated as {stated_size.length:g} m × {stated_size.height:g} m, that of the calibration as "
+            f"{size.length:g} m × {size.height:g} m",
+            value=stated_size.length / size.length,
             fix="check --flag-size, or calibrate this flag",
         )
     ]
@@ -161,11 +164,11 @@ def _verdict(
     options: Options,
     findings: Sequence[Finding],
 ) -> Familiarity:
-    shown = np.isfinite(winds)
-    compared = Compared.of(model.familiar.shift(used[shown], winds[shown]), features.place, model.places)
-    faults = [one for one in findings if one.kind in REASONS]
+    read = np.isfinite(winds)
+    compared = Compared.of(model.familiar.shift(used[read], winds[read]), features.place, model.places)
+    faults = [finding for finding in findings if finding.kind in REASONS]
     faults += [*_size_reason(options.size, model), *compared.reasons()]
-    p = model.familiar.p_value(used[shown], winds[shown])
+    p = model.familiar.p_value(used[read], winds[read])
     return Familiarity(
         false_alarm=options.false_alarm,
         level=0.0,
@@ -176,7 +179,7 @@ def _verdict(
         p=float(np.median(p)),
         window_p=tuple(p.tolist()),
         blank=(False,) * len(p),
-        faults=tuple(Reason.counted(one) for one in faults),
+        faults=tuple(Reason.counted(finding) for finding in faults),
         window_reasons=(
             Reason(kind="familiar", what=f"the median p of its windows is {np.median(p):.2f}", p=float(np.median(p))),
         ),
@@ -185,12 +188,12 @@ def _verdict(
 
 
 def _window(
-    features: Features, k: int, wind: float, half: float, judged: Verdict, model: ReadingModel, options: Options
+    features: Features, k: int, wind: float, half: float, verdict: Verdict, model: ReadingModel, options: Options
 ) -> WindowAnswer:
     least, _ = limits_of(WIND)
     value = max(wind, least)
-    place = int(np.count_nonzero(features.whole[:k]))
-    own = Quantity(
+    position = int(np.count_nonzero(features.whole[:k]))
+    quantity = Quantity(
         name=WIND,
         unit="m/s",
         value=value,
@@ -200,22 +203,24 @@ def _window(
         information=information(wind + model.errors, model.winds),
     )
     start = float(features.starts[k])
-    return WindowAnswer(start=start, end=start + features.layout.length, quantities=(own,), p=judged.window_p[place])
+    return WindowAnswer(
+        start=start, end=start + features.layout.length, quantities=(quantity,), p=verdict.window_p[position]
+    )
 
 
 def _dependence(errors: FloatArray, model: ReadingModel, count: int) -> Dependence:
-    """The correlation of windows at which the mean of so many errs as `errors` do."""
+    """Returns the correlation of windows at which the mean of so many errs as `errors` do."""
     ratio = float(errors.var() / model.errors.var()) * count
     correlation = 0.0 if count < 2 else float(np.clip((ratio - 1) / (count - 1), 0.0, 1.0))
     return Dependence(wind=correlation, cloth=1.0, source="blocks of the calibration that were left out")
 
 
 def _about(winds: FloatArray, features: Features, model: ReadingModel) -> list[Finding]:
-    found = []
+    findings = []
     low, high = model.range
     beyond = int(np.count_nonzero((winds < low) | (winds > high)))
     if beyond:
-        found.append(
+        findings.append(
             Finding.of(
                 "beyond-calibration",
                 f"{beyond} of {len(winds)} windows read winds beyond those of the calibration ({low:.1f} to "
@@ -227,11 +232,11 @@ def _about(winds: FloatArray, features: Features, model: ReadingModel) -> list[F
         )
     missing = len(features.starts) - len(winds)
     if missing:
-        found.append(
+        findings.append(
             Finding.of(
                 "windows-left-out",
                 f"{missing} of {len(features.starts)} windows lack frames and were left out",
                 count=missing,
             )
         )
-    return found
+    return findings

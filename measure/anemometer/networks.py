@@ -25,17 +25,17 @@ CALIBRATED = "anemometer"
 """Key of the recipes of reading models (`measure.anemometer`)."""
 
 
-def gate_beside(found: Network, *, false_alarm: float) -> WindowGate:
-    """The gate of a network: the calibrated one where it lies in the model's folder, else the distance of summaries.
+def gate_beside(model: Network, *, false_alarm: float) -> WindowGate:
+    """Opens the gate of a network: the calibrated one in the model's folder, else the distance of summaries.
 
     Raises:
         CorruptError: the calibrated one is damaged, or another network's.
         InputError: the model has neither.
     """
-    if not (found.folder / storage.GATE).is_file():
-        return gate_of(found.estimator)
-    calibrated = storage.read(found.folder, found.estimator)
-    return CheckedGate(model=found.estimator, calibrated=calibrated, false_alarm=false_alarm)
+    if not (model.folder / storage.GATE).is_file():
+        return gate_of(model.estimator)
+    calibrated = storage.read(model.folder, model.estimator)
+    return CheckedGate(model=model.estimator, calibrated=calibrated, false_alarm=false_alarm)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,7 +65,7 @@ class Network:
 
 
 def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
-    """The model of a name.
+    """Opens the model of a name.
 
     Args:
         name: of a model that comes with the package, a folder, or a network or reading model of the lake by its name or
@@ -102,14 +102,14 @@ def _models(lake: Lake, at: str | None) -> list[dict[str, Any]]:
 
 def _calibrated(folder: Path, artifact: Artifact, lake: Lake, at: str | None) -> Network:
     reading = read_reading_model(folder)
-    own = network(reading.network, lake=lake, at=at)
-    if own.identity != reading.identity:
+    base = network(reading.network, lake=lake, at=at)
+    if base.identity != reading.identity:
         raise InputError(
             f"the network {reading.network!r} is another one than when the flag was calibrated",
             where=artifact.name,
             fix="calibrate the flag again",
         )
-    return replace(own, identity=artifact.id, artifact=artifact, reading=reading)
+    return replace(base, identity=artifact.id, artifact=artifact, reading=reading)
 
 
 def _loaded(folder: Path, artifact: Artifact | None) -> Network:

@@ -69,8 +69,8 @@ class Familiar:
 
     @classmethod
     def of(cls, values: FloatArray, winds: FloatArray, blocks: NDArray[np.int_]) -> Familiar:
-        """Of windows (n, column), the winds that were read of them and their blocks of time (n,)."""
-        whole = cls._fitted(values, winds)
+        """Fits to windows (n, column), the winds read from them and their blocks of time (n,)."""
+        fit = cls._fitted(values, winds)
         distances, noises = np.empty(len(winds)), []
         for block in np.unique(blocks):
             inside = blocks == block
@@ -78,13 +78,13 @@ class Familiar:
             distances[inside] = np.sqrt(np.square(white).mean(axis=1))
             noises.append(len(white) * float(np.square(white.mean(axis=0)).mean()))
         return cls(
-            centre=whole.centre,
-            spread=whole.spread,
-            coefficients=whole.coefficients,
-            whitening=whole.whitening,
+            centre=fit.centre,
+            spread=fit.spread,
+            coefficients=fit.coefficients,
+            whitening=fit.whitening,
             distances=np.sort(distances),
-            low=whole.low,
-            high=whole.high,
+            low=fit.low,
+            high=fit.high,
             noise=float(np.mean(noises)),
         )
 
@@ -113,20 +113,20 @@ class Familiar:
         return ((values - self.centre) / self.spread - powers @ self.coefficients) @ self.whitening.T
 
     def distance(self, values: FloatArray, winds: FloatArray) -> FloatArray:
-        """(n,) of windows (n, column) at the winds that are read of them."""
+        """Computes the distance of windows (n, column) at the winds read from them, (n,)."""
         return np.sqrt(np.square(self._white(values, winds)).mean(axis=1))
 
     def p_value(self, values: FloatArray, winds: FloatArray) -> FloatArray:
-        """(n,) conformal p of a window of the calibration being as far."""
+        """Returns the conformal p (n,): the share of the calibration's windows that are as far."""
         return conformal_p(self.distances, self.distance(values, winds))
 
     def within(self, winds: FloatArray) -> BoolArray:
-        """(n,) whether films are compared at these winds."""
+        """Returns which of these winds are within the range where films are compared, (n,)."""
         return (winds >= self.low) & (winds <= self.high)
 
     def shift(self, values: FloatArray, winds: FloatArray) -> float | None:
-        """Distance of the mean of windows (n, column), less what the means of as few windows scatter by; NaN where too
-        few are `within`, None where the calibration had too few windows to know their scatter."""
+        """Returns how far the mean of windows (n, column) is, less the scatter of such means; NaN where too few windows
+        are `within`, None where the calibration had too few windows to know their scatter."""
         if len(self.distances) < ENOUGH * len(self.centre):
             return None
         shared = self.within(winds)
@@ -154,88 +154,88 @@ class Compared:
     same_shape: bool
 
     @classmethod
-    def of(cls, shift: float | None, here: Place, places: Sequence[Place]) -> Compared:
-        """A film from a place, beside the recordings' places."""
-        alike = [one for one in places if one.background.shape == here.background.shape]
-        known = [value for one in alike if not math.isnan(value := _correlation(here, one))]
+    def of(cls, shift: float | None, film_place: Place, places: Sequence[Place]) -> Compared:
+        """Compares a film's place with the recordings' places."""
+        same_shape = [place for place in places if place.background.shape == film_place.background.shape]
+        likenesses = [value for place in same_shape if not math.isnan(value := _correlation(film_place, place))]
         return cls(
             shift=shift,
-            framing=min(_away(here, one) for one in places),
-            likeness=max(known) if known else math.nan,
-            same_shape=bool(alike),
+            framing=min(_away(film_place, place) for place in places),
+            likeness=max(likenesses) if likenesses else math.nan,
+            same_shape=bool(same_shape),
         )
 
     @property
     def figures(self) -> str:
-        """In words, what is known."""
-        found = ["the calibration is too short to recognise the flag"]
+        """Returns the figures in words."""
+        phrases = ["the calibration is too short to recognise the flag"]
         if self.shift is not None:
-            found = [f"its windows are shifted by {self.shift:.2f} standard deviations"]
-        found.append(
+            phrases = [f"its windows are shifted by {self.shift:.2f} standard deviations"]
+        phrases.append(
             "the hoist was not found" if math.isnan(self.framing) else f"the hoist by {self.framing:.2f} of its height"
         )
-        found.append(
+        phrases.append(
             "no background shows the place"
             if math.isnan(self.likeness)
             else f"the backgrounds correlate by {self.likeness:.2f}"
         )
-        return ", ".join(found)
+        return ", ".join(phrases)
 
     def reasons(self) -> list[Finding]:
-        """Why the film is refused, the plainest reason first; empty where it is not."""
-        found = []
+        """Returns why the film is refused, the plainest reason first; empty where it is not."""
+        findings = []
         if not self.same_shape:
-            found.append(_reason("another-picture", "the picture is of another shape than that of the calibration"))
+            findings.append(_reason("another-picture", "the picture is of another shape than that of the calibration"))
         if self.likeness < BACKGROUND:
-            what = (
+            sentence = (
                 f"the pictures' backgrounds correlate by {self.likeness:.2f}, at least {BACKGROUND:g} is required: the "
                 "film may be from another place than the calibration"
             )
-            found.append(_reason("another-place", what, self.likeness))
+            findings.append(_reason("another-place", sentence, self.likeness))
         if math.isnan(self.likeness) and self.framing > FRAMING:
             beyond = math.isinf(self.framing)
             away = "on the other side of the flag" if beyond else f"{self.framing:.2f} of its height away"
-            what = f"the flag's hoist is not where it was in the picture: {away}, at most {FRAMING:g} is accepted"
-            found.append(_reason("another-framing", what, None if beyond else self.framing))
+            sentence = f"the flag's hoist is not where it was in the picture: {away}, at most {FRAMING:g} is accepted"
+            findings.append(_reason("another-framing", sentence, None if beyond else self.framing))
         if self.shift is None:
-            return found
+            return findings
         if math.isnan(self.shift):
-            found.append(_reason("another-wind", "hardly any window reads a wind in which the flag was calibrated"))
+            findings.append(_reason("another-wind", "hardly any window reads a wind in which the flag was calibrated"))
         if self.shift > SHIFT:
-            what = (
+            sentence = (
                 f"what its windows show beside the wind is off by {self.shift:.2f} standard deviations, at most "
                 f"{SHIFT:g} is accepted: it may be another flag than that of the calibration, or seen from another "
                 "side of the wind"
             )
-            found.append(_reason("another-flag", what, self.shift))
-        return found
+            findings.append(_reason("another-flag", sentence, self.shift))
+        return findings
 
 
-def _reason(kind: str, what: str, value: float | None = None) -> Finding:
+def _reason(kind: str, sentence: str, value: float | None = None) -> Finding:
     fix = "calibrate this flag from this place and in such winds (flagdata calibrate), or leave --model out"
-    return Finding(kind=kind, severity=Severity.WARNING, what=what, value=value, fix=fix)
+    return Finding(kind=kind, severity=Severity.WARNING, what=sentence, value=value, fix=fix)
 
 
-def _away(here: Place, one: Place) -> float:
-    height = float(np.hypot(*(one.hoist[1] - one.hoist[0])))
-    away = float(np.hypot(*(here.hoist - one.hoist).T).max()) / height
-    return math.inf if here.side * one.side < 0 else away
+def _away(film_place: Place, recorded_place: Place) -> float:
+    height = float(np.hypot(*(recorded_place.hoist[1] - recorded_place.hoist[0])))
+    away = float(np.hypot(*(film_place.hoist - recorded_place.hoist).T).max()) / height
+    return math.inf if film_place.side * recorded_place.side < 0 else away
 
 
-def _correlation(one: Place, other: Place) -> float:
-    """Of the details of two pictures of one shape; NaN where they share too few."""
-    shared = one.bare & other.bare
+def _correlation(first: Place, second: Place) -> float:
+    """Correlates the details of two pictures of one shape; NaN where they share too few pixels."""
+    shared = first.bare & second.bare
     if shared.sum() < _LEAST_PIXELS:
         return math.nan
-    own, others = (_details(place, shared)[shared] for place in (one, other))
-    if min(float(own.std()), float(others.std())) < _DETAIL:
+    first_details, second_details = (_details(picture, shared)[shared] for picture in (first, second))
+    if min(float(first_details.std()), float(second_details.std())) < _DETAIL:
         return math.nan
-    return float(np.corrcoef(own, others)[0, 1])
+    return float(np.corrcoef(first_details, second_details)[0, 1])
 
 
-def _details(place: Place, shared: BoolArray) -> FloatArray:
-    """The picture less its light: its mean over the neighbourhood, of bare places alone."""
+def _details(picture: Place, shared: BoolArray) -> FloatArray:
+    """Subtracts a picture's lighting: its mean over the neighbourhood, of pixels without cloth alone."""
     weight = shared.astype(np.float32)
-    light = cv2.GaussianBlur(place.background * weight, (0, 0), _BLUR)
+    light = cv2.GaussianBlur(picture.background * weight, (0, 0), _BLUR)
     total = cv2.GaussianBlur(weight, (0, 0), _BLUR)
-    return np.asarray(place.background - light / np.maximum(total, 1e-3), np.float64)
+    return np.asarray(picture.background - light / np.maximum(total, 1e-3), np.float64)

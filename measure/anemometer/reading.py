@@ -53,9 +53,9 @@ class ReadingModel:
         return float(self.winds.min()), float(self.winds.max())
 
     def used(self, features: Features) -> FloatArray:
-        """(w, column) the features that are used; rows of NaN where frames are missing."""
+        """Selects the features that are used, (w, column); rows of NaN where frames are missing."""
         return features.values[:, [features.names.index(name) for name in self.names]]
 
     def read(self, used: FloatArray) -> FloatArray:
-        """(w,) winds [m/s] of `used`; NaN where frames are missing."""
+        """Reads winds (w,) [m/s] from `used`; NaN where frames are missing."""
         return self.ridge(with_neighbours(used))

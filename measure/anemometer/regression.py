@@ -55,46 +55,49 @@ class Ridge:
 
     @classmethod
     def fitted(cls, rows: FloatArray, winds: FloatArray, penalty: float, weights: FloatArray | float = 1.0) -> Ridge:
-        """To rows (n, column) and winds (n,) [m/s], all finite; the penalty of a column is over its squared weight."""
+        """Fits to rows (n, column) and winds (n,) [m/s], all finite; the penalty of a column is divided by its squared
+        weight."""
         centre, spread = _standard(rows, weights)
         offset = float(winds.mean())
         coefficients = _solved((rows - centre) / spread, winds - offset, [penalty])[0]
         return cls(centre=centre, spread=spread, coefficients=coefficients, offset=offset, penalty=penalty)
 
     def __call__(self, rows: FloatArray) -> FloatArray:
-        """(n,) winds [m/s] of rows (n, column)."""
+        """Predicts winds (n,) [m/s] from rows (n, column)."""
         return self.offset + (rows - self.centre) / self.spread @ self.coefficients
 
 
 def _standard(rows: FloatArray, weights: FloatArray | float) -> tuple[FloatArray, FloatArray]:
-    """Mean and standard deviation of columns, the latter over the weights."""
+    """Computes mean and standard deviation of columns, the latter divided by the weights."""
     spread = rows.std(axis=0)
     return rows.mean(axis=0), np.where(spread > 0, spread, 1.0) / weights
 
 
 def _solved(rows: FloatArray, winds: FloatArray, penalties: Sequence[float]) -> FloatArray:
-    """(penalty, column) coefficients of centred rows (n, column) and winds (n,)."""
+    """Solves for the coefficients (penalty, column) of centred rows (n, column) and winds (n,)."""
     left, values, right = np.linalg.svd(rows, full_matrices=False)
     along = left.T @ winds
     return np.stack([(values / (values**2 + penalty) * along) @ right for penalty in penalties])
 
 
 def with_neighbours(values: FloatArray) -> FloatArray:
-    """(w, 3 · feature) each window's features (w, feature) with those of the one before and the one after."""
+    """Joins each window's features (w, feature) with those before and after it: (w, 3 · feature)."""
     before, after = np.roll(values, 1, axis=0), np.roll(values, -1, axis=0)
     before[0], after[-1] = np.nan, np.nan
-    return np.concatenate([values, *(np.where(np.isfinite(one), one, values) for one in (before, after))], axis=1)
+    return np.concatenate(
+        [values, *(np.where(np.isfinite(shifted), shifted, values) for shifted in (before, after))], axis=1
+    )
 
 
 def blocks_of(times: FloatArray, recordings: NDArray[np.int_]) -> NDArray[np.int_]:
-    """(n,) number of the block of time that each window is in; none is of two recordings.
+    """Numbers the block of time of each window, (n,); no block is of two recordings.
 
     Args:
         times: (n,) [s].
         recordings: (n,) number of each window's recording.
     """
-    own = np.floor((times - times.min()) / BLOCK).astype(int)
-    _, numbers = np.unique(np.stack([recordings, own]), axis=1, return_inverse=True)
+    block = np.floor((times - times.min()) / BLOCK).astype(int)
+    _, numbers = np.unique(np.stack([recordings, block]), axis=1, return_inverse=True)
     return np.asarray(numbers).reshape(-1)
 
 
@@ -115,17 +118,17 @@ class Validated:
     rmse: float
 
 
-def validated(rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], named: BoolArray) -> Validated:
-    """Leave each block out in turn, with the windows beside it, for each penalty and weight of the named features.
+def validated(rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], is_named: BoolArray) -> Validated:
+    """Leaves each block out in turn, with the windows around it, for each penalty and weight of the named features.
 
     Args:
         rows: (n, column).
         winds: (n,) [m/s].
         blocks: (n,) of each window; two or more.
-        named: (column,) which are numbers with a unit, each of which says more than one of a summary.
+        is_named: (column,) which are numbers with a unit, each of which says more than one of a summary.
     """
-    tried = [_validated(rows, winds, blocks, np.where(named, weight, 1.0)) for weight in WEIGHTS]
-    return min(tried, key=lambda one: one.rmse)
+    results = [_validated(rows, winds, blocks, np.where(is_named, weight, 1.0)) for weight in WEIGHTS]
+    return min(results, key=lambda result: result.rmse)
 
 
 def _validated(rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], weights: FloatArray) -> Validated:

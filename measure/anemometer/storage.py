@@ -68,7 +68,7 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
 
 
 def read(path: Path) -> ReadingModel:
-    """The reading model in an object of the lake.
+    """Reads the reading model in an object of the lake.
 
     Raises:
         CorruptError: not such a folder, damaged, or of a newer format.

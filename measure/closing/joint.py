@@ -97,16 +97,16 @@ def joined(markers: Verdict, films: Verdict, *, level: float, nominal: Mapping[s
     verdicts = (markers, films)
     tested = [verdict for verdict in verdicts if verdict.conclusion is not Conclusion.UNTESTED]
     rejecting = [verdict for verdict in tested if verdict.conclusion not in NOT_REJECTED]
-    named = tuple(
+    effects = tuple(
         name
         for name in (rejecting[0].named if rejecting else ())
         if all(name in verdict.named for verdict in rejecting)
     )
     p = min([1.0, *(len(verdicts) * verdict.test.p_value.value for verdict in tested)])
-    strengths = [_strength(name, markers, films) for name in named]
+    strengths = [_strength(name, markers, films) for name in effects]
     return Joint(
-        conclusion=_conclusion(tested, rejecting, named),
-        named=named,
+        conclusion=_conclusion(tested, rejecting, effects),
+        named=effects,
         p_value=p,
         level=level,
         strengths=tuple(strengths),
@@ -116,17 +116,17 @@ def joined(markers: Verdict, films: Verdict, *, level: float, nominal: Mapping[s
     )
 
 
-def _conclusion(tested: Sequence[Verdict], rejecting: Sequence[Verdict], named: Sequence[str]) -> Conclusion:
+def _conclusion(tested: Sequence[Verdict], rejecting: Sequence[Verdict], effects: Sequence[str]) -> Conclusion:
     if not tested:
         return Conclusion.UNTESTED
     if not rejecting:
         open_ones = any(verdict.conclusion is Conclusion.UNDECIDED for verdict in tested)
         return Conclusion.UNDECIDED if open_ones else Conclusion.SUFFICIENT
-    if not named:
+    if not effects:
         return Conclusion.OUTSIDE
     if any(verdict.conclusion is Conclusion.PARTLY for verdict in rejecting):
         return Conclusion.PARTLY
-    return Conclusion.EFFECT if len(named) == 1 else Conclusion.ONE_OF
+    return Conclusion.EFFECT if len(effects) == 1 else Conclusion.ONE_OF
 
 
 def _strength(effect: str, markers: Verdict, films: Verdict) -> Combined:

@@ -193,9 +193,9 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     tracked = tuple(source for source in chosen.recordings if source not in films)
     if in_recipe:
         _refuse_beside(chosen, tracked)
-    both = bool(films) and (in_recipe or bool(tracked))
-    names = {kind: name if name is None or not both else f"{name}-{kind}" for kind in KINDS}
-    if both:
+    two_kinds = bool(films) and (in_recipe or bool(tracked))
+    names = {kind: name if name is None or not two_kinds else f"{name}-{kind}" for kind in KINDS}
+    if two_kinds:
         for kind in KINDS:
             check_files(out / kind, *FILES, command="close-loop")
         if chosen.nulls is not None:
@@ -217,15 +217,15 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         return
 
     def of_markers(level: float | None) -> tuple[VerdictAnswer, Material]:
-        """The answer by markers, and the cloth's nominal material."""
-        said = nulls_given(recipe, chosen, level=level)
+        """Returns the answer by markers, and the cloth's nominal material."""
+        null_options = nulls_given(recipe, chosen, level=level)
         options = LoopOptions(
             seed=chosen.seed,
             bank=chosen.bank,
             most_nulls=chosen.most_nulls,
             workers=chosen.processes,
             suspected=None if chosen.suspect is None else Suspicion.parse(chosen.suspect, on_markers()),
-            **said,
+            **null_options,
         )
         setup = _setup(Setup() if recipe is None else recipe.setup, chosen)
         if recipe is not None and in_recipe:
@@ -254,7 +254,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
 
         return close_films(films, chosen, lake=lake, branch=branch, name=names["films"], level=level)
 
-    if not both:
+    if not two_kinds:
         answer = of_films(chosen.level) if films else of_markers(chosen.level)[0]
         deliver(answer, out=out, lake=lake, branch=branch, as_json=chosen.as_json)
         return
@@ -262,13 +262,13 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     from measure.closing.joint import joined
     from measure.verdict.criteria import CRITERIA
 
-    whole = chosen.level or (None if recipe is None else recipe.level) or CRITERIA.level
-    by_films = of_films(whole / 2)
-    by_markers, nominal = of_markers(whole / 2)
+    level_of_both = chosen.level or (None if recipe is None else recipe.level) or CRITERIA.level
+    by_films = of_films(level_of_both / 2)
+    by_markers, nominal = of_markers(level_of_both / 2)
     joint = joined(
         by_markers.verdict,
         by_films.verdict,
-        level=whole,
+        level=level_of_both,
         nominal={"area_weight": nominal.density, "bending": mean_bending(nominal)},
     )
     deliver_joint(joint, (by_markers, by_films), out=out, lake=lake, branch=branch, as_json=chosen.as_json)
@@ -287,7 +287,7 @@ def _refuse_beside(chosen: CloseLoopCommand, sources: tuple[str, ...]) -> None:
 
 
 def _reading(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> SourceOptions:
-    """How sources of the command line are read."""
+    """Returns how sources of the command line are read."""
     from measure.closing.sources import SourceOptions
 
     return SourceOptions(
@@ -338,14 +338,14 @@ def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None
 
 
 def _name(recording: str, sources: tuple[str, ...], recipe: ExperimentRecipe | None) -> str:
-    """The name of the first source that is a file, of the recipe, or of the first recording."""
+    """Returns the name of the first source that is a file, of the recipe, or of the first recording."""
     if sources and Path(sources[0]).exists():
         return Path(sources[0]).resolve().stem
     return recording if recipe is None or sources else recipe.title
 
 
 def _axis(chosen: CloseLoopCommand) -> tuple[float, float, float] | None:
-    """Where the air goes; None where north is given."""
+    """Returns where the air goes; None where north is given."""
     text = chosen.axis
     if chosen.north is not None:
         if "axis" in typed(chosen):
@@ -371,7 +371,7 @@ def _up(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Up:
 
 
 def _setup(setup: Setup, chosen: CloseLoopCommand) -> Setup:
-    """A setup with what the command line says instead."""
+    """Replaces what the command line states in a setup."""
     from measure.observe import Hold, sheet
     from sim.material import MATERIALS, named
 
@@ -388,9 +388,9 @@ def _setup(setup: Setup, chosen: CloseLoopCommand) -> Setup:
             raise UsageError(f"{chosen.size!r} is not a size", where="--size", fix="give 1.5x1.0, in metres") from error
         setup = replace(setup, outline=sheet(width, height))
     if chosen.pins is not None:
-        held: Hold | tuple[tuple[float, float], ...]
-        held = Hold(chosen.pins) if chosen.pins in {h.value for h in Hold} else _places(chosen.pins)
-        setup = replace(setup, pins=held)
+        attachment: Hold | tuple[tuple[float, float], ...]
+        attachment = Hold(chosen.pins) if chosen.pins in {h.value for h in Hold} else _places(chosen.pins)
+        setup = replace(setup, pins=attachment)
     return setup
 
 

@@ -69,9 +69,9 @@ def observe(chosen: ObserveCommand) -> None:
     identity = None
     if lake is not None and not chosen.read_only:
         part = [chosen.start, chosen.end]
-        place = keep(lake, table, subject, {**reading.recipe(), "part": part}, branch=chosen.branch)
-        identity = place.artifact.id
-        say(f"{identity[:SHORT]}  measurement, {place.sentence}")
+        placed = keep(lake, table, subject, {**reading.recipe(), "part": part}, branch=chosen.branch)
+        identity = placed.artifact.id
+        say(f"{identity[:SHORT]}  measurement, {placed.sentence}")
     if chosen.parquet is not None:
         write_file(chosen.parquet, table.parquet())
     if chosen.zarr is not None:

@@ -61,8 +61,8 @@ def propose(chosen: Proposing) -> None:
     if chosen.effect is None:
         effect_file.check(folder)
     recipe = recipes.load(chosen.recipe)
-    said = nulls_given(recipe, chosen, level=chosen.level)
-    options = NullOptions(seed=chosen.seed, bank=chosen.bank, workers=chosen.processes, **said)
+    null_options = nulls_given(recipe, chosen, level=chosen.level)
+    options = NullOptions(seed=chosen.seed, bank=chosen.bank, workers=chosen.processes, **null_options)
     tried, controls = (
         (dictionary(), ()) if chosen.effect is None else (candidates.from_file(chosen.effect), dictionary())
     )
@@ -73,7 +73,7 @@ def propose(chosen: Proposing) -> None:
     outcome = seek(
         observed.experiment,
         tried,
-        known=[candidates.library_column(name) for name in chosen.known],
+        acting_columns=[candidates.library_column(name) for name in chosen.known],
         controls=controls,
         options=options,
         stage=stage_bars(),

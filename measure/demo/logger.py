@@ -60,7 +60,8 @@ _STUCK = 12
 
 
 def write_log(path: Path, speed: FloatArray, direction: FloatArray, *, first: datetime, quiet: int, seed: int) -> None:
-    """One reading a second, in km/h and degrees, with a gap anywhere and a stretch early on at which the logger stuck.
+    """Writes one reading a second, in km/h and degrees, with a gap anywhere and a stretch early on at which the logger
+    stuck.
 
     Args:
         speed, direction: (n,) of the readings [m/s], [rad].
@@ -71,13 +72,13 @@ def write_log(path: Path, speed: FloatArray, direction: FloatArray, *, first: da
     rng = stream(seed, "demo", "logger")
     gap = int(rng.integers(len(speed) // 4, len(speed) - _DROPOUT))
     stuck = int(rng.integers(1, quiet - _STUCK))
-    shown = np.stack([speed * 3.6, np.degrees(direction) % 360], axis=1)
-    shown[stuck : stuck + _STUCK] = shown[stuck]
+    readings = np.stack([speed * 3.6, np.degrees(direction) % 360], axis=1)
+    readings[stuck : stuck + _STUCK] = readings[stuck]
     zone = datetime.strptime(ZONE, "%z").tzinfo
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, delimiter=";")
         writer.writerow(["Date", "Time", "Wind speed [km/h]", "Wind direction [deg]"])
-        for second, (kilometres, degrees) in enumerate(shown.tolist()):
+        for second, (kilometres, degrees) in enumerate(readings.tolist()):
             if not gap <= second < gap + _DROPOUT:
                 stamp = (first.astimezone(UTC) + timedelta(seconds=second)).astimezone(zone)
                 decimal = f"{kilometres:.2f}".replace(".", ",")

@@ -49,7 +49,7 @@ class Recovered:
 
 
 def write_page(
-    folder: Path, *, made: Recording, at: str, transcript: Sequence[tuple[str, str]], seconds: float
+    folder: Path, *, recording: Recording, at: str, transcript: Sequence[tuple[str, str]], seconds: float
 ) -> Path:
     """Write `recording.html` (self-contained) into `folder` from the lake inside it; returns its path."""
     lake = Lake.open(folder / "lake")
@@ -57,13 +57,13 @@ def write_page(
     record = Record.open(lake.object_path(row["object"]))
     pairs = flagdata.open(folder / "lake").pairs(where="kind = 'clip'", at=at, seed=0)
     order = np.argsort([pairs[i].wind for i in range(len(pairs))])
-    shown = [pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]]
-    wind_image, caption = _wind_plot(record, lake, at, made)
+    samples = [pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]]
+    wind_image, caption = _wind_plot(record, lake, at, recording)
     target = folder / "recording.html"
     values = {
         "minutes": f"{len(record.frame_times) / FRAME_RATE / 60:.2g}",
         "seconds": seconds,
-        "clock": recovered(row, made.clock_offset),
+        "clock": recovered(row, recording.clock_offset),
         "images": {
             "wind": wind_image,
             "alignment": data_url((folder / "alignment.png").read_bytes(), "image/png"),
@@ -74,7 +74,7 @@ def write_page(
             "refused": len(pairs.refused),
             "reason": "; ".join(pairs.refused[0].reasons) if pairs.refused else "",
         },
-        "clips": [_clip_card(sample) for sample in shown],
+        "clips": [_clip_card(sample) for sample in samples],
         "findings": _findings(lake, at),
         "transcript": transcript,
         "version": f"flagdata {code_version()}",
@@ -84,7 +84,7 @@ def write_page(
 
 
 def recovered(recording: dict[str, Any], truth: float) -> Recovered:
-    """The recording's clock at mid-recording beside the true offset [s] that the generator kept."""
+    """Compares the recording's clock at mid-recording with the true offset [s] that the generator kept."""
     clock = ClockModel.from_json(recording["clock_model"])
     middle = (recording["start"] + recording["end"]) // 2
     device = middle - round(recording["clock_offset"] * NANOSECONDS)
@@ -111,13 +111,14 @@ def _clip_card(sample: Sample) -> dict[str, Any]:
 
 
 def dominant_frequency(clip: torch.Tensor) -> float:
-    """Peak frequency [Hz] of a (1, time, height, width) clip, weighted by power over a four times coarser picture."""
+    """Computes the peak frequency [Hz] of a (1, time, height, width) clip, weighted by power over a four times coarser
+    picture."""
     coarse = torch.nn.functional.avg_pool2d(clip.float(), 4)
     power, frequency = SpectralDecomposition(rate=FRAME_RATE)(coarse[None])[0]
     return float((power * frequency).sum() / power.sum())
 
 
-def _wind_plot(record: Record, lake: Lake, at: str, made: Recording) -> tuple[str, str]:
+def _wind_plot(record: Record, lake: Lake, at: str, recording: Recording) -> tuple[str, str]:
     from matplotlib.figure import Figure
 
     logged = record.wind_1hz()
@@ -130,8 +131,8 @@ def _wind_plot(record: Record, lake: Lake, at: str, made: Recording) -> tuple[st
     sigma = np.array([np.nan if clip["wind"] is None else clip["wind_sigma"] for clip in clips])
     figure = Figure(figsize=(9.5, 3.4), layout="constrained")
     axes = figure.subplots()
-    truth = np.arange(len(made.wind)) / AIR_RATE - BEFORE
-    axes.plot(truth, made.wind, color="0.82", linewidth=0.6, label="true wind at the flag")
+    truth = np.arange(len(recording.wind)) / AIR_RATE - BEFORE
+    axes.plot(truth, recording.wind, color="0.82", linewidth=0.6, label="true wind at the flag")
     axes.plot(
         (logged.time - zero) / NANOSECONDS, logged.speed, color="#2b6f8f", linewidth=0.8, label="anemometer, 1 Hz"
     )
@@ -149,8 +150,8 @@ def _wind_plot(record: Record, lake: Lake, at: str, made: Recording) -> tuple[st
 
 
 def _findings(lake: Lake, at: str) -> list[dict[str, Any]]:
-    found = []
+    findings = []
     for row in lake.rows("kind in ('camera', 'wind')", at=at, columns=["source_name", "report"]).to_pylist():
         report = json.loads(row["report"])
-        found += [{"source": row["source_name"], **finding} for finding in report["findings"]]
-    return found
+        findings += [{"source": row["source_name"], **finding} for finding in report["findings"]]
+    return findings

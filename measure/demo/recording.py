@@ -133,7 +133,7 @@ class RecordingRecipe:
             )
 
     def drawn(self, name: str, low: float, high: float) -> float:
-        """A value between two from the stream of that name."""
+        """Draws a value between two limits from the stream of that name."""
         return float(stream(self.seed, "demo", name).uniform(low, high))
 
     @property
@@ -240,8 +240,8 @@ def make_recording(
 
 
 def look(recipe: RecordingRecipe) -> RenderParameters:
-    """How it is filmed: as in the data set `outdoor`, from 7 to 9 m away, in daylight, before the sky or hills, against
-    which the outline of a flag is found."""
+    """Draws how it is filmed: as in the data set `outdoor`, from 7 to 9 m away, in daylight, before the sky or hills,
+    against which the outline of a flag is found."""
     quantities = {
         "camera_radius": recipe.drawn("radius", 7.0, 9.0),
         "camera_height": recipe.drawn("camera", 1.4, 1.8),
@@ -258,7 +258,7 @@ def look(recipe: RecordingRecipe) -> RenderParameters:
 
 
 def _cloth(recipe: RecordingRecipe) -> tuple[float, float, float]:
-    """Area weight [kg/m²], factor on the bending table, damping [s]."""
+    """Draws area weight [kg/m²], factor on the bending table and damping [s]."""
     return (
         recipe.drawn("area-weight", 0.16, 0.20),
         math.exp(recipe.drawn("bending", -0.5, 0.5)),
@@ -267,16 +267,16 @@ def _cloth(recipe: RecordingRecipe) -> tuple[float, float, float]:
 
 
 def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
-    """The flag in its wind, `_SETTLE` before the first frame; the wind's time begins with the log."""
+    """Assembles the flag in its wind, `_SETTLE` before the first frame; the wind's time begins with the log."""
     flat = recipe.mesh
-    held = Handles(vertices=handles.corners(flat.rest))
+    handles_held = Handles(vertices=handles.corners(flat.rest))
     area_weight, bending, damping = _cloth(recipe)
     base = named(MATERIAL)
     material = replace(base.scaled(bending=bending), density=area_weight, damping=max(damping - recipe.step, 0.0))
     start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
-    start = roughened(start, held, stream(recipe.seed, "demo", "start"), _ROUGH)
+    start = roughened(start, handles_held, stream(recipe.seed, "demo", "start"), _ROUGH)
     speed = recipe.wind
-    scene = Scene(mesh=flat, position=start, material=material, handles=held, wind=(speed, 0.0, 0.0))
+    scene = Scene(mesh=flat, position=start, material=material, handles=handles_held, wind=(speed, 0.0, 0.0))
     gusts = Gusts(intensity=recipe.intensity).with_series(
         stream(recipe.seed, "demo", "gusts"),
         batch=1,
@@ -286,13 +286,13 @@ def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
         rate=AIR_RATE,
     )
     acting = recipe.acting
-    beside = [] if acting is None else [EFFECTS[acting.effect](**{acting.parameter: acting.strength})]
-    system, state = apply([gusts, *beside], *assemble([scene], dtype=torch.float32))
+    undeclared = [] if acting is None else [EFFECTS[acting.effect](**{acting.parameter: acting.strength})]
+    system, state = apply([gusts, *undeclared], *assemble([scene], dtype=torch.float32))
     return system, replace(state, time=BEFORE - _SETTLE)
 
 
 def _flown(recipe: RecordingRecipe, system: System, state: State, advance: Callable[[int], object]) -> MeshSequence:
-    """The flag in each frame of the film."""
+    """Simulates the flag in each frame of the film."""
     method = BackwardEuler(step=recipe.step, tolerance=1e-3)
     batch = Batch(system=system, state=state, integrator=method, divergence=Divergence.REFUSE)
     frames = after(_SETTLE, recipe.duration, recipe.rate)

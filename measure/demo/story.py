@@ -51,8 +51,8 @@ _CLIPS = 2.4  # s from one window of the wind series to the next
 
 
 def field_steps(shell: Transcript, seed: int) -> Recording:
-    """From nothing to a film and a log on one clock, pairs of them, and the wind that is read off the film."""
-    made = _film(shell, RecordingRecipe(seed=seed))
+    """Goes from nothing to a film and a log on one clock, pairs of them, and the wind estimated from the film."""
+    recording = _film(shell, RecordingRecipe(seed=seed))
     began = time.monotonic()
     done = "Each file was identified, with the reason; for the log a sensor recipe was drafted."
     with _Step(shell, "What are these files?", done) as step:
@@ -64,18 +64,18 @@ def field_steps(shell: Transcript, seed: int) -> Recording:
             ("anemometer.csv", "--sensor", "cup-logger.toml", "--zone", "+02:00", "--session", "demo"),
         ):
             step.found += _head(shell.show("ingest", *arguments, "--lake", "lake"), 6)
-    _aligned(shell, made)
+    _aligned(shell, recording)
     page = write_page(
-        shell.folder, made=made, at="demo", transcript=tuple(shell.entries), seconds=time.monotonic() - began
+        shell.folder, recording=recording, at="demo", transcript=tuple(shell.entries), seconds=time.monotonic() - began
     )
     shell.cards[-1] = replace(shell.cards[-1], page=page.name)
-    _measured(shell, made)
-    return made
+    _measured(shell, recording)
+    return recording
 
 
-def weighing_step(shell: Transcript, made: Recording) -> None:
-    """The cloth weighed with the log beside the film."""
-    noted = made.noted
+def weighing_step(shell: Transcript, recording: Recording) -> None:
+    """Weighs the cloth with the log beside the film."""
+    noted = recording.noted
     done = (
         f"The flag's motion in {WEIGHED:g} s of the film was compared with that of {SIMULATIONS} simulated flags in "
         "the logged wind, which are few and a short time: more of both narrow the interval. What acts on "
@@ -83,50 +83,58 @@ def weighing_step(shell: Transcript, made: Recording) -> None:
         f"{math.degrees(noted.azimuth):.0f}° from the wind's direction and {noted.distance:.1f} m away."
     )
     with _Step(shell, "What the cloth weighs", done, page="weighed.html") as step:
-        step.took(shell.attempt("calibrate", "flag", *_filmed(made), "--report", "weighed.html"))
+        step.took(shell.attempt("calibrate", "flag", *_filmed(recording), "--report", "weighed.html"))
         step.beside(
             "area weight, by the model without what acts",
-            f"{made.area_weight:.3f} kg/m²",
-            _judged(step.found, made.area_weight),
+            f"{recording.area_weight:.3f} kg/m²",
+            _judged(step.found, recording.area_weight),
         )
 
 
-def loop_step(shell: Transcript, made: Recording) -> None:
-    """What the model of the filmed flag lacks."""
-    weighed = f"{made.noted.area_weight:.3f}±{SCALE_SIGMA:g}"
+def loop_step(shell: Transcript, recording: Recording) -> None:
+    """Tests what the model of the filmed flag lacks."""
+    scale_weight = f"{recording.noted.area_weight:.3f}±{SCALE_SIGMA:g}"
     done = (
         f"The same {WEIGHED:g} s were compared with flags on which each of the library's effects acts, and with flags "
-        f"of {KINDS} other meshes and time steps on which nothing undeclared does. The weight "
-        f"that the motion asked for was set aside: on a scale the cloth weighed {weighed} kg/m² before it was sewn."
+        f"of {KINDS} other meshes and time steps on which nothing undeclared does. The weight that the motion asked "
+        f"for was set aside: on a scale the cloth weighed {scale_weight} kg/m² before it was sewn."
     )
     with _Step(shell, "What the model of the flag lacks", done, page="loop/report.html") as step:
         printed = shell.attempt(
-            "close-loop", "flag", *_filmed(made), "--area-weight", weighed, "--nulls", str(KINDS), "--out", "loop"
+            "close-loop",
+            "flag",
+            *_filmed(recording),
+            "--area-weight",
+            scale_weight,
+            "--nulls",
+            str(KINDS),
+            "--out",
+            "loop",
         )
         step.took(None if printed is None else _verdict(printed))
-        if made.acting is not None:
+        if recording.acting is not None:
             document = None if printed is None else (shell.folder / "loop" / "verdict.json").read_text(encoding="utf-8")
-            _beside_what_acts(step, made.acting, None if document is None else json.loads(document))
+            _beside_what_acts(step, recording.acting, None if document is None else json.loads(document))
 
 
 def _beside_what_acts(step: _Step, acting: Acting, verdict: dict[str, Any] | None) -> None:
-    """Put what acts on the flag beside what a verdict names; None where it was refused."""
-    what = "what acts on the flag beside the model"
+    """Compares what acts on the flag with what a verdict names; None where it was refused."""
+    subject = "what acts on the flag beside the model"
     if verdict is None:
-        step.beside(what, acting.sentence, Judgement.REFUSED)
+        step.beside(subject, acting.sentence, Judgement.REFUSED)
     elif verdict["conclusion"] == Conclusion.UNDECIDED:
-        step.beside(what, acting.sentence, Judgement.UNDECIDED)
+        step.beside(subject, acting.sentence, Judgement.UNDECIDED)
     elif acting.effect not in (named := verdict["named"]):
-        step.beside(what, acting.sentence, Judgement.MISSED)
+        step.beside(subject, acting.sentence, Judgement.MISSED)
     else:
-        place = named.index(acting.effect) + 1
-        several = f"one of {len(named)} effects; it is number {place} of them by probability"
-        step.beside(what, acting.sentence, Judgement.RIGHT, found=several if len(named) > 1 else "")
+        rank = named.index(acting.effect) + 1
+        several = f"one of {len(named)} effects; it is number {rank} of them by probability"
+        step.beside(subject, acting.sentence, Judgement.RIGHT, inferred=several if len(named) > 1 else "")
 
 
-def _filmed(made: Recording) -> tuple[str, ...]:
-    """Options of the film that weighing and the loop have in common, so that they share simulations."""
-    noted = made.noted
+def _filmed(recording: Recording) -> tuple[str, ...]:
+    """Returns options of the film that weighing and the loop have in common, so that they share simulations."""
+    noted = recording.noted
     return (
         "--flag-size",
         SIZE,
@@ -150,7 +158,7 @@ def _filmed(made: Recording) -> tuple[str, ...]:
 
 
 def markers_step(shell: Transcript, seed: int) -> None:
-    """What the model of a tracked flag lacks."""
+    """Tests what the model of a tracked flag lacks."""
     from measure.demo.tracked import TrackedRecipe, make_tracks
 
     recipe = TrackedRecipe(seed=seed)
@@ -162,13 +170,13 @@ def markers_step(shell: Transcript, seed: int) -> None:
     with _Step(shell, "What the model of a cloth lacks", done, page="loop/report.html") as step:
         frames = round((recipe.settle + recipe.duration) * recipe.rate)
         with progress(frames, label="tracking", unit="frame") as advance:
-            made = make_tracks(recipe, shell.folder, advance=advance)
-        step.found = shell.show("close-loop", made.recipe.name, "--lake", "lake", "--out", "loop")
+            tracks = make_tracks(recipe, shell.folder, advance=advance)
+        step.found = shell.show("close-loop", tracks.recipe.name, "--lake", "lake", "--out", "loop")
         models = [row["name"] for row in shell.read("ls", "--kind", "model", "--lake", "lake")["artifacts"]]
         with_effects = [name for name in models if not name.endswith("-base")]
         shell.show("simulate", (with_effects or models)[0], "--lake", "lake")
-        unit = "" if made.unit == "1" else f" {made.unit}"
-        true = f"{made.effect}, {made.parameter} {made.strength:g}{unit}"
+        unit = "" if tracks.unit == "1" else f" {tracks.unit}"
+        true = f"{tracks.effect}, {tracks.parameter} {tracks.strength:g}{unit}"
         step.beside("what acted on the tracked flag", true, Judgement.OPEN)
 
 
@@ -187,13 +195,13 @@ class _Step:
         self._truths: list[Truth] = []
 
     def took(self, printed: str | None) -> None:
-        """What the step's command printed; None where it refused, and left no page."""
+        """Takes what the step's command printed; None where it refused, and left no page."""
         self.found = printed or "Refused: the film does not pass a check of this command, which says which.\n"
         self._page = "" if printed is None else self._page
 
-    def beside(self, what: str, true: str, judgement: Judgement, *, found: str = "") -> None:
-        """Put a truth beside what the step found: the first line of it, or `found`."""
-        self._truths.append(Truth(what=what, true=true, found=found or _first(self.found), judgement=judgement))
+    def beside(self, subject: str, true: str, judgement: Judgement, *, inferred: str = "") -> None:
+        """Puts a truth beside what the step found: the first line of it, or `inferred`."""
+        self._truths.append(Truth(what=subject, true=true, found=inferred or _first(self.found), judgement=judgement))
 
     def __enter__(self) -> _Step:
         say("")
@@ -226,22 +234,22 @@ def _film(shell: Transcript, recipe: RecordingRecipe) -> Recording:
     )
     with _Step(shell, "A film and a log", done, alt="The film") as step:
         with progress(2 * round(recipe.duration * recipe.rate), label="film", unit="frame") as advance:
-            made = make_recording(recipe, shell.folder, workers=_cores(), advance=advance)
-        step.picture = _moving(made.video, recipe.rate)
-    return made
+            recording = make_recording(recipe, shell.folder, workers=_cores(), advance=advance)
+        step.picture = _moving(recording.video, recipe.rate)
+    return recording
 
 
-def _aligned(shell: Transcript, made: Recording) -> None:
+def _aligned(shell: Transcript, recording: Recording) -> None:
     done = (
         "The flag moves more in a stronger wind, a moment later. So the gusts in the log and the motion in the film "
         "give the offset of the two clocks, if they agree clearly enough; with it, each clip of the film has its wind."
     )
     with _Step(shell, "On one clock, in pairs", done, alt="Motion and wind on one clock, and the evidence") as step:
         artifacts = {row["kind"]: row["artifact"] for row in shell.read("ls", "--lake", "lake")["artifacts"]}
-        both = ("align", artifacts["camera"][:10], artifacts["wind"][:10], "--lake", "lake")
-        estimated = shell.attempt(*both, "--search", "60", "--plot", "alignment.png")
+        pair = ("align", artifacts["camera"][:10], artifacts["wind"][:10], "--lake", "lake")
+        estimated = shell.attempt(*pair, "--search", "60", "--plot", "alignment.png")
         step.found = estimated or _REFUSED + shell.show(
-            *both, "--by", "given", "--offset", f"{made.noted.clock:.1f}", "--offset-sigma", f"{CLOCK_SIGMA:g}"
+            *pair, "--by", "given", "--offset", f"{recording.noted.clock:.1f}", "--offset-sigma", f"{CLOCK_SIGMA:g}"
         )
         shell.show("tag", "demo", "--lake", "lake")
         shell.show("ls", "--lake", "lake")
@@ -250,17 +258,17 @@ def _aligned(shell: Transcript, made: Recording) -> None:
         shell.show("verify", "--lake", "lake")
         step.picture = data_url((shell.folder / "alignment.png").read_bytes(), "image/png")
         (row,) = Lake.open(shell.folder / "lake").rows("kind = 'recording'", at="demo").to_pylist()
-        clock = recovered(row, made.clock_offset)
+        clock = recovered(row, recording.clock_offset)
         inferred = Judgement.RIGHT if clock.covered else Judgement.MISSED
         step.beside(
             "the log's clock minus the camera's",
             f"{clock.truth:+.2f} s",
             Judgement.GIVEN if estimated is None else inferred,
-            found=f"{clock.offset:+.2f} s [{clock.low:+.2f}, {clock.high:+.2f}] 90 %",
+            inferred=f"{clock.offset:+.2f} s [{clock.low:+.2f}, {clock.high:+.2f}] 90 %",
         )
 
 
-def _measured(shell: Transcript, made: Recording) -> None:
+def _measured(shell: Transcript, recording: Recording) -> None:
     done = "From the film alone, a network that was trained on simulated flags estimates the wind."
     alt = "The wind read off the film, beside the log and the true wind"
     with _Step(shell, "Wind from the film", done, alt=alt, page="measured.html") as step:
@@ -278,27 +286,27 @@ def _measured(shell: Transcript, made: Recording) -> None:
         )
         step.took(None if printed is None else _first(printed))
         if printed is not None:
-            step.picture = _series(shell.folder / "lake", made)
-        mean = float(_during(made).mean())
+            step.picture = _series(shell.folder / "lake", recording)
+        mean = float(_during(recording).mean())
         step.beside("mean wind at the flag", f"{mean:.2f} m/s", _judged(step.found, mean))
 
 
-def _during(made: Recording) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """The true wind from the first frame to the last [m/s]."""
+def _during(recording: Recording) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Returns the true wind from the first frame to the last [m/s]."""
     first = round(BEFORE * AIR_RATE)
-    return made.wind[first : len(made.wind) - first]
+    return recording.wind[first : len(recording.wind) - first]
 
 
-def _series(place: Path, made: Recording) -> str:
+def _series(lake_path: Path, recording: Recording) -> str:
     from matplotlib.figure import Figure
 
-    lake = Lake.open(place)
+    lake = Lake.open(lake_path)
     (measured,) = lake.rows("kind = 'measurement'").to_pylist()
     _, columns = read(lake.object_path(measured["object"]))
     time_, value, low, high = (columns[name] for name in ("time", "wind", "low", "high"))
     figure = Figure(figsize=(9.5, 3.2), layout="constrained")
     axes = figure.subplots()
-    wind = _during(made)
+    wind = _during(recording)
     axes.plot(np.arange(len(wind)) / AIR_RATE, wind, color="0.75", linewidth=0.8, label="true wind at the flag")
     axes.errorbar(
         time_,
@@ -316,7 +324,7 @@ def _series(place: Path, made: Recording) -> str:
 
 
 def _moving(video: Path, rate: int) -> str:
-    """The first seconds of a film, in motion."""
+    """Returns the first seconds of a film, in motion."""
     with av.open(str(video)) as container:
         frames = []
         for frame in container.decode(video=0):
@@ -330,18 +338,18 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def _judged(found: str, true: float) -> Judgement:
-    """Judge the first interval or bound of a text by a true value; a text without one is a refusal."""
-    ends = re.search(r"\[([\d.]+), ([\d.]+)\]|at least ([\d.]+)|at most ([\d.]+)", found)
+def _judged(text: str, true: float) -> Judgement:
+    """Judges the first interval or bound of a text by a true value; a text without one is a refusal."""
+    ends = re.search(r"\[([\d.]+), ([\d.]+)\]|at least ([\d.]+)|at most ([\d.]+)", text)
     if ends is None:
         return Judgement.REFUSED
     low, high, least, most = ends.groups()
-    held = float(low or least or "-inf") <= true <= float(high or most or "inf")
-    return Judgement.RIGHT if held else Judgement.MISSED
+    contained = float(low or least or "-inf") <= true <= float(high or most or "inf")
+    return Judgement.RIGHT if contained else Judgement.MISSED
 
 
 def _verdict(text: str) -> str:
-    """What a verdict's words say before their list."""
+    """Returns what a verdict's words say before their list."""
     return "\n".join(takewhile(lambda line: not line.startswith(" "), text.splitlines()))
 
 

@@ -122,14 +122,14 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
     """
     flat = grid(width=recipe.width, height=recipe.height, columns=17, rows=11, diagonals=Diagonals.FORWARD)
     markers = grid(width=recipe.width, height=recipe.height, columns=9, rows=6).rest
-    seen = np.einsum("mv,fvcb->bfmc", onto(flat.rest, markers), _flight(recipe, flat, advance))
-    seen = seen + recipe.noise * stream(recipe.seed, "tracked", "noise").standard_normal(seen.shape)
+    observed = np.einsum("mv,fvcb->bfmc", onto(flat.rest, markers), _flight(recipe, flat, advance))
+    observed = observed + recipe.noise * stream(recipe.seed, "tracked", "noise").standard_normal(observed.shape)
     names = [f"{speed:g} m-s" for speed in recipe.speeds]
     table, recipe_file = folder / "tracks.csv", folder / "tracked.toml"
     with table.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["recording", "frame", "marker", "u", "v", "x", "y", "z"])
-        for name, positions in zip(names, seen, strict=True):
+        for name, positions in zip(names, observed, strict=True):
             for frame, at in enumerate(positions):
                 for marker, ((u, v), (x, y, z)) in enumerate(zip(markers, at, strict=True)):
                     writer.writerow(
@@ -161,15 +161,15 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
 
 
 def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object]) -> FloatArray:
-    """(frame, vertex, 3, recording) [m]."""
+    """Simulates positions (frame, vertex, 3, recording) [m]."""
     nominal = named(MATERIAL)
     material = replace(nominal.scaled(density=recipe.density, bending=recipe.bending), damping=recipe.damping)
-    held = Handles(vertices=handles.corners(flat.rest))
+    handles_held = Handles(vertices=handles.corners(flat.rest))
     scenes = []
     for index, speed in enumerate(recipe.speeds):
         start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
-        start = roughened(start, held, stream(recipe.seed, "tracked", "start", index), _ROUGH)
-        scenes.append(Scene(mesh=flat, position=start, material=material, handles=held, wind=(speed, 0.0, 0.0)))
+        start = roughened(start, handles_held, stream(recipe.seed, "tracked", "start", index), _ROUGH)
+        scenes.append(Scene(mesh=flat, position=start, material=material, handles=handles_held, wind=(speed, 0.0, 0.0)))
     effect = EFFECTS[recipe.effect](**{recipe.parameter: recipe.strength})
     method = Symplectic(outer=_OUTER)
     system, state = apply([effect], *assemble(scenes))

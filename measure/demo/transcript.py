@@ -40,7 +40,7 @@ class Transcript:
         return printed
 
     def attempt(self, *arguments: str) -> str | None:
-        """`show`, or None where the command refuses because the data fail a quality check.
+        """Runs `show`; returns None where the command refuses because the data fail a quality check.
 
         Raises:
             FlagdataError: when it ends with anything but 0 and 3.
@@ -54,7 +54,7 @@ class Transcript:
         return None if code else printed
 
     def _typed(self, arguments: tuple[str, ...]) -> tuple[str, int]:
-        """What `flagdata ARGUMENTS` prints on stdout, and its exit code."""
+        """Runs `flagdata ARGUMENTS` and returns its stdout and exit code."""
         typed = " ".join(map(_word, ("flagdata", *arguments)))
         say("")
         say(f"$ {typed}")
@@ -70,20 +70,20 @@ class Transcript:
         return self.entries[-1][1], done.returncode
 
     def show(self, *arguments: str) -> str:
-        """`run`, and its stdout printed for the person who watches."""
+        """Runs a command and prints its stdout for the person who watches."""
         printed = self.run(*arguments)
         echo_lines(printed, aside=self.aside)
         return printed
 
     def read(self, *arguments: str) -> dict[str, Any]:
-        """`run` with --json, decoded; left out of the transcript, which is for people."""
+        """Runs a command with --json and decodes it; left out of the transcript, which is for people."""
         printed = json.loads(self.run(*arguments, "--json"))
         self.entries.pop()
         return printed
 
 
 def _word(argument: str) -> str:
-    """An argument as a person types it for a shell: within double quotes where it holds single ones, as SQL does."""
+    """Quotes an argument as a person types it for a shell: in double quotes where it holds single ones, as SQL does."""
     if "'" in argument and not set(argument) & set('"$`\\!'):
         return f'"{argument}"'
     return shlex.quote(argument)

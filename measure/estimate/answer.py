@@ -62,7 +62,7 @@ class Quantity:
         return self.information >= LEAST_INFORMATION and self.span.bound is not Bound.NOTHING
 
     def phrase(self, *, first: bool) -> str:
-        """In words, without a full stop.
+        """Phrases the quantity, without a full stop.
 
         Args:
             first: whether the level of an interval is stated; that of a bound always is.
@@ -75,30 +75,30 @@ class Quantity:
             if self.given:
                 return f"{short} {low} to {high}{self._suffix}, as given"
             return f"{short}: not constrained by this clip (prior range {low} to {high}{self._suffix})"
-        stated = f"{self.span.level * 100:.3g} %"
+        level = f"{self.span.level * 100:.3g} %"
         if bound is None:
-            shown = self.span.phrase(self._digits)
-            return f"{short} {self._number(self.value)}{self._suffix} {shown}" + (f" {stated}" if first else "")
+            interval = self.span.phrase(self._digits)
+            return f"{short} {self._number(self.value)}{self._suffix} {interval}" + (f" {level}" if first else "")
         why = "" if self.value is not None else f" ({self._beyond})"
-        return f"{short} {self.span.phrase(self._digits, self._suffix)}, {stated}{why}"
+        return f"{short} {self.span.phrase(self._digits, self._suffix)}, {level}{why}"
 
     def finding(self) -> Finding | None:
-        """Why it is bounded on one side only; None where it is not, or where nothing lies beyond the end."""
+        """Reports why it has a bound on one side only; None where it has not, or where nothing lies beyond the end."""
         if self.value is not None or not self.constrained:
             return None
-        other = "more" if self.span.bound is Bound.LEAST else "less"
+        beyond = "more" if self.span.bound is Bound.LEAST else "less"
         return Finding(
             kind=f"{self.name.replace('_', '-')}-at-end",
             severity=Severity.WARNING,
             what=f"{SHORT[self.name]}: {self._beyond}, and {PILED:.0%} of the draws or more lie within {WITHIN:.0%} of "
-            f"that end; {other} would look the same, so that only a bound is given",
+            f"that end; {beyond} would look the same, so that only a bound is given",
             fix="check --flag-size, with which the range grows",
         )
 
     @property
     def _beyond(self) -> str:
-        what, end = ("ends", self.assumed[1]) if self.span.bound is Bound.LEAST else ("begins", self.assumed[0])
-        return f"the network's range {what} at {self._number(end)}{self._suffix}"
+        verb, end = ("ends", self.assumed[1]) if self.span.bound is Bound.LEAST else ("begins", self.assumed[0])
+        return f"the network's range {verb} at {self._number(end)}{self._suffix}"
 
     @property
     def _digits(self) -> int:
@@ -113,7 +113,7 @@ class Quantity:
         return "" if value is None else f"{value:.{self._digits}f}"
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values; an end of the interval that nothing bounds is null."""
+        """Returns JSON values; an end of the interval that nothing bounds is null."""
         return {
             "unit": self.unit,
             "value": self.value,
@@ -136,9 +136,9 @@ def quantities(
     level: float,
     assumed: FloatArray,
     places: FloatArray,
-    stated: Mapping[str, Stated],
+    stated_values: Mapping[str, Stated],
 ) -> tuple[Quantity, ...]:
-    """All quantities of a posterior.
+    """Summarises all quantities of a posterior.
 
     Args:
         draws: (n, target) of the posterior.
@@ -147,47 +147,47 @@ def quantities(
         level: share of each central interval.
         assumed: (target, 2) range of the simulations, for this size of flag.
         places: (k, target) of the draws in the range that the model learned, 0 to 1; of means, those of their parts.
-        stated: name → what the user states of the quantity.
+        stated_values: name → what the user states of the quantity.
 
     Raises:
         InputError: a level that is not between 0 and 1.
     """
     if not 0 < level < 1:
         raise InputError(f"an interval of {level:g}", where="--level", fix="give a share between 0 and 1, as in 0.9")
-    found = []
+    answers = []
     for k, name in enumerate(names):
         ends = float(assumed[k, 0]), float(assumed[k, 1])
-        given, limits = stated.get(name), limits_of(name)
-        if given is not None and given.exact:
-            found.append(_given(name, given.low, level=level))
+        stated_value, limits = stated_values.get(name), limits_of(name)
+        if stated_value is not None and stated_value.exact:
+            answers.append(_given(name, stated_value.low, level=level))
             continue
-        if given is not None and not given.sigma:
-            limits = given.low, given.high
-        own = span(draws[:, k], places[:, k], level=level, limits=limits, assumed=ends)
-        found.append(
+        if stated_value is not None and not stated_value.sigma:
+            limits = stated_value.low, stated_value.high
+        interval = span(draws[:, k], places[:, k], level=level, limits=limits, assumed=ends)
+        answers.append(
             Quantity(
                 name=name,
                 unit=_UNITS[name],
-                value=float(draws[:, k].mean()) if own.estimated else None,
-                sigma=float(draws[:, k].std()) if own.estimated else None,
-                span=own,
+                value=float(draws[:, k].mean()) if interval.estimated else None,
+                sigma=float(draws[:, k].std()) if interval.estimated else None,
+                span=interval,
                 assumed=ends,
                 information=information(draws[:, k], prior[:, k]),
-                given=given is not None,
+                given=stated_value is not None,
             )
         )
-    return tuple(found)
+    return tuple(answers)
 
 
 def _given(name: str, value: float, *, level: float) -> Quantity:
-    """A quantity whose value was stated."""
-    own = Span(low=value, high=value, level=level, bound=None, estimated=True)
+    """Returns a quantity whose value the user stated."""
+    exact = Span(low=value, high=value, level=level, bound=None, estimated=True)
     return Quantity(
         name=name,
         unit=_UNITS[name],
         value=value,
         sigma=0.0,
-        span=own,
+        span=exact,
         assumed=(value, value),
         information=0.0,
         given=True,
@@ -195,19 +195,19 @@ def _given(name: str, value: float, *, level: float) -> Quantity:
 
 
 def information(posterior: FloatArray, prior: FloatArray) -> float:
-    """Kullback–Leibler divergence of two samples' Gaussians, posterior from prior [nat]:
-    ½ (σ²/τ² − 1 − ln σ²/τ² + (m − μ)²/τ²)."""
+    """Computes the Kullback–Leibler divergence of two samples' Gaussians, posterior from prior [nat]: ½ (σ²/τ² − 1 − ln
+    σ²/τ² + (m − μ)²/τ²)."""
     variance = float(prior.var())
     ratio = max(float(posterior.var()) / variance, 1e-12)
     shift = float(posterior.mean() - prior.mean())
     return 0.5 * (ratio - 1 - math.log(ratio) + shift**2 / variance)
 
 
-def sentence(found: Sequence[Quantity]) -> str:
-    """The answer in one line."""
-    shown = [quantity for name in HEADLINE for quantity in found if quantity.name == name]
-    constrained = [quantity for quantity in shown if quantity.constrained]
+def sentence(quantities: Sequence[Quantity]) -> str:
+    """Phrases the answer in one line."""
+    headline = [quantity for name in HEADLINE for quantity in quantities if quantity.name == name]
+    constrained = [quantity for quantity in headline if quantity.constrained]
     leading = next((quantity for quantity in constrained if quantity.span.bound is None), None)
     first = [quantity.phrase(first=quantity is leading) for quantity in constrained]
-    rest = [quantity.phrase(first=False) for quantity in shown if not quantity.constrained]
+    rest = [quantity.phrase(first=False) for quantity in headline if not quantity.constrained]
     return "; ".join([", ".join(first), *rest] if first else rest)

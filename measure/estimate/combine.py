@@ -94,7 +94,7 @@ def of_model(model: Estimator) -> Dependence:
 
 
 def effective(count: int, correlation: float) -> float:
-    """K_eff: how many independent estimates so many correlated ones are worth."""
+    """Computes K_eff: the number of independent estimates that so many correlated ones are worth."""
     return count / (1 + (count - 1) * correlation)
 
 
@@ -106,16 +106,16 @@ def combined(
     spread: FloatArray,
     dependence: Dependence,
     generator: np.random.Generator,
-    given: Sequence[str] = (),
+    exact: Sequence[str] = (),
 ) -> tuple[FloatArray, FloatArray]:
-    """One posterior of all windows.
+    """Combines all windows into one posterior.
 
     Args:
         logits: (k, n, target) draws of each window's posterior.
         names: of the targets.
         centre, spread: (target,) mean and standard deviation of the prior's logits.
         generator: for the draws.
-        given: targets of the cloth whose values were stated, draw by draw the same in all windows.
+        exact: targets of the cloth whose values were stated, draw by draw the same in all windows.
 
     Returns:
         (k, n, own) logits of the targets that each window has its own of, draw by draw in the given correlation, and
@@ -127,22 +127,22 @@ def combined(
     draws = np.asarray(logits, dtype=np.float64)
     if draws.ndim != 3 or not draws.shape[0]:
         raise InputError(f"draws of shape {draws.shape}", fix="give (window, draw, target) of at least one window")
-    own = [place for place, name in enumerate(names) if name in OWN]
-    cloth = [place for place, name in enumerate(names) if name not in OWN]
+    wind_columns = [column for column, name in enumerate(names) if name in OWN]
+    cloth_columns = [column for column, name in enumerate(names) if name not in OWN]
     if len(draws) == 1:
-        return draws[:, :, own], draws[0][:, cloth]
-    free = [place for place in cloth if names[place] not in given]
-    every = draws[0].copy()
-    every[:, free] = centre[free] + spread[free] * _cloth(
-        (draws[:, :, free] - centre[free]) / spread[free], dependence.cloth
+        return draws[:, :, wind_columns], draws[0][:, cloth_columns]
+    free_columns = [column for column in cloth_columns if names[column] not in exact]
+    joint = draws[0].copy()
+    joint[:, free_columns] = centre[free_columns] + spread[free_columns] * _cloth(
+        (draws[:, :, free_columns] - centre[free_columns]) / spread[free_columns], dependence.cloth
     )
-    shared = every[:, cloth]
-    winds = _winds(draws[:, :, own], draws[:, :, cloth], shared, dependence.wind, generator)
+    shared = joint[:, cloth_columns]
+    winds = _winds(draws[:, :, wind_columns], draws[:, :, cloth_columns], shared, dependence.wind, generator)
     return winds, shared
 
 
 def _cloth(white: FloatArray, correlation: float) -> FloatArray:
-    """(n, cloth) draws of the tempered product of posteriors (k, n, cloth), in units of the prior."""
+    """Draws from the tempered product of posteriors (k, n, cloth), in units of the prior: (n, cloth)."""
     count, n, size = white.shape
     if not size:
         return np.zeros((n, 0))
@@ -169,7 +169,7 @@ def _winds(
     correlation: float,
     generator: np.random.Generator,
 ) -> FloatArray:
-    """(k, n, own) draws of each window's wind at the shared cloth."""
+    """Draws each window's wind at the shared cloth, (k, n, own)."""
     count, n, _ = winds.shape
     common = generator.standard_normal(n)
     out = np.empty_like(winds)
@@ -184,7 +184,7 @@ def _winds(
 
 
 def _regression(cloth: FloatArray, wind: FloatArray) -> FloatArray:
-    """(cloth,) slopes of the linear regression of wind on cloth, over the draws."""
+    """Computes slopes (cloth,) of the linear regression of wind on cloth, over the draws."""
     if not cloth.shape[1]:
         return np.zeros(0)
     offset = cloth - cloth.mean(axis=0)

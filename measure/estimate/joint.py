@@ -52,11 +52,11 @@ class WindowAnswer:
     p: float
 
     def quantity(self, name: str) -> Quantity:
-        """The one of that name."""
+        """Returns the quantity of that name."""
         return next(quantity for quantity in self.quantities if quantity.name == name)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "start": self.start,
             "end": self.end,
@@ -84,14 +84,14 @@ class Look:
         return all(reasons[0].blank for reasons in self.reasons)
 
     def only(self, places: Sequence[int]) -> Look:
-        """The same at some of the sizes."""
+        """Returns the same at some of the sizes."""
         chosen = list(places)
         return replace(
             self,
             posterior=self.posterior.rows(chosen),
             logits=self.logits[chosen],
             summaries=self.summaries[chosen],
-            reasons=tuple(self.reasons[place] for place in chosen),
+            reasons=tuple(self.reasons[size] for size in chosen),
             log_factor=self.log_factor[chosen],
         )
 
@@ -115,27 +115,28 @@ class Joint:
 
     @cached_property
     def _before(self) -> Restricted:
-        """What is assumed before the film where something is known."""
-        own = child_seed(self.options.seed, "prior")
-        return self.model.given(self.model.prior(len(self.sizes.scale)), self.known, seed=own, draws=DRAWS)
+        """Restricts the prior to what is known before the film."""
+        prior_seed = child_seed(self.options.seed, "prior")
+        return self.model.given(self.model.prior(len(self.sizes.scale)), self.known, seed=prior_seed, draws=DRAWS)
 
     def given(self, posterior: Mixture, *, seed: int) -> tuple[FloatArray, FloatArray]:
-        """Logits (i, n, target) of a window's posterior given what is known, and their log Bayes factors (i, n)."""
-        found = self.model.given(posterior, self.known, seed=seed, draws=DRAWS)
-        factor = torch.where(found.log_mass > -torch.inf, found.log_mass - self._before.log_mass, -torch.inf)
-        return found.logits.cpu().numpy(), factor.cpu().numpy()
+        """Draws logits (i, n, target) of a window's posterior given what is known, and their log Bayes factors (i,
+        n)."""
+        restricted = self.model.given(posterior, self.known, seed=seed, draws=DRAWS)
+        factor = torch.where(restricted.log_mass > -torch.inf, restricted.log_mass - self._before.log_mass, -torch.inf)
+        return restricted.logits.cpu().numpy(), factor.cpu().numpy()
 
     def by_weight(
-        self, seen: Sequence[Look], dependence: Dependence, found: Sequence[Quantity], draws: FloatArray
+        self, looks: Sequence[Look], dependence: Dependence, quantities: Sequence[Quantity], draws: FloatArray
     ) -> Finding | None:
         """How the wind would change with the weight of the cloth, where that is open and matters: the answers for a
         light and a heavy cloth of those that the answer leaves possible; None where it does not.
 
         Args:
-            found: the answer's quantities.
+            quantities: the answer's quantities.
             draws: (n, target) of the answer.
         """
-        wind = next(one for one in found if one.name == WIND)
+        wind = next(quantity for quantity in quantities if quantity.name == WIND)
         if (
             wind.value is None
             or not wind.constrained
@@ -147,15 +148,17 @@ class Joint:
         weights = [float(f"{end:.2g}") for end in ends]
         winds = []
         for weight in weights:
-            weighed = replace(self, options=replace(self.options, area_weight=Stated.of(weight)))
-            parts = []
-            for place, one in enumerate(seen):
-                logits, log_factor = weighed.given(one.posterior, seed=child_seed(self.options.seed, WEIGHT, place))
-                parts.append(replace(one, logits=logits, log_factor=log_factor))
-            winds.append(float(weighed.joint(parts, dependence)[0][:, self.names.index(WIND)].mean()))
+            at_weight = replace(self, options=replace(self.options, area_weight=Stated.of(weight)))
+            reweighted = []
+            for number, look in enumerate(looks):
+                logits, log_factor = at_weight.given(look.posterior, seed=child_seed(self.options.seed, WEIGHT, number))
+                reweighted.append(replace(look, logits=logits, log_factor=log_factor))
+            winds.append(float(at_weight.joint(reweighted, dependence)[0][:, self.names.index(WIND)].mean()))
         if abs(winds[1] - winds[0]) < _MATTERS * (wind.span.high - wind.span.low):
             return None
-        light, heavy = (f"at {weight:g} kg/m² {own:.1f} m/s" for weight, own in zip(weights, winds, strict=True))
+        light, heavy = (
+            f"at {weight:g} kg/m² {wind_speed:.1f} m/s" for weight, wind_speed in zip(weights, winds, strict=True)
+        )
         return Finding.of(
             "weight-open",
             f"the wind depends on the weight of the cloth, which was not given: {light}, {heavy}",
@@ -163,46 +166,46 @@ class Joint:
             fix="weigh the cloth and give --area-weight",
         )
 
-    def joint(self, seen: Sequence[Look], dependence: Dependence) -> tuple[FloatArray, FloatArray]:
+    def joint(self, looks: Sequence[Look], dependence: Dependence) -> tuple[FloatArray, FloatArray]:
         """(n, target) draws of all windows together, the wind their mean, and (m, target) places of the windows' own in
         the network's range."""
-        own = [place for place, name in enumerate(self.names) if name in OWN]
-        cloth = [place for place, name in enumerate(self.names) if name not in OWN]
+        wind_columns = [column for column, name in enumerate(self.names) if name in OWN]
+        cloth_columns = [column for column, name in enumerate(self.names) if name not in OWN]
         parts, places = [], []
         for stratum in range(len(self.sizes.scale)):
             prior = self.prior_logits[stratum]
             winds, shared = combined(
-                np.stack([one.logits[stratum] for one in seen]),
+                np.stack([look.logits[stratum] for look in looks]),
                 names=self.names,
                 centre=prior.mean(axis=0),
                 spread=prior.std(axis=0),
                 dependence=dependence,
-                given=self.stated_exactly,
+                exact=self.stated_exactly,
                 generator=stream(self.options.seed, "combine", stratum),
             )
             logits = np.empty((*winds.shape[:2], len(self.names)))
-            logits[..., own] = winds
-            logits[..., cloth] = shared
+            logits[..., wind_columns] = winds
+            logits[..., cloth_columns] = shared
             values = self._values(logits)
             parts.append(scaled_back(values.mean(axis=0), self.names, self.sizes.draws[stratum]))
             places.append(self._places(values))
-        tempered = effective(len(seen), dependence.cloth) / len(seen)
-        rows = self._rows(tempered * np.sum([one.log_factor for one in seen], axis=0), "answer")
+        tempered = effective(len(looks), dependence.cloth) / len(looks)
+        rows = self._rows(tempered * np.sum([look.log_factor for look in looks], axis=0), "answer")
         draws = np.concatenate(parts)[rows]
-        for name, stated in self.options.stated(self.model).items():
-            if not stated.sigma:  # combining windows moves draws a little, some out of the range
+        for name, stated_value in self.options.stated(self.model).items():
+            if not stated_value.sigma:  # combining windows moves draws a little, some out of the range
                 column = self.names.index(name)
-                draws[:, column] = np.clip(draws[:, column], stated.low, stated.high)
+                draws[:, column] = np.clip(draws[:, column], stated_value.low, stated_value.high)
         return draws, np.concatenate(places, axis=1)[:, rows].reshape(-1, len(self.names))
 
-    def window(self, one: Look, layout: Layout, p: float) -> WindowAnswer:
-        values = [self._values(logits) for logits in one.logits]
+    def window(self, look: Look, layout: Layout, p: float) -> WindowAnswer:
+        values = [self._values(logits) for logits in look.logits]
         draws = [scaled_back(v, self.names, s) for v, s in zip(values, self.sizes.draws, strict=True)]
         places = np.concatenate([self._places(v) for v in values])
-        rows = self._rows(one.log_factor, "window")
+        rows = self._rows(look.log_factor, "window")
         return WindowAnswer(
-            start=one.start,
-            end=one.start + layout.length,
+            start=look.start,
+            end=look.start + layout.length,
             quantities=self.quantities(np.concatenate(draws)[rows], places[rows]),
             p=p,
         )
@@ -230,7 +233,7 @@ class Joint:
             level=self.options.level,
             assumed=self.assumed,
             places=places,
-            stated=self.options.stated(self.model),
+            stated_values=self.options.stated(self.model),
         )
 
     def _places(self, values: FloatArray) -> FloatArray:
@@ -260,22 +263,22 @@ class Joint:
 
     @cached_property
     def assumed(self) -> FloatArray:
-        """(target, 2) range that was simulated, at these sizes; of what was not simulated evenly 90 % of it."""
+        """Returns the range (target, 2) that was simulated, at these sizes; where not simulated evenly, 90 % of it."""
         ends = self._ends
         smallest, largest = np.quantile(self.sizes.draws, [0.05, 0.95])
         low, high = scaled_back(ends[0], self.names, smallest), scaled_back(ends[1], self.names, largest)
         even = np.array([name in POWERS for name in self.names])[:, None]
-        found = np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
-        for name, stated in self.options.stated(self.model).items():
+        ranges = np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
+        for name, stated_value in self.options.stated(self.model).items():
             column = self.names.index(name)
-            within = np.array(stated.within(_NORMAL))
-            found[column] = np.clip(within, *found[column]) if stated.sigma else within
-        return found
+            within = np.array(stated_value.within(_NORMAL))
+            ranges[column] = np.clip(within, *ranges[column]) if stated_value.sigma else within
+        return ranges
 
     @property
     def stated_exactly(self) -> tuple[str, ...]:
-        """Targets whose value was given."""
-        return tuple(name for name, stated in self.options.stated(self.model).items() if stated.exact)
+        """Returns the targets whose value was given."""
+        return tuple(name for name, stated_value in self.options.stated(self.model).items() if stated_value.exact)
 
     def _values(self, logits: FloatArray) -> FloatArray:
         return self.model.learners[0].scaling.values(torch.from_numpy(logits)).numpy()

@@ -13,7 +13,7 @@ from sim.material import MATERIALS, named
 
 
 def weight_of(name: str, *, lake: Lake | None, at: str | None) -> tuple[Stated, str]:
-    """The area weight of a material [kg/m²], and where it is from, in words.
+    """Returns the area weight of a material [kg/m²] and its source in words.
 
     Nothing else of the material is used: its stiffness stays what the film and the network's prior say.
 
@@ -27,8 +27,8 @@ def weight_of(name: str, *, lake: Lake | None, at: str | None) -> tuple[Stated, 
         UsageError: films of the lake declare several weights for it.
     """
     if name in MATERIALS.names():
-        found = named(name)
-        return Stated.of(found.density), found.source
+        material = named(name)
+        return Stated.of(material.density), material.source
     fabrics = {} if lake is None else _declared(lake, at)
     weights = fabrics.get(name, set())
     if not weights:
@@ -43,11 +43,11 @@ def weight_of(name: str, *, lake: Lake | None, at: str | None) -> tuple[Stated, 
 
 
 def _declared(lake: Lake, at: str | None) -> Mapping[str, set[float]]:
-    """Area weights of the fabrics that films declare, by name."""
-    found: dict[str, set[float]] = {}
+    """Collects the area weights of the fabrics that films declare, by name."""
+    weights: dict[str, set[float]] = {}
     rows = lake.rows({"kind": Kind.RECORDING}, at=at, columns=["session", "recipe"]).to_pylist()
     for row in rows:
         cloth = from_stored_json(row["recipe"]).get("cloth") if row["recipe"] else None
         if cloth is not None and row["session"] is not None:
-            found.setdefault(row["session"], set()).add(float(cloth["density"]))
-    return found
+            weights.setdefault(row["session"], set()).add(float(cloth["density"]))
+    return weights

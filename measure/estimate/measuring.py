@@ -84,16 +84,16 @@ class Measurement:
         return sentence(self.quantities)
 
     def shown(self, *, anyway: bool) -> bool:
-        """Whether it is reported: a refused film only `anyway`, of one with nothing to measure never."""
+        """Returns whether it is reported: a refused film only `anyway`, one with nothing to measure never."""
         return self.verdict.measurable and (anyway or not self.verdict.refused)
 
     def noticed(self, *, anyway: bool) -> tuple[Finding, ...]:
-        """The findings, those on the answer where it is `shown`."""
+        """Returns the findings, those on the answer where it is `shown`."""
         return (*self.findings, *self.bounds) if self.shown(anyway=anyway) else self.findings
 
     def as_dict(self, *, anyway: bool) -> Mapping[str, Any]:
-        """JSON values. What is not `shown` is left out."""
-        shown = self.shown(anyway=anyway)
+        """Returns JSON values. What is not `shown` is left out."""
+        reported = self.shown(anyway=anyway)
         return {
             "film": self.film,
             "rate": self.rate,
@@ -101,9 +101,9 @@ class Measurement:
             "model": self.model,
             "options": {**self.options.recipe(), "seed": self.options.seed},
             "gate": self.verdict.as_dict(),
-            "sentence": self.sentence if shown else None,
-            "quantities": {q.name: q.as_dict() for q in self.quantities} if shown else None,
-            "windows": [window.as_dict() for window in self.windows] if shown else None,
+            "sentence": self.sentence if reported else None,
+            "quantities": {q.name: q.as_dict() for q in self.quantities} if reported else None,
+            "windows": [window.as_dict() for window in self.windows] if reported else None,
             "combined": self.combined,
             "dependence": {
                 "wind": self.dependence.wind,
@@ -149,40 +149,42 @@ def measure(
         generator=stream(options.seed, "sizes"),
         trained=trained_on(model.targets),
     )
-    given = Joint(model=model, sizes=considered, options=options)
+    joint = Joint(model=model, sizes=considered, options=options)
     scales = considered.scale.tolist()
     reader = WindowReader(film, model, scales, step=options.step, first=options.first, last=options.last)
     layout, distinct = reader.layout, reader.distinct
-    seen: list[Look] = []
+    looks: list[Look] = []
     clips: UInt8Array | None = None  # of the first window, or of the first with something to measure
     interpolated = 0
     for window in reader.windows(advance):
-        one = _look(window, gate, given)
-        if clips is None or (all(earlier.blank for earlier in seen) and not one.blank):
+        look = _look(window, gate, joint)
+        if clips is None or (all(earlier.blank for earlier in looks) and not look.blank):
             clips = window.clips
-        seen.append(one)
+        looks.append(look)
         interpolated += window.interpolated
     of_film = film.findings()
-    faults = [one for one in of_film if one.kind in REASONS]
+    faults = [finding for finding in of_film if finding.kind in REASONS]
     if clips is None:
         raise _without_windows(film, layout, distinct, faults)
-    judged = verdict([one.reasons for one in seen], false_alarm=options.false_alarm, level=gate.level, faults=faults)
-    kept = considered.only(judged.sizes)
-    answer = Joint(model=model, sizes=kept, options=options)
-    whole = [one.only(judged.sizes) for one in seen]
-    used = _used(whole, judged, layout)
-    draws, places = answer.joint([whole[k] for k in used], dependence)
-    middle = seen[int(np.argsort(judged.window_p, kind="stable")[len(seen) // 2])]
-    found = findings_of(
-        layout, found=len(seen), interpolated=interpolated, frames=distinct.frames, repeated=distinct.repeated
+    gate_verdict = verdict(
+        [look.reasons for look in looks], false_alarm=options.false_alarm, level=gate.level, faults=faults
+    )
+    sizes_kept = considered.only(gate_verdict.sizes)
+    answer = Joint(model=model, sizes=sizes_kept, options=options)
+    kept_looks = [look.only(gate_verdict.sizes) for look in looks]
+    used = _used(kept_looks, gate_verdict, layout)
+    draws, places = answer.joint([kept_looks[k] for k in used], dependence)
+    middle = looks[int(np.argsort(gate_verdict.window_p, kind="stable")[len(looks) // 2])]
+    of_reading = findings_of(
+        layout, found=len(looks), interpolated=interpolated, frames=distinct.frames, repeated=distinct.repeated
     )
     windows = tuple(
-        answer.window(one, layout, p)
-        for one, p, blank in zip(whole, judged.window_p, judged.blank, strict=True)
-        if not (blank and judged.measurable)
+        answer.window(look, layout, p)
+        for look, p, blank in zip(kept_looks, gate_verdict.window_p, gate_verdict.blank, strict=True)
+        if not (blank and gate_verdict.measurable)
     )
-    own = answer.quantities(draws, places)
-    open_weight = answer.by_weight([whole[k] for k in used], dependence, own, draws)
+    quantities = answer.quantities(draws, places)
+    open_weight = answer.by_weight([kept_looks[k] for k in used], dependence, quantities, draws)
     return Measurement(
         film=film.name,
         rate=film.rate,
@@ -191,28 +193,33 @@ def measure(
         options=options,
         names=tuple(answer.names),
         draws=draws,
-        quantities=own,
+        quantities=quantities,
         windows=windows,
         combined=len(used),
         dependence=dependence,
-        verdict=judged,
-        sizes=kept,
-        summary=middle.summaries[judged.size],
-        clip=clips[judged.size],
-        findings=(*of_film, *kept.findings, *found, *_about_windows(whole, judged, used, dependence)),
-        bounds=(*_at_ends(own, windows), *([] if open_weight is None else [open_weight])),
+        verdict=gate_verdict,
+        sizes=sizes_kept,
+        summary=middle.summaries[gate_verdict.size],
+        clip=clips[gate_verdict.size],
+        findings=(
+            *of_film,
+            *sizes_kept.findings,
+            *of_reading,
+            *_about_windows(kept_looks, gate_verdict, used, dependence),
+        ),
+        bounds=(*_at_ends(quantities, windows), *([] if open_weight is None else [open_weight])),
     )
 
 
 @torch.no_grad()
-def _look(window: Window, gate: WindowGate, given: Joint) -> Look:
-    model, own = given.model, child_seed(given.options.seed, "window", window.index)
+def _look(window: Window, gate: WindowGate, joint: Joint) -> Look:
+    model, seed = joint.model, child_seed(joint.options.seed, "window", window.index)
     embeddings = model.embeddings(model.inputs(window.clips))
     posterior = model.posterior(embeddings)
-    if given.known:
-        logits, log_factor = given.given(posterior, seed=own)
+    if joint.known:
+        logits, log_factor = joint.given(posterior, seed=seed)
     else:
-        logits = model.logits(embeddings, seed=own, draws=DRAWS)[:, :DRAWS].double().cpu().numpy()
+        logits = model.logits(embeddings, seed=seed, draws=DRAWS)[:, :DRAWS].double().cpu().numpy()
         log_factor = np.zeros(logits.shape[:2])
     summaries = embeddings[0].cpu().numpy().astype(np.float32)
     reasons = tuple(gate.judge(clip, summary) for clip, summary in zip(window.clips, summaries, strict=True))
@@ -227,7 +234,7 @@ def _look(window: Window, gate: WindowGate, given: Joint) -> Look:
 
 
 def _without_windows(film: Film, layout: Layout, distinct: Distinct, faults: Sequence[Finding]) -> FlagdataError:
-    """Why no window of a film is whole."""
+    """Explains why no window of a film is complete."""
     still = [fault for fault in faults if fault.kind == "no-motion"]
     if distinct.repeated and not still:
         repeated = REASONS["repeated-frames"]
@@ -247,25 +254,27 @@ def _without_windows(film: Film, layout: Layout, distinct: Distinct, faults: Seq
     )
 
 
-def _used(seen: Sequence[Look], judged: Verdict, layout: Layout) -> list[int]:
-    """Windows that the answer rests on: none that overlap, none without anything to measure where others have it; of a
-    familiar recording none that are strange."""
-    apart = layout.frames * max(layout.spacings)
-    left_out = np.array(judged.blank) & judged.measurable
-    if not judged.refused:
-        left_out |= judged.strange
+def _used(looks: Sequence[Look], gate_verdict: Verdict, layout: Layout) -> list[int]:
+    """Selects windows that the answer rests on: none that overlap, none without anything to measure where others have
+    it; of a familiar recording none that are strange."""
+    length = layout.frames * max(layout.spacings)
+    left_out = np.array(gate_verdict.blank) & gate_verdict.measurable
+    if not gate_verdict.refused:
+        left_out |= gate_verdict.strange
     chosen: list[int] = []
     for k in np.flatnonzero(~left_out).tolist():
-        if not chosen or seen[k].start - seen[chosen[-1]].start >= apart - layout.period:
+        if not chosen or looks[k].start - looks[chosen[-1]].start >= length - layout.period:
             chosen.append(k)
     return chosen
 
 
-def _about_windows(seen: Sequence[Look], judged: Verdict, used: Sequence[int], dependence: Dependence) -> list[Finding]:
-    found = []
-    factor = float(np.median([np.exp(one.log_factor).mean() for one in seen]))
+def _about_windows(
+    looks: Sequence[Look], gate_verdict: Verdict, used: Sequence[int], dependence: Dependence
+) -> list[Finding]:
+    findings = []
+    factor = float(np.median([np.exp(look.log_factor).mean() for look in looks]))
     if factor < CONTRADICTION:
-        found.append(
+        findings.append(
             Finding.of(
                 "area-weight-contradicted",
                 f"the area weight that was given makes the film much less probable (Bayes factor {factor:.2g}): "
@@ -274,9 +283,9 @@ def _about_windows(seen: Sequence[Look], judged: Verdict, used: Sequence[int], d
                 fix="check --area-weight and --flag-size",
             )
         )
-    excluded = float(np.isneginf(seen[0].log_factor).mean())
+    excluded = float(np.isneginf(looks[0].log_factor).mean())
     if excluded > EXCLUDED:
-        found.append(
+        findings.append(
             Finding.of(
                 "sizes-excluded-by-weight",
                 f"{excluded:.0%} of the sizes that were taken as possible were left out: of a flag of these the "
@@ -285,19 +294,20 @@ def _about_windows(seen: Sequence[Look], judged: Verdict, used: Sequence[int], d
                 fix="give --flag-size LENGTHxHEIGHT",
             )
         )
-    strange = int(judged.strange.sum())
-    if strange and not judged.refused:
-        found.append(
+    strange = int(gate_verdict.strange.sum())
+    if strange and not gate_verdict.refused:
+        findings.append(
             Finding.of(
                 "strange-windows",
-                f"{strange} of {len(seen)} windows are unlike what the network was trained on, p at most "
-                f"{judged.level:.2g}, and were left out of the answer; {judged.refusing} would refuse the film",
+                f"{strange} of {len(looks)} windows are unlike what the network was trained on, p at most "
+                f"{gate_verdict.level:.2g}, and were left out of the answer; {gate_verdict.refusing} would refuse the "
+                "film",
                 count=strange,
                 fix="choose a part of the film without them by --start and --end",
             )
         )
     if len(used) > 1:
-        found.append(
+        findings.append(
             Finding.of(
                 "windows-combined",
                 f"the answer combines {len(used)} windows of one cloth, each with its own wind; their errors "
@@ -306,15 +316,15 @@ def _about_windows(seen: Sequence[Look], judged: Verdict, used: Sequence[int], d
                 count=len(used),
             )
         )
-    return found
+    return findings
 
 
-def _at_ends(found: Sequence[Quantity], windows: Sequence[WindowAnswer]) -> list[Finding]:
-    """Why quantities are bounded on one side only, and of how many windows the wind is where the answer's is not."""
-    own = [finding for quantity in found if (finding := quantity.finding()) is not None]
-    bounded = [one.quantity(name).value is None for one in windows for name in OWN]
-    if any(bounded) and not any(quantity.value is None for quantity in found if quantity.name in OWN):
-        own.append(
+def _at_ends(quantities: Sequence[Quantity], windows: Sequence[WindowAnswer]) -> list[Finding]:
+    """Reports quantities bounded on one side only, and how many windows bound the wind where the answer does not."""
+    findings = [finding for quantity in quantities if (finding := quantity.finding()) is not None]
+    bounded = [window.quantity(name).value is None for window in windows for name in OWN]
+    if any(bounded) and not any(quantity.value is None for quantity in quantities if quantity.name in OWN):
+        findings.append(
             Finding.of(
                 "windows-at-end",
                 f"{sum(bounded)} of {len(windows)} windows bound the wind on one side only: theirs may lie beyond "
@@ -323,4 +333,4 @@ def _at_ends(found: Sequence[Quantity], windows: Sequence[WindowAnswer]) -> list
                 fix="give the wind of single windows by --windows",
             )
         )
-    return own
+    return findings

@@ -55,7 +55,7 @@ def nearest(
     seed: int,
     advance: Callable[[int, int], None] | None = None,
 ) -> tuple[tuple[Neighbour, ...], int]:
-    """The `SHOWN` nearest of `COMPARED` simulated clips, and how many were compared; none where the lake has none.
+    """Finds the `SHOWN` nearest of `COMPARED` simulated clips; also counts those compared, 0 where the lake has none.
 
     Args:
         summary: (dimension,) of the film, conditioned.
@@ -69,22 +69,22 @@ def nearest(
     rows = [row for row in clips.select(columns).to_pylist() if row["recording"] != without]
     chosen = stream(seed, "nearest").permutation(len(rows))[:COMPARED].tolist()
     whitening = np.eye(len(summary)) if model.cloud is None else model.cloud.whitening
-    found: list[Neighbour] = []
-    for place in chosen:
-        row = rows[place]
+    neighbours: list[Neighbour] = []
+    for index in chosen:
+        row = rows[index]
         record = Record.open(lake.record_place(row["object"]))
         first = row["frame_first"]
         times = record.times(first, count)
         times = (times - times[0]) / NANOSECONDS
         frames = FitFilm.of(record.frames(first, count), times).frames
-        own = model.summaries(model.inputs(frames[None]))[0].cpu().numpy()
-        distance = float(np.linalg.norm(whitening @ (own.astype(np.float64) - summary)))
-        found.append(
+        embedding = model.summaries(model.inputs(frames[None]))[0].cpu().numpy()
+        distance = float(np.linalg.norm(whitening @ (embedding.astype(np.float64) - summary)))
+        neighbours.append(
             Neighbour(
                 artifact=row["artifact"], name=row["name"], frames=frames, distance=distance, known=record.truth or {}
             )
         )
-        found = sorted(found, key=lambda one: one.distance)[:SHOWN]
+        neighbours = sorted(neighbours, key=lambda neighbour: neighbour.distance)[:SHOWN]
         if advance is not None:
             advance(len(chosen), 1)
-    return tuple(found), len(chosen)
+    return tuple(neighbours), len(chosen)

@@ -50,7 +50,7 @@ class Options:
             )
 
     def recipe(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "flag_size": None if self.size is None else [self.size.length, self.size.height],
             "step": self.step,
@@ -63,21 +63,21 @@ class Options:
         }
 
     def stated(self, model: Estimator) -> Mapping[str, Stated]:
-        """What is stated about quantities, by their names: the weight that was given, and of a model that
-        estimates a flag's aspect that of the size that was given, where it is one that the model knows."""
-        found = {} if self.area_weight is None else {"density": self.area_weight}
-        if self.size is not None and (own := usable_aspect(model.targets, self.size.length, self.size.height)):
-            found[ASPECT] = own
-        return found
+        """Returns what is stated about quantities, by name: the area weight, and for a model that estimates a flag's
+        aspect that of the stated size, where the model knows it."""
+        stated_values = {} if self.area_weight is None else {"density": self.area_weight}
+        if self.size is not None and (aspect := usable_aspect(model.targets, self.size.length, self.size.height)):
+            stated_values[ASPECT] = aspect
+        return stated_values
 
     def known(self, sizes: Sizes, model: Estimator) -> tuple[Known, ...]:
-        """The same at each size considered, as of a flag of the network's own size.
+        """Returns the same at each size considered, as of a flag of the network's own size.
 
         Raises:
             UsageError: a quantity that the model does not estimate, or a statement beyond what it knows at any size.
         """
-        found = []
-        for name, stated in self.stated(model).items():
+        constraints = []
+        for name, stated_value in self.stated(model).items():
             target = next((target for target in model.targets if target.name == name), None)
             if target is None:
                 raise UsageError(
@@ -87,13 +87,13 @@ class Options:
                 )
             power = POWERS.get(name, 0.0)  # an aspect has none
             least, most = (end * sizes.scale**power for end in (target.low, target.high))
-            if not ((least * (1 - 1e-9) <= stated.low) & (stated.high <= most * (1 + 1e-9))).any():
+            if not ((least * (1 - 1e-9) <= stated_value.low) & (stated_value.high <= most * (1 + 1e-9))).any():
                 raise UsageError(
-                    f"an {target.about} of {stated.text} {target.unit}; of a flag of this size the model knows "
+                    f"an {target.about} of {stated_value.text} {target.unit}; of a flag of this size the model knows "
                     f"{least.min():.3g} to {most.max():.3g}",
                     where="--area-weight",
                     fix="give kg/m² within that (100 g/m² is 0.1)" + ("" if sizes.given else ", and --flag-size"),
                 )
             scale = sizes.draws if sizes.given is None else sizes.scale[:, None]
-            found.append(Known.stated(name, stated, scale=scale**power))
-        return tuple(found)
+            constraints.append(Known.stated(name, stated_value, scale=scale**power))
+        return tuple(constraints)

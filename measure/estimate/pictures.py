@@ -24,13 +24,13 @@ _SHOWN = 640
 
 
 def steps(film: ConditionedFilm) -> str | None:
-    """The reference frame with all moving cloths, numbered, the outline of what is not frozen, and the square that is
-    judged; None before the film was read."""
-    found, reference = film.found, film.reference
-    if found is None or reference is None:
+    """Draws the reference frame with all moving cloths, numbered, the outline of what is not frozen, and the square
+    that is judged; None before the film was read."""
+    detection, reference = film.found, film.reference
+    if detection is None or reference is None:
         return None
     height, width = reference.shape
-    square = found.square
+    square = detection.square
     left, top = min(0, square.x), min(0, square.y)
     right, bottom = max(width, square.x + square.side), max(height, square.y + square.side)
     scale = _SHOWN / max(right - left, bottom - top)
@@ -42,13 +42,13 @@ def steps(film: ConditionedFilm) -> str | None:
     def at(x: float, y: float) -> tuple[float, float]:
         return (x - left) * scale, (y - top) * scale
 
-    for number, region in enumerate(found.regions, start=1):
-        colour = _RUST if number == found.chosen + 1 else _BLUE
+    for number, region in enumerate(detection.regions, start=1):
+        colour = _RUST if number == detection.chosen + 1 else _BLUE
         lines, _ = cv2.findContours(region.mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         for line in lines:
-            points = [at(*place) for place in (line.reshape(-1, 2) / found.scale).tolist()]
+            points = [at(*vertex) for vertex in (line.reshape(-1, 2) / detection.scale).tolist()]
             pen.line([*points, points[0]], fill=colour, width=2)
-        corner = at(region.box[0] / found.scale, region.box[1] / found.scale)
+        corner = at(region.box[0] / detection.scale, region.box[1] / detection.scale)
         pen.text((corner[0] + 3, corner[1] + 3), str(number), fill=colour, font_size=22)
     pen.rectangle(
         (*at(square.x, square.y), *at(square.x + square.side - 1, square.y + square.side - 1)), outline=_CROP, width=2
@@ -57,7 +57,7 @@ def steps(film: ConditionedFilm) -> str | None:
 
 
 def corner(measured: Measurement) -> str:
-    """The joint posterior: each quantity by itself on the diagonal, in pairs below it."""
+    """Draws the joint posterior: each quantity by itself on the diagonal, in pairs below it."""
     from matplotlib.figure import Figure
 
     names, draws = measured.names, measured.draws
@@ -93,47 +93,71 @@ def corner(measured: Measurement) -> str:
     return figure_url(figure)
 
 
-def _label(measured: Measurement, place: int) -> str:
-    quantity = measured.quantities[place]
+def _label(measured: Measurement, index: int) -> str:
+    quantity = measured.quantities[index]
     return SHORT[quantity.name] + ("" if quantity.unit == "1" else f" [{quantity.unit}]")
 
 
-def series(found: Beside, *, level: float) -> str:
-    """Wind by window with its intervals, beside the anemometer where there is one; hollow where p ≤ `level`, an arrow
-    where a window gives a bound instead of a value."""
+def series(wind_series: Beside, *, level: float) -> str:
+    """Draws the wind by window with its intervals, beside the anemometer where there is one; hollow where p ≤ `level`,
+    an arrow where a window gives a bound instead of a value."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.5, 3.0), layout="constrained")
     axes = figure.subplots()
-    if found.logged is not None and found.minute is not None:
-        axes.plot(found.time, found.logged, color=_BLUE, linewidth=1.0, label="anemometer, over the window")
-        axes.plot(found.time, found.minute, color=_BLUE, linewidth=1.6, linestyle=":", label="anemometer, minute mean")
-    bounded = np.isnan(found.wind)
-    axes.vlines(found.time[~bounded], found.low[~bounded], found.high[~bounded], color=_RUST, alpha=0.35, linewidth=1.4)
+    if wind_series.logged is not None and wind_series.minute is not None:
+        axes.plot(wind_series.time, wind_series.logged, color=_BLUE, linewidth=1.0, label="anemometer, over the window")
+        axes.plot(
+            wind_series.time,
+            wind_series.minute,
+            color=_BLUE,
+            linewidth=1.6,
+            linestyle=":",
+            label="anemometer, minute mean",
+        )
+    bounded = np.isnan(wind_series.wind)
+    axes.vlines(
+        wind_series.time[~bounded],
+        wind_series.low[~bounded],
+        wind_series.high[~bounded],
+        color=_RUST,
+        alpha=0.35,
+        linewidth=1.4,
+    )
     if bounded.any():
-        axes.plot(found.time[bounded], found.low[bounded], "^", markersize=5, color=_RUST, label="film, at least")
+        axes.plot(
+            wind_series.time[bounded], wind_series.low[bounded], "^", markersize=5, color=_RUST, label="film, at least"
+        )
     for strange, label in ((False, "film, with its interval"), (True, "film, window unlike the training data")):
-        own = ~bounded & ((found.p <= level) == strange)
-        if own.any():
+        selected = ~bounded & ((wind_series.p <= level) == strange)
+        if selected.any():
             face = "none" if strange else _RUST
-            axes.plot(found.time[own], found.wind[own], "o", markersize=4, color=_RUST, mfc=face, label=label)
+            axes.plot(
+                wind_series.time[selected],
+                wind_series.wind[selected],
+                "o",
+                markersize=4,
+                color=_RUST,
+                mfc=face,
+                label=label,
+            )
     axes.set(xlabel="time since the first frame [s]", ylabel="wind speed [m/s]", ylim=(0, None))
     axes.legend(loc="best", fontsize=8, ncols=2)
     return figure_url(figure)
 
 
-def spectra(found: Spectrum) -> str:
-    """Power densities of both series, and their coherence with what chance reaches."""
+def spectra(spectrum: Spectrum) -> str:
+    """Draws power densities of both series, and their coherence with what chance reaches."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.5, 3.0), layout="constrained")
     power, coherent = figure.subplots(1, 2)
-    power.loglog(found.frequency, found.logged, color=_BLUE, label="anemometer")
-    power.loglog(found.frequency, found.estimated, color=_RUST, label="film")
+    power.loglog(spectrum.frequency, spectrum.logged, color=_BLUE, label="anemometer")
+    power.loglog(spectrum.frequency, spectrum.estimated, color=_RUST, label="film")
     power.set(xlabel="frequency [Hz]", ylabel="power density [(m/s)²/Hz]")
     power.legend(fontsize=8)
-    coherent.semilogx(found.frequency, found.coherence, color=_RUST)
-    coherent.axhline(found.chance, color=_GRAY, linestyle=":", label="of unrelated series, 1 in 20")
+    coherent.semilogx(spectrum.frequency, spectrum.coherence, color=_RUST)
+    coherent.axhline(spectrum.chance, color=_GRAY, linestyle=":", label="of unrelated series, 1 in 20")
     coherent.set(xlabel="frequency [Hz]", ylabel="coherence", ylim=(0, 1))
     coherent.legend(fontsize=8)
     return figure_url(figure)

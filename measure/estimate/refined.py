@@ -25,7 +25,7 @@ from models.targets import ASPECT, Cloth
 def refined(
     measured: Measurement, subject: Subject, model: Estimator, *, budget: int, cache: Path | None
 ) -> Refinement:
-    """Refine the first window of a film of a flag whose size is known.
+    """Refines the first window of a film of a flag whose size is known.
 
     Where the film's record states how it was simulated and filmed, the simulated clips are filmed likewise. Both are
     conditioned after that, so it does not matter which square of the picture is judged.
@@ -47,38 +47,38 @@ def refined(
     clip = Clip(name=measured.film, frames=measured.clip, recording=subject.artifact)
     options = measured.options
     s = float(measured.sizes.scale[0])
-    known = options.area_weight
-    found = run(
+    area_weight = options.area_weight
+    refinement = run(
         [clip],
         model,
         budget=budget,
         seed=options.seed,
         level=options.level,
         cache=cache,
-        area_weight=None if known is None else _searched(known, s),
+        area_weight=None if area_weight is None else _searched(area_weight, s),
         aspect=None if options.size is None or ASPECT not in options.stated(model) else options.size.aspect,
     )
-    return scaled(found, s)
+    return scaled(refinement, s)
 
 
-def _searched(known: Stated, s: float) -> tuple[float, float]:
-    """The range of area weights that is searched for a flag of s times the size [kg/m²]: that was stated, two standard
-    deviations either way, or 1 % either way of an exact value, since a search needs a width."""
-    low, high = known.within(2.0)
+def _searched(area_weight: Stated, s: float) -> tuple[float, float]:
+    """Returns the range of area weights searched for a flag of s times the size [kg/m²]: two standard deviations either
+    way of what was stated, or 1 % either way of an exact value, since a search needs a width."""
+    low, high = area_weight.within(2.0)
     slack = 0.01 * low if low == high else 0.0
     return (low - slack) / s, (high + slack) / s
 
 
-def scaled(found: Refinement, s: float) -> Refinement:
-    """The same of a flag s times as large as the one simulated."""
+def scaled(refinement: Refinement, s: float) -> Refinement:
+    """Scales a refinement to a flag s times as large as the one simulated."""
     if math.isclose(s, 1.0):
-        return found
+        return refinement
     return replace(
-        found,
-        intervals=_all(found.intervals, s),
-        amortised=_all(found.amortised, s),
-        bending=found.bending * s**4,
-        rounds=tuple(replace(one, intervals=_all(one.intervals, s)) for one in found.rounds),
+        refinement,
+        intervals=_all(refinement.intervals, s),
+        amortised=_all(refinement.amortised, s),
+        bending=refinement.bending * s**4,
+        rounds=tuple(replace(round_, intervals=_all(round_.intervals, s)) for round_ in refinement.rounds),
     )
 
 
@@ -90,5 +90,9 @@ def _one(interval: Interval, s: float) -> Interval:
     name = interval.name.partition(".")[0]
     factor = s ** POWERS.get(name, 0.0)
     shift = LOGARITHMS.get(name, 0.0) * math.log10(s)
-    own = replace(interval.span, low=interval.span.low * factor + shift, high=interval.span.high * factor + shift)
-    return replace(interval, median=None if interval.median is None else interval.median * factor + shift, span=own)
+    scaled_span = replace(
+        interval.span, low=interval.span.low * factor + shift, high=interval.span.high * factor + shift
+    )
+    return replace(
+        interval, median=None if interval.median is None else interval.median * factor + shift, span=scaled_span
+    )

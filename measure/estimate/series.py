@@ -64,17 +64,17 @@ class Agreement:
 
     @property
     def sentence(self) -> str:
-        """In words."""
-        found = f"the intervals contain {self.covered:.0%} of it, n = {self.count} windows"
+        """Phrases the agreement."""
+        covered = f"the intervals contain {self.covered:.0%} of it, n = {self.count} windows"
         if self.bounded:
-            found += f", of which {self.bounded} give a bound and no value"
+            covered += f", of which {self.bounded} give a bound and no value"
         if self.bias is None or self.rmse is None or self.interval is None:
-            return found
+            return covered
         low, high = self.interval
-        return f"bias {self.bias:+.2f} m/s, RMSE {self.rmse:.2f} m/s [{low:.2f}, {high:.2f}] 90 %, {found}"
+        return f"bias {self.bias:+.2f} m/s, RMSE {self.rmse:.2f} m/s [{low:.2f}, {high:.2f}] 90 %, {covered}"
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "count": self.count,
             "bounded": self.bounded,
@@ -105,7 +105,7 @@ class Spectrum:
     windows: int
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "frequency": self.frequency.tolist(),
             "estimated": self.estimated.tolist(),
@@ -130,7 +130,7 @@ class Delay:
     reasons: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {"offset": self.offset, "sigma": self.sigma, "reasons": list(self.reasons)}
 
 
@@ -176,24 +176,24 @@ class Beside:
             yield ["" if math.isnan(value) else f"{value:.6g}" for value in values]
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values of what is concluded; the columns are elsewhere."""
+        """Returns JSON values of what is concluded; the columns are elsewhere."""
         parts = {"window": self.window, "minute": self.of_minute, "spectrum": self.spectrum, "delay": self.delay}
         return {name: None if part is None else part.as_dict() for name, part in parts.items()}
 
 
 def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None) -> Beside:
-    """The windows of a measurement as a series, beside an anemometer on the film's clock.
+    """Places the windows of a measurement as a series beside an anemometer on the film's clock.
 
     Args:
         start: instant of the film's first frame [UTC ns]; None where nobody said, and nothing is compared.
         wind: of the anemometer; None if there is none.
     """
-    found = [window.quantity(WIND) for window in measured.windows]
+    quantities = [window.quantity(WIND) for window in measured.windows]
     series = Beside(
         time=np.array([(window.start + window.end) / 2 for window in measured.windows]),
-        wind=np.array([math.nan if one.value is None else one.value for one in found]),
-        low=np.array([one.span.low for one in found]),
-        high=np.array([one.span.high for one in found]),
+        wind=np.array([math.nan if quantity.value is None else quantity.value for quantity in quantities]),
+        low=np.array([quantity.span.low for quantity in quantities]),
+        high=np.array([quantity.span.high for quantity in quantities]),
         p=np.array([window.p for window in measured.windows]),
     )
     if start is None or wind is None or over_ground(wind) is None:
@@ -220,26 +220,26 @@ def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None)
 
 
 def agreement(series: Beside, reference: FloatArray, *, seed: int) -> Agreement | None:
-    """How the windows that the reference covers agree with it; None where there is none."""
-    known = np.isfinite(reference)
-    count = int(known.sum())
+    """Compares the windows with the reference where it covers them; None where it covers none."""
+    covered = np.isfinite(reference)
+    count = int(covered.sum())
     if not count:
         return None
-    off = (series.wind - reference)[known & np.isfinite(series.wind)]
-    inside = (series.low[known] <= reference[known]) & (reference[known] <= series.high[known])
-    found = bool(len(off))
+    off = (series.wind - reference)[covered & np.isfinite(series.wind)]
+    inside = (series.low[covered] <= reference[covered]) & (reference[covered] <= series.high[covered])
+    valued = bool(len(off))
     return Agreement(
         count=count,
         bounded=count - len(off),
-        bias=float(off.mean()) if found else None,
-        rmse=float(np.sqrt(np.mean(off**2))) if found else None,
-        interval=_rmse_interval(off, seed) if found else None,
+        bias=float(off.mean()) if valued else None,
+        rmse=float(np.sqrt(np.mean(off**2))) if valued else None,
+        interval=_rmse_interval(off, seed) if valued else None,
         covered=float(inside.mean()),
     )
 
 
 def _rmse_interval(off: FloatArray, seed: int) -> tuple[float, float]:
-    """90 % of the RMSE, by resampling blocks of ten windows: neighbours err alike."""
+    """Computes the RMSE's 90 % interval by resampling blocks of ten windows: neighbours err alike."""
     blocks = np.array_split(np.square(off), max(1, len(off) // 10))
     sums, sizes = np.array([block.sum() for block in blocks]), np.array([len(block) for block in blocks])
     drawn = stream(seed, "agreement").integers(len(blocks), size=(_RESAMPLES, len(blocks)))
@@ -249,15 +249,15 @@ def _rmse_interval(off: FloatArray, seed: int) -> tuple[float, float]:
 
 
 def spectrum(time: FloatArray, estimated: FloatArray, logged: FloatArray) -> Spectrum | None:
-    """Over the longest run of windows one step apart, all of them estimated and logged; None where that is shorter than
-    `LEAST_SPECTRUM`, or where one of the series does not vary."""
+    """Computes spectra over the longest run of windows one step apart, all estimated and logged; None where it is
+    shorter than `LEAST_SPECTRUM`, or where one of the series does not vary."""
     if len(time) < LEAST_SPECTRUM:
         return None
     from scipy import signal
 
     step = float(np.median(np.diff(time)))
-    known = np.isfinite(estimated + logged)
-    broken = np.flatnonzero((np.abs(np.diff(time) - step) > 0.01 * step) | ~(known[1:] & known[:-1])) + 1
+    both_valid = np.isfinite(estimated + logged)
+    broken = np.flatnonzero((np.abs(np.diff(time) - step) > 0.01 * step) | ~(both_valid[1:] & both_valid[:-1])) + 1
     runs = np.split(np.arange(len(time)), broken)
     run = max(runs, key=len)
     if len(run) < LEAST_SPECTRUM:
@@ -266,13 +266,13 @@ def spectrum(time: FloatArray, estimated: FloatArray, logged: FloatArray) -> Spe
     pair = estimated[run] - estimated[run].mean(), logged[run] - logged[run].mean()
     if min(float(np.ptp(values)) for values in pair) == 0:
         return None
-    frequency, own = signal.welch(pair[0], fs=1 / step, nperseg=segment)
-    _, other = signal.welch(pair[1], fs=1 / step, nperseg=segment)
+    frequency, power = signal.welch(pair[0], fs=1 / step, nperseg=segment)
+    _, logged_power = signal.welch(pair[1], fs=1 / step, nperseg=segment)
     _, coherent = signal.coherence(*pair, fs=1 / step, nperseg=segment)
     return Spectrum(
         frequency=frequency[1:],
-        estimated=own[1:],
-        logged=other[1:],
+        estimated=power[1:],
+        logged=logged_power[1:],
         coherence=coherent[1:],
         chance=1 - 0.05 ** (1 / (_SEGMENTS - 1)),
         windows=len(run),
@@ -290,7 +290,7 @@ def _delay(series: Beside, start: int, wind: WindSeries, seed: int) -> Delay:
     instants = start + np.round(series.time * NANOSECONDS).astype(np.int64)
     try:
         bins = wind_bins(wind, shortest=max(1.0, 2 * step))
-        found = estimate_offset(
+        fit = estimate_offset(
             MotionSeries(time=instants, energy=np.maximum(series.wind, 0.0)),
             bins.average,
             search=LagSearch(
@@ -300,9 +300,9 @@ def _delay(series: Beside, start: int, wind: WindSeries, seed: int) -> Delay:
         )
     except InputError as error:
         return Delay(offset=None, sigma=None, reasons=(error.what,))
-    known = math.isfinite(found.offset)
+    is_known = math.isfinite(fit.offset)
     return Delay(
-        offset=found.offset if known else None,
-        sigma=found.sigma if known and math.isfinite(found.sigma) else None,
-        reasons=found.reasons,
+        offset=fit.offset if is_known else None,
+        sigma=fit.sigma if is_known and math.isfinite(fit.sigma) else None,
+        reasons=fit.reasons,
     )

@@ -25,18 +25,19 @@ _STEPS = (3, 8, 15, 29)
 
 
 def shift(clip: ClipStatistics) -> float:
-    """Common logarithm of the shift of the rim [px]: the largest over frames of the tiles' median.
+    """Computes the common logarithm of the shift of the rim [px]: the largest over frames of the tiles' median.
 
     A tile's shift is the peak of its phase correlation with the first frame (Kuglin and Hines, 1975). The spectrum is
     divided by its modulus plus the noise's, so that a tile without texture gives no shift; the peak is refined by a
     parabola.
     """
-    found = [_median_shift(clip, frame) for frame in _STEPS if frame < len(clip.gray)]
-    return float(np.log10(max(max(found), 0.01)))
+    shifts = [_median_shift(clip, frame) for frame in _STEPS if frame < len(clip.gray)]
+    return float(np.log10(max(max(shifts), 0.01)))
 
 
 def sway(clip: ClipStatistics) -> float:
-    """Common logarithm of the root mean square translation of the rim from one frame to the next [px/frame].
+    """Computes the common logarithm of the root mean square translation of the rim from one frame to the next
+    [px/frame].
 
     The translation is that of least squares between slopes and changes (Lucas and Kanade, 1981) over the rim's pixels.
     """
@@ -60,23 +61,23 @@ def _median_shift(clip: ClipStatistics, frame: int) -> float:
     return float(np.hypot(*np.median(shifts, axis=0)))
 
 
-def _phase_shift(one: Float32Array, other: Float32Array, noise: float) -> tuple[float, float]:
-    """How far the second picture lies below and right of the first [px]."""
+def _phase_shift(first_tile: Float32Array, second_tile: Float32Array, noise: float) -> tuple[float, float]:
+    """Estimates how far the second picture lies below and right of the first [px]."""
     hann = np.hanning(_TILE)
     window = np.outer(hann, hann)
-    first, second = (np.fft.rfft2((picture - picture.mean()) * window) for picture in (one, other))
+    first, second = (np.fft.rfft2((picture - picture.mean()) * window) for picture in (first_tile, second_tile))
     cross = second * np.conj(first)
     floor = (1.0 + noise**2) * np.square(window).sum()
     surface = np.fft.irfft2(cross / (np.abs(cross) + floor), s=(_TILE, _TILE))
-    y, x = (int(place) for place in np.unravel_index(surface.argmax(), surface.shape))
+    y, x = (int(index) for index in np.unravel_index(surface.argmax(), surface.shape))
     return _refined(surface[:, x], y), _refined(surface[y], x)
 
 
-def _refined(line: FloatArray, place: int) -> float:
-    """Place of a periodic line's peak by the parabola through three values, as a signed shift."""
-    before, peak, after = line[place - 1], line[place], line[(place + 1) % len(line)]
+def _refined(line: FloatArray, index: int) -> float:
+    """Refines a periodic line's peak by the parabola through three values; returns it as a signed shift."""
+    before, peak, after = line[index - 1], line[index], line[(index + 1) % len(line)]
     bend = before - 2 * peak + after
-    fine = place + (0.5 * (before - after) / bend if bend < 0 else 0.0)
+    fine = index + (0.5 * (before - after) / bend if bend < 0 else 0.0)
     return fine - len(line) if fine > len(line) / 2 else fine
 
 
@@ -86,7 +87,7 @@ _SHORTEST_LOOP = 4
 
 
 def held(clip: ClipStatistics) -> float:
-    """Common logarithm of the lower quartile of the changes from frame to frame over their 90 % quantile.
+    """Computes the common logarithm of the lower quartile of the changes from frame to frame over their 90 % quantile.
 
     Near 0 where each frame differs from the last; very low where at least a quarter of them repeat it.
     """
@@ -95,7 +96,7 @@ def held(clip: ClipStatistics) -> float:
 
 
 def uneven(clip: ClipStatistics) -> float:
-    """How far each change is from the mean of its neighbours, over the mean change: 0 for smooth motion."""
+    """Computes how far each change is from the mean of its neighbours, over the mean change: 0 for smooth motion."""
     change = _changes(clip)
     if len(change) < 3:
         return 0.0
@@ -104,13 +105,13 @@ def uneven(clip: ClipStatistics) -> float:
 
 
 def stopped(clip: ClipStatistics) -> float:
-    """Common logarithm of the mean change over the last third of the clip over that of the whole clip."""
+    """Computes the common logarithm of the mean change over the last third of the clip over that of the whole clip."""
     change = _changes(clip)
     return float(np.log10((change[-(len(change) // 3) :].mean() + _LEAST) / (change.mean() + _LEAST)))
 
 
 def loop(clip: ClipStatistics) -> float:
-    """Common logarithm of the smallest mean difference of frames a lag apart over the median lag's.
+    """Computes the common logarithm of the smallest mean difference of frames a lag apart over the median lag's.
 
     Lags are 4 frames to two thirds of the clip. Flutter comes near its shape of a period ago, a loop repeats it.
     """
@@ -118,33 +119,34 @@ def loop(clip: ClipStatistics) -> float:
     pixels = clip.gray[:, clip.moving] if clip.moving.any() else clip.gray.reshape(len(clip.gray), -1)
     if not lags:
         return 0.0
-    apart = np.array([np.abs(pixels[lag:] - pixels[:-lag]).mean() for lag in lags])
-    return float(np.log10((apart.min() + _LEAST) / (np.median(apart) + _LEAST)))
+    differences = np.array([np.abs(pixels[lag:] - pixels[:-lag]).mean() for lag in lags])
+    return float(np.log10((differences.min() + _LEAST) / (np.median(differences) + _LEAST)))
 
 
 def _changes(clip: ClipStatistics) -> FloatArray:
-    """(n − 1,), mean absolute change from frame to frame over the moving pixels, or over all if none moves."""
+    """Computes mean absolute changes from frame to frame over the moving pixels, or over all if none moves, (n −
+    1,)."""
     pixels = clip.gray[:, clip.moving] if clip.moving.any() else clip.gray.reshape(len(clip.gray), -1)
     return np.abs(np.diff(pixels, axis=0)).mean(axis=1).astype(np.float64)
 
 
 def level(clip: ClipStatistics) -> float:
-    """Mean gray level, 0 to 255."""
+    """Computes the mean gray level, 0 to 255."""
     return float(clip.mean.mean())
 
 
 def highlights(clip: ClipStatistics) -> float:
-    """Gray level below which 99 % of the mean picture lies."""
+    """Computes the gray level below which 99 % of the mean picture lies."""
     return float(np.quantile(clip.mean, 0.99))
 
 
 def contrast(clip: ClipStatistics) -> float:
-    """Common logarithm of the standard deviation of the mean picture [gray levels]."""
+    """Computes the common logarithm of the standard deviation of the mean picture [gray levels]."""
     return float(np.log10(max(clip.contrast, 1e-2)))
 
 
 def noise(clip: ClipStatistics) -> float:
-    """Common logarithm of the noise's deviation over the contrast of the mean picture."""
+    """Computes the common logarithm of the noise's deviation over the contrast of the mean picture."""
     return float(np.log10(max(clip.still, 1e-2) / max(clip.contrast, 1e-2)))
 
 
@@ -172,7 +174,7 @@ class Check:
     logarithm: bool = False
 
     def shown(self, value: float) -> float:
-        """The figure in the message."""
+        """Returns the figure in the message."""
         return float(10**value) if self.logarithm else value
 
 
@@ -265,7 +267,7 @@ CHECKS: dict[str, Check] = {
 
 
 def measured(frames: UInt8Array) -> FloatArray:
-    """(len(CHECKS),) statistics of frames (n, height, width) in the order of the table.
+    """Computes the statistics (len(CHECKS),) of frames (n, height, width) in the order of the table.
 
     Raises:
         InputError: see `ClipStatistics.of`.

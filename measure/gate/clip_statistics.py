@@ -38,7 +38,7 @@ class ClipStatistics:
 
     @classmethod
     def of(cls, frames: UInt8Array) -> ClipStatistics:
-        """Reduce frames (n, height, width).
+        """Reduces frames (n, height, width).
 
         Raises:
             InputError: frames of another shape or type, or fewer than `LEAST_FRAMES`.

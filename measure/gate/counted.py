@@ -32,32 +32,32 @@ _SMALL = 40.0
 """Pixels of the film that the cloth's places span at least."""
 
 
-def reasons(watch: FilmWatch, found: Conditioning, follower: Follower) -> tuple[Finding, ...]:
-    """All of them.
+def reasons(watch: FilmWatch, conditioning: Conditioning, follower: Follower) -> tuple[Finding, ...]:
+    """Returns all reasons.
 
     Args:
         watch: that looked at all frames.
-        found: camera and flag.
+        conditioning: camera and flag.
         follower: that followed the camera through all frames.
     """
-    of = {finding.kind: finding for finding in _all(watch, found, follower)}
+    of = {finding.kind: finding for finding in _all(watch, conditioning, follower)}
     return tuple(of[kind] for kind in REASONS if kind in of)
 
 
-def _all(watch: FilmWatch, found: Conditioning, follower: Follower) -> Iterator[Finding]:
+def _all(watch: FilmWatch, conditioning: Conditioning, follower: Follower) -> Iterator[Finding]:
     height, width = watch.shape
-    region = found.region
-    box = None if region is None else tuple(edge / found.scale for edge in region.box)
+    region = conditioning.region
+    box = None if region is None else tuple(edge / conditioning.scale for edge in region.box)
     cuts = watch.cuts()
     if cuts:
         times = "once" if len(cuts) == 1 else f"{len(cuts)} times"
         yield _reason("scene-cut", len(cuts), f"{times}, first at {cuts[0]:.2f} s")
     if watch.brightness < _DARK or watch.contrast < _FLAT:
-        what = f"its brightest hundredth has gray level {watch.brightness:.0f} of 255, its contrast is "
-        yield _reason("too-dark", watch.brightness, f"{what}{watch.contrast:.1f}")
+        figure = f"its brightest hundredth has gray level {watch.brightness:.0f} of 255, its contrast is "
+        yield _reason("too-dark", watch.brightness, f"{figure}{watch.contrast:.1f}")
     elif watch.noise > _NOISY * watch.contrast:
-        what = f"noise of {watch.noise:.1f} gray levels at a contrast of {watch.contrast:.1f}"
-        yield _reason("too-dark", watch.noise / watch.contrast, what)
+        figure = f"noise of {watch.noise:.1f} gray levels at a contrast of {watch.contrast:.1f}"
+        yield _reason("too-dark", watch.noise / watch.contrast, figure)
     if region is None or box is None:
         spot = watch.spot()
         if 0 < spot < _SMALL:
@@ -71,23 +71,25 @@ def _all(watch: FilmWatch, found: Conditioning, follower: Follower) -> Iterator[
         yield _reason("repeated-frames", twins, f"{twins:.0%} of the frames look like another one")
     total = max(len(follower.path), 1)
     if follower.lost > _LOST * total:
-        what = f"in {follower.lost} of {total} frames the background was not found"
-        yield _reason("moving-camera", follower.lost / total, what)
-    if edges := {name: share for name, share in found.cut_share.items() if share > _AT_EDGE}:
-        what = ", ".join(f"the {name} edge in {share:.0%} of the frames" for name, share in edges.items())
-        yield _reason("cut-off", max(edges.values()), what)
-    elif not len(found.camera.corners) and watch.resting() < _RESTING:  # cloth that is cut off hides what stands still
+        figure = f"in {follower.lost} of {total} frames the background was not found"
+        yield _reason("moving-camera", follower.lost / total, figure)
+    if edges := {name: share for name, share in conditioning.cut_share.items() if share > _AT_EDGE}:
+        figure = ", ".join(f"the {name} edge in {share:.0%} of the frames" for name, share in edges.items())
+        yield _reason("cut-off", max(edges.values()), figure)
+    elif (
+        not len(conditioning.camera.corners) and watch.resting() < _RESTING
+    ):  # cloth that is cut off hides what stands still
         yield _reason("moving-camera", float(watch.resting()), "no edge in the picture stays in its place")
     span = max(box[2] - box[0], box[3] - box[1])
     if span < _SMALL:
         yield _reason("scale", span, f"it spans {span:.0f} px, {_SMALL:.0f} are needed")
     elif (grain := watch.grain(region.mask)) < _GRAIN:
-        what = f"averaged over a fortieth of the picture, {grain:.0%} of it is left, of cloth {_GRAIN:.0%} or more"
-        yield _reason("unlike-cloth", grain, what)
+        figure = f"averaged over a fortieth of the picture, {grain:.0%} of it is left, of cloth {_GRAIN:.0%} or more"
+        yield _reason("unlike-cloth", grain, figure)
 
 
-def _reason(kind: str, value: float, what: str) -> Finding:
+def _reason(kind: str, value: float, figure: str) -> Finding:
     reason = REASONS[kind]
     return Finding(
-        kind=kind, severity=Severity.ERROR, what=f"{reason.sentence}: {what}", value=float(value), fix=reason.fix
+        kind=kind, severity=Severity.ERROR, what=f"{reason.sentence}: {figure}", value=float(value), fix=reason.fix
     )

@@ -35,14 +35,14 @@ class Distortion:
     apply: Distort
 
 
-def _still(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
-    """The picture at rest, with noise: nothing moves."""
+def _still(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+    """Holds the picture at rest, with noise: nothing moves."""
     picture = np.median(film, axis=0)
     return _noisy(np.repeat(picture[None], count, axis=0), rng.uniform(0.5, 4), rng)
 
 
-def _cut(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
-    """The picture is cut through the moving part, on one side or two."""
+def _cut(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+    """Cuts the picture through the moving part, on one side or two."""
     side = min(film.shape[1:])
     mass = np.asarray(ndimage.zoom(np.sqrt(ClipStatistics.of(film).excess), side / SIDE, order=1))
     ends = []
@@ -59,8 +59,8 @@ def _cut(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
     return film[:count, top : top + size, left : left + size]
 
 
-def _camera(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
-    """The camera drifts, sways or shakes."""
+def _camera(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+    """Lets the camera drift, sway or shake."""
     time = np.arange(count)
     side = min(film.shape[1:])
     drift = rng.uniform(-0.006, 0.006, (2, 1)) * side * time * rng.choice([0, 1])
@@ -74,8 +74,8 @@ def _camera(film: Film, other: Film, rng: np.random.Generator, count: int) -> Fi
     return moved[:, margin:-margin, margin:-margin]
 
 
-def _repeated(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
-    """A few frames in a loop, forth and back, or followed by the last one."""
+def _repeated(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+    """Repeats a few frames in a loop, forth and back, or followed by the last one."""
     few = int(rng.integers(5, 14))
     order = rng.choice(3)
     index = np.arange(count)
@@ -88,36 +88,36 @@ def _repeated(film: Film, other: Film, rng: np.random.Generator, count: int) -> 
     return _noisy(film[index], rng.uniform(0, 1.5) * rng.choice([0, 1]), rng)
 
 
-def _held(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
-    """A lower frame rate, each frame shown until the next."""
+def _held(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+    """Lowers the frame rate, each frame shown until the next."""
     step = rng.uniform(1.7, 5)
     index = (np.floor(np.arange(count) / step) * step).astype(int)
     return _noisy(film[index], rng.uniform(0, 1.0) * rng.choice([0, 1]), rng)
 
 
-def _dark(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
-    """Too little light: dark, or made bright again with its noise."""
+def _dark(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+    """Removes light: dark, or made bright again with its noise."""
     gain = 10 ** rng.uniform(-1.7, -0.5)
     dark = _noisy(film[:count] * gain, rng.uniform(1, 6), rng)
     lift = rng.choice([1.0, rng.uniform(1, 1 / gain)])
     return np.clip(dark * lift, 0, 255).astype(np.uint8)
 
 
-def _pair(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
-    """Two films beside or above each other, in one picture."""
-    side = min(film.shape[1], other.shape[1])
-    one, two = film[:count, :side, :side], other[:count, :side, :side]
+def _pair(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+    """Puts two films beside or above each other, in one picture."""
+    side = min(film.shape[1], second.shape[1])
+    first_square, second_square = film[:count, :side, :side], second[:count, :side, :side]
     keep = int(side * rng.uniform(0.6, 0.95))
     low = (side - keep) // 2
     if rng.random() < 0.7:
-        joined = np.concatenate([one[:, :, low : low + keep], two[:, :, low : low + keep]], axis=2)
+        joined = np.concatenate([first_square[:, :, low : low + keep], second_square[:, :, low : low + keep]], axis=2)
     else:
-        joined = np.concatenate([one[:, low : low + keep], two[:, low : low + keep]], axis=1)
+        joined = np.concatenate([first_square[:, low : low + keep], second_square[:, low : low + keep]], axis=1)
     return _squared(joined)
 
 
-def _small(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
-    """The flag far away: the picture small before a still one, which is its own surroundings, mirrored."""
+def _small(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+    """Makes the flag small, as from far away, before its own surroundings, still and mirrored."""
     share = rng.uniform(0.2, 0.45)
     small = np.stack([np.asarray(ndimage.zoom(frame, share, order=1)) for frame in film[:count]])
     high, wide = small.shape[1:]
@@ -130,8 +130,8 @@ def _small(film: Film, other: Film, rng: np.random.Generator, count: int) -> Fil
     return clip
 
 
-def _swaying(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
-    """What is behind the flag sways, each part by itself, as foliage does; nothing flutters."""
+def _swaying(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+    """Lets the background sway, each part by itself, as foliage does; nothing flutters."""
     picture = np.median(film, axis=0)
     high, wide = picture.shape
     length = rng.uniform(0.01, 0.08) * high
@@ -155,8 +155,8 @@ def _swaying(film: Film, other: Film, rng: np.random.Generator, count: int) -> F
     return _noisy(clip, rng.uniform(0.3, 2), rng)
 
 
-def _patchwork(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
-    """Patches of the film at instants of their own, so that no wave travels from one to the next."""
+def _patchwork(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+    """Takes each patch of the film from a different instant, so that no wave travels from one to the next."""
     clip = film[:count].copy()
     size = int(rng.uniform(0.05, 0.15) * film.shape[1])
     there_and_back = np.concatenate([np.arange(len(film)), np.arange(len(film))[-2:0:-1]])
@@ -177,7 +177,7 @@ def _noisy(clip: Pixels | Film, sigma: float, rng: np.random.Generator) -> Film:
 
 
 def _squared(clip: Film) -> Film:
-    """The longer sides averaged down to the shorter one's length."""
+    """Averages the longer sides down to the shorter one's length."""
     side = min(clip.shape[1:])
     zoom = (1, side / clip.shape[1], side / clip.shape[2])
     blurred = ndimage.gaussian_filter(clip.astype(np.float32), (0, 0.4 * (1 / zoom[1] - 1), 0.4 * (1 / zoom[2] - 1)))

@@ -40,14 +40,14 @@ class Features:
     moved: FloatArray
 
     def vector(self, model: Estimator) -> FloatArray:
-        """(f,) everything in one, the summary as the training clips' covariance whitens it, distances as logarithms."""
+        """Joins all features, (f,): the summary whitened by the training clips' covariance, distances as logarithms."""
         cloud = _cloud(model)
         logs = np.log10(np.maximum([self.distance, *self.moved], 1e-3))
         return np.concatenate([self.checks, self.handmade, cloud.whitening @ (self.summary - cloud.centre), logs])
 
 
 def features_of(model: Estimator, frames: UInt8Array, summary: NDArray[np.floating] | None = None) -> Features:
-    """Measure a clip.
+    """Measures a clip.
 
     Args:
         model: with a cloud of training summaries.
@@ -64,14 +64,14 @@ def features_of(model: Estimator, frames: UInt8Array, summary: NDArray[np.floati
     square = frames[:, top : top + side, left : left + side]
     middle = square[:, cut : side - cut, cut : side - cut]
     clips = [square[..., ::-1], middle] if summary is not None else [square, square[..., ::-1], middle]
-    found = model.summaries(torch.cat([model.inputs(clip[None]) for clip in clips])).cpu().double().numpy()
-    own = found[0] if summary is None else np.asarray(summary, dtype=np.float64)
-    moved = (found[-len(MOVES) :] - own) @ cloud.whitening.T
+    summaries = model.summaries(torch.cat([model.inputs(clip[None]) for clip in clips])).cpu().double().numpy()
+    embedding = summaries[0] if summary is None else np.asarray(summary, dtype=np.float64)
+    moved = (summaries[-len(MOVES) :] - embedding) @ cloud.whitening.T
     return Features(
         checks=measured(frames),
         handmade=handmade(torch.from_numpy(square.copy())[None, None], rate=model.front_end.rate)[0].double().numpy(),
-        summary=own,
-        distance=float(cloud.distance(own[None])[0]),
+        summary=embedding,
+        distance=float(cloud.distance(embedding[None])[0]),
         moved=np.linalg.norm(moved, axis=1),
     )
 

@@ -99,7 +99,7 @@ class Gate:
 
     @classmethod
     def of(cls, plain: FloatArray, distorted: Mapping[str, FloatArray], calibration: FloatArray) -> Gate:
-        """Learn it from feature vectors (see `Features.vector`).
+        """Learns the gate from feature vectors (see `Features.vector`).
 
         Args:
             plain: (n, f) of simulated clips, one of a simulation, from the training side.
@@ -118,13 +118,13 @@ class Gate:
         scale = np.maximum((high - low) / 1.349, 0.2 * first.std(axis=0)) + 1e-3
         z = squashed(first, centre, scale)
         directions, offsets = [], []
-        own = z - z.mean(axis=0)
+        z_centred = z - z.mean(axis=0)
         for name in DISTORTIONS:
-            other = squashed(distorted[name], centre, scale)
-            pooled, _ = shrunk_covariance(np.concatenate([own, other - other.mean(axis=0)]))
-            direction = np.linalg.solve(pooled, other.mean(axis=0) - z.mean(axis=0))
+            z_distorted = squashed(distorted[name], centre, scale)
+            pooled, _ = shrunk_covariance(np.concatenate([z_centred, z_distorted - z_distorted.mean(axis=0)]))
+            direction = np.linalg.solve(pooled, z_distorted.mean(axis=0) - z.mean(axis=0))
             directions.append(direction)
-            offsets.append(direction @ (other.mean(axis=0) + z.mean(axis=0)) / 2)
+            offsets.append(direction @ (z_distorted.mean(axis=0) + z.mean(axis=0)) / 2)
         blank = ExponentialTails(start=np.zeros(len(SCORES)), excess=np.ones(len(SCORES)))
         gate = cls(
             centre=centre,
@@ -143,22 +143,22 @@ class Gate:
         return replace(gate, calibration=np.sort(gate.surprises(calibration).max(axis=1)))
 
     def scores(self, vectors: FloatArray) -> FloatArray:
-        """(n, len(SCORES)) of feature vectors (n, f); high is suspicious."""
+        """Computes scores (n, len(SCORES)) of feature vectors (n, f); high is suspicious."""
         z = squashed(vectors, self.centre, self.scale)
-        sided = np.stack([sign * vectors[:, place] for _, place, sign, _ in _SIDED], axis=1)
+        sided = np.stack([sign * vectors[:, index] for _, index, sign, _ in _SIDED], axis=1)
         distances = vectors[:, -1 - len(MOVES) :]
         everything = np.log10(np.linalg.norm(z @ self.whitening.T, axis=1, keepdims=True)) * 10
         return np.concatenate([sided, distances, everything, z @ self.directions.T - self.offsets], axis=1)
 
     def surprises(self, vectors: FloatArray) -> FloatArray:
-        """(n, len(SCORES)) of feature vectors (n, f): scores on the scale of their tails."""
+        """Computes the scores (n, len(SCORES)) of feature vectors (n, f) on the scale of their tails."""
         return self.tails.surprise(self.scores(vectors))
 
     def p_value(self, surprise: float) -> float:
-        """Conformal p of a clip whose largest surprise is this."""
+        """Returns the conformal p of a clip whose largest surprise is this."""
         return float(conformal_p(self.calibration, surprise))
 
 
 def squashed(vectors: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatArray:
-    """Feature vectors (n, f) standardised, their far tails drawn in as a logarithm does: asinh."""
+    """Standardises feature vectors (n, f) and draws in their far tails as a logarithm does: asinh."""
     return np.arcsinh((vectors - centre) / scale)

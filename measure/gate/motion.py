@@ -20,22 +20,23 @@ LEAST_AREA = 1 / SIDE**2
 
 
 def area(clip: ClipStatistics) -> float:
-    """Common logarithm of the share of the picture that moves."""
+    """Computes the common logarithm of the share of the picture that moves."""
     return float(np.log10(max(float(clip.moving.mean()), LEAST_AREA)))
 
 
 def energy(clip: ClipStatistics) -> float:
-    """Common logarithm of the mean variance in time beyond noise over the variance of the mean picture."""
+    """Computes the common logarithm of the mean variance in time beyond noise over the variance of the mean picture."""
     return float(np.log10(max(float(clip.excess.mean()), 1e-4) / max(clip.contrast, 1e-2) ** 2))
 
 
 def strength(clip: ClipStatistics) -> float:
-    """Common logarithm of the strongest deviation in time (99.5 % of the pixels' lie below) over the noise's."""
+    """Computes the common logarithm of the strongest deviation in time (99.5 % of the pixels' lie below) over the
+    noise's."""
     return float(np.log10(max(float(np.quantile(clip.deviation, 0.995)), 1e-2) / max(clip.still, 0.1)))
 
 
 def at_edge(clip: ClipStatistics) -> float:
-    """Root mean deviation within a strip along the side where it is largest, over that of the moving part."""
+    """Computes the root mean deviation in a strip along the side where it is largest, over that of the moving part."""
     if not clip.moving.any():
         return 0.0
     inside = float(clip.excess[clip.moving].mean())
@@ -45,7 +46,7 @@ def at_edge(clip: ClipStatistics) -> float:
 
 
 def around(clip: ClipStatistics) -> float:
-    """Share of the outermost eighth of the picture, on all four sides, that moves."""
+    """Computes the share of the outermost eighth of the picture, on all four sides, that moves."""
     ring = np.ones_like(clip.moving)
     width = SIDE // 8
     ring[width:-width, width:-width] = False
@@ -53,7 +54,7 @@ def around(clip: ClipStatistics) -> float:
 
 
 def off_centre(clip: ClipStatistics) -> float:
-    """Distance of the motion's centre of mass from the picture's middle, in sides of the picture."""
+    """Computes the distance of the motion's centre of mass from the picture's middle, in sides of the picture."""
     if not clip.moving.any():
         return 0.0
     amplitude = np.sqrt(clip.excess)
@@ -63,17 +64,17 @@ def off_centre(clip: ClipStatistics) -> float:
 
 
 def width(clip: ClipStatistics) -> float:
-    """Width with 90 % of the motion, in sides of the picture."""
+    """Computes the width with 90 % of the motion, in sides of the picture."""
     return _extent(np.sqrt(clip.excess).sum(axis=0))
 
 
 def height(clip: ClipStatistics) -> float:
-    """Height with 90 % of the motion, in sides of the picture."""
+    """Computes the height with 90 % of the motion, in sides of the picture."""
     return _extent(np.sqrt(clip.excess).sum(axis=1))
 
 
 def second_region(clip: ClipStatistics) -> float:
-    """Motion of the second strongest separate region over that of the strongest, 0 to 1."""
+    """Computes the motion of the second strongest separate region over that of the strongest, 0 to 1."""
     amplitude = np.asarray(ndimage.gaussian_filter(np.sqrt(clip.excess), _SMOOTHING), dtype=np.float32)
     if amplitude.max() <= 0:
         return 0.0
@@ -82,21 +83,22 @@ def second_region(clip: ClipStatistics) -> float:
 
 
 def scatter(clip: ClipStatistics) -> float:
-    """Share of the motion outside of the largest region of moving pixels that touch."""
+    """Computes the share of the motion outside of the largest region of moving pixels that touch."""
     masses = _masses(clip.moving, np.sqrt(clip.excess))
     return 1 - float(masses[-1] / masses.sum()) if len(masses) else 0.0
 
 
 def edges_moving(clip: ClipStatistics) -> float:
-    """Share of the mean picture's edges, its steepest tenth, that move: all of them where the camera does."""
+    """Computes the share of the mean picture's edges, its steepest tenth, that move: all of them where the camera
+    does."""
     steep = clip.slope >= np.quantile(clip.slope, 0.9)
     return float(clip.moving[steep].mean())
 
 
 def _masses(inside: BoolArray, amplitude: Float32Array) -> FloatArray:
-    """Sums of the amplitude over the connected regions, ascending."""
-    found: Any = ndimage.label(inside)
-    labels, count = found
+    """Sums the amplitude over the connected regions, ascending."""
+    labelling: Any = ndimage.label(inside)
+    labels, count = labelling
     return np.sort(np.asarray(ndimage.sum_labels(amplitude, labels, np.arange(1, count + 1)), dtype=np.float64))
 
 

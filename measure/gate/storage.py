@@ -21,7 +21,7 @@ _DIRECT = ("centre", "scale", "whitening", "directions", "offsets", "calibration
 
 
 def fingerprint(model: Estimator) -> UInt8Array:
-    """(32,) SHA-256 of the weights of the learner whose summaries the gate looks at."""
+    """Hashes the weights of the learner whose summaries the gate looks at: SHA-256, (32,)."""
     digest = hashlib.sha256()
     for name, value in sorted(model.learners[0].state_dict().items()):
         digest.update(name.encode())
@@ -44,7 +44,7 @@ def write(folder: Path, gate: Gate, model: Estimator) -> Path:
 
 
 def read(folder: Path, model: Estimator) -> Gate:
-    """The gate in a model's folder.
+    """Reads the gate in a model's folder.
 
     Raises:
         NotFoundError: there is none.

@@ -41,12 +41,12 @@ class ExponentialTails:
         return cls(start=start, excess=np.maximum(excess, resolution))
 
     def surprise(self, scores: FloatArray) -> FloatArray:
-        """(…, c) excesses over the start of the tail in mean excesses: each one more is e times rarer."""
+        """Returns excesses (…, c) over the start of the tail in mean excesses: each one more is e times rarer."""
         return (scores - self.start) / self.excess
 
 
 def level(count: int, false_alarm: float, confidence: float) -> float:
-    """The p at or below which a clip is refused, so that the false-alarm rate keeps to what is stated.
+    """Chooses the p at or below which a clip is refused, so that the false-alarm rate keeps to what is stated.
 
     Given the calibration clips, the rate at which familiar clips have p ≤ k/(n + 1) is distributed as Beta(k,
     n + 1 − k) (Vovk, Asian Conference on Machine Learning 2012, proposition 2a). k is the largest at which this rate
@@ -63,11 +63,11 @@ def level(count: int, false_alarm: float, confidence: float) -> float:
             f"a false-alarm rate of {false_alarm:g} with confidence {confidence:g}", fix="give shares between 0 and 1"
         )
     k = np.arange(1, count + 1)
-    kept = np.flatnonzero(betainc(k, count + 1 - k, false_alarm) >= confidence)
-    if len(kept) == 0:
+    admissible = np.flatnonzero(betainc(k, count + 1 - k, false_alarm) >= confidence)
+    if len(admissible) == 0:
         fewest = int(np.ceil(np.log(1 - confidence) / np.log(1 - false_alarm)))
         raise InputError(
             f"{count} calibration clips are too few for a false-alarm rate of {false_alarm:g}",
             fix=f"give at least {fewest} clips, or a higher rate",
         )
-    return float(k[kept[-1]]) / (count + 1)
+    return float(k[admissible[-1]]) / (count + 1)

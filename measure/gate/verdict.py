@@ -87,7 +87,7 @@ class Reason:
 
     @classmethod
     def counted(cls, fault: Finding) -> Reason:
-        """A fault of the film."""
+        """Converts a fault of the film to a reason."""
         return cls(kind=fault.kind, what=fault.what, p=None, fix=fault.fix or cls.fix, value=fault.value)
 
     def of(self, p: float | None) -> Reason:
@@ -97,7 +97,7 @@ class Reason:
         return Reason(kind="unlike-training", what=self.figure, p=p)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {"kind": self.kind, "what": self.what, "p": self.p, "value": self.value, "fix": self.fix}
 
 
@@ -147,10 +147,10 @@ class Verdict:
 
     @property
     def reasons(self) -> tuple[Reason, ...]:
-        """All of them, the weightiest first."""
+        """Returns all reasons, the weightiest first."""
         if self.undecided:
-            what = f"at {len(self.sizes)} of {self.considered} sizes of the flag it is, at the others it is not"
-            return (*self.faults, Reason(kind="size-needed", what=what, p=self.p, fix=GIVE_SIZE))
+            sentence = f"at {len(self.sizes)} of {self.considered} sizes of the flag it is, at the others it is not"
+            return (*self.faults, Reason(kind="size-needed", what=sentence, p=self.p, fix=GIVE_SIZE))
         return self.faults if self.faults and not self.unlike else (*self.faults, *self.window_reasons)
 
     @property
@@ -165,7 +165,7 @@ class Verdict:
 
     @property
     def sentence(self) -> str:
-        """In words, with the level that is applied and the rate that it keeps to."""
+        """Phrases the verdict, with the level that is applied and the rate that it keeps to."""
         strange, count = int(self.strange.sum()), len(self.window_p)
         rate = f"at most {self.false_alarm:.0%} of familiar films are refused"
         windows = (
@@ -174,12 +174,12 @@ class Verdict:
             else f"{strange} of {count} windows look unfamiliar (p ≤ {self.level:.2g}), {self.refusing} would refuse it"
         )
         if not self.measurable:
-            what = self.window_reasons[0].what
-            return f"there is nothing to measure, so that no number is given, not even with --anyway: {what}"
+            cause = self.window_reasons[0].what
+            return f"there is nothing to measure, so that no number is given, not even with --anyway: {cause}"
         if self.faults:
-            others = len(self.reasons) - 1
-            more = "" if not others else f" ({others} more {'reasons' if others > 1 else 'reason'})"
-            return f"the film cannot be measured: {self.faults[0].what}{more}"
+            further = len(self.reasons) - 1
+            suffix = "" if not further else f" ({further} more {'reasons' if further > 1 else 'reason'})"
+            return f"the film cannot be measured: {self.faults[0].what}{suffix}"
         if self.unlike:
             return f"this is not like what the network was trained on: {self.reasons[0].what}; {windows} ({rate})"
         if self.undecided:
@@ -187,7 +187,7 @@ class Verdict:
         return f"like what the network was trained on; {windows} ({rate})"
 
     def as_dict(self) -> Mapping[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "refused": self.refused,
             "p": self.p,
@@ -208,7 +208,7 @@ def verdict(
     level: Callable[[float], float],
     faults: Sequence[Finding] = (),
 ) -> Verdict:
-    """The verdict on a recording.
+    """Judges a recording.
 
     Args:
         windows: the reasons of each window, for each size of flag considered; the first of each has a p-value.
@@ -227,7 +227,7 @@ def verdict(
     p = np.array([[reasons[0].p for reasons in sizes] for sizes in windows])
     deciding = np.sort(p, axis=0)[needed - 1]
     size = int(np.argmax(deciding))
-    kept = tuple(np.flatnonzero(deciding > at).tolist()) or tuple(range(p.shape[1]))
+    measurable_sizes = tuple(np.flatnonzero(deciding > at).tolist()) or tuple(range(p.shape[1]))
     order = np.argsort(p[:, size], kind="stable")
     speaking = int((p[:, size] <= at).sum()) if deciding[size] <= at else count
     return Verdict(
@@ -235,7 +235,7 @@ def verdict(
         level=at,
         refusing=needed,
         considered=p.shape[1],
-        sizes=kept,
+        sizes=measurable_sizes,
         size=size,
         p=float(deciding[size]),
         window_p=tuple(p[:, size].tolist()),
@@ -246,12 +246,12 @@ def verdict(
 
 
 def refusing(windows: int) -> int:
-    """How many strange windows refuse a recording of so many."""
+    """Returns how many strange windows refuse a recording of so many."""
     return max(int(SHARE * windows) + 1, min(windows, 2))
 
 
 def refused_share(strange: float, windows: int) -> float:
-    """Share of the familiar recordings that are refused, at the correlation at which it is largest.
+    """Computes the share of familiar recordings that are refused, at the correlation at which it is largest.
 
     Args:
         strange: probability of a familiar window being strange.
@@ -263,7 +263,7 @@ def refused_share(strange: float, windows: int) -> float:
 
 @lru_cache(maxsize=64)
 def window_rate(windows: int, false_alarm: float) -> float:
-    """Largest probability of a familiar window being strange that keeps to the stated rate of recordings.
+    """Finds the largest probability of a familiar window being strange that keeps to the stated rate of recordings.
 
     Args:
         windows: of a recording.

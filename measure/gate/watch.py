@@ -76,10 +76,10 @@ class FilmWatch:
     _noise: list[float] = field(default_factory=list)
 
     def look(self, time: float, picture: Picture) -> None:
-        """The next frame, (height, width) gray of the whole picture."""
-        every = max(1, round(self.rate / _RATE))
+        """Takes the next frame, (height, width) gray of the whole picture."""
+        step = max(1, round(self.rate / _RATE))
         self._frames += 1
-        if (self._frames - 1) % every:
+        if (self._frames - 1) % step:
             return
         self.shape = (picture.shape[0], picture.shape[1])
         small = _averaged(picture, SIDE)
@@ -121,16 +121,16 @@ class FilmWatch:
         return float(np.stack(self._sample).mean(axis=0).std()) if self._sample else 0.0
 
     def cuts(self) -> list[float]:
-        """Instants at which the picture changes to another at once [s]."""
+        """Finds instants at which the picture changes to another at once [s]."""
         if len(self._thumbs) < 3:
             return []
         change = np.array([np.abs(b - a).mean() for a, b in zip(self._thumbs, self._thumbs[1:], strict=False)])
-        found = []
-        for k, own in enumerate(change):
+        instants = []
+        for k, jump in enumerate(change):
             about = np.concatenate([change[max(0, k - _ABOUT) : k], change[k + 1 : k + 1 + _ABOUT]])
-            if own > _CUT and own > _CUT_TIMES * about.max(initial=0.0):
-                found.append(self.times[k + 1])
-        return found
+            if jump > _CUT and jump > _CUT_TIMES * about.max(initial=0.0):
+                instants.append(self.times[k + 1])
+        return instants
 
     def twins(self, box: tuple[float, float, float, float] | None = None) -> float:
         """Share of the frames that look like another one four frames away or more, 0 to 1: a loop, or frames that are
@@ -150,10 +150,10 @@ class FilmWatch:
         flat = flat - flat.mean(axis=0)
         square = np.square(flat).sum(axis=1)
         distance = np.sqrt(np.maximum(square[:, None] + square[None] - 2 * flat @ flat.T, 0.0))
-        place = np.arange(len(flat))
-        far = np.abs(place[:, None] - place[None]) >= _APART
-        usual = float(np.median(distance[far]))
-        nearest = np.where(far, distance, np.inf).min(axis=1)
+        index = np.arange(len(flat))
+        distant = np.abs(index[:, None] - index[None]) >= _APART
+        usual = float(np.median(distance[distant]))
+        nearest = np.where(distant, distance, np.inf).min(axis=1)
         return float((nearest < _TWIN * usual).mean()) if usual > 0 else 1.0
 
     def grain(self, mask: BoolArray) -> float:
@@ -169,16 +169,16 @@ class FilmWatch:
         return coarse / fine if fine > 0 else 1.0
 
     def spot(self) -> float:
-        """Longer side of the largest spot that changes, in pixels of the film; 0 where none does."""
+        """Measures the longer side of the largest spot that changes, in pixels of the film; 0 where none does."""
         if len(self._sample) < 3:
             return 0.0
         deviation = np.stack(self._sample).astype(np.float32).std(axis=0)
         moving = (deviation > max(_SPOT_NOISES * float(np.median(deviation)), _SPOT_CHANGE)).astype(np.uint8)
         joined = cv2.morphologyEx(moving, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-        count, _, found, _ = cv2.connectedComponentsWithStats(joined)
+        count, _, components, _ = cv2.connectedComponentsWithStats(joined)
         if count < 2:
             return 0.0
-        spot = found[1 + int(np.argmax(found[1:, cv2.CC_STAT_AREA]))]
+        spot = components[1 + int(np.argmax(components[1:, cv2.CC_STAT_AREA]))]
         return float(max(spot[cv2.CC_STAT_WIDTH], spot[cv2.CC_STAT_HEIGHT]) * max(self.shape) / max(self.small))
 
     def resting(self) -> int:
@@ -189,7 +189,7 @@ class FilmWatch:
 
 
 def _averaged(picture: NDArray[_Gray], side: int) -> NDArray[_Gray]:
-    """A picture (height, width) averaged down to this longer side [px]."""
+    """Averages a picture (height, width) down to this longer side [px]."""
     scale = min(1.0, side / max(picture.shape))
     size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=picture.dtype)
@@ -200,9 +200,9 @@ def _resized(mask: BoolArray, shape: tuple[int, ...]) -> BoolArray:
 
 
 def _resting(sample: list[Picture]) -> int:
-    """Pixels of pictures (height, width) in which an edge stays where it is."""
-    gray = [cv2.GaussianBlur(one.astype(np.float32), (0, 0), 1.0) for one in sample]
-    slope = np.stack([[cv2.Sobel(one, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)] for one in gray])
+    """Counts pixels of pictures (height, width) in which an edge stays where it is."""
+    gray = [cv2.GaussianBlur(picture.astype(np.float32), (0, 0), 1.0) for picture in sample]
+    slope = np.stack([[cv2.Sobel(smooth, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)] for smooth in gray])
     mean = slope.mean(axis=0)  # (2, height, width)
     length = np.hypot(*mean)
     along = (slope * (mean / np.maximum(length, 1e-6))).sum(axis=1)

@@ -46,7 +46,7 @@ class WindowGate(Protocol):
     """Looks at one window at a time."""
 
     def judge(self, frames: UInt8Array, summary: NDArray[np.floating]) -> list[Reason]:
-        """What was found of a window, strange or not; at least one reason.
+        """Judges a window; returns at least one reason, strange or not.
 
         Where there are several, the first speaks for all: its p holds for the checks together.
 
@@ -57,7 +57,7 @@ class WindowGate(Protocol):
         ...
 
     def level(self, false_alarm: float) -> float:
-        """p at or below which a window is strange, so that this happens to familiar ones at most so often.
+        """Returns the p at or below which a window is strange, so that this happens to familiar ones at most so often.
 
         The rate itself where p-values are exact; less where the clips that they were calibrated by are few and the rate
         is to hold for most draws of these.
@@ -81,11 +81,11 @@ class FamiliarityGate:
         distance = float(self.cloud.distance(summary[None])[0])
         p = float(self.cloud.p_value(summary[None])[0])
         usual = float(np.median(self.cloud.reference))
-        what = (
+        sentence = (
             f"its summary is {distance:.1f} standard deviations from the training clips, usual are {usual:.1f}; "
             f"p = {p:.3f} among {len(self.cloud.reference)} validation clips"
         )
-        return [Reason(kind="unlike-training", what=what, p=p)]
+        return [Reason(kind="unlike-training", what=sentence, p=p)]
 
     def level(self, false_alarm: float) -> float:
         self.cloud.threshold(false_alarm)  # checks that the clips suffice for this rate
@@ -107,24 +107,27 @@ class CheckedGate:
     false_alarm: float
 
     def judge(self, frames: UInt8Array, summary: NDArray[np.floating]) -> list[Reason]:
-        """As `WindowGate`. Of a statistic it says that the window is unlike the training clips, and in which figure:
-        faults such as a moving camera are counted in the film (`measure.gate.counted`), and are stated from there."""
-        judged = judge(
+        """Judges as `WindowGate`. Of a statistic it says that the window is unlike the training clips, and in which
+        figure: faults such as a moving camera are counted in the film (`measure.gate.counted`), and are stated from
+        there."""
+        judgement = judge(
             frames, self.model, self.calibrated, false_alarm=self.false_alarm, summary=summary, without=COUNTED
         )
-        if not judged.reasons:
+        if not judgement.reasons:
             return [
-                Reason(kind="familiar", what=f"no check is unusual, p = {judged.p:.3f} over all checks", p=judged.p)
+                Reason(
+                    kind="familiar", what=f"no check is unusual, p = {judgement.p:.3f} over all checks", p=judgement.p
+                )
             ]
         # The first speaks for all checks together.
-        return [one.of(one.p if place else judged.p) for place, one in enumerate(judged.reasons)]
+        return [reason.of(reason.p if number else judgement.p) for number, reason in enumerate(judgement.reasons)]
 
     def level(self, false_alarm: float) -> float:
         return level(len(self.calibrated.calibration), false_alarm, CONFIDENCE)
 
 
 def gate_of(model: Estimator) -> WindowGate:
-    """The gate that belongs to a model.
+    """Returns the gate that belongs to a model.
 
     Raises:
         InputError: the model does not know its training clips.
@@ -165,7 +168,7 @@ def judge(
     summary: NDArray[np.floating] | None = None,
     without: Collection[str] = (),
 ) -> Judgement:
-    """Whether a clip is like what a model was trained on.
+    """Judges whether a clip is like what a model was trained on.
 
     Args:
         frames: (n, height, width) gray at the model's frame rate, as many as the model takes.
@@ -193,24 +196,24 @@ def judge(
     nothing = _too_few(len(frames), wanted) if len(frames) < wanted else blank(frames)
     if nothing is not None:
         return Judgement(familiar=False, p=least, level=at, reasons=(replace(nothing, p=least),))
-    found = features_of(model, frames, summary)
-    vector = found.vector(model)
+    features = features_of(model, frames, summary)
+    vector = features.vector(model)
     scores, surprises = gate.scores(vector[None])[0], gate.surprises(vector[None])[0]
     surprises[[score.reason in without for score in SCORES]] = -np.inf
     p = gate.p_value(float(surprises.max()))
-    still = found.checks[_AREA] <= np.log10(LEAST_AREA)
+    still = features.checks[_AREA] <= np.log10(LEAST_AREA)
     reasons = () if p > at else _reasons(gate, scores, surprises, at, still=bool(still))
     return Judgement(familiar=p > at, p=p, level=at, reasons=reasons)
 
 
 def _too_few(count: int, wanted: int) -> Reason:
     row = REASONS["too-few-frames"]
-    what = f"{row.sentence}: {count} instead of {wanted}"
-    return Reason(kind="too-few-frames", what=what, p=None, fix=row.fix, check="frames", value=count)
+    sentence = f"{row.sentence}: {count} instead of {wanted}"
+    return Reason(kind="too-few-frames", what=sentence, p=None, fix=row.fix, check="frames", value=count)
 
 
 def _reasons(gate: Gate, scores: FloatArray, surprises: FloatArray, at: float, *, still: bool) -> tuple[Reason, ...]:
-    """Each kind once, of those whose scores would refuse the clip alone. Of a still clip none is about what moves.
+    """Gives each kind once, of those whose scores would refuse the clip alone. Of a still clip none is about motion.
 
     A fault shows in many scores. The kinds are in the order of two voices: the surprise of the kind's weightiest score
     as a share of the clip's largest, and, by `_LIKENESS`, the log-likelihood ratio of the kind's likeliest distortion
@@ -219,52 +222,52 @@ def _reasons(gate: Gate, scores: FloatArray, surprises: FloatArray, at: float, *
     """
     weightiest: dict[str, int] = {}
     pictured: dict[str, int] = {}
-    for place in np.argsort(-surprises):
-        of_motion = REASONS[SCORES[place].reason].of_motion
-        if gate.p_value(float(surprises[place])) <= at and not (still and of_motion):
-            weightiest.setdefault(SCORES[place].reason, int(place))
-            if SCORES[place].name in CHECKS:
-                pictured.setdefault(SCORES[place].reason, int(place))
+    for index in np.argsort(-surprises):
+        of_motion = REASONS[SCORES[index].reason].of_motion
+        if gate.p_value(float(surprises[index])) <= at and not (still and of_motion):
+            weightiest.setdefault(SCORES[index].reason, int(index))
+            if SCORES[index].name in CHECKS:
+                pictured.setdefault(SCORES[index].reason, int(index))
     ratios = dict.fromkeys(weightiest, 0.0)
-    for place in range(len(SCORES) - len(DISTORTIONS), len(SCORES)):
-        kind = SCORES[place].reason
+    for index in range(len(SCORES) - len(DISTORTIONS), len(SCORES)):
+        kind = SCORES[index].reason
         if kind in ratios:
-            ratios[kind] = max(ratios[kind], float(scores[place]))
-    most, likeliest = float(surprises.max()), max(1.0, *(float(one) for one in scores[-len(DISTORTIONS) :]))
+            ratios[kind] = max(ratios[kind], float(scores[index]))
+    most, likeliest = float(surprises.max()), max(1.0, *(float(ratio) for ratio in scores[-len(DISTORTIONS) :]))
     order = sorted(
         weightiest, key=lambda kind: -surprises[weightiest[kind]] / most - _LIKENESS * ratios[kind] / likeliest
     )
     return tuple(
-        _reason(gate, place, float(scores[place]), gate.p_value(float(surprises[place])))
-        for place in (pictured.get(kind, weightiest[kind]) for kind in order)
+        _reason(gate, index, float(scores[index]), gate.p_value(float(surprises[index])))
+        for index in (pictured.get(kind, weightiest[kind]) for kind in order)
     )
 
 
-def _reason(gate: Gate, place: int, value: float, p: float) -> Reason:
-    score, row = SCORES[place], REASONS[SCORES[place].reason]
+def _reason(gate: Gate, index: int, value: float, p: float) -> Reason:
+    score, row = SCORES[index], REASONS[SCORES[index].reason]
     check = CHECKS.get(score.name)
     if check is None:
-        shown, limit = value, gate.tails.start[place] + np.log(20) * gate.tails.excess[place]
+        figure_value, limit = value, gate.tails.start[index] + np.log(20) * gate.tails.excess[index]
         usual = f"normal up to {limit:.3g}, as 99 % of the simulated clips"
     else:
         column = gate.statistics[:, list(CHECKS).index(score.name)]
-        shown = check.shown(score.sign * value)
+        figure_value = check.shown(score.sign * value)
         low, high = (check.shown(float(end)) for end in np.quantile(column, _USUAL))
         usual = f"normal from {low:.3g} to {high:.3g}, as 98 % of the simulated clips"
-    figure = f"{score.what}: {shown:.3g}; {usual}"
+    figure = f"{score.what}: {figure_value:.3g}; {usual}"
     return Reason(
         kind=score.reason,
         what=f"{row.sentence} ({figure})",
         p=p,
         fix=row.fix,
-        value=shown,
+        value=figure_value,
         figure=figure,
         check=score.name,
     )
 
 
 def blank(frames: UInt8Array) -> Reason | None:
-    """What a clip lacks; None where there is something to measure.
+    """Explains what a clip lacks; None where there is something to measure.
 
     Args:
         frames: (n, height, width) gray.
@@ -274,17 +277,17 @@ def blank(frames: UInt8Array) -> Reason | None:
     """
     contrast = float(frames.std())
     if contrast < _FLAT:
-        what = f"{REASONS['too-dark'].sentence}: all gray levels lie within {contrast:.2g} of each other"
-        return _lacking("too-dark", what, check="contrast", value=contrast)
+        sentence = f"{REASONS['too-dark'].sentence}: all gray levels lie within {contrast:.2g} of each other"
+        return _lacking("too-dark", sentence, check="contrast", value=contrast)
     most = float(ClipStatistics.of(frames).deviation.max())
     if most > LEAST_DEVIATION:
         return None
-    what = (
+    sentence = (
         f"no motion is found in the picture: its gray levels change by {most:.1f} at most (standard deviation in "
         f"time), and up to {LEAST_DEVIATION:g} comes of rounding and coding"
     )
-    return _lacking("no-motion", what, check="strength", value=most)
+    return _lacking("no-motion", sentence, check="strength", value=most)
 
 
-def _lacking(kind: str, what: str, *, check: str, value: float) -> Reason:
-    return Reason(kind=kind, what=what, p=None, fix=REASONS[kind].fix, blank=True, check=check, value=value)
+def _lacking(kind: str, sentence: str, *, check: str, value: float) -> Reason:
+    return Reason(kind=kind, what=sentence, p=None, fix=REASONS[kind].fix, blank=True, check=check, value=value)

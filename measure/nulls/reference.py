@@ -196,7 +196,7 @@ class _NullGroups(StatisticRows):
         that of a null lies nearer to its nominal one by as much.
 
         Args:
-            own: one segment of it.
+            segment: one segment of it.
         """
         nominal = -segment.calibration[0] * np.minimum(evidence.prior / PRIOR, 1.0)
         swing, settles = (np.zeros(0) if values is None else values for values in (evidence.swing, evidence.settles))

@@ -7,7 +7,7 @@ from measure.observables.observable import Observable
 
 
 def amplitude_across(window: Window) -> float:
-    """Standard deviation over the frames [flag heights]."""
+    """Computes the standard deviation over the frames [flag heights]."""
     return float(chord(window)[:, 0].std() / window.height)
 
 

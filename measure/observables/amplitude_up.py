@@ -7,7 +7,7 @@ from measure.observables.observable import Observable
 
 
 def amplitude_up(window: Window) -> float:
-    """Standard deviation over the frames [flag heights]."""
+    """Computes the standard deviation over the frames [flag heights]."""
     return float(chord(window)[:, 1].std() / window.height)
 
 

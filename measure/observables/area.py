@@ -7,7 +7,7 @@ from measure.observables.observable import Observable
 
 
 def area(window: Window) -> float:
-    """Mean over the frames [1]."""
+    """Computes the mean over the frames [1]."""
     return float(window.silhouettes.area.mean() / (window.length * window.height))
 
 

@@ -19,7 +19,7 @@ VERSION = 5
 
 
 def artifact(table: Table, subject: Subject, options: Mapping[str, Any]) -> Artifact:
-    """The row of a table, without its object.
+    """Builds the row of a table, without its object.
 
     Args:
         options: all that shapes the readings beside the film: JSON values.

@@ -7,12 +7,12 @@ from measure.observables.observable import Observable
 
 
 def asymmetry(window: Window) -> float:
-    """Mean area above the mean chord less the mean area below it, over their sum [1]."""
+    """Computes the mean area above the mean chord less the mean area below it, over their sum [1]."""
     across, up = chord(window).mean(axis=0)
     shapes = window.silhouettes
     above = shapes.rows[:, None] * across > shapes.columns[None, :] * up
-    whole = shapes.masks.sum()
-    return float(2 * (shapes.masks & above).sum() / whole - 1)
+    total = shapes.masks.sum()
+    return float(2 * (shapes.masks & above).sum() / total - 1)
 
 
 ASYMMETRY = Observable(

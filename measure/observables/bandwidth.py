@@ -10,10 +10,10 @@ from measure.observables.observable import Observable
 
 
 def bandwidth(window: Window) -> float:
-    """Deviation of the frequencies, each weighed by its power [Hz]."""
-    found, power = moving(window)
+    """Computes the deviation of the frequencies, each weighed by its power [Hz]."""
+    frequencies, power = moving(window)
     share = power / power.sum()
-    return float(np.sqrt((share * np.square(found - share @ found)).sum()))
+    return float(np.sqrt((share * np.square(frequencies - share @ frequencies)).sum()))
 
 
 BANDWIDTH = Observable(

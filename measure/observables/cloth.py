@@ -46,7 +46,8 @@ class View:
             )
 
     def axes(self, heading: float) -> FloatArray:
-        """(3, 3) rows: the picture's right, its up, and the direction of view, of a wind that goes to `heading`."""
+        """Returns (3, 3) rows: the picture's right, its up, and the direction of view, in a wind that goes to
+        `heading`."""
         around, up = heading + self.azimuth, self.elevation
         forward = [math.cos(around) * math.cos(up), math.sin(around) * math.cos(up), math.sin(up)]
         right = [math.sin(around), -math.cos(around), 0.0]
@@ -86,8 +87,8 @@ class ClothWindow:
                 where="cloth",
                 fix="give finite points (n, vertex, 2) at two instants or more",
             )
-        for name, some in (("hoist", self.hoist), ("free edge", self.free), ("faces", self.faces)):
-            if some.size < 2 or some.min() < 0 or some.max() >= vertices:
+        for name, indices in (("hoist", self.hoist), ("free edge", self.free), ("faces", self.faces)):
+            if indices.size < 2 or indices.min() < 0 or indices.max() >= vertices:
                 raise InputError(f"vertices of the {name} that are not there", where="cloth", fix="give their indices")
 
     @cached_property
@@ -146,7 +147,7 @@ def seen_from(
     height: float,
     heading: float = 0.0,
 ) -> ClothWindow:
-    """Cloth as a place sees it.
+    """Projects cloth into the view of a camera.
 
     Args:
         view: the place.
@@ -162,10 +163,10 @@ def seen_from(
     ends = positions[:, [upper, lower]].mean(axis=(0, 1))
     # People aim at the flag's middle: from near by the hoist is then seen at another angle than the axis'.
     aim = ends + length / 2 * np.array([math.cos(heading), math.sin(heading), 0.0])
-    seen = (np.asarray(positions, np.float64) - aim) @ view.axes(heading).T
-    places = seen[..., :2]
+    camera_frame = (np.asarray(positions, np.float64) - aim) @ view.axes(heading).T
+    places = camera_frame[..., :2]
     if math.isfinite(view.distance):
-        depth = view.distance + seen[..., 2]
+        depth = view.distance + camera_frame[..., 2]
         if depth.min() < 0.05 * view.distance:
             raise InputError("cloth reaches to the camera or behind it", where="view", fix="enlarge the distance")
         places = places * (view.distance / depth)[..., None]
@@ -185,15 +186,16 @@ def seen_from(
 
 
 def edges_of(rest: NDArray[np.floating]) -> tuple[IntArray, IntArray]:
-    """Hoist and free edge of a flat flag from their upper ends: vertices of least and of largest first coordinate.
+    """Finds hoist and free edge of a flat flag from their upper ends: vertices of least and of largest first
+    coordinate.
 
     Args:
         rest: (vertex, 2) along the length and up along the hoist [m].
     """
     along, up = np.asarray(rest, np.float64).T
-    near = 1e-6 * max(1.0, float(np.ptp(along)))
-    found = []
-    for side in (along <= along.min() + near, along >= along.max() - near):
-        some = np.flatnonzero(side)
-        found.append(some[np.argsort(-up[some], kind="stable")].astype(np.int64))
-    return found[0], found[1]
+    tolerance = 1e-6 * max(1.0, float(np.ptp(along)))
+    edges = []
+    for side in (along <= along.min() + tolerance, along >= along.max() - tolerance):
+        vertices = np.flatnonzero(side)
+        edges.append(vertices[np.argsort(-up[vertices], kind="stable")].astype(np.int64))
+    return edges[0], edges[1]

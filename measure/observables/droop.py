@@ -9,7 +9,7 @@ from measure.observables.observable import Observable
 
 
 def droop(window: Window) -> float:
-    """Mean over the frames [rad]."""
+    """Computes the mean over the frames [rad]."""
     across, up = chord(window).T
     return float(np.arctan2(-up, across).mean())
 

@@ -9,7 +9,7 @@ from measure.observables.observable import Observable
 
 
 def extension(window: Window) -> float:
-    """Mean over the frames [1]."""
+    """Computes the mean over the frames [1]."""
     return float(np.hypot(*chord(window).T).mean() / window.length)
 
 

@@ -26,9 +26,9 @@ def moving(window: Window) -> tuple[FloatArray, FloatArray]:
 
 
 def frequency(window: Window) -> float:
-    """Mean of the frequencies, each weighed by its power [Hz]."""
-    found, power = moving(window)
-    return float((found * power).sum() / power.sum())
+    """Computes the mean of the frequencies, each weighed by its power [Hz]."""
+    frequencies, power = moving(window)
+    return float((frequencies * power).sum() / power.sum())
 
 
 FREQUENCY = Observable(

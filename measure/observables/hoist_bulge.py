@@ -27,12 +27,12 @@ def hoist_bulge(window: Window) -> float:
     shapes = window.silhouettes
     between = np.abs(shapes.rows) <= _BETWEEN * shapes.height
     masks = shapes.masks[:, between]
-    there = masks.any(axis=2)
-    if not there.size or there.mean() < _ROWS:
+    has_cloth = masks.any(axis=2)
+    if not has_cloth.size or has_cloth.mean() < _ROWS:
         raise UnseenError("no-silhouette")
     # The first cloth's edge is half a pixel before its middle.
     first = shapes.columns[masks.argmax(axis=2)] - 0.5 / shapes.scale
-    return float(np.maximum(first, 0.0)[there].mean() / shapes.length)
+    return float(np.maximum(first, 0.0)[has_cloth].mean() / shapes.length)
 
 
 HOIST_BULGE = Observable(

@@ -8,7 +8,7 @@ from measure.observables.observable import Observable
 
 
 def middle_speed(window: Window) -> float:
-    """Root mean square over the frames [flag lengths a second]."""
+    """Computes the root mean square over the frames [flag lengths a second]."""
     return speed(window.silhouettes.times, window.middle) / window.length
 
 

@@ -34,7 +34,8 @@ def even(times: FloatArray, course: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def speed(times: FloatArray, course: FloatArray) -> float:
-    """Root mean square speed of a course (n, 2) by central differences over 2/`RATE` seconds [its unit per s].
+    """Computes the root mean square speed of a course (n, 2) by central differences over 2/`RATE` seconds [its unit per
+    s].
 
     Raises:
         UnseenError: as `even`.
@@ -59,7 +60,8 @@ def spectrum(times: FloatArray, course: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def transformed(at: FloatArray, places: FloatArray) -> NDArray[np.complex128]:
-    """Fourier transform (f, d) of a course (n, d) at even instants less its straight line, under a Hann window."""
+    """Computes the Fourier transform (f, d) of a course (n, d) at even instants less its straight line, under a Hann
+    window."""
     line = np.polynomial.polynomial.polyvander(at - at.mean(), 1)
     residual = places - line @ np.linalg.lstsq(line, places, rcond=None)[0]
     return np.fft.rfft(residual * np.hanning(len(at) + 2)[1:-1, None], axis=0)

@@ -67,12 +67,12 @@ class Observable:
         return None if self.counted_in is None else "m" if self.unit == "1" else "m/s"
 
     def of_film(self, window: FilmWindow) -> Reading:
-        """The reading of pixels, less the bias."""
-        found = _read(self.pixels, window)
-        return Reading(value=found.value - self.bias, reason=found.reason)
+        """Reads the observable from pixels, less the bias."""
+        reading = _read(self.pixels, window)
+        return Reading(value=reading.value - self.bias, reason=reading.reason)
 
     def of_cloth(self, window: ClothWindow) -> Reading:
-        """The reading of geometry."""
+        """Reads the observable from geometry."""
         return _read(self.geometry, window)
 
 

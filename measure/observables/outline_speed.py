@@ -12,18 +12,18 @@ from measure.observables.unseen import UnseenError
 
 
 def outline_speed(window: Window) -> float:
-    """Area that the outline sweeps a second, over its free length [flag lengths a second]."""
+    """Computes the area that the outline sweeps a second, over its free length [flag lengths a second]."""
     shapes = window.silhouettes
     step = max(1, round(1 / RATE / float(np.median(np.diff(shapes.times)))))
     free = shapes.columns > BESIDE * shapes.length
     masks = shapes.masks[:, :, free]
-    apart = shapes.times[step:] - shapes.times[:-step]
-    near = apart < 2 / RATE
-    if near.sum() < 2:
+    intervals = shapes.times[step:] - shapes.times[:-step]
+    usable = intervals < 2 / RATE
+    if usable.sum() < 2:
         raise UnseenError("few-frames")
-    swept = (masks[step:] ^ masks[:-step]).sum(axis=(1, 2))[near] / shapes.scale**2
+    swept = (masks[step:] ^ masks[:-step]).sum(axis=(1, 2))[usable] / shapes.scale**2
     around = 2 * (shapes.length * (1 - BESIDE)) + shapes.height
-    return float((swept / apart[near]).mean() / around / shapes.length)
+    return float((swept / intervals[usable]).mean() / around / shapes.length)
 
 
 OUTLINE_SPEED = Observable(

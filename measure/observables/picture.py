@@ -16,7 +16,7 @@ _BLUE, _RUST = "#2b6f8f", "#c4622d"
 
 
 def picture(table: Table) -> Figure:
-    """A row an observable: over time on the left, over the wind on the right; bars of one sigma of the pixels."""
+    """Draws a row an observable: over time on the left, over the wind on the right; bars of one sigma of the pixels."""
     from matplotlib.figure import Figure
 
     names = list(table.readings)

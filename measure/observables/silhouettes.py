@@ -63,13 +63,14 @@ class Silhouettes:
         return (self.hoist[1] - np.arange(self.masks.shape[1]) - 0.5) / self.scale
 
     def middle_of(self, low: float, high: float) -> FloatArray:
-        """(n, 2) centroid [m] of the cloth between two shares of its area, counted away from the hoist; NaN without."""
+        """Computes the centroid (n, 2) [m] of the cloth between two shares of its area, counted away from the hoist;
+        NaN without."""
         profile = self.masks.sum(axis=1).astype(np.float64)
-        held = np.where(profile > 0, profile, 1.0)
+        divisor = np.where(profile > 0, profile, 1.0)
         total = np.where(profile.any(axis=1), profile.sum(axis=1), np.nan)[:, None]
         begins = (np.cumsum(profile, axis=1) - profile) / total
         inside = np.clip(begins + profile / total, low, high) - np.clip(begins, low, high)
-        up = np.einsum("nrc,r->nc", self.masks, self.rows) / held
+        up = np.einsum("nrc,r->nc", self.masks, self.rows) / divisor
         return np.stack([(inside * self.columns).sum(axis=1), (inside * up).sum(axis=1)], axis=1) / (high - low)
 
     def free_edge(self) -> FloatArray:
@@ -78,11 +79,11 @@ class Silhouettes:
 
         Against the mean of the edge's points, the first is too high where the flag droops, the second too low.
         """
-        found = np.full((len(self.masks), 2), np.nan)
+        edge = np.full((len(self.masks), 2), np.nan)
         for k, mask in enumerate(self.masks):
             if mask.any():
-                found[k] = (self._along_outline(mask) + self._tail(mask)) / 2
-        return found
+                edge[k] = (self._along_outline(mask) + self._tail(mask)) / 2
+        return edge
 
     def _tail(self, mask: BoolArray) -> FloatArray:
         rows, columns = np.nonzero(mask)
@@ -98,8 +99,8 @@ class Silhouettes:
             int(np.hypot(places[:, 0], places[:, 1] - end).argmin()) for end in (self.height / 2, -self.height / 2)
         )
         places = np.roll(places, -upper, axis=0)
-        there, back = places[: (lower - upper) % len(places) + 1], places[(lower - upper) % len(places) :]
-        free = there if there[:, 0].mean() >= back[:, 0].mean() else back
+        first_path, second_path = places[: (lower - upper) % len(places) + 1], places[(lower - upper) % len(places) :]
+        free = first_path if first_path[:, 0].mean() >= second_path[:, 0].mean() else second_path
         length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(free, axis=0).T))])
         middle = np.abs(length - length[-1] / 2) <= length[-1] / 8
         return free[middle].mean(axis=0)

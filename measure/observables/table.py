@@ -53,11 +53,11 @@ class Table:
     wind: FloatArray | None = None
 
     def values(self, name: str) -> FloatArray:
-        """(w,) of an observable, NaN where a window does not show it."""
+        """Returns an observable's values (w,), NaN where a window does not show it."""
         return np.array([reading.value for reading in self.readings[name]])
 
     def unseen(self, name: str) -> Counter[str]:
-        """Reason → windows without a value."""
+        """Counts windows without a value by their reason."""
         return Counter(reading.reason for reading in self.readings[name] if reading.reason is not None)
 
     @property
@@ -76,11 +76,11 @@ class Table:
             columns.append(pa.array(self.wind, from_pandas=True))
             fields.append(pa.field("wind", pa.float64(), metadata={"unit": "m/s", "meaning": "the log's mean"}))
         for name, readings in self.readings.items():
-            found: Observable = OBSERVABLES[name]
+            observable: Observable = OBSERVABLES[name]
             columns.append(pa.array(self.values(name), from_pandas=True))
-            fields.append(pa.field(name, pa.float64(), metadata={k: str(v) for k, v in _about(found).items()}))
-            columns.append(pa.array(np.full(len(self.time), found.sigma)))
-            fields.append(pa.field(f"{name}-sigma", pa.float64(), metadata={"unit": found.unit}))
+            fields.append(pa.field(name, pa.float64(), metadata={k: str(v) for k, v in _about(observable).items()}))
+            columns.append(pa.array(np.full(len(self.time), observable.sigma)))
+            fields.append(pa.field(f"{name}-sigma", pa.float64(), metadata={"unit": observable.unit}))
             columns.append(pa.array([reading.reason for reading in readings], type=pa.string()))
             fields.append(pa.field(f"{name}-reason", pa.string()))
         schema = pa.schema(fields, metadata={"flagdata": json.dumps(self.head())})
@@ -95,7 +95,7 @@ class Table:
         return sink.getvalue()
 
     def write_zarr(self, folder: Path) -> None:
-        """A new Zarr group: `time`, `wind` and each observable over `time`, units and sigmas as attributes."""
+        """Writes a new Zarr group: `time`, `wind` and each observable over `time`, units and sigmas as attributes."""
         import zarr
 
         group = zarr.open_group(folder, mode="w-", zarr_format=3)
@@ -110,7 +110,7 @@ class Table:
             group[name].attrs.update(_about(OBSERVABLES[name]))
 
     def head(self) -> dict[str, Any]:
-        """What the table is of: JSON values."""
+        """Describes what the table is of: JSON values."""
         return {
             "schema": SCHEMA,
             "film": self.film,
@@ -119,7 +119,7 @@ class Table:
         }
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values: mean, its standard error and the windows of each observable."""
+        """Returns JSON values: mean, its standard error and the windows of each observable."""
         return {
             **self.head(),
             "windows": len(self.time),
@@ -129,30 +129,30 @@ class Table:
 
     def _summary(self, name: str) -> dict[str, Any]:
         values = self.values(name)
-        shown = values[np.isfinite(values)]
-        found: Observable = OBSERVABLES[name]
+        values_seen = values[np.isfinite(values)]
+        observable: Observable = OBSERVABLES[name]
         return {
-            "unit": found.unit,
-            "windows": len(shown),
-            "mean": float(shown.mean()) if len(shown) else None,
-            "deviation": float(shown.std(ddof=1)) if len(shown) > 1 else None,
-            "sigma": found.sigma,
+            "unit": observable.unit,
+            "windows": len(values_seen),
+            "mean": float(values_seen.mean()) if len(values_seen) else None,
+            "deviation": float(values_seen.std(ddof=1)) if len(values_seen) > 1 else None,
+            "sigma": observable.sigma,
             "unseen": dict(self.unseen(name)),
         }
 
     def lines(self) -> list[str]:
-        """For people: an observable a line."""
-        found = []
+        """Describes each observable in a line, for people."""
+        lines = []
         for name in self.readings:
-            own, about = self._summary(name), OBSERVABLES[name]
+            summary, about = self._summary(name), OBSERVABLES[name]
             unit = "" if about.unit == "1" else f" {about.unit}"
-            missing = "".join(f"; {count} × {REASONS[kind]}" for kind, count in own["unseen"].items())
-            if own["mean"] is None:
-                found.append(f"{name:17} not shown{missing}")
+            missing = "".join(f"; {count} × {REASONS[kind]}" for kind, count in summary["unseen"].items())
+            if summary["mean"] is None:
+                lines.append(f"{name:17} not shown{missing}")
                 continue
-            spread = "" if own["deviation"] is None else f", deviation between windows {own['deviation']:.3f}"
-            found.append(f"{name:17} {own['mean']:8.3f}{unit}{spread}, n = {own['windows']} windows{missing}")
-        return found
+            spread = "" if summary["deviation"] is None else f", deviation between windows {summary['deviation']:.3f}"
+            lines.append(f"{name:17} {summary['mean']:8.3f}{unit}{spread}, n = {summary['windows']} windows{missing}")
+        return lines
 
 
 def table_of(
@@ -164,7 +164,7 @@ def table_of(
     start: int | None = None,
     wind: WindSeries | None = None,
 ) -> Table:
-    """All observables of all windows.
+    """Computes all observables of all windows.
 
     Args:
         start: instant of the film's first frame [UTC ns]; None where it is unknown: then the table has no wind.
@@ -172,7 +172,7 @@ def table_of(
     """
     nothing = Reading(value=math.nan, reason=UNSEEN)
     readings = {
-        name: tuple(nothing if one is None else OBSERVABLES[name].of_film(one) for one in watched.windows)
+        name: tuple(nothing if window is None else OBSERVABLES[name].of_film(window) for window in watched.windows)
         for name in OBSERVABLES
     }
     logged = None
@@ -191,5 +191,10 @@ def table_of(
     )
 
 
-def _about(found: Observable) -> dict[str, Any]:
-    return {"unit": found.unit, "meaning": found.meaning, "sigma": found.sigma, "blind": found.blind}
+def _about(observable: Observable) -> dict[str, Any]:
+    return {
+        "unit": observable.unit,
+        "meaning": observable.meaning,
+        "sigma": observable.sigma,
+        "blind": observable.blind,
+    }

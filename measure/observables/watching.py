@@ -47,7 +47,7 @@ class Watched:
 def count_of(
     film: ConditionedFilm, *, first: float | None = None, last: float | None = None, seconds: float = WINDOW
 ) -> int:
-    """How many whole windows a part of a film has; the parameters as for `watched`.
+    """Counts the complete windows of a part of a film; the parameters as for `watched`.
 
     Raises:
         RefusedError: the film has no whole window.
@@ -72,7 +72,7 @@ def watched(
     seconds: float = WINDOW,
     advance: Callable[[int], object] | None = None,
 ) -> Watched:
-    """The windows of a film, one after another.
+    """Reads the windows of a film, one after another.
 
     Args:
         size: of the flag, whose height gives the scale.
@@ -85,12 +85,12 @@ def watched(
     begin, count = first or 0.0, count_of(film, first=first, last=last, seconds=seconds)
     windows: list[FilmWindow | None] = []
 
-    def keep(some: Sequence[FilmWindow | None]) -> None:
-        windows.extend(some)
+    def keep(chunk: Sequence[FilmWindow | None]) -> None:
+        windows.extend(chunk)
         if advance is not None:
-            advance(len(some))
+            advance(len(chunk))
 
-    watcher = Watcher(film, size, begin=begin, count=count, seconds=seconds, found=keep)
+    watcher = Watcher(film, size, begin=begin, count=count, seconds=seconds, deliver=keep)
     for time, frame in film.frames(begin, begin + count * seconds):
         watcher.look(time, frame)
     watcher.finish()
@@ -118,9 +118,9 @@ class Watcher:
         begin: float,
         count: int,
         seconds: float,
-        found: Callable[[Sequence[FilmWindow | None]], object],
+        deliver: Callable[[Sequence[FilmWindow | None]], object],
     ) -> None:
-        self._film, self._size, self._found = film, size, found
+        self._film, self._size, self._found = film, size, deliver
         self._begin, self._count, self._seconds = begin, count, seconds
         self._a_chunk = max(1, round(CHUNK / seconds))
         self._done = 0
@@ -150,47 +150,47 @@ class Watcher:
                 fix="give another film, or --crop around the flag",
             )
 
-    def _read(self, held: Sequence[tuple[float, UInt8Array]], some: int) -> None:
-        some = min(some, self._count - self._done)
-        if some > 0:
+    def _read(self, frames: Sequence[tuple[float, UInt8Array]], count: int) -> None:
+        count = min(count, self._count - self._done)
+        if count > 0:
             begin = self._begin + self._done * self._seconds
-            self._done += some
-            self._found(_chunk(self._film, held, begin, some, self._seconds, self._size))
+            self._done += count
+            self._found(_chunk(self._film, frames, begin, count, self._seconds, self._size))
 
 
 def _chunk(
     film: ConditionedFilm,
-    held: Sequence[tuple[float, UInt8Array]],
+    timed_frames: Sequence[tuple[float, UInt8Array]],
     begin: float,
     count: int,
     seconds: float,
     size: FlagSize,
 ) -> list[FilmWindow | None]:
-    """The windows of one still picture."""
+    """Outlines the windows of one chunk of the film, from its still picture."""
     nothing: list[FilmWindow | None] = [None] * count
-    if film.found is None or not held:
+    if film.found is None or not timed_frames:
         return nothing
-    frames = np.stack([halved(frame) for _, frame in held])
+    frames = np.stack([halved(frame) for _, frame in timed_frames])
     outliner = Outliner.of(frames)
     if outliner is None or outliner.hoist[1, 1] - outliner.hoist[0, 1] < _LEAST_HOIST:
         return nothing
-    times = np.array([time for time, _ in held])
+    times = np.array([time for time, _ in timed_frames])
     cloth, expected = outliner.masks(frames)
     hoist = outliner.hoist
-    found: list[FilmWindow | None] = []
+    windows: list[FilmWindow | None] = []
     for k in range(count):
-        own = (times >= begin + k * seconds - 1e-6) & (times < begin + (k + 1) * seconds - 1e-6)
-        if own.sum() < _FEWEST:
-            found.append(None)
+        inside = (times >= begin + k * seconds - 1e-6) & (times < begin + (k + 1) * seconds - 1e-6)
+        if inside.sum() < _FEWEST:
+            windows.append(None)
             continue
-        area = cloth[own].sum(axis=(1, 2))
+        area = cloth[inside].sum(axis=(1, 2))
         usual = np.abs(area - np.median(area)) <= _STEADY * np.median(area)
-        found.append(
+        windows.append(
             FilmWindow(
-                times=times[own],
-                frames=frames[own],
-                masks=cloth[own],
-                shown=(expected[own] >= _EXPECTED) & usual,
+                times=times[inside],
+                frames=frames[inside],
+                masks=cloth[inside],
+                shown=(expected[inside] >= _EXPECTED) & usual,
                 scale=float(hoist[1, 1] - hoist[0, 1]) / size.height,
                 hoist=hoist,
                 side=outliner.side,
@@ -198,4 +198,4 @@ def _chunk(
                 height=size.height,
             )
         )
-    return found
+    return windows

@@ -10,9 +10,9 @@ from measure.observables.waves import wave
 
 
 def wave_length(window: Window) -> float:
-    """Of the mean wave [flag lengths]."""
-    found = wave(window)
-    return 2 * math.pi / found.number
+    """Computes the length of the mean wave [flag lengths]."""
+    mean_wave = wave(window)
+    return 2 * math.pi / mean_wave.number
 
 
 WAVE_LENGTH = Observable(

@@ -10,9 +10,9 @@ from measure.observables.waves import wave
 
 
 def wave_speed(window: Window) -> float:
-    """Of the mean wave [flag lengths a second]."""
-    found = wave(window)
-    return 2 * math.pi * found.frequency / found.number
+    """Computes the speed of the mean wave [flag lengths a second]."""
+    mean_wave = wave(window)
+    return 2 * math.pi * mean_wave.frequency / mean_wave.number
 
 
 WAVE_SPEED = Observable(

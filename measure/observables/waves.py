@@ -33,7 +33,7 @@ class Wave:
 
 
 def wave(window: Window) -> Wave:
-    """The mean wave of a window.
+    """Estimates the mean wave of a window.
 
     Raises:
         UnseenError: no phases that belong together, or too few frames.
@@ -44,10 +44,10 @@ def wave(window: Window) -> Wave:
     with np.errstate(invalid="ignore", divide="ignore"):
         line = np.einsum("nrc,r->nc", shapes.masks, shapes.rows) / profile
     half = 0.04 * shapes.length
-    some = [np.abs(shapes.columns - share * reach) <= half for share in _SECTIONS]
-    if not all(near.any() for near in some):
+    sections = [np.abs(shapes.columns - share * reach) <= half for share in _SECTIONS]
+    if not all(section.any() for section in sections):
         raise UnseenError("edge-on")
-    course = np.stack([line[:, near].mean(axis=1) for near in some], axis=1)
+    course = np.stack([line[:, section].mean(axis=1) for section in sections], axis=1)
     at, places = even(shapes.times, course)
     spectra = transformed(at, places)
     frequency = np.fft.rfftfreq(len(at), 1 / RATE)
@@ -58,8 +58,8 @@ def wave(window: Window) -> Wave:
     total = cross.sum()
     if power.sum() <= 0 or abs(total) < _COHERENT * power.sum():
         raise UnseenError("no-wave")
-    apart = float(np.diff(_SECTIONS).mean()) * reach / window.length
-    number = -math.atan2(total.imag, total.real) / apart
+    spacing = float(np.diff(_SECTIONS).mean()) * reach / window.length
+    number = -math.atan2(total.imag, total.real) / spacing
     if number * _LONGEST < 2 * math.pi:
         raise UnseenError("no-wave")
     return Wave(frequency=float((power * frequency).sum() / power.sum()), number=number)

@@ -129,7 +129,7 @@ def from_arrays(
     faces: IntArray | None = None,
     wind: WindTrack | None = None,
     noise: float | None = None,
-    known: Known | None = None,
+    description: Known | None = None,
 ) -> Observation:
     """Makes a recording from arrays: positions (frame, marker, 3) [m] at `rate` [Hz], rest (marker, 2) [m], z up.
 
@@ -152,6 +152,6 @@ def from_arrays(
         times=np.arange(len(positions)) / rate,
         wind=wind,
         noise=noise,
-        known=known or Known(),
+        known=description or Known(),
         outline=corners,
     )

@@ -207,7 +207,7 @@ def propose(
     experiment: Experiment,
     candidates: Sequence[EffectColumn],
     *,
-    known: Sequence[EffectColumn] = (),
+    acting_columns: Sequence[EffectColumn] = (),
     controls: Sequence[EffectColumn] = (),
     options: plan.NullOptions,
     stage: Stage | None = None,
@@ -216,7 +216,7 @@ def propose(
 
     Args:
         candidates: terms, or strengths of an effect from a file.
-        known: strengths that the model has already.
+        acting_columns: strengths that the model has already.
         controls: terms that are not taken, but may be what a proposal is compared with.
         stage: called with progress.
 
@@ -227,7 +227,16 @@ def propose(
     report = stage or (lambda stage_name, done, total: None)
     setting = made_ready(experiment)
     bank = plan.bank_for(setting, options, stage=report)
-    return weigh(setting, candidates, bank, columns(), known=known, controls=controls, options=options, stage=report)
+    return weigh(
+        setting,
+        candidates,
+        bank,
+        columns(),
+        acting_columns=acting_columns,
+        controls=controls,
+        options=options,
+        stage=report,
+    )
 
 
 def made_ready(experiment: Experiment) -> Setting:
@@ -253,7 +262,7 @@ def weigh(
     bank: NullBank,
     along: Sequence[Column],
     *,
-    known: Sequence[EffectColumn] = (),
+    acting_columns: Sequence[EffectColumn] = (),
     controls: Sequence[EffectColumn] = (),
     options: plan.NullOptions,
     stage: Stage,
@@ -274,13 +283,13 @@ def weigh(
     all_segments = ProjectedSegments.of(setting.forecaster, setting.segments, along)
     projected = all_segments.select(np.flatnonzero(parts.used))
     speeds = projected.speeds(setting.speeds)
-    tried = _tried(projected, null, speeds, candidates, [*known, *controls])
+    tried = _tried(projected, null, speeds, candidates, [*acting_columns, *controls])
     projected_evidence = evidence(tried.statistics, speeds, null)
     noise = max(segment.noise for segment in projected.segments.items)
     family = Family.of(bank.nulls, tried.statistics, noise=noise, seed=options.seed)
     names = tuple(column.name for column in tried.columns)
-    acting = list(range(len(THETA), len(THETA) + len(known)))
-    proposed = list(range(len(THETA) + len(known), len(THETA) + len(names)))
+    acting = list(range(len(THETA), len(THETA) + len(acting_columns)))
+    proposed = list(range(len(THETA) + len(acting_columns), len(THETA) + len(names)))
     physical = [
         column
         for column in proposed
@@ -332,7 +341,7 @@ def weigh(
         nulls=bank.words,
         proposed_from=data_hash(projected.segments),
         tested_on=data_hash(setting.segments.select(np.flatnonzero(~parts.used))),
-        known=tuple(column.name for column in known),
+        known=tuple(column.name for column in acting_columns),
         seed=options.seed,
     )
 

@@ -6,7 +6,7 @@ file in the folder the user named). The same name gives the same picture, to the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -127,7 +127,7 @@ def _split(name: str, noun: str, example: str) -> tuple[str, str]:
     return kind, member
 
 
-def _draw(table: Registry, kinds: Sequence[str], rng: np.random.Generator) -> str:
+def _draw(table: Mapping[str, AssetKind], kinds: Sequence[str], rng: np.random.Generator) -> str:
     sources = [table[kind] for kind in kinds]
     index = int(rng.integers(len(kinds)))
     return f"{kinds[index]}/{sources[index].draw(rng)}"

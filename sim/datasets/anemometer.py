@@ -40,7 +40,7 @@ class Reading:
 
 
 def read(spec: AnemometerSpec, crew: Crew, member: Member, *, instrument: int, seed: int, begin: int) -> Reading:
-    """The log of one recording.
+    """Simulates the log of one recording.
 
     The instrument stands at the middle of the hoist in undisturbed air: effects that change the wind from place to
     place do not reach it. Its samples are means over their period up to their stamp, after its effects in the recipe's
@@ -64,7 +64,7 @@ def logged(
     seed: int,
     begin: int,
 ) -> Reading:
-    """What an anemometer logs of the air's velocity (n, 3) [m/s] at times (n,) [s]; the others as of `read`."""
+    """Simulates what an anemometer logs of air at velocity (n, 3) [m/s] at times (n,) [s]; the others as of `read`."""
     drawn = {
         name: {key: _drawn(value, instrument, "anemometer", name, key) for key, value in parameters.items()}
         for name, parameters in spec.effects.items()
@@ -94,8 +94,8 @@ def logged(
             distance_constant=drawn.get("anemometer-lag", {}).get("distance"),
         ),
     )
-    known = {f"{name}.{key}": value for name, values in drawn.items() for key, value in values.items()}
-    return Reading(series=series, parameters={**known, "anemometer.noise": noise})
+    parameters = {f"{name}.{key}": value for name, values in drawn.items() for key, value in values.items()}
+    return Reading(series=series, parameters={**parameters, "anemometer.noise": noise})
 
 
 def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[FloatArray, FloatArray]:
@@ -115,13 +115,13 @@ def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[FloatArray, F
 
 
 def velocities(system: System, times: FloatArray) -> FloatArray:
-    """(n, 3) [m/s] of the undisturbed air that the first of a batch stands in, at times (n,) [s]."""
+    """Returns the velocity (n, 3) [m/s] of the undisturbed air at the first of a batch, at times (n,) [s]."""
     with torch.no_grad():
         return np.stack([system.wind.velocity(float(t))[:, 0].double().numpy() for t in times])
 
 
 def blowing_from(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Where a wind (x towards east, y towards north) blows from, clockwise from north, in [0, 2π) [rad]."""
+    """Returns where a wind (x to the east, y to the north) blows from, clockwise from north, in [0, 2π) [rad]."""
     return np.mod(np.arctan2(-x, -y), 2 * math.pi)
 
 

@@ -113,18 +113,18 @@ class Build:
 
     def _simulate(self) -> list[Roll]:
         rolls = [Roll(cast=cast) for cast in casts(self.recipe)]
-        known = whole(self.lake, [roll.id(i) for roll in rolls for i in roll.candidates], branch=self.branch)
+        in_lake = whole(self.lake, [roll.id(i) for roll in rolls for i in roll.candidates], branch=self.branch)
         total = sum(roll.cast.simulation.count for roll in rolls)
         with self.bars(total, f"{self.recipe.name}: simulate", "flag") as advance:
-            todo = [(roll, roll.pending(known)) for roll in rolls]
+            todo = [(roll, roll.pending(in_lake)) for roll in rolls]
             advance(total - sum(len(pending) for _, pending in todo))
             while any(pending for _, pending in todo):
                 self._simulate_once([entry for entry in todo if entry[1]], advance)
-                todo = [(roll, roll.pending(known)) for roll, _ in todo]
+                todo = [(roll, roll.pending(in_lake)) for roll, _ in todo]
         return rolls
 
     def _simulate_once(self, todo: Sequence[tuple[Roll, list[int]]], advance: Advance) -> None:
-        """All pending members of the rolls once; those that fail are noted on their roll."""
+        """Simulates all pending members of the rolls once; those that fail are noted on their roll."""
         by_name = {roll.cast.simulation.name: roll for roll, _ in todo}
         done: Simulated
         for done in results(self.client, self._batches(todo), say=self.say):
@@ -144,33 +144,33 @@ class Build:
         for roll, pending in todo:
             simulation = roll.cast.simulation
             for base in range(len(simulation.material.bases)):
-                own = [index for index in pending if roll.crew.base(index) == base]
-                for first in range(0, len(own), simulation.batch):
-                    yield jobs.simulate, (simulation, base, own[first : first + simulation.batch], self.device)
+                indices = [index for index in pending if roll.crew.base(index) == base]
+                for first in range(0, len(indices), simulation.batch):
+                    yield jobs.simulate, (simulation, base, indices[first : first + simulation.batch], self.device)
 
     # Films
 
     def films(self, rolls: Iterable[Roll]) -> list[Film]:
-        """All films of the data set, in the order they are made in: the small sides first, so that what a training is
-        judged by is there while its own side still grows."""
+        """Returns all films of the data set in the order they are rendered: small sides first, so that a network's
+        validation films exist while its training films are still being rendered."""
         members: dict[str, list[tuple[Cast, int, str]]] = {side.name: [] for side in self.recipe.sides}
         for roll in rolls:
             members[roll.cast.side.name] += [(roll.cast, index, roll.id(index)) for index in roll.chosen]
         return [
             film
-            for side, own in sorted(members.items(), key=lambda item: self.recipe.side(item[0]).renders)
-            for film in Sequences(recipe=self.recipe, side=side, members=tuple(own)).films()
+            for side, side_members in sorted(members.items(), key=lambda item: self.recipe.side(item[0]).renders)
+            for film in Sequences(recipe=self.recipe, side=side, members=tuple(side_members)).films()
         ]
 
     def _film(self, rolls: Iterable[Roll]) -> list[Film]:
         films = self.films(rolls)
         self._refuse_other_names(films)
-        own = {film.artifact().id for film in films}
-        self._refuse_mixture(own)
-        known = whole(self.lake, own, branch=self.branch)
-        missing = [film for film in films if film.artifact().id not in known]
+        film_ids = {film.artifact().id for film in films}
+        self._refuse_mixture(film_ids)
+        in_lake = whole(self.lake, film_ids, branch=self.branch)
+        missing = [film for film in films if film.artifact().id not in in_lake]
         clips = self.lake.rows({"kind": Kind.CLIP}, at=self.branch, columns=["recording"])["recording"].to_pylist()
-        self._clips = sum(recording in own for recording in clips)
+        self._clips = sum(recording in film_ids for recording in clips)
         with self.bars(len(films), f"{self.recipe.name}: render", "film") as advance:
             advance(len(films) - len(missing))
             waiting: list[Filmed] = []
@@ -186,26 +186,26 @@ class Build:
                 advance(self._commit(waiting))
         return films
 
-    def _refuse_mixture(self, own: set[str]) -> None:
+    def _refuse_mixture(self, film_ids: set[str]) -> None:
         """Make sure that all films of the data set's name are of this recipe."""
         films = {"kind": Kind.RECORDING, "dataset": self.recipe.name}
-        others = set(self.lake.rows(films, at=self.branch, columns=["artifact"])["artifact"].to_pylist()) - own
-        if others:
+        foreign = set(self.lake.rows(films, at=self.branch, columns=["artifact"])["artifact"].to_pylist()) - film_ids
+        if foreign:
             raise ConflictError(
-                f"{len(others)} recordings of the data set {self.recipe.name!r} are of another recipe",
+                f"{len(foreign)} recordings of the data set {self.recipe.name!r} are of another recipe",
                 where=f"branch {self.branch}",
                 fix="give the recipe another name, or build on another branch",
             )
 
     def _refuse_other_names(self, films: Sequence[Film]) -> None:
         """Make sure that no film of this recipe is there under another data set's name, where it would stay."""
-        own = [film.artifact().id for film in films]
+        film_ids = [film.artifact().id for film in films]
         columns = ["artifact", "dataset"]
-        there = self.lake.rows({"artifact": own}, at=self.branch, columns=columns)["dataset"].to_pylist()
-        others = sorted({str(dataset) for dataset in there} - {self.recipe.name})
-        if others:
+        datasets = self.lake.rows({"artifact": film_ids}, at=self.branch, columns=columns)["dataset"].to_pylist()
+        other_datasets = sorted({str(dataset) for dataset in datasets} - {self.recipe.name})
+        if other_datasets:
             raise ConflictError(
-                f"films of this recipe are there already, in the data set {others[0]!r}",
+                f"films of this recipe are there already, in the data set {other_datasets[0]!r}",
                 where=f"branch {self.branch}",
                 fix="use that data set, or give the recipe another seed",
             )
@@ -218,7 +218,7 @@ class Build:
             yield jobs.film, (self.recipe, film, sequence, self.device)
 
     def _commit(self, filmed: Sequence[Filmed]) -> int:
-        """Lay films into the lake; returns how many."""
+        """Commits films to the lake and returns how many."""
         if not filmed:
             return 0
         message = f"build {self.recipe.name}: {len(filmed)} films"

@@ -100,20 +100,20 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
 
 
 def _frames(recipe: DatasetRecipe) -> str:
-    """How many frames a film has, at each rate."""
+    """Describes how many frames a film has, at each rate."""
     times = sorted({(cast.simulation.time.rate, cast.simulation.time.frames) for cast in casts(recipe)})
     return "; ".join(f"{frames} frames at {rate:g} Hz" for rate, frames in times)
 
 
 def _sides(lake: Lake, recipe: DatasetRecipe, branch: str) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Counts of each side, and all recordings, by name."""
+    """Counts what each side holds, and lists all recordings by name."""
     sides: list[dict[str, Any]] = []
-    every: list[dict[str, Any]] = []
+    recordings: list[dict[str, Any]] = []
     columns = ["artifact", "name", "seed", "session", "parameters", "object", "object_bytes"]
     for side in recipe.sides:
-        own = {"dataset": recipe.name, "side": side.name}
-        rows = lake.rows({**own, "kind": Kind.RECORDING}, at=branch, columns=columns).to_pylist()
-        clips = lake.rows({**own, "kind": Kind.CLIP}, at=branch, columns=["wind"])["wind"].drop_null().to_numpy()
+        of_side = {"dataset": recipe.name, "side": side.name}
+        rows = lake.rows({**of_side, "kind": Kind.RECORDING}, at=branch, columns=columns).to_pylist()
+        clips = lake.rows({**of_side, "kind": Kind.CLIP}, at=branch, columns=["wind"])["wind"].drop_null().to_numpy()
         sides.append(
             {
                 "name": side.name,
@@ -125,30 +125,30 @@ def _sides(lake: Lake, recipe: DatasetRecipe, branch: str) -> tuple[list[dict[st
                 "wind": (float(clips.min()), float(np.median(clips)), float(clips.max())) if len(clips) else None,
             }
         )
-        every += sorted(rows, key=lambda row: row["name"])
-    return sides, every
+        recordings += sorted(rows, key=lambda row: row["name"])
+    return sides, recordings
 
 
 def distributions(parameters: Sequence[dict[str, Any]], *, rendered: bool) -> list[Distribution]:
-    """Distributions of all numbers of ζ, or of θ and the instruments, by name.
+    """Returns distributions of all numbers of ζ, or of θ and the instruments, by name.
 
     Args:
         parameters: of each film.
     """
     names = dict.fromkeys(name for values in parameters for name, value in values.items() if not isinstance(value, str))
-    found: list[Distribution] = []
+    histograms: list[Distribution] = []
     for name in names:
         if name.startswith("render.") != rendered:
             continue
         values = np.array([entry[name] for entry in parameters if name in entry], dtype=np.float64)
         low, high = float(values.min()), float(values.max())
         counts = None if math.isclose(low, high) else np.histogram(values, bins=_BINS, range=(low, high))[0].tolist()
-        found.append(
+        histograms.append(
             Distribution(
                 name=name.removeprefix("render."), low=low, middle=float(np.median(values)), high=high, counts=counts
             )
         )
-    return sorted(found, key=lambda distribution: _in_order(distribution.name))
+    return sorted(histograms, key=lambda distribution: _in_order(distribution.name))
 
 
 def _in_order(name: str) -> tuple[tuple[bool, int, str], ...]:
@@ -157,15 +157,15 @@ def _in_order(name: str) -> tuple[tuple[bool, int, str], ...]:
 
 
 def _names(parameters: Sequence[dict[str, Any]]) -> list[tuple[str, list[tuple[str, int]]]]:
-    """Names of materials, textures and kinds of background, with how many films have each."""
-    found: dict[str, dict[str, int]] = {}
+    """Counts the films of each material, texture and kind of background."""
+    counts_by_name: dict[str, dict[str, int]] = {}
     for values in parameters:
         for name, value in values.items():
             if isinstance(value, str):
-                shown = value.partition("/")[0] if name == "render.background" else value
-                counts = found.setdefault(name.removeprefix("render."), {})
-                counts[shown] = counts.get(shown, 0) + 1
-    return [(name, sorted(counts.items())) for name, counts in sorted(found.items())]
+                label = value.partition("/")[0] if name == "render.background" else value
+                counts = counts_by_name.setdefault(name.removeprefix("render."), {})
+                counts[label] = counts.get(label, 0) + 1
+    return [(name, sorted(counts.items())) for name, counts in sorted(counts_by_name.items())]
 
 
 def _sheet(lake: Lake, recipe: DatasetRecipe, rows: Sequence[dict[str, Any]]) -> str:

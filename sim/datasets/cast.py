@@ -34,7 +34,7 @@ class Cast:
 
 
 def casts(recipe: DatasetRecipe) -> Iterator[Cast]:
-    """All sequences of a data set, side by side, session by session or group by group. No seed is on two sides."""
+    """Yields all sequences of a data set: by side, then by session or group. No two sides share a seed."""
     for side in recipe.sides:
         root = replace(recipe.simulation, name=f"{recipe.name}-{side.name}", title=recipe.title)
         if recipe.groups is not None:
@@ -47,15 +47,15 @@ def casts(recipe: DatasetRecipe) -> Iterator[Cast]:
         for session in range(side.sessions):
             seed = child_seed(recipe.seed, "sequences", side.name, session)
             count = len(range(session, side.sequences, side.sessions))
-            own = _of_session(replace(root, seed=seed, count=count), recipe.sessions)
-            yield Cast(side=side, session=session, simulation=replace(own, name=f"{root.name}-{session:02d}"))
+            simulation = _of_session(replace(root, seed=seed, count=count), recipe.sessions)
+            yield Cast(side=side, session=session, simulation=replace(simulation, name=f"{root.name}-{session:02d}"))
 
 
 def _groups(recipe: DatasetRecipe, groups: GroupSpec, side: Side, root: Simulation) -> Iterator[Cast]:
-    """The sequences of a side, a batch at a time."""
+    """Yields the sequences of a side, a batch at a time."""
     for number, first in enumerate(range(0, side.sequences, root.batch)):
-        named = replace(root, name=f"{root.name}-{number:03d}", count=min(root.batch, side.sequences - first))
-        yield of_group(named, groups, side, seed=child_seed(recipe.seed, "sequences", side.name, number))
+        simulation = replace(root, name=f"{root.name}-{number:03d}", count=min(root.batch, side.sequences - first))
+        yield of_group(simulation, groups, side, seed=child_seed(recipe.seed, "sequences", side.name, number))
 
 
 def of_group(simulation: Simulation, groups: GroupSpec, side: Side, *, seed: int) -> Cast:
@@ -81,7 +81,7 @@ def of_group(simulation: Simulation, groups: GroupSpec, side: Side, *, seed: int
 
 
 def _of_session(simulation: Simulation, spec: SessionSpec) -> Simulation:
-    """The recipe of one session: one flag, drawn once, in winds about one mean."""
+    """Returns the recipe of one session: one flag, drawn once, in winds about one mean."""
     drawn = Crew(simulation).member(0)
     mean = drawn.parameters["wind_speed"]
     if not isinstance(mean, float):
@@ -147,17 +147,17 @@ class Roll:
         count = self.cast.simulation.count
         return range(count + max(4, math.ceil(count / 4)))
 
-    def pending(self, known: Collection[str]) -> list[int]:
-        """Chosen members that are not in the lake.
+    def pending(self, in_lake: Collection[str]) -> list[int]:
+        """Returns the chosen members that are not in the lake.
 
         Args:
-            known: artifact ids that are there, and whole.
+            in_lake: artifact ids that are there, and whole.
         """
-        self.done |= {index for index in self.chosen if self.id(index) in known}
+        self.done |= {index for index in self.chosen if self.id(index) in in_lake}
         return [index for index in self.chosen if index not in self.done]
 
     def id(self, index: int) -> str:
-        """Identity of a member's mesh sequence."""
+        """Returns the identity of a member's mesh sequence."""
         if index not in self.ids:
             simulation = self.cast.simulation
             self.ids[index] = member_artifact(simulation, self._recipe, index, self._crew.seed(index)).id

@@ -52,7 +52,7 @@ class WorkerError(FlagdataError):
 
 @contextmanager
 def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
-    """A client of the scheduler at an address ("tcp://host:8786"), or of processes of this machine if it is None.
+    """Connects to the scheduler at an address ("tcp://host:8786"), or to processes of this machine if it is None.
 
     Args:
         workers: processes on this machine, of one thread each; of no meaning with a scheduler, which has its own.
@@ -91,7 +91,7 @@ def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
 
 
 def _check(client: Client, *, where: str) -> None:
-    """Make sure that somebody works there, and with this version of the code.
+    """Checks that there are workers, and that they run this version of the code.
 
     Raises:
         NotFoundError: no worker came within `_CONNECT_TIMEOUT`.
@@ -105,11 +105,11 @@ def _check(client: Client, *, where: str) -> None:
             where=where,
             fix="start some with dask worker ADDRESS",
         ) from None
-    found = cast("dict[str, str]", client.run(version, "flagdata"))
-    for worker, other in found.items():
-        if other != version("flagdata"):
+    versions = cast("dict[str, str]", client.run(version, "flagdata"))
+    for worker, worker_version in versions.items():
+        if worker_version != version("flagdata"):
             raise UsageError(
-                f"the worker {worker} has flagdata {other}, not {version('flagdata')}",
+                f"the worker {worker} has flagdata {worker_version}, not {version('flagdata')}",
                 where=where,
                 fix="install the same version everywhere",
             )
@@ -117,7 +117,7 @@ def _check(client: Client, *, where: str) -> None:
 
 @contextmanager
 def _environment(wanted: Mapping[str, str]) -> Iterator[None]:
-    """What processes that are started meanwhile find in their environment."""
+    """Sets environment variables for processes that are started within the context."""
     before = {name: os.environ.get(name) for name in wanted}
     os.environ.update(wanted)
     try:
@@ -131,7 +131,7 @@ def _environment(wanted: Mapping[str, str]) -> Iterator[None]:
 
 
 def threads(client: Client) -> int:
-    """Number of threads of all workers together, 0 where there are none.
+    """Counts the threads of all workers together, 0 where there are none.
 
     Raises:
         WorkerError: the connection to the scheduler was lost, and with it all jobs.
@@ -149,7 +149,7 @@ def _lost() -> WorkerError:
 
 
 def _next(client: Client, running: as_completed, say: Callable[[str], None]) -> tuple[Future, Any]:
-    """The next job that is done, and its result.
+    """Waits for the next job that is done, and returns it with its result.
 
     A result counts when it is here: that of a worker which died over sending it is made again by another.
 
@@ -157,28 +157,28 @@ def _next(client: Client, running: as_completed, say: Callable[[str], None]) -> 
         WorkerError: nobody has worked for `PATIENCE`, or the scheduler is gone.
         Exception: what the job raised.
     """
-    looked = time.monotonic()
-    alone: float | None = None
+    checked_at = time.monotonic()
+    lost_at: float | None = None
     while not running.has_ready():
         time.sleep(_POLL)
         now = time.monotonic()
-        if now - looked < _LOOK:
+        if now - checked_at < _LOOK:
             continue
-        looked = now
+        checked_at = now
         if threads(client):
-            if alone is not None:
+            if lost_at is not None:
                 say("there are workers again")
-            alone = None
-        elif alone is None:
-            alone = now
+            lost_at = None
+        elif lost_at is None:
+            lost_at = now
             say(f"all workers are gone; waiting {PATIENCE:g} s for new ones")
-        elif now - alone > PATIENCE:
+        elif now - lost_at > PATIENCE:
             raise WorkerError(f"no workers for {PATIENCE:g} s", where="dask", fix=f"see that workers run, {_AGAIN}")
     return cast("tuple[Future, Any]", next(running))
 
 
 def results(client: Client, jobs: Iterable[Job], *, say: Callable[[str], None]) -> Iterator[Any]:
-    """The jobs' results as they come; a few wait beside those that run, so that memory stays bounded.
+    """Yields the jobs' results as they come; few jobs wait beside those that run, so that memory stays bounded.
 
     A job whose worker dies is done again by another one, as often as Dask allows failures (three times). While there
     are no workers, the jobs wait for new ones, for `PATIENCE`. Leaving the iteration early cancels what still runs.
@@ -194,7 +194,7 @@ def results(client: Client, jobs: Iterable[Job], *, say: Callable[[str], None]) 
     running = as_completed(loop=client.loop, with_results=True)
 
     def fill() -> None:
-        """Workers may come and go meanwhile."""
+        """Submits jobs for the workers there are now: they may come and go."""
         for function, arguments in islice(waiting, max(0, max(1, threads(client)) * _AHEAD - running.count())):
             with dask.config.set(_LARGEST):
                 running.add(client.submit(function, *arguments, pure=False))

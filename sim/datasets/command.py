@@ -122,13 +122,13 @@ def build(
 
 
 def _lake(path: str) -> Lake | None:
-    """The lake at a path, None where nothing is there."""
+    """Opens the lake at a path; None where nothing exists."""
     from flagdata.lake import Lake
 
-    place = lake_place(path)
-    if not (any(True for _ in place.iterdir()) if place.is_dir() else place.exists()):
+    location = lake_place(path)
+    if not (any(True for _ in location.iterdir()) if location.is_dir() else location.exists()):
         return None
-    return Lake.open(place)
+    return Lake.open(location)
 
 
 def _made(path: str) -> Lake:

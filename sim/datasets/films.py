@@ -56,7 +56,7 @@ class Film:
         return None if session is None else f"{self.cast.simulation.name}"
 
     def artifact(self) -> Artifact:
-        """The recording's row without its result; its identity is complete."""
+        """Returns the recording's row without its result; its identity is complete."""
         return Artifact(
             kind=Kind.RECORDING,
             name=self.name,
@@ -84,16 +84,16 @@ class Sequences:
         return self.recipe.filming()
 
     def films(self) -> Iterator[Film]:
-        """In the order of their names, which is shuffled: neighbours have nothing to do with each other."""
+        """Yields films in the order of their names, which is shuffled so that neighbours are unrelated."""
         recipe, renders = self.recipe, self.recipe.side(self.side).renders
         order = stream(recipe.seed, "order", self.side).permutation(renders).tolist()
-        for place, number in enumerate(order):
+        for position, number in enumerate(order):
             cast, index, sequence = self.members[number % len(self.members)]
-            again = number // len(self.members)
+            take = number // len(self.members)
             seed = child_seed(recipe.seed, "film", self.side, number)
-            look = seed if cast.session is None else child_seed(cast.simulation.seed, "look", again)
+            look = seed if cast.session is None else child_seed(cast.simulation.seed, "look", take)
             yield Film(
-                name=f"{recipe.name}-{self.side}-{place:05d}",
+                name=f"{recipe.name}-{self.side}-{position:05d}",
                 dataset=recipe.name,
                 cast=cast,
                 index=index,

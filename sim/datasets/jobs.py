@@ -75,7 +75,7 @@ def simulate(simulation: Simulation, base: int, indices: Sequence[int], device: 
 
 
 def film(recipe: DatasetRecipe, job: Film, sequence: MeshSequence, device: str) -> Filmed:
-    """Film a sequence.
+    """Films a sequence.
 
     Raises:
         FlagdataError: a renderer that is not installed or fails, or an asset that is not there.
@@ -87,8 +87,8 @@ def film(recipe: DatasetRecipe, job: Film, sequence: MeshSequence, device: str) 
     member = crew.member(job.index)
     reading = anemometer.read(recipe.anemometer, crew, member, instrument=job.look, seed=job.seed, begin=job.begin)
     drawn = picture.settings(recipe.camera, seed=job.look)
-    seen = shot(recipe, job, sequence, zeta, assets, device=device).cpu().numpy()
-    frames = picture.coded(seen, drawn, recipe.camera, seed=job.seed)
+    rendered = shot(recipe, job, sequence, zeta, assets, device=device).cpu().numpy()
+    frames = picture.coded(rendered, drawn, recipe.camera, seed=job.seed)
     parameters = parameters_of(
         member, zeta, {**job.cast.stated, **reading.parameters, **drawn}, recipe.anemometer.truth
     )
@@ -127,19 +127,19 @@ def shot(
 
 
 def _crew(simulation: Simulation) -> tuple[Crew, dict[int, Stepper]]:
-    """The crew of a recipe with the steppers that were made for it."""
-    kept: dict[str, tuple[Crew, dict[int, Stepper]]] = _own.__dict__.setdefault("crews", {})
+    """Returns the crew of a recipe with its steppers, from this thread's cache."""
+    crews: dict[str, tuple[Crew, dict[int, Stepper]]] = _own.__dict__.setdefault("crews", {})
     key = canonical({**simulation.identity(), "batch": simulation.batch, "name": simulation.name})
-    if key not in kept:
-        while len(kept) >= _KEPT:
-            kept.pop(next(iter(kept)))
-        kept[key] = (Crew(simulation), {})
-    return kept[key]
+    if key not in crews:
+        while len(crews) >= _KEPT:
+            crews.pop(next(iter(crews)))
+        crews[key] = (Crew(simulation), {})
+    return crews[key]
 
 
 def _renderer(name: str, assets: Assets) -> Any:
-    """This thread's renderer: Blender's has a process of its own, which answers one request at a time."""
-    kept: dict[tuple[str, Assets], Any] = _own.__dict__.setdefault("renderers", {})
-    if (name, assets) not in kept:
-        kept[name, assets] = RENDERERS[name](assets=assets)
-    return kept[name, assets]
+    """Returns this thread's renderer: Blender's has a process of its own, which answers one request at a time."""
+    renderers: dict[tuple[str, Assets], Any] = _own.__dict__.setdefault("renderers", {})
+    if (name, assets) not in renderers:
+        renderers[name, assets] = RENDERERS[name](assets=assets)
+    return renderers[name, assets]

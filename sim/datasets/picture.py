@@ -22,7 +22,7 @@ _FILL = b"\xff"  # any marker may be preceded by fill bytes (ITU-T T.81, B.1.1.2
 
 
 def settings(spec: CameraSpec, *, seed: int) -> dict[str, float]:
-    """What a recording's camera draws, "camera.…" → value."""
+    """Draws the settings of a recording's camera, "camera.…" → value."""
 
     def drawn(quantity: Quantity, name: str) -> float:
         return quantity.at(stream(seed, "camera", name).random()) if isinstance(quantity, Range) else quantity
@@ -39,7 +39,7 @@ def settings(spec: CameraSpec, *, seed: int) -> dict[str, float]:
 
 
 def coded(frames: UInt8Array, drawn: dict[str, float], spec: CameraSpec, *, seed: int) -> list[bytes]:
-    """Frames (n, height, width, 3) as the camera stores them, one message each.
+    """Encodes frames (n, height, width, 3) as the camera stores them, one message each.
 
     Args:
         drawn: of `settings`; where JPEGs take a lower quality to fit, it is changed to that.
@@ -48,9 +48,9 @@ def coded(frames: UInt8Array, drawn: dict[str, float], spec: CameraSpec, *, seed
         InputError: as `jpegs`, or an odd size for H.264.
     """
     if spec.coding is Coding.JPEG:
-        found, quality = jpegs(frames, drawn, slot=spec.frame_slot, seed=seed)
+        pictures, quality = jpegs(frames, drawn, slot=spec.frame_slot, seed=seed)
         drawn["camera.jpeg_quality"] = float(quality)
-        return found
+        return pictures
     encoder = VideoEncoder(
         height=frames.shape[1], width=frames.shape[2], rate_factor=drawn["camera.rate_factor"], preset=_PRESET
     )
@@ -93,7 +93,7 @@ def _noisy(frames: UInt8Array, drawn: dict[str, float], *, seed: int) -> Iterato
 
 
 def noisy(gray: UInt8Array, drawn: Mapping[str, float], rng: np.random.Generator) -> UInt8Array:
-    """A gray picture (height, width) with the camera's noise.
+    """Adds the camera's noise to a gray picture (height, width).
 
     Args:
         drawn: of `settings`.
@@ -107,5 +107,5 @@ def noisy(gray: UInt8Array, drawn: Mapping[str, float], rng: np.random.Generator
 
 
 def filled(jpeg: bytes, length: int) -> bytes:
-    """The same picture in a file of this length, which is not below its own."""
+    """Pads a JPEG to a length that is not below its own; the picture stays the same."""
     return jpeg[: -len(_END)] + _FILL * (length - len(jpeg)) + _END

@@ -102,7 +102,7 @@ def plan(
     device: str = "cpu",
     rates: Rates | None = None,
 ) -> Plan:
-    """Count what a build makes, and measure what it takes.
+    """Counts what a build makes, and measures what it takes.
 
     Args:
         lake: what is in it is not made again; None where there is none yet.
@@ -112,25 +112,25 @@ def plan(
     Raises:
         FlagdataError: the measurement failed, as the build would.
     """
-    known: set[str] = set()
+    in_lake: set[str] = set()
     if lake is not None:
-        known = set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
+        in_lake = set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
     rolls = [Roll(cast=cast) for cast in casts(recipe)]
     films = 0
     frames: dict[str, list[int]] = {side.name: [] for side in recipe.sides}
     for side in recipe.sides:
-        own = [roll for roll in rolls if roll.cast.side.name == side.name]
-        members = tuple((roll.cast, index, roll.id(index)) for roll in own for index in roll.chosen)
-        every = Sequences(recipe=recipe, side=side.name, members=members).films()
-        for film in every:
-            films += film.artifact().id not in known
+        side_rolls = [roll for roll in rolls if roll.cast.side.name == side.name]
+        members = tuple((roll.cast, index, roll.id(index)) for roll in side_rolls for index in roll.chosen)
+        side_films = Sequences(recipe=recipe, side=side.name, members=members).films()
+        for film in side_films:
+            films += film.artifact().id not in in_lake
             frames[side.name].append(film.cast.simulation.time.frames)
     return Plan(
         recipe=recipe,
         sequences={side.name: side.sequences for side in recipe.sides},
         films={side.name: side.renders for side in recipe.sides},
         clips={side: sum(count // CLIP_FRAMES for count in counts) for side, counts in frames.items()},
-        missing_sequences=sum(len(roll.pending(known)) for roll in rolls),
+        missing_sequences=sum(len(roll.pending(in_lake)) for roll in rolls),
         missing_films=films,
         rates=rates or measure(recipe, _typical([roll.cast for roll in rolls]), device=device),
         workers=workers,
@@ -138,8 +138,8 @@ def plan(
 
 
 def length(recipe: DatasetRecipe, lake: Lake, *, workers: int, branch: str = "main", device: str = "cpu") -> str | None:
-    """What a build makes, and for about how long; None where nothing is missing. Paces are measured where usual ones
-    give more than a few minutes.
+    """Describes what a build makes and for about how long; None where nothing is missing. Rates are measured where the
+    typical ones predict more than a few minutes.
 
     Raises:
         FlagdataError: the measurement failed, as the build would.
@@ -148,51 +148,51 @@ def length(recipe: DatasetRecipe, lake: Lake, *, workers: int, branch: str = "ma
     usual = plan(recipe, lake, workers=workers, branch=branch, rates=_usual(typical))
     if not usual.missing_sequences and not usual.missing_films:
         return None
-    found = usual if usual.seconds < _BRIEF else replace(usual, rates=measure(recipe, typical, device=device))
+    estimate = usual if usual.seconds < _BRIEF else replace(usual, rates=measure(recipe, typical, device=device))
     return announced(
-        f"building {found.missing_sequences} sequences and {found.missing_films} films",
-        found.seconds * workers,
+        f"building {estimate.missing_sequences} sequences and {estimate.missing_films} films",
+        estimate.seconds * workers,
         workers=workers,
         kept="an interrupted build goes on where its last commit was",
     )
 
 
 def _usual(cast: Cast) -> Rates:
-    """What sequences and films of the raster renderer take; bytes are not known."""
-    time_ = cast.simulation.time
+    """Returns typical rates for sequences and films of the raster renderer; bytes are not known."""
+    spec = cast.simulation.time
     return Rates(
-        sequence_seconds=time_.total / time_.rate / _USUAL_PACE,
-        film_seconds=time_.frames / _USUAL_FRAMES,
+        sequence_seconds=spec.total / spec.rate / _USUAL_PACE,
+        film_seconds=spec.frames / _USUAL_FRAMES,
         sequence_bytes=0.0,
         film_bytes=0.0,
     )
 
 
-def _typical(every: Sequence[Cast]) -> Cast:
-    """Of all sequences those whose number of frames is nearest to the mean."""
-    frames = [cast.simulation.time.frames for cast in every]
+def _typical(sequences: Sequence[Cast]) -> Cast:
+    """Returns the sequences whose number of frames is nearest to the mean."""
+    frames = [cast.simulation.time.frames for cast in sequences]
     mean = sum(frames) / len(frames)
-    return min(every, key=lambda cast: abs(cast.simulation.time.frames - mean))
+    return min(sequences, key=lambda cast: abs(cast.simulation.time.frames - mean))
 
 
 def measure(recipe: DatasetRecipe, cast: Cast, *, device: str = "cpu") -> Rates:
-    """Simulate and film two short sequences, and go on in proportion to their frames. Every material has its share.
+    """Simulates and films two short sequences of every material, and extrapolates in proportion to their frames.
 
     Raises:
         FlagdataError: no sequence can be simulated, or a renderer that is not installed or fails.
     """
-    few, more = (_shortened(cast, frames) for frames in (_FEW, _MORE))
-    whole = cast.simulation.time
+    shorter, longer = (_shortened(cast, frames) for frames in (_FEW, _MORE))
+    spec = cast.simulation.time
     bases = range(len(cast.simulation.material.bases))
     with one_thread():
-        runs = [(_simulated(few, base, device), _simulated(more, base, device)) for base in bases]
+        runs = [(_simulated(shorter, base, device), _simulated(longer, base, device)) for base in bases]
         films = [_filmed(recipe, cast, run, device) for run in runs[0]]
-    sequences = [_line(a.seconds, b.seconds, whole.total) for a, b in runs]
+    sequences = [_line(a.seconds, b.seconds, spec.total) for a, b in runs]
     return Rates(
         sequence_seconds=sum(sequences) / len(sequences),
-        film_seconds=_line(films[0][0], films[1][0], whole.frames),
-        sequence_bytes=_line(_stored(runs[0][0].sequence), _stored(runs[0][1].sequence), whole.frames),
-        film_bytes=_line(films[0][1], films[1][1], whole.frames),
+        film_seconds=_line(films[0][0], films[1][0], spec.frames),
+        sequence_bytes=_line(_stored(runs[0][0].sequence), _stored(runs[0][1].sequence), spec.frames),
+        film_bytes=_line(films[0][1], films[1][1], spec.frames),
     )
 
 
@@ -236,13 +236,13 @@ def _timed(function: Callable[[], T]) -> tuple[T, float]:
 
 
 def _stored(sequence: MeshSequence) -> float:
-    """What a sequence takes in the lake [B]."""
+    """Measures the size of a sequence in the lake [B]."""
     with tempfile.TemporaryDirectory(prefix="flagdata-plan-") as folder:
         path = Path(folder) / "sequence.zarr"
         write_meshes(path, sequence)
         return sum(file.stat().st_size for file in files_of(path))
 
 
-def _line(few: float, more: float, frames: int) -> float:
-    """What `frames` frames take, where two numbers of them take these; never less than the larger one."""
-    return max(few, more, few + (more - few) / (_MORE - _FEW) * (frames - _FEW))
+def _line(of_few: float, of_more: float, frames: int) -> float:
+    """Extrapolates linearly to `frames` frames from two smaller numbers of them; never below the larger of the two."""
+    return max(of_few, of_more, of_few + (of_more - of_few) / (_MORE - _FEW) * (frames - _FEW))

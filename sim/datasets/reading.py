@@ -99,19 +99,19 @@ class _SessionsSide(_Side):
 
 
 def load(source: str) -> DatasetRecipe:
-    """The recipe of that name in the catalog, or of a `.toml` file.
+    """Reads the recipe of that name in the catalog, or of a `.toml` file.
 
     Raises:
         NotFoundError: no such file.
         UnknownNameError: no such recipe; a key, name or option that is not known.
         InputError, UsageError: a value that does not fit.
     """
-    found = DATASETS.find(source)
-    return parse(found.text, name=found.name, folder=found.folder, where=found.where)
+    file = DATASETS.find(source)
+    return parse(file.text, name=file.name, folder=file.folder, where=file.where)
 
 
 def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
-    """A recipe from its text.
+    """Reads a recipe from its text.
 
     Args:
         folder: that a scene's path is relative to.
@@ -146,7 +146,7 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
 
 
 def with_renderer(recipe: DatasetRecipe, renderer: str) -> DatasetRecipe:
-    """The recipe with another renderer, which is another data set and has another name.
+    """Returns the recipe with another renderer, which is another data set and has another name.
 
     Raises:
         UnknownNameError: no renderer of that name.
@@ -176,7 +176,7 @@ def _groups(content: Mapping[str, Any], simulation: Simulation, *, where: str) -
 
 
 def _sides(sides: Mapping[str, Any], sessions: SessionSpec | None, *, where: str) -> tuple[Side, ...]:
-    found: list[Side] = []
+    specs: list[Side] = []
     for name, content in sides.items():
         inside = f"{where} [{name}]"
         side = read(_Side if sessions is None else _SessionsSide, content, where=inside)
@@ -189,10 +189,10 @@ def _sides(sides: Mapping[str, Any], sessions: SessionSpec | None, *, where: str
             raise InputError(
                 f"sessions is {dealt}, of {side.sequences} sequences", where=inside, fix="have fewer sessions"
             )
-        found.append(Side(name=name, sequences=side.sequences, renders=renders, sessions=dealt))
-    if not found:
+        specs.append(Side(name=name, sequences=side.sequences, renders=renders, sessions=dealt))
+    if not specs:
         raise InputError("no sides are given", where=where, fix="add [sides.train] with sequences and renders")
-    return tuple(found)
+    return tuple(specs)
 
 
 def _camera(content: Mapping[str, Any], *, where: str) -> CameraSpec:
@@ -205,18 +205,18 @@ def _camera(content: Mapping[str, Any], *, where: str) -> CameraSpec:
 
 def _anemometer(content: Mapping[str, Any], *, where: str) -> AnemometerSpec:
     effects: dict[str, dict[str, Quantity]] = {}
-    known = [name for name in SENSOR_EFFECTS if issubclass(SENSOR_EFFECTS[name], AnemometerEffect)]
+    offered = [name for name in SENSOR_EFFECTS if issubclass(SENSOR_EFFECTS[name], AnemometerEffect)]
     chosen = value(
-        Mapping[Annotated[str, Named("effect of an anemometer", known)], Mapping[str, Any]],
+        Mapping[Annotated[str, Named("effect of an anemometer", offered)], Mapping[str, Any]],
         content.get("effects", {}),
         key="effects",
         where=where,
     )
-    for name, given in chosen.items():
-        described = SENSOR_EFFECTS[name].parameters()
-        types = {key.replace("_", "-"): within(Quantity, *entry.admissible) for key, entry in described.items()}
-        values = entries(types, given, where=f"{where} [effects] [{name}]")
-        effects[name] = {key: values.get(key.replace("_", "-"), entry.null) for key, entry in described.items()}
+    for name, stated_values in chosen.items():
+        schema = SENSOR_EFFECTS[name].parameters()
+        types = {key.replace("_", "-"): within(Quantity, *entry.admissible) for key, entry in schema.items()}
+        values = entries(types, stated_values, where=f"{where} [effects] [{name}]")
+        effects[name] = {key: values.get(key.replace("_", "-"), entry.null) for key, entry in schema.items()}
     return read(AnemometerSpec, content, where=where, effects=effects)
 
 
@@ -231,10 +231,10 @@ def _check(recipe: DatasetRecipe, *, where: str) -> None:
             where=where,
             fix=f"have at most {SAMPLES_LIMIT}: lower its rate, or `before`",
         )
-    known = time.settle if changing(recipe.simulation) else anemometer.before
-    if anemometer.truth is Truth.MEASURED and known < TRUTH_WINDOW:
+    wind_before = time.settle if changing(recipe.simulation) else anemometer.before
+    if anemometer.truth is Truth.MEASURED and wind_before < TRUTH_WINDOW:
         raise UsageError(
-            f"the anemometer has {known:g} s of wind before the first frame, ground truth is the mean of the "
+            f"the anemometer has {wind_before:g} s of wind before the first frame, ground truth is the mean of the "
             f"{TRUTH_WINDOW:g} s before a clip's end",
             where=where,
             fix=f"let the scene settle for {TRUTH_WINDOW:g} s" if changing(recipe.simulation) else "raise before",
@@ -242,5 +242,5 @@ def _check(recipe: DatasetRecipe, *, where: str) -> None:
 
 
 def changing(simulation: Simulation) -> bool:
-    """Whether the wind of a scene changes with time or place, so that it is known only while it is simulated."""
+    """Returns whether the wind of a scene changes with time or place: then it is known only while it is simulated."""
     return any(issubclass(EFFECTS[name], (WindEffect, FlowEffect)) for name in simulation.effects)

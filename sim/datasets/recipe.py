@@ -156,11 +156,11 @@ class DatasetRecipe:
     groups: GroupSpec | None = None
 
     def side(self, name: str) -> Side:
-        """The side of that name."""
+        """Returns the side of that name."""
         return next(side for side in self.sides if side.name == name)
 
     def filming(self) -> dict[str, Any]:
-        """All that shapes a recording beside its mesh sequence and its seed, as JSON."""
+        """Returns all that shapes a recording besides its mesh sequence and its seed, as JSON."""
         camera, anemometer = self.camera, self.anemometer
         return {
             "film": RECIPE_VERSION,
@@ -188,7 +188,7 @@ class DatasetRecipe:
         }
 
     def identity(self) -> dict[str, Any]:
-        """All that shapes the data set, as JSON."""
+        """Returns all that shapes the data set, as JSON."""
         return {
             "dataset": RECIPE_VERSION,
             "name": self.name,
@@ -207,7 +207,7 @@ class DatasetRecipe:
 
 
 def _grouped(groups: GroupSpec | None, batch: int) -> dict[str, Any]:
-    """What is drawn by batches, and their size, where anything is."""
+    """Describes what is drawn per batch, and the batch size; nothing where there are no groups."""
     if groups is None:
         return {}
     return {
@@ -228,5 +228,5 @@ def _coding(camera: CameraSpec) -> dict[str, Any]:
 
 @cache
 def _content(folder: Path) -> str:
-    """SHA-256 of the names and bytes of a folder's photographs."""
+    """Hashes the names and bytes of a folder's photographs (SHA-256)."""
     return digest(canonical({name: file_hash(folder / name) for name in Photos.of(folder).members}))

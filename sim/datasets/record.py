@@ -46,13 +46,13 @@ class Content:
 
 
 def record_bytes(content: Content) -> bytes:
-    """The file. The code's version is not in it but in the catalog: the same film gives the same bytes."""
+    """Writes the file. The code's version is in the catalog, not in the file: the same film gives the same bytes."""
     with tempfile.TemporaryDirectory(prefix="flagdata-film-") as folder:
-        whole = Path(folder) / "whole.mcap"
+        padded = Path(folder) / "whole.mcap"
         _write(Path(folder) / "bare.mcap", content, fill=0)
         size = (Path(folder) / "bare.mcap").stat().st_size
-        _write(whole, content, fill=-size % content.camera.frame_slot)
-        return whole.read_bytes()
+        _write(padded, content, fill=-size % content.camera.frame_slot)
+        return padded.read_bytes()
 
 
 def _write(path: Path, content: Content, *, fill: int) -> None:
@@ -85,16 +85,16 @@ def _write(path: Path, content: Content, *, fill: int) -> None:
 
 
 def parameters_of(member: Member, zeta: RenderParameters, drawn: Mapping[str, float], truth: Truth) -> dict[str, float]:
-    """θ, ζ and what the instruments drew, numbers by name in SI; lists as "name.0", "name.1", …
+    """Returns θ, ζ and what the instruments drew, numbers by name in SI; lists as "name.0", "name.1", …
 
     Where the anemometer is to be believed, the simulated mean wind has another name than ground truth goes by.
     """
-    found: dict[str, float] = {}
+    numbers: dict[str, float] = {}
     for name, value in member.parameters.items():
-        found |= _numbers(MEAN_WIND if name == "wind_speed" and truth is Truth.MEASURED else name, value)
+        numbers |= _numbers(MEAN_WIND if name == "wind_speed" and truth is Truth.MEASURED else name, value)
     for name, value in zeta.as_dict().items():
-        found |= _numbers(f"render.{name}", value)
-    return {**found, **drawn}
+        numbers |= _numbers(f"render.{name}", value)
+    return {**numbers, **drawn}
 
 
 def _numbers(name: str, value: Parameter) -> dict[str, float]:
@@ -106,6 +106,6 @@ def _numbers(name: str, value: Parameter) -> dict[str, float]:
 
 
 def texts_of(member: Member, zeta: RenderParameters) -> dict[str, str]:
-    """The parameters that are names."""
+    """Returns the parameters that are names."""
     drawn = {f"render.{name}": value for name, value in zeta.as_dict().items()}
     return {name: value for name, value in {**member.parameters, **drawn}.items() if isinstance(value, str)}

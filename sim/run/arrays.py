@@ -22,12 +22,12 @@ PLAIN: Content = {"material": {"name": "camel-ponte-roma"}}
 """What is simulated where no recipe is named: a flag of a measured knit."""
 
 
-def simulated(recipe: str | Content | None, given: Content, *, device: str, workers: int) -> Simulated:
-    """The members of a recipe with what is given beside it.
+def simulated(recipe: str | Content | None, overrides: Content, *, device: str, workers: int) -> Simulated:
+    """Simulates the members of a recipe, with entries of the caller's in place of its own.
 
     Args:
-        recipe: name of a recipe of the catalog, path of a TOML file, its content, or None for what is given alone.
-        given: entries and tables that are put in place of the recipe's, a table's entries one by one.
+        recipe: name of a recipe of the catalog, path of a TOML file, its content, or None for the overrides alone.
+        overrides: entries and tables put in place of the recipe's, a table's entries one by one.
 
     Raises:
         FlagdataError: see `flagdata.simulate`.
@@ -35,41 +35,47 @@ def simulated(recipe: str | Content | None, given: Content, *, device: str, work
     if workers < 1:
         raise UsageError(f"{workers} workers", where="workers", fix="give at least one")
     check_device(device)
-    crew = Crew(recipe_of(recipe, given))
+    crew = Crew(recipe_of(recipe, overrides))
     steppers = [Stepper.of(crew, base) for base in range(len(crew.recipe.material.bases))]
     waiting = batches(crew, steppers, range(crew.recipe.count))
-    found = [one for _, some in outcomes(crew, waiting, device=device, workers=workers, progress=None) for one in some]
-    return _answer(crew.recipe, sorted(found, key=lambda one: one.member.index))
+    members = [
+        outcome
+        for _, batch in outcomes(crew, waiting, device=device, workers=workers, progress=None)
+        for outcome in batch
+    ]
+    return _answer(crew.recipe, sorted(members, key=lambda outcome: outcome.member.index))
 
 
-def recipe_of(recipe: str | Content | None, given: Content) -> Recipe:
-    """The recipe with what is given beside it; as `simulated`."""
+def recipe_of(recipe: str | Content | None, overrides: Content) -> Recipe:
+    """Reads a recipe and puts the overrides in place of its entries; as `simulated`."""
     name, folder, where = "simulation", Path(), "recipe"
     if isinstance(recipe, str):
-        found = SCENES.find(recipe)
-        name, folder, where = found.name, found.folder, found.where
-        recipe = parsed(found.text, where=found.where)
+        file = SCENES.find(recipe)
+        name, folder, where = file.name, file.folder, file.where
+        recipe = parsed(file.text, where=file.where)
     content = dict(PLAIN if recipe is None else recipe)
-    for key, value in given.items():
-        own = content.get(key)
-        content[key] = {**own, **value} if isinstance(own, Mapping) and isinstance(value, Mapping) else value
+    for key, value in overrides.items():
+        entry = content.get(key)
+        content[key] = {**entry, **value} if isinstance(entry, Mapping) and isinstance(value, Mapping) else value
     return of_content(content, name=name, folder=folder, where=where)
 
 
-def _answer(recipe: Recipe, found: list[Outcome]) -> Simulated:
-    whole = [one for one in found if one.sequence is not None]
-    failed = {one.member.index: one.failure[1] for one in found if one.failure is not None}
-    if not whole:
+def _answer(recipe: Recipe, members: list[Outcome]) -> Simulated:
+    complete = [member for member in members if member.sequence is not None]
+    failed = {member.member.index: member.failure[1] for member in members if member.failure is not None}
+    if not complete:
         raise InputError(
-            f"none of {len(found)} members was simulated to the end: {next(iter(failed.values()))}",
+            f"none of {len(members)} members was simulated to the end: {next(iter(failed.values()))}",
             where=recipe.name,
             fix="declare more damping, or a smaller step",
         )
-    names = [name for name, value in whole[0].member.parameters.items() if isinstance(value, float)]
+    names = [name for name, value in complete[0].member.parameters.items() if isinstance(value, float)]
     return Simulated(
         name=recipe.name,
-        members=tuple(one.sequence for one in whole if one.sequence is not None),
+        members=tuple(member.sequence for member in complete if member.sequence is not None),
         failed=failed,
-        wind=np.stack([one.wind for one in whole]),
-        parameters={name: np.array([one.member.parameters[name] for one in whole], dtype=np.float64) for name in names},
+        wind=np.stack([member.wind for member in complete]),
+        parameters={
+            name: np.array([member.member.parameters[name] for member in complete], dtype=np.float64) for name in names
+        },
     )

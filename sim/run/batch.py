@@ -100,7 +100,7 @@ class Monitor:
         self.compressions.append((strains[:, 0].clamp(max=0) ** 2).mean(0).sqrt().cpu())
 
     def of(self, member: int) -> Diagnosis:
-        """The diagnosis of a member by its place in the batch."""
+        """Returns the diagnosis of the member at an index of the batch."""
         names = self.energies[0] if self.energies else {}
         return Diagnosis(
             energies={name: tuple(float(e[name][member]) for e in self.energies) for name in names},
@@ -110,7 +110,7 @@ class Monitor:
 
 
 def principal_strains(cloth: Cloth, position: Tensor) -> Tensor:
-    """Principal stretches less 1: (face, 2, batch), the smaller first."""
+    """Computes principal stretches less 1: (face, 2, batch), the smaller first."""
     e = membrane.strain(cloth, position)
     c00, c11, c01 = 2 * e.g00 + 1, 2 * e.g11 + 1, 2 * e.g01
     middle, half = (c00 + c11) / 2, (((c00 - c11) / 2) ** 2 + c01**2).sqrt()
@@ -163,7 +163,7 @@ class Stepper:
 
     @classmethod
     def of(cls, crew: Crew, base: int = 0) -> Stepper:
-        """The method and the steps of a recipe for the members of one of its materials, by its place among them.
+        """Chooses the method and the steps of a recipe for the members of the material at an index.
 
         Raises:
             UsageError: a forced step beyond the stability limit of a member at the ends of the recipe's ranges; a
@@ -195,7 +195,7 @@ class Stepper:
         return advance(system, state, duration, steps=self.steps, backend=self.recipe.integrator.backend)
 
     def unstable(self, system: System) -> Tensor:
-        """(batch,) whether a member's own limit is below the step."""
+        """Returns whether each member's stability limit is below the step, (batch,)."""
         if self.method is not None:
             return torch.zeros(system.cloth.batch, dtype=torch.bool)
         damping = system.cloth.damping
@@ -212,7 +212,7 @@ def run(
     device: torch.device | str = "cpu",
     progress: Callable[[int], object] | None = None,
 ) -> list[Outcome]:
-    """Simulate some members of one material together.
+    """Simulates members of one material together.
 
     The batch always has `size` members, the last repeated as often as it takes: results then depend on a member and
     the size alone, to the last bit.
@@ -224,37 +224,39 @@ def run(
     time = crew.recipe.time
     system, state = crew.assemble(filled, device=device)
     batch = Batch(system=system, state=state, integrator=stepper, divergence=Divergence.RESTART)
-    monitor, kept, winds = Monitor(), [], []
+    monitor, frames, winds = Monitor(), [], []
     with torch.no_grad():
         unstable = torch.nonzero(stepper.unstable(system)).flatten().tolist()
         for frame, state in enumerate(batch.states(range(time.total), time.rate)):
             if frame >= time.settling:
                 monitor.look(system, state)
-                kept.append(state.position.to("cpu", torch.float32))
+                frames.append(state.position.to("cpu", torch.float32))
                 winds.append(system.wind.velocity(state.time).expand(3, size).double().cpu().numpy())
             if progress is not None:
                 progress(1)
     failures = dict.fromkeys(
         unstable, ("unstable-step", f"its stable step is below the recipe's, {stepper.step:.3g} s")
     )
-    failures |= {place: ("diverged", f"it diverged before {seen:.3f} s") for place, seen in batch.diverged.items()}
-    positions, blown = torch.stack(kept).numpy(), np.stack(winds)
+    failures |= {
+        index: ("diverged", f"it diverged before {last_good:.3f} s") for index, last_good in batch.diverged.items()
+    }
+    positions, velocities = torch.stack(frames).numpy(), np.stack(winds)
     first = [round((time.settling + i) / time.rate * NANOSECONDS) for i in range(time.frames)]
     outcomes: list[Outcome] = []
-    for place, member in enumerate(members):
-        diagnosis = monitor.of(place)
-        failure = failures.get(place) or _crumpled(diagnosis)
+    for index, member in enumerate(members):
+        diagnosis = monitor.of(index)
+        failure = failures.get(index) or _crumpled(diagnosis)
         sequence = None
         if failure is None:
             sequence = MeshSequence(
                 time=np.array(first, dtype=np.int64),
-                positions=np.ascontiguousarray(positions[..., place]),
+                positions=np.ascontiguousarray(positions[..., index]),
                 faces=crew.mesh.faces.astype(np.int32),
                 rest=crew.mesh.rest.astype(np.float32),
-                attributes=_attributes(crew, stepper, member, diagnosis, blown[..., place]),
+                attributes=_attributes(crew, stepper, member, diagnosis, velocities[..., index]),
             )
         outcomes.append(
-            Outcome(member=member, sequence=sequence, wind=blown[..., place], diagnosis=diagnosis, failure=failure)
+            Outcome(member=member, sequence=sequence, wind=velocities[..., index], diagnosis=diagnosis, failure=failure)
         )
     return outcomes
 

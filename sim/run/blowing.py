@@ -37,9 +37,9 @@ class WindSamples:
     artifact: str = ""
 
     def mean(self, frames: int, rate: float) -> FloatArray:
-        """Returns the mean (3,) at the frames that are kept [m/s]."""
-        kept = np.arange(frames) / rate
-        return np.stack([np.interp(kept, self.times, part).mean() for part in self.velocity.T])
+        """Returns the mean (3,) over the recorded frames [m/s]."""
+        frame_times = np.arange(frames) / rate
+        return np.stack([np.interp(frame_times, self.times, component).mean() for component in self.velocity.T])
 
     def wind(self, first: float, batch: int, like: Tensor) -> SampledWind:
         """Returns the wind of a batch on the clock of its run; the first and the last sample last on.
@@ -74,10 +74,10 @@ def source(content: Mapping[str, Any], *, where: str) -> str | None:
     Raises:
         UsageError: a speed beside them, or both.
     """
-    stated = [key for key in ("speed", *TYPES) if key in content]
-    if len(stated) > 1:
-        raise UsageError(f"{' and '.join(stated)} are given", where=where, fix="keep one of them")
-    return stated[0] if stated and stated[0] in TYPES else None
+    sources = [key for key in ("speed", *TYPES) if key in content]
+    if len(sources) > 1:
+        raise UsageError(f"{' and '.join(sources)} are given", where=where, fix="keep one of them")
+    return sources[0] if sources and sources[0] in TYPES else None
 
 
 def read(values: Mapping[str, Any], *, before: float, duration: float, logs: Logs | None, where: str) -> WindSamples:

@@ -88,15 +88,15 @@ class Crew:
         return held.full_hoist(self.mesh.rest) if hoist else held.corners(self.mesh.rest)
 
     def seed(self, index: int) -> int:
-        """The seed of a member."""
+        """Returns the seed of a member."""
         return child_seed(self.recipe.seed, "member", index)
 
     def base(self, index: int) -> int:
-        """The place of a member's material among the recipe's."""
+        """Draws which of the recipe's materials a member has, as an index."""
         return int(stream(self.seed(index), "material", "names").random() * len(self.recipe.material.bases))
 
     def member(self, index: int) -> Member:
-        """A member, which depends on the recipe's seed and the index alone.
+        """Draws a member, which depends on the recipe's seed and the index alone.
 
         Raises:
             InputError: what it drew makes no scene.
@@ -107,15 +107,15 @@ class Crew:
             return quantity.at(stream(seed, *path).random()) if isinstance(quantity, Range) else quantity
 
         spec, wind = self.recipe.material, self.recipe.wind
-        place = self.base(index)
-        base = spec.bases[place]
-        each = _factors(spec, stream(seed, "material", "bending-factors").random(math.prod(BENDING_SHAPE)))
+        material_index = self.base(index)
+        base = spec.bases[material_index]
+        factors = _factors(spec, stream(seed, "material", "bending-factors").random(math.prod(BENDING_SHAPE)))
         material = _material(
             base,
             density=drawn(_of(spec.density, base.density), "material", "density")
             * drawn(spec.density_factor, "material", "density-factor"),
             stretching=drawn(spec.stretching, "material", "stretching-factor"),
-            bending=drawn(spec.bending, "material", "bending-factor") * each,
+            bending=drawn(spec.bending, "material", "bending-factor") * factors,
             damping=drawn(_of(spec.damping, base.damping), "material", "damping"),
         )
         speed, toward = drawn(wind.speed, "wind", "speed"), drawn(wind.toward, "wind", "toward")
@@ -146,10 +146,10 @@ class Crew:
             "bending": tuple(material.bending.ravel().tolist()),
         }
         parameters |= {f"{name}.{key}": value for name, chosen in effects.items() for key, value in chosen.items()}
-        return Member(index=index, seed=seed, base=place, scene=scene, parameters=parameters, effects=effects)
+        return Member(index=index, seed=seed, base=material_index, scene=scene, parameters=parameters, effects=effects)
 
     def assemble(self, members: Sequence[Member], *, device: torch.device | str = "cpu") -> tuple[System, State]:
-        """The batch of these members with their effects, and its start.
+        """Assembles the batch of these members with their effects, and its start.
 
         Raises:
             UsageError: an effect that does not fit.
@@ -160,12 +160,12 @@ class Crew:
             system = replace(system, wind=samples.wind(self.recipe.time.first, len(members), system.anchors))
         return apply([self._effect(name, members) for name in self.recipe.effects], system, state)
 
-    def corners(self, place: int) -> tuple[System, State]:
-        """Members of a material at the ends of all ranges: where its stable step is found, whatever they draw."""
+    def corners(self, material_index: int) -> tuple[System, State]:
+        """Assembles members of a material at the ends of all ranges: a step that suits them suits all members."""
         spec, wind = self.recipe.material, self.recipe.wind
         stiffest = np.full(BENDING_SHAPE, ends(spec.bending)[1] * ends(spec.bending_each)[1])
         members: list[Member] = []
-        base = spec.bases[place]
+        base = spec.bases[material_index]
         for end in (0, 1):
             material = _material(
                 base,
@@ -188,7 +188,7 @@ class Crew:
                 name: {key: ends(value)[end] for key, value in effect.parameters.items()}
                 for name, effect in self.recipe.effects.items()
             }
-            members.append(Member(index=end, seed=0, base=place, scene=scene, parameters={}, effects=effects))
+            members.append(Member(index=end, seed=0, base=material_index, scene=scene, parameters={}, effects=effects))
         return self.assemble(members)
 
     def _start(self, seed: int) -> FloatArray:
@@ -197,7 +197,7 @@ class Crew:
         return roughened(flat, self.handles, stream(seed, "start"), spec.start_noise) if spec.start_noise else flat
 
     def _flat(self, spec: SceneSpec) -> FloatArray:
-        """(vertex, 3) where the cloth starts, before its noise [m]."""
+        """Returns where the cloth starts, before its noise, (vertex, 3) [m]."""
         if spec.arcsim is not None:
             return spec.arcsim.scene.position
         if spec.given is None:
@@ -220,7 +220,7 @@ class Crew:
         return effect
 
     def _gusty(self, effect: Gusts, spec: EffectSpec, members: Sequence[Member]) -> Gusts:
-        """Each member's gusts from its own stream, whatever the others draw."""
+        """Draws each member's gusts from its own stream, whatever the others draw."""
         time = self.recipe.time
         duration = max(time.settle + (time.frames + 1) / time.rate, 2 / _GUST_RATE)
         series: list[Gusts] = []

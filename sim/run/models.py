@@ -21,7 +21,7 @@ from sim.run.recipe import Recipe
 
 
 def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
-    """A recipe from a file or the catalog, as `sim.run.reading.load`, or a model of the lake by its name or id.
+    """Reads a recipe from a file or the catalog, as `sim.run.reading.load`, or a model of the lake by its name or id.
 
     Raises:
         UnknownNameError: neither a recipe nor a model has that name.
@@ -31,23 +31,23 @@ def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
     if local_path(source).suffix in (".toml", ".json") or source in reading.SCENES.names():
         return reading.load(source, logs=partial(_log, lake, branch))
     rows = lake.rows({"kind": Kind.MODEL}, at=branch, columns=OF_RESULTS).to_pylist()
-    found = [row["artifact"] for row in meant(rows, source)]
-    if len(found) > 1:
-        raise NotFoundError(f"{len(found)} models are meant by {source!r}", where=str(lake.path), fix=_one_of(found))
-    if not found:
+    ids = [row["artifact"] for row in meant(rows, source)]
+    if len(ids) > 1:
+        raise NotFoundError(f"{len(ids)} models are meant by {source!r}", where=str(lake.path), fix=_one_of(ids))
+    if not ids:
         names = [*reading.SCENES.names(), *(row["name"] for row in rows)]
         raise UnknownNameError.of("recipe or model", source, names)
-    return of_artifact(lake.artifact(found[0], at=branch))
+    return of_artifact(lake.artifact(ids[0], at=branch))
 
 
 def _log(lake: Lake, branch: str, name: str) -> tuple[str, WindSeries]:
     rows = lake.rows({"kind": [Kind.WIND, Kind.RECORDING]}, at=branch, columns=COLUMNS).to_pylist()
-    found = [row["artifact"] for row in meant(rows, name, kinds=(Kind.WIND,))]
-    if len(found) > 1:
-        raise NotFoundError(f"{len(found)} logs are meant by {name!r}", where=str(lake.path), fix=_one_of(found))
-    if not found:
+    ids = [row["artifact"] for row in meant(rows, name, kinds=(Kind.WIND,))]
+    if len(ids) > 1:
+        raise NotFoundError(f"{len(ids)} logs are meant by {name!r}", where=str(lake.path), fix=_one_of(ids))
+    if not ids:
         raise UnknownNameError.of("log", name, [row["name"] for row in rows], where=str(lake.path))
-    artifact = lake.artifact(found[0], at=branch)
+    artifact = lake.artifact(ids[0], at=branch)
     series = None if artifact.object is None else open_parent(lake, artifact.object).wind()
     if series is None:
         raise InputError("the record has no wind", where=f"artifact {artifact.id}", fix="name a wind artifact")
@@ -55,7 +55,7 @@ def _log(lake: Lake, branch: str, name: str) -> tuple[str, WindSeries]:
 
 
 def of_artifact(artifact: Artifact) -> Recipe:
-    """The recipe of a model.
+    """Returns the recipe of a model.
 
     Raises:
         CorruptError: a row of another kind, or without parameters.
@@ -68,5 +68,5 @@ def of_artifact(artifact: Artifact) -> Recipe:
     return replace(recipe, model=artifact.id)
 
 
-def _one_of(found: Iterable[str]) -> str:
-    return f"give one's id: {', '.join(identity[:SHORT] for identity in found)}"
+def _one_of(ids: Iterable[str]) -> str:
+    return f"give one's id: {', '.join(identity[:SHORT] for identity in ids)}"

@@ -92,9 +92,9 @@ def simulate(
     crew = Crew(recipe)
     identity = recipe.identity()
     ids = {index: member_artifact(recipe, identity, index, crew.seed(index)).id for index in range(recipe.count)}
-    known = whole(lake, ids.values(), branch=branch)
-    existing = [ids[index] for index in ids if ids[index] in known]
-    pending = [index for index in ids if ids[index] not in known]
+    in_lake = whole(lake, ids.values(), branch=branch)
+    existing = [ids[index] for index in ids if ids[index] in in_lake]
+    pending = [index for index in ids if ids[index] not in in_lake]
     steppers = [Stepper.of(crew, base) for base in range(len(recipe.material.bases))]
     if progress is not None:
         progress(len(existing))
@@ -107,9 +107,9 @@ def simulate(
         good = [o for o in done if o.sequence is not None]
         failed += [failure_of(o) for o in done if o.failure is not None]
         if good:
-            done_now = publish(lake, recipe, good, step=stepper.step, branch=branch)
-            added += done_now.added
-            healed |= done_now.healed
+            commit = publish(lake, recipe, good, step=stepper.step, branch=branch)
+            added += commit.added
+            healed |= commit.healed
     seconds = time.perf_counter() - begun
     return RunReport(
         added=tuple(added),
@@ -123,19 +123,19 @@ def simulate(
 
 
 def whole(lake: Lake, artifacts: Collection[str], *, branch: str) -> frozenset[str]:
-    """Those of some artifacts that a branch has, and whose objects are neither damaged nor missing."""
-    there = lake.rows({"artifact": list(artifacts)}, at=branch, columns=["artifact"])["artifact"].to_pylist()
-    return frozenset(there) - unsound(lake, there, at=branch)
+    """Returns those of some artifacts that a branch has and whose objects are neither damaged nor missing."""
+    present = lake.rows({"artifact": list(artifacts)}, at=branch, columns=["artifact"])["artifact"].to_pylist()
+    return frozenset(present) - unsound(lake, present, at=branch)
 
 
 def batches(crew: Crew, steppers: Sequence[Stepper], pending: Sequence[int]) -> list[tuple[Stepper, list[int]]]:
-    """Members of one material together, since each material has its own steps."""
+    """Groups members by material, since each material has its own steps."""
     size = crew.recipe.batch
-    found: list[tuple[Stepper, list[int]]] = []
+    groups: list[tuple[Stepper, list[int]]] = []
     for base, stepper in enumerate(steppers):
-        own = [index for index in pending if crew.base(index) == base]
-        found += [(stepper, own[first : first + size]) for first in range(0, len(own), size)]
-    return found
+        indices = [index for index in pending if crew.base(index) == base]
+        groups += [(stepper, indices[first : first + size]) for first in range(0, len(indices), size)]
+    return groups
 
 
 def outcomes(
@@ -146,13 +146,13 @@ def outcomes(
     workers: int,
     progress: Progress | None,
 ) -> Iterator[tuple[Stepper, list[Outcome]]]:
-    """The batches' outcomes as they come, one batch waiting beside those that run.
+    """Yields the batches' outcomes as they come, one batch waiting beside those that run.
 
     Leaving the iteration early stops what is still running.
     """
     ticks = _Ticks(progress, crew.recipe.time.total)
 
-    def one(stepper: Stepper, indices: list[int]) -> tuple[Stepper, list[Outcome]]:
+    def simulate_batch(stepper: Stepper, indices: list[int]) -> tuple[Stepper, list[Outcome]]:
         members = [crew.member(index) for index in indices]
         tick = ticks.of_batch(len(members))
         return stepper, run(crew, stepper, members, size=crew.recipe.batch, device=device, progress=tick)
@@ -163,12 +163,12 @@ def outcomes(
     executor = ThreadPoolExecutor(max_workers=workers, thread_name_prefix="simulate")
     with one_thread():
         try:
-            running = {executor.submit(one, *batch) for batch in islice(waiting, workers + 1)}
+            running = {executor.submit(simulate_batch, *batch) for batch in islice(waiting, workers + 1)}
             while running:
                 done, running = wait(running, return_when=FIRST_COMPLETED)
                 for future in done:
                     yield future.result()
-                    running |= {executor.submit(one, *batch) for batch in islice(waiting, 1)}
+                    running |= {executor.submit(simulate_batch, *batch) for batch in islice(waiting, 1)}
         finally:
             ticks.stop()
             executor.shutdown(cancel_futures=True)
@@ -176,7 +176,7 @@ def outcomes(
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Torch on one thread: the order of its sums, and so their last bits, depends on how many it has."""
+    """Limits torch to one thread: the order of its sums, and so their last bits, depends on how many it has."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -204,7 +204,7 @@ def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[Outcome], *, step: fl
 
 
 def member_artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, seed: int) -> Artifact:
-    """The member's row without its result; its identity is complete."""
+    """Returns the member's row without its result; its identity is complete."""
     return Artifact(
         kind=Kind.MESHES,
         name=f"{recipe.name}-{index:05d}",
@@ -238,8 +238,8 @@ def _published(recipe: Recipe, identity: Mapping[str, Any], outcome: Outcome, st
 
 
 def failure_of(outcome: Outcome) -> dict[str, Any]:
-    kind, what = outcome.failure or ("failed", "it failed")
-    return {"index": outcome.member.index, "seed": outcome.member.seed, "kind": kind, "what": what}
+    kind, reason = outcome.failure or ("failed", "it failed")
+    return {"index": outcome.member.index, "seed": outcome.member.seed, "kind": kind, "what": reason}
 
 
 def check_device(device: str) -> None:
@@ -267,7 +267,7 @@ class _Ticks:
         self._stopped.set()
 
     def of_batch(self, members: int) -> Callable[[int], None]:
-        """What one batch calls with the frames it has done.
+        """Returns a function that one batch calls with the frames it has done.
 
         Raises:
             CancelledError: from that call, once all is stopped.

@@ -94,7 +94,7 @@ SCENES = Shelf(folder="scenes", noun="recipe")
 
 
 def load(source: str, *, logs: Logs | None = None) -> Recipe:
-    """The recipe of that name in the catalog, of a `.toml` file, or of an ArcSim scene `.json`.
+    """Reads the recipe of that name in the catalog, of a `.toml` file, or of an ArcSim scene `.json`.
 
     Args:
         logs: gives the logs of a lake that recipes name.
@@ -106,13 +106,13 @@ def load(source: str, *, logs: Logs | None = None) -> Recipe:
     """
     if source.endswith(".json"):
         return _of_scene_file(local_path(source))
-    found = SCENES.find(source)
-    content = parsed(found.text, where=found.where)
-    return of_content(content, name=found.name, folder=found.folder, where=found.where, logs=logs)
+    file = SCENES.find(source)
+    content = parsed(file.text, where=file.where)
+    return of_content(content, name=file.name, folder=file.folder, where=file.where, logs=logs)
 
 
 def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
-    """A recipe from its text.
+    """Reads a recipe from its text.
 
     Args:
         folder: that the files it names are relative to.
@@ -214,7 +214,7 @@ _LIMITS = {"low": float, "high": float, "sweeps": Count}
 
 
 def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: str, logs: Logs | None = None) -> Recipe:
-    """A recipe from what its TOML holds.
+    """Builds a recipe from the content of its TOML.
 
     Args:
         folder: that the files it names are relative to.
@@ -225,8 +225,8 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
     """
     form = read(_Form, content, where=where)
     scene = _scene(form.scene, folder, where=f"{where} [scene]")
-    given = None if scene.arcsim is None else scene.arcsim.scene
-    limits = given and given.limits
+    arcsim = None if scene.arcsim is None else scene.arcsim.scene
+    limits = arcsim and arcsim.limits
     if form.limits is not None or limits is not None:
         # Small steps need one sweep.
         base = replace(limits or StrainLimits(), sweeps=SWEEPS if form.integrator.name == "implicit" else 1)
@@ -241,21 +241,21 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
         scene=scene,
         material=_material(form.material, folder, scene, where=f"{where} [material]"),
         wind=_wind(form.wind, scene, form.time, logs, where=f"{where} [wind]"),
-        contact=form.contact or (given and given.contact),
+        contact=form.contact or (arcsim and arcsim.contact),
         limits=limits,
         integrator=_integrator(form.integrator, content.get("integrator", {}), where=f"{where} [integrator]"),
         time=form.time,
-        effects={key: _effect(key, each, where=f"{where} [effects] [{key}]") for key, each in form.effects.items()},
+        effects={key: _effect(key, effect, where=f"{where} [effects] [{key}]") for key, effect in form.effects.items()},
     )
 
 
 def _scene(content: Mapping[str, Any], folder: Path, *, where: str) -> SceneSpec:
     shape = value(Shape, content.get("shape", Shape.FLAG.value), key="shape", where=where)
     if shape is Shape.ARCSIM:
-        named = read(_SceneFile, content, where=where)
-        root = None if named.root is None else folder / local_path(named.root)
-        file = read_scene(folder / local_path(named.file), root=root, accept=named.accept)
-        return _arcsim(file, noise=named.start_noise, evaluation=named.evaluation)
+        arcsim = read(_SceneFile, content, where=where)
+        root = None if arcsim.root is None else folder / local_path(arcsim.root)
+        file = read_scene(folder / local_path(arcsim.file), root=root, accept=arcsim.accept)
+        return _arcsim(file, noise=arcsim.start_noise, evaluation=arcsim.evaluation)
     if shape is Shape.MESH:
         return _given(read(_Mesh, content, where=where), where=where)
     sheet, square = read(_Sheet, content, where=where), shape is Shape.HANGING_CLOTH
@@ -356,7 +356,7 @@ def _bases(cloth: _Cloth, folder: Path, scene: SceneSpec, *, where: str) -> tupl
         return (Material.from_mapping(cloth.table, name=str(cloth.table.get("title", "material"))),)
     chosen = (cloth.name,) if cloth.name is not None else cloth.names
     if chosen:
-        return tuple(material.named(each, where=where) for each in chosen)
+        return tuple(material.named(name, where=where) for name in chosen)
     if cloth.file is not None:
         return (material_file(folder / local_path(cloth.file)),)
     if scene.arcsim is not None:
@@ -365,7 +365,7 @@ def _bases(cloth: _Cloth, folder: Path, scene: SceneSpec, *, where: str) -> tupl
 
 
 def material_file(path: Path) -> Material:
-    """The material of a file, TOML or ArcSim's JSON.
+    """Reads the material of a file, TOML or ArcSim's JSON.
 
     Raises:
         NotFoundError: no such file.
@@ -381,11 +381,13 @@ def _wind(
 ) -> WindSpec:
     if scene.arcsim is not None and not content:
         return _mean_wind(scene.arcsim.scene.wind, force=scene.arcsim.scene.air)
-    own = _FORCES.get(str(content.get("force")), _FORCES[_FORCE])
+    force_types = _FORCES.get(str(content.get("force")), _FORCES[_FORCE])
     source = blowing.source(content, where=where)
-    types = {"force": Annotated[str, Named("wind force", AIR_FORCES)], **own}
+    types = {"force": Annotated[str, Named("wind force", AIR_FORCES)], **force_types}
     values = entries({**types, **(blowing.TYPES[source] if source else _STEADY)}, content, where=where)
-    force: AirForce = AIR_FORCES[values.get("force", _FORCE)](**{key: values[key] for key in own if key in values})
+    force: AirForce = AIR_FORCES[values.get("force", _FORCE)](
+        **{key: values[key] for key in force_types if key in values}
+    )
     if source:
         samples = blowing.read(
             values, before=time.first, duration=(time.frames - 1) / time.rate, logs=logs, where=where
@@ -443,7 +445,7 @@ def _effect(name: str, content: Mapping[str, Any], *, where: str) -> EffectSpec:
 
 
 def _of_scene_file(path: Path) -> Recipe:
-    """An ArcSim scene as it is: its own steps and duration, from its first frame on."""
+    """Reads an ArcSim scene as it is: its own steps and duration, from its first frame on."""
     file = read_scene(path)
     scene = _arcsim(file, noise=0.0, evaluation=Evaluation.ARCSIM)
     where = f"scene {path}"

@@ -246,9 +246,9 @@ class Recipe:
     model: str = ""
 
     def __post_init__(self) -> None:
-        for what, number in (("members", self.count), ("members a batch", self.batch)):
+        for counted, number in (("members", self.count), ("members a batch", self.batch)):
             if number > MEMBERS_LIMIT:
-                raise LimitError(f"{number} {what}", where=self.name, fix=f"have at most {MEMBERS_LIMIT}")
+                raise LimitError(f"{number} {counted}", where=self.name, fix=f"have at most {MEMBERS_LIMIT}")
         vertices = self.scene.vertices
         if vertices > VERTICES_LIMIT:
             raise LimitError(
@@ -275,7 +275,7 @@ class Recipe:
         return DTYPES[self.precision]
 
     def identity(self) -> dict[str, Any]:
-        """All that shapes a member beside its index, defaults filled in, as JSON."""
+        """Returns all that shapes a member besides its index, defaults filled in, as JSON."""
         scene, material, wind = self.scene, self.material, self.wind
         return {
             "simulate": 1,
@@ -330,19 +330,19 @@ class Recipe:
 
 
 def _chosen(backend: Backend) -> dict[str, Any]:
-    """The backend, where it is not the usual one: results are another's to rounding."""
+    """Describes the backend where it is not the default: its results differ from the others' by rounding."""
     return {} if backend is Backend.AUTO else {"backend": backend.value}
 
 
 def _held(scene: SceneSpec) -> dict[str, Any]:
-    """The handles' stiffness, where it is not the usual one."""
+    """Describes the handles' stiffness where it is not the usual one."""
     if scene.stiffness == ARCSIM_STIFFNESS:
         return {}
     return {"stiffness": "rigid" if math.isinf(scene.stiffness) else scene.stiffness}
 
 
 def _weighed(material: MaterialSpec) -> dict[str, Any]:
-    """The factor on the density, where there is one."""
+    """Describes the factor on the density, where there is one."""
     return {} if material.density_factor == 1.0 else {"density_factor": plain(material.density_factor)}
 
 
@@ -357,5 +357,7 @@ def _base(base: Material) -> dict[str, Any]:
 
 
 def _force(force: AirForce) -> dict[str, Any]:
-    name = next((known for known in AIR_FORCES if isinstance(force, AIR_FORCES[known])), type(force).__name__)
+    name = next(
+        (candidate for candidate in AIR_FORCES if isinstance(force, AIR_FORCES[candidate])), type(force).__name__
+    )
     return {"name": name, **vars(force)}

@@ -19,7 +19,7 @@ class Wind(Protocol):
     """Air velocity in the frame of the scene: where the air goes to, +z up."""
 
     def velocity(self, time: float) -> Tensor:
-        """(3, batch) [m/s] at a time since the start of the run [s]."""
+        """Returns the velocity (3, batch) [m/s] at a time since the start of the run [s]."""
         ...
 
 

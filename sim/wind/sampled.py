@@ -122,7 +122,7 @@ class SampledWind:
         check(self.times, self.samples, where="sampled wind")
 
     def velocity(self, time: float) -> Tensor:
-        """(3, batch) [m/s] at a time since the start of the run [s].
+        """Returns the velocity (3, batch) [m/s] at a time since the start of the run [s].
 
         Raises:
             UsageError: see `place`.

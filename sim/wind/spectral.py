@@ -48,13 +48,13 @@ class VonKarman:
         return self.intensity * self.mean
 
     def density(self, frequency: ArrayLike) -> FloatArray:
-        """One-sided spectral density [m²/s] at frequencies [Hz]; shape kept."""
+        """Computes the one-sided spectral density [m²/s] at frequencies [Hz]; the shape is kept."""
         scale = self.length / self.mean
         reduced = np.asarray(frequency, dtype=np.float64) * scale
         return 4 * self.sigma**2 * scale / (1 + 70.8 * reduced**2) ** (5 / 6)
 
     def series(self, rng: np.random.Generator, *, duration: float, rate: float) -> FloatArray:
-        """A realisation of the speed [m/s], (round(duration · rate),), sampled at `rate` [Hz].
+        """Draws a realisation of the speed [m/s], (round(duration · rate),), sampled at `rate` [Hz].
 
         The Fourier coefficients are independent complex Gaussians with variance S(f) Δf over a period of at least
         eight integral time scales and twice the duration, of which the first part is returned: so the series is a

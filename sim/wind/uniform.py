@@ -36,5 +36,5 @@ class UniformWind:
             )
 
     def velocity(self, time: float) -> Tensor:
-        """(3, batch) [m/s]; `time` does not matter."""
+        """Returns the velocity (3, batch) [m/s]; `time` does not matter."""
         return self.constant

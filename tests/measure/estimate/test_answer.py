@@ -113,7 +113,13 @@ def found(
 ) -> Quantity:
     low, high = assumed
     return quantities(
-        draws, prior, [name], level=level, assumed=np.array([assumed]), places=(draws - low) / (high - low), stated={}
+        draws,
+        prior,
+        [name],
+        level=level,
+        assumed=np.array([assumed]),
+        places=(draws - low) / (high - low),
+        stated_values={},
     )[0]
 
 

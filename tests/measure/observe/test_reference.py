@@ -27,7 +27,7 @@ def run(reference_data: Path, name: str, frames: slice = slice(50, 150)) -> Obse
             rest=stored["rest"],
             faces=stored["faces"],
             rate=25.0,
-            known=known,
+            description=known,
         )
 
 
