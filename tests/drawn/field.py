@@ -9,8 +9,8 @@ from pathlib import Path
 
 import av
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS, from_datetime
 from measure.demo import BEFORE, CUP, START
@@ -50,11 +50,11 @@ class DrawnRecipe:
             return self.clock
         return float(stream(self.seed, "clock").uniform(-_LARGEST_OFFSET, _LARGEST_OFFSET))
 
-    def blown(self) -> NDArray[np.float64]:
+    def blown(self) -> FloatArray:
         """The true wind [m/s] at `WIND_RATE`, from `BEFORE` seconds before the first frame on."""
         return self.wind.series(stream(self.seed, "wind"), duration=BEFORE + self.duration + _AFTER, rate=WIND_RATE)
 
-    def at_frames(self) -> NDArray[np.float64]:
+    def at_frames(self) -> FloatArray:
         """The wind at each frame [m/s]."""
         wind = self.blown()
         times = np.arange(round(self.duration * self.rate)) / self.rate + BEFORE
@@ -76,7 +76,7 @@ def write_drawn_log(path: Path, recipe: DrawnRecipe) -> float:
     return recipe.offset
 
 
-def write_drawn_film(path: Path, winds: NDArray[np.float64], *, rate: int, seed: int, flag: DrawnFlag) -> None:
+def write_drawn_film(path: Path, winds: FloatArray, *, rate: int, seed: int, flag: DrawnFlag) -> None:
     """A film of a drawn flag in the winds (n,) of its frames [m/s]."""
     with av.open(str(path), "w") as container:
         container.metadata["creation_time"] = START.isoformat()

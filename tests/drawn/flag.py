@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError
 
 
@@ -40,7 +40,7 @@ class DrawnFlag:
                 fix="give a picture at least 1.5 times as wide and 1.4 times as high as the flag is long",
             )
 
-    def frames(self, wind: NDArray[np.float64], rate: float, rng: np.random.Generator) -> Iterator[NDArray[np.uint8]]:
+    def frames(self, wind: FloatArray, rate: float, rng: np.random.Generator) -> Iterator[UInt8Array]:
         """One gray picture (height, width) uint8 for each wind speed of `wind` [m/s] at `rate` [Hz]."""
         scene = self._background(rng)
         grain = (self.noise * rng.standard_normal((16, self.height, self.width))).astype(np.float32)
@@ -51,7 +51,7 @@ class DrawnFlag:
             self._draw(picture, u, p, lean=0.04 * math.sin(0.13 * number / rate))
             yield np.clip(picture, 0, 255).astype(np.uint8)
 
-    def _background(self, rng: np.random.Generator) -> NDArray[np.float32]:
+    def _background(self, rng: np.random.Generator) -> Float32Array:
         """Sky, haze, a tree line and the pole."""
         rows = np.arange(self.height, dtype=np.float32)[:, None]
         scene = np.broadcast_to(205 - 60 * rows / self.height, (self.height, self.width)).copy()
@@ -64,7 +64,7 @@ class DrawnFlag:
     def _pole(self) -> int:
         return (self.width - self.length) // 3
 
-    def _draw(self, picture: NDArray[np.float32], speed: float, phase: float, lean: float) -> None:
+    def _draw(self, picture: Float32Array, speed: float, phase: float, lean: float) -> None:
         """Lay the flag over `picture`: hanging at no wind, streaming and rippling as the speed grows."""
         hoist = self.length * 2 / 3
         droop = math.atan2(1.0, 0.12 * speed**2 + 0.12) + lean
@@ -82,7 +82,7 @@ class DrawnFlag:
         window += cover.astype(np.float32) * ((band * light).astype(np.float32) - window)
 
 
-def _follow(signal: NDArray[np.float64], constant: float) -> NDArray[np.float64]:
+def _follow(signal: FloatArray, constant: float) -> FloatArray:
     """First-order lag with a time constant in samples, started settled."""
     from scipy.signal import lfilter
 

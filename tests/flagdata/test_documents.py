@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from flagdata import documents
+from flagdata.arrays import UInt8Array
 from flagdata.dataset import DecodedCache
 from flagdata.documents import NESTING_LIMIT, LimitsError, from_json, from_toml, read_json
 from flagdata.errors import CorruptError
@@ -89,7 +89,7 @@ def test_every_bit_of_a_decoded_clip_counts(tmp_path: Path) -> None:
     def read() -> list[bool]:
         made: list[bool] = []
 
-        def decode() -> NDArray[np.uint8]:
+        def decode() -> UInt8Array:
             made.append(True)
             return frames
 

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.ends import Bound, Span, bound_of, limits_of, of_profile, span
 
 ANY = (-math.inf, math.inf)
 
 
-def places(below: int, above: int) -> NDArray[np.float64]:
+def places(below: int, above: int) -> FloatArray:
     """100 places, so many of them 2 % from the lower end and from the upper one, the rest in the middle."""
     return np.repeat([0.02, 0.5, 0.98], [below, 100 - below - above, above])
 
@@ -35,7 +35,7 @@ def test_draws_further_than_three_percent_from_the_ends_or_spread_evenly_keep_bo
     assert bound_of(np.full(100, 1.004)) is Bound.LEAST  # networks' ranges reach half a percent beyond the ends
 
 
-def of(draws: NDArray[np.float64], limits: tuple[float, float]) -> Span:
+def of(draws: FloatArray, limits: tuple[float, float]) -> Span:
     return span(draws, draws / 10, level=0.9, limits=limits, assumed=(0.0, 10.0))
 
 
@@ -78,7 +78,7 @@ def test_draws_at_both_ends_constrain_nothing() -> None:
     assert found.phrase(1) == "not constrained"
 
 
-def profiled(misfit: NDArray[np.float64], *, larger: float = 1.0) -> Span:
+def profiled(misfit: FloatArray, *, larger: float = 1.0) -> Span:
     return of_profile(np.linspace(0.0, 10.0, len(misfit)), misfit, level=0.9, limits=ANY, larger=larger)
 
 

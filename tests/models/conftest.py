@@ -6,14 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.dataset import clip_rows
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
-from tests.small import TRAINING
 
 PERIOD = 40_000_000
 START = 1_577_836_800_000_000_000
@@ -22,7 +21,7 @@ SIDES = {"train": (10, 2), "validation": (6, 1), "test": (6, 2)}
 """Simulations of a side, and films of each."""
 
 
-def film(wind: float, look: int) -> NDArray[np.uint8]:
+def film(wind: float, look: int) -> UInt8Array:
     """(frames, 40, 48): waves across a patch, whose frequency is in proportion to the wind; places differ by look."""
     rng = np.random.default_rng(look)
     t = np.arange(FILM_FRAMES)[:, None, None] / 25
@@ -89,11 +88,4 @@ def lake_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     lake = Lake.create(path)
     fill(lake)
     lake.tag("v1")
-    return path
-
-
-@pytest.fixture
-def recipe_path(tmp_path: Path) -> Path:
-    path = tmp_path / "small.toml"
-    path.write_text(TRAINING)
     return path

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from models import flow
 from models.flow import CHANNELS, CHANNELS_OF_THREE, flow_maps, lucas_kanade
@@ -20,13 +20,13 @@ SIZE, FRAMES = 112, 30
 INNER = (slice(4, -4), slice(4, -4))  # of maps of 28 × 28: windows that do not see beyond the edge
 
 
-def speckle(size: int, grain: float, *, seed: int = 3) -> NDArray[np.float64]:
+def speckle(size: int, grain: float, *, seed: int = 3) -> FloatArray:
     """(size, size) of standard deviation 1, periodic."""
     noise = ndimage.gaussian_filter(np.random.default_rng(seed).standard_normal((size, size)), grain, mode="wrap")
     return (noise - noise.mean()) / noise.std()
 
 
-def warped(along_x: NDArray[np.float64], along_y: NDArray[np.float64], *, grain: float = 10.0) -> torch.Tensor:
+def warped(along_x: FloatArray, along_y: FloatArray, *, grain: float = 10.0) -> torch.Tensor:
     """(time, SIZE, SIZE): speckle; what shows at (x, y) has moved there by so many pixels, each (time, y, x)."""
     picture = speckle(SIZE, grain)
     y, x = np.mgrid[:SIZE, :SIZE].astype(float)

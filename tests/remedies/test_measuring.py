@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.dataset import clip_rows
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record
@@ -35,7 +35,7 @@ def command(user: User, models: Path) -> tuple[str, ...]:
     return ("measure", "f.mkv", "--model", str(models / "model"))
 
 
-def beside(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def beside(left: UInt8Array, right: UInt8Array) -> UInt8Array:
     return np.concatenate([left, right], axis=2)
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.timebase import NANOSECONDS
 from measure.calibrate import Design, calibrate
 from tests.measure.calibrate.conftest import cheap as cheap
@@ -26,24 +26,24 @@ START = 1_777_629_600 * NANOSECONDS
 """When the scene's films begin."""
 
 
-def shown(speed: NDArray[np.float64], *, azimuth: float = 70.0) -> NDArray[np.float64]:
+def shown(speed: FloatArray, *, azimuth: float = 70.0) -> FloatArray:
     """(window, 3) what windows in these winds show of one cloth."""
     values = {"area_weight": 0.2, "gain": 1.0, "damping": 0.01, "azimuth": math.radians(azimuth)}
     return readings({name: np.array([value]) for name, value in values.items()}, speed, seed=3)[0, :, :3]
 
 
-def gusts(windows: int = 48, *, swing: float = 1.5) -> NDArray[np.float64]:
+def gusts(windows: int = 48, *, swing: float = 1.5) -> FloatArray:
     return 5.0 + swing * np.sin(np.arange(windows) / 1.7)
 
 
-def table(heading: str, *columns: Sequence[float] | NDArray[np.float64], spacing: float = 2.5) -> str:
+def table(heading: str, *columns: Sequence[float] | FloatArray, spacing: float = 2.5) -> str:
     """A table of windows, whose first column is their time."""
     count = len(columns[0])
     rows = np.column_stack([spacing * np.arange(count), *columns]).tolist()
     return "\n".join([heading, *(",".join(map(str, row)) for row in rows), ""])
 
 
-def windy(speed: NDArray[np.float64]) -> str:
+def windy(speed: FloatArray) -> str:
     return table("time,wind,droop,extension,middle-speed", speed, shown(speed))
 
 
@@ -175,7 +175,7 @@ def test_the_weight_that_was_found_is_given_to_a_measurement(user: User) -> None
 def simulated(patch: pytest.MonkeyPatch, shows: Any) -> None:
     """Let simulations show `known`, changed by a function of the design and of what they show."""
 
-    def changed(design: Design, *, folder: Any, workers: int, advance: object) -> NDArray[np.float64]:
+    def changed(design: Design, *, folder: Any, workers: int, advance: object) -> FloatArray:
         return shows(design, known(design, folder=folder, workers=workers, advance=advance))
 
     patch.setattr(calibrate, "simulated", changed)
@@ -187,7 +187,7 @@ def test_flags_that_are_simulated_otherwise_do_not_show_what_the_film_shows(
 ) -> None:
     """Of a size that is not the film's most flags hang down."""
 
-    def shows(design: Design, every: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shows(design: Design, every: FloatArray) -> FloatArray:
         rare = design.flag.length > 2
         return np.where((np.arange(len(every)) % 12 < (9 if rare else 0))[:, None, None], np.nan, every)
 
@@ -204,7 +204,7 @@ def test_windows_with_more_wind_show_the_cloth(user: User, monkeypatch: pytest.M
     """In less than 3 m/s all flags hang alike."""
     noise = np.random.default_rng(1)
 
-    def shows(design: Design, every: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shows(design: Design, every: FloatArray) -> FloatArray:
         return every if design.log.speed.mean() > 3 else noise.standard_normal(every.shape)
 
     simulated(monkeypatch, shows)

@@ -34,7 +34,6 @@ PLAIN_NAKED = rows("time,wind_speed\n", ISO + ",{v}")
 SPRING = rows("time,wind_speed\n", "2026-03-29T02:{m}:{s},{v}", 150)
 BACK = rows("time,wind_speed\n", ISO + "Z,{v}", 200) + rows("", "2026-05-01T12:01:{s}Z,{v}", 60)
 TWO = rows("wind_speed (m/s),temp (C)\n", "{v},20.0")
-ORDERED = rows("time,wind_speed (m/s)\n", "13/6/2026 12:{m}:{s},{v}")
 
 
 RECIPE = """

@@ -15,6 +15,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import ConflictError, InputError, NotFoundError, UnknownNameError
 from flagdata.ingest import read_folder
 from flagdata.lake import Mesh as MeshFrame
@@ -311,7 +312,7 @@ def test_the_papers_own_scene_has_its_contact_and_limits(papers_scene: Scene) ->
     np.testing.assert_allclose(scene.material.density, 2 * named("camel-ponte-roma").density, rtol=1e-9)
 
 
-def centre(positions: NDArray[np.floating], mesh: Mesh | MeshFrame) -> NDArray[np.float64]:
+def centre(positions: NDArray[np.floating], mesh: Mesh | MeshFrame) -> FloatArray:
     """(3,) centre of mass of a mesh with these positions [m]."""
     (a, b), (c, d) = (mesh.rest[mesh.faces[:, k]].T - mesh.rest[mesh.faces[:, 0]].T for k in (1, 2))
     return np.average(positions[mesh.faces].mean(axis=1), axis=0, weights=np.abs(a * d - b * c))

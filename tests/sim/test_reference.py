@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from sim.integrate import AirShape, BackwardEuler, Symplectic
 from sim.material import named
 from sim.scene import Scene, assemble, flag
@@ -20,7 +20,7 @@ CAMEL = named("camel-ponte-roma")
 RATE = 25.0
 
 
-def reference(folder: Path, name: str) -> NDArray[np.float64]:
+def reference(folder: Path, name: str) -> FloatArray:
     """(frame, vertex, 3) positions of a run [m]."""
     with np.load(folder / "arcsim" / f"{name}.npz") as run:
         return run["positions"].astype(np.float64)

@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.console import LocalPath, progress, say
 from flagdata.errors import InputError
 from flagdata.rng import child_seed, stream
@@ -53,7 +53,7 @@ class Errors:
     """
 
     names: tuple[str, ...]
-    values: NDArray[np.float64]
+    values: FloatArray
 
     def correlation(self, name: str, *, seed: int = 0) -> tuple[float, float]:
         """The correlation of one target in two windows, and the upper end of its one-sided 90 % interval by resampling
@@ -86,9 +86,9 @@ class Posteriors:
     """
 
     names: tuple[str, ...]
-    logits: NDArray[np.float64]
-    known: NDArray[np.float64]
-    errors: NDArray[np.float64]
+    logits: FloatArray
+    known: FloatArray
+    errors: FloatArray
 
 
 def posteriors(model: Estimator, films: Iterable[LongFilm], *, draws: int, seed: int) -> Posteriors:
@@ -102,7 +102,7 @@ def posteriors(model: Estimator, films: Iterable[LongFilm], *, draws: int, seed:
         InputError: films that do not state the truth.
     """
     scaling = model.learners[0].scaling
-    logits: list[NDArray[np.float64]] = []
+    logits: list[FloatArray] = []
     parameters: list[dict[str, float]] = []
     for number, film in enumerate(films):
         found = model.logits(
@@ -136,13 +136,13 @@ def errors(model: Estimator, films: Iterable[LongFilm], *, seed: int = 0) -> Err
     return Errors(names=found.names, values=found.errors)
 
 
-def columns_of(parameters: Sequence[dict[str, float]]) -> dict[str, NDArray[np.float64]]:
+def columns_of(parameters: Sequence[dict[str, float]]) -> dict[str, FloatArray]:
     """Name → (film,) values; NaN where a film does not state one."""
     names = {name for one in parameters for name in one}
     return {name: np.array([one.get(name, np.nan) for one in parameters]) for name in names}
 
 
-def errors_of(draws: NDArray[np.float64], truth: NDArray[np.float64], names: Sequence[str]) -> NDArray[np.float64]:
+def errors_of(draws: FloatArray, truth: FloatArray, names: Sequence[str]) -> FloatArray:
     """(film, window, target) errors or scores, as the module's text says.
 
     Args:
@@ -158,7 +158,7 @@ def errors_of(draws: NDArray[np.float64], truth: NDArray[np.float64], names: Seq
     return np.where(own, error, score)
 
 
-def _about_zero(own: NDArray[np.float64]) -> float:
+def _about_zero(own: FloatArray) -> float:
     """Correlation of two windows of (film, window) values whose means are known to be 0, over all pairs of windows; 1
     where all are 0."""
     count = own.shape[1]

@@ -14,8 +14,8 @@ from typing import Any
 import click
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.console import LocalPath, progress, say
 from flagdata.dataset import explicit_sides
 from flagdata.errors import InputError
@@ -70,7 +70,7 @@ def calibrated(
     with torch.no_grad():
         references = [measured(film[:count]) for film in validation]
         plains = [measured(training[index][:count]).vector(model) for index in range(plain)]
-        made: dict[str, NDArray[np.float64]] = {}
+        made: dict[str, FloatArray] = {}
         for name, distortion in DISTORTIONS.items():
             clips = []
             for index in range(distorted):

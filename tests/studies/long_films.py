@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 from flagdata.record import decode
 from flagdata.rng import child_seed
@@ -39,7 +39,7 @@ class LongFilm:
     """
 
     dataset: str
-    windows: NDArray[np.uint8]
+    windows: UInt8Array
     parameters: dict[str, float]
 
 

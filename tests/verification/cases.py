@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 from scipy.signal import welch
 from scipy.special import j0, jn_zeros
 
+from flagdata.arrays import FloatArray
 from sim.air import QuadraticNormal
 from sim.handles import Handles
 from sim.integrate import Symplectic, advance, stable_step
@@ -46,7 +47,7 @@ def kicked(state: State) -> State:
     return State(position=state.position, velocity=velocity, time=state.time)
 
 
-def energy_drift(*, duration: float, share: float) -> NDArray[np.float64]:
+def energy_drift(*, duration: float, share: float) -> FloatArray:
     """Relative error of the total energy of a kicked, undamped sheet, every 10 ms.
 
     Args:
@@ -108,9 +109,7 @@ def elastica_tip(rigidity: float, weight: float, length: float) -> tuple[float, 
     return float(solution.y[2, -1]), float(solution.y[3, -1])
 
 
-def drooped_tips(
-    tables: Sequence[float], *, columns: int, length: float = 0.15, density: float = 0.2
-) -> NDArray[np.float64]:
+def drooped_tips(tables: Sequence[float], *, columns: int, length: float = 0.15, density: float = 0.2) -> FloatArray:
     """Tips of strips clamped level in gravity, (table, 2): out and down [m].
 
     The flexural rigidity B of the grid with alternating diagonals, by hand: let the lines along the strip turn by a at
@@ -181,7 +180,7 @@ def terminal_velocity() -> float:
     return math.sqrt(0.15 * G / 1.2)
 
 
-def fall(duration: float, *, steps: int, looks: int = 1) -> NDArray[np.float64]:
+def fall(duration: float, *, steps: int, looks: int = 1) -> FloatArray:
     """A level sheet that falls from rest in still air, (look, 5): time [s], speed and depth simulated, and exact [SI].
 
     m dv/dt = m g − ρ A v²: v = v_t tanh(g t/v_t), v_t = √(ρ_s g/ρ); the fall is (v_t²/g) ln cosh(g t/v_t). The air sees
@@ -209,7 +208,7 @@ def fall(duration: float, *, steps: int, looks: int = 1) -> NDArray[np.float64]:
     return np.array(rows)
 
 
-def step_errors(counts: Sequence[int], *, finest: int, frames: int = 4) -> NDArray[np.float64]:
+def step_errors(counts: Sequence[int], *, finest: int, frames: int = 4) -> FloatArray:
     """Mean distance of a flag's vertices from the finest run [m] while its motion is predictable.
 
     Args:
@@ -229,7 +228,7 @@ def step_errors(counts: Sequence[int], *, finest: int, frames: int = 4) -> NDArr
     return np.array([float((after(steps) - exact).norm(dim=1).mean()) for steps in counts])
 
 
-def mesh_differences(counts: Sequence[int], *, frames: int = 4) -> NDArray[np.float64]:
+def mesh_differences(counts: Sequence[int], *, frames: int = 4) -> FloatArray:
     """Mean distance between a flag's vertices on each mesh and the next [m], (counts − 1,), before chaos sets in.
 
     Args:
@@ -249,7 +248,7 @@ def mesh_differences(counts: Sequence[int], *, frames: int = 4) -> NDArray[np.fl
     return np.array([np.linalg.norm(b - a, axis=-1).mean() for a, b in itertools.pairwise(places)])
 
 
-def edge_statistics(columns: int, *, seed: int, wind: float, members: int, share: float) -> NDArray[np.float64]:
+def edge_statistics(columns: int, *, seed: int, wind: float, members: int, share: float) -> FloatArray:
     """(member, 8) of a settled flag: its free edge's height [m], distance downwind [m], speed [m/s] and frequency [Hz],
     and the power of its upper corner's motion across the wind in each of `OCTAVES` [m²]."""
     scene = flag(material=named("camel-ponte-roma"), wind_speed=wind, columns=columns)
@@ -268,7 +267,7 @@ def edge_statistics(columns: int, *, seed: int, wind: float, members: int, share
     return np.concatenate([motion, _tip_power(np.stack(track)[:, -1, 1])], axis=1)
 
 
-def _tip_power(across: NDArray[np.floating]) -> NDArray[np.float64]:
+def _tip_power(across: NDArray[np.floating]) -> FloatArray:
     """(member, octave) mean square of a displacement (frame, member) in each of `OCTAVES`, from pieces of 4 s."""
     frequency, density = welch(across.astype(np.float64), fs=1 / FRAME, nperseg=100, detrend="linear", axis=0)
     inside = [(low <= frequency) & (frequency < high) for low, high in OCTAVES]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import UsageError
 
 
@@ -22,7 +23,7 @@ class EdgeMotion:
             sinusoid, and for any motion the root mean square frequency of its displacement spectrum.
     """
 
-    position: NDArray[np.float64]
+    position: FloatArray
     speed: float
     frequency: float
 

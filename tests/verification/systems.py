@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from sim.air import AirForce, QuadraticNormal
 from sim.cloth import Cloth
 from sim.handles import Handles
@@ -25,7 +25,7 @@ def build(
     mesh: Mesh,
     materials: Sequence[Material],
     *,
-    position: NDArray[np.float64] | None = None,
+    position: FloatArray | None = None,
     handles: Handles | None = None,
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     air: AirForce | None = None,

@@ -15,13 +15,14 @@ import torch
 from scipy.integrate import quad, solve_ivp
 from scipy.special import j0
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import NotFoundError
 from sim.cloth import Cloth
 from sim.effects import FiniteSpanLoading
 from sim.material import named
 from sim.mesh import grid
 from tests.studies.validation.environments import MUJOCO, UnusableError
-from tests.studies.validation.mujoco.cloth import Air, Flight, Floats, Integrator, Method, Sheet, Wind, fly
+from tests.studies.validation.mujoco.cloth import Air, Flight, Integrator, Method, Sheet, Wind, fly
 
 STILL, CALM = Air(pressure=0.0), Wind()
 GRAVITY = 9.81
@@ -37,11 +38,11 @@ def mujoco() -> Path:
         pytest.skip(f"{error.what}: {error.fix}")
 
 
-def _level(sheet: Sheet) -> Floats:
+def _level(sheet: Sheet) -> FloatArray:
     return np.concatenate([sheet.mesh.rest, np.zeros((len(sheet.mesh.rest), 1))], axis=1)
 
 
-def _hanging(sheet: Sheet) -> Floats:
+def _hanging(sheet: Sheet) -> FloatArray:
     """v from bottom to top, along z."""
     u, v = sheet.mesh.rest.T
     return np.stack([u, np.zeros_like(u), v], axis=1)
@@ -93,13 +94,13 @@ def test_a_level_sheet_in_air_falls_towards_its_terminal_speed(mujoco: Path, met
 def test_a_level_sheet_whose_pressure_lags_falls_as_wagners_function_has_it(mujoco: Path) -> None:
     """σ v̇ = −σ g + F − s Σ Aᵢ (F − zᵢ), F = p v², żᵢ = (2 |v|/L) bᵢ (F − zᵢ) with L = 0.6 m."""
 
-    def speeds(air: Air) -> Floats:
+    def speeds(air: Air) -> FloatArray:
         made = fly(
             mujoco, FREE, start=_level(FREE), air=air, wind=CALM, method=Method(), rate=25.0, frames=21, gravity=GRAVITY
         )
         return made.velocities[:, :, 2].mean(axis=1)
 
-    def rates(_: float, state: Floats) -> list[float]:
+    def rates(_: float, state: FloatArray) -> list[float]:
         speed, slow, fast = state
         load = 1.3 * speed * abs(speed)
         held_back = 0.165 * (load - slow) + 0.335 * (load - fast)
@@ -163,7 +164,7 @@ def test_the_inertia_of_the_air_about_a_still_wave_is_that_of_its_wavenumbers(mo
     position = np.stack([u, wave, v], axis=1)
     found = carried.load(position, np.zeros_like(position), np.array([5.0, 0.0, 0.0]))
 
-    def root(at: Floats) -> Floats:
+    def root(at: FloatArray) -> FloatArray:
         return np.sqrt(4 / np.pi * np.sqrt(np.clip(1 - (2 * at - 1) ** 2, 0, None)))
 
     places = (np.arange(4000) + 0.5) / 4000
@@ -330,11 +331,11 @@ def test_a_swinging_sheet_without_losses_keeps_its_energy(mujoco: Path) -> None:
     assert _energy(sheet, lossy)[-1] < total[0] - 0.05 * moving
 
 
-def _kinetic(sheet: Sheet, made: Flight) -> Floats:
+def _kinetic(sheet: Sheet, made: Flight) -> FloatArray:
     return (sheet.mass[:, None] * made.velocities**2).sum(axis=(1, 2)) / 2
 
 
-def _energy(sheet: Sheet, made: Flight) -> Floats:
+def _energy(sheet: Sheet, made: Flight) -> FloatArray:
     """Kinetic, of height, and of the membrane as Saint Venant and Kirchhoff have it [J]; hinges hold too little."""
     corners = made.positions[:, sheet.mesh.faces]
     rest = sheet.mesh.rest[sheet.mesh.faces]

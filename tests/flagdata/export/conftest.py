@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from PIL import Image
 
+from flagdata.arrays import FloatArray, IntArray, UInt8Array
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
 from flagdata.schema import Kind
@@ -40,19 +40,19 @@ class Known:
     lake: Lake
     recording: str
     clips: tuple[str, ...]
-    times: NDArray[np.int64]
-    images: NDArray[np.uint8]
+    times: IntArray
+    images: UInt8Array
     jpegs: tuple[bytes, ...]
-    wind_time: NDArray[np.int64]
-    wind_speed: NDArray[np.float64]
+    wind_time: IntArray
+    wind_speed: FloatArray
 
 
-def picture(index: int) -> NDArray[np.uint8]:
+def picture(index: int) -> UInt8Array:
     """A gray picture (48, 64) that says its index: a smooth slope from 40, brighter by 1 level a frame."""
     return (40 + index + np.arange(HEIGHT)[:, None] + np.arange(WIDTH)[None, :] // 2).astype(np.uint8)
 
 
-def jpeg(image: NDArray[np.uint8]) -> bytes:
+def jpeg(image: UInt8Array) -> bytes:
     buffer = io.BytesIO()
     Image.fromarray(image).save(buffer, "JPEG", quality=95)
     return buffer.getvalue()
@@ -107,10 +107,10 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
 
 def write_record(
     path: Path,
-    times: NDArray[np.int64],
+    times: IntArray,
     jpegs: tuple[bytes, ...],
-    wind_time: NDArray[np.int64],
-    wind_speed: NDArray[np.float64],
+    wind_time: IntArray,
+    wind_speed: FloatArray,
 ) -> None:
     with RecordWriter(path, metadata={"provenance": {"source_name": "pier.mp4"}}) as writer:
         writer.wind(
@@ -126,7 +126,7 @@ def write_record(
             writer.frame(log_time=time, publish_time=time - CAMERA_BEHIND, timestamp=time, image=data)
 
 
-def clip(recording: Artifact, name: str, number: int, times: NDArray[np.int64]) -> Artifact:
+def clip(recording: Artifact, name: str, number: int, times: IntArray) -> Artifact:
     first = CLIP * number
     return Artifact(
         kind=Kind.CLIP,

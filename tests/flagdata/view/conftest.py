@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.lake import Artifact, Lake, MeshSequence, write_meshes
 from flagdata.record import RecordWriter
 from flagdata.schema import Kind
@@ -45,7 +45,7 @@ class Shown:
     meshes: str
     network: str
     jpegs: tuple[bytes, ...]
-    wind: NDArray[np.float64]
+    wind: FloatArray
 
     @property
     def site(self) -> Site:

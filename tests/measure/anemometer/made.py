@@ -6,9 +6,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from flagdata.signals import Sensor
 from measure.anemometer import Calibrated, Features, Place, Recording, calibrated
@@ -26,14 +26,14 @@ NETWORK: Any = SimpleNamespace(identity="0" * 64, estimator=SimpleNamespace(name
 """What is asked of a network."""
 
 
-def gusts(seconds: float, *, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def gusts(seconds: float, *, seed: int) -> tuple[FloatArray, FloatArray]:
     """Times and a wind of 5 ± 0.8 m/s with a correlation time of 4 s, 30 s before and after the film as well."""
     rng = stream(seed, "made", "gusts")
     count = round((seconds + 60) * _RATE)
     return np.arange(count) / _RATE - 30.0, 5.0 + 0.8 * slow(rng.standard_normal((count, 1)), 4 * _RATE)[:, 0]
 
 
-def slow(kicks: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+def slow(kicks: FloatArray, time: float) -> FloatArray:
     """Standard normal series (n, k) with a correlation time in steps, of white ones: AR(1)."""
     keep = np.exp(-1 / time)
     return np.asarray(lfilter([np.sqrt(1 - keep**2)], [1.0, -keep], kicks, axis=0))
@@ -49,7 +49,7 @@ def place(*, seed: int = 0, shifted: float = 0.0) -> Place:
 
 
 def features(
-    wind: tuple[NDArray[np.float64], NDArray[np.float64]], *, seed: int, other: float = 0.0, where: Place | None = None
+    wind: tuple[FloatArray, FloatArray], *, seed: int, other: float = 0.0, where: Place | None = None
 ) -> Features:
     """Six features, four of which follow the wind of the window, with noise.
 

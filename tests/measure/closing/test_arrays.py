@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import flagdata
+from flagdata.arrays import FloatArray
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake import MeshSequence
 from measure.closing import arrays
@@ -22,7 +22,7 @@ RNG = np.random.default_rng(4)
 REST = np.stack(np.meshgrid(np.linspace(0, 0.9, 7), np.linspace(0, 0.6, 5)), axis=-1).reshape(-1, 2)
 
 
-def swaying(frames: int = 80) -> NDArray[np.float64]:
+def swaying(frames: int = 80) -> FloatArray:
     """(frame, marker, 3): a sheet held at its hoist whose fly turns from side to side about the pole, by up to 0.2."""
     angle = 0.2 * np.sin(4 * np.pi * np.arange(frames) / RATE)[:, None] * REST[:, 0]
     plane = np.broadcast_to(REST[:, 0], angle.shape)

@@ -9,8 +9,8 @@ import av
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.checksums import write_sums
 from flagdata.film_array import Frames
 from flagdata.rng import stream, torch_draws
@@ -27,7 +27,7 @@ FRAMES, SIZE, RATE = 12, 24, 25.0
 TARGETS = ("wind_speed", "density", "bending_scale", "anisotropy")
 
 
-def pictures(count: int, *, seed: int = 3, height: int = 32, width: int = 40) -> NDArray[np.uint8]:
+def pictures(count: int, *, seed: int = 3, height: int = 32, width: int = 40) -> UInt8Array:
     """(count, height, width): a patch of waves that travel across it."""
     rng = stream(seed, "pictures")
     t = np.arange(count)[:, None, None] / RATE
@@ -97,7 +97,7 @@ def cloth_model(cloth_folder: Path) -> Estimator:
     return estimator.load(cloth_folder)
 
 
-def write_video(path: Path, images: NDArray[np.uint8], *, rate: int = 25) -> Path:
+def write_video(path: Path, images: UInt8Array, *, rate: int = 25) -> Path:
     """A film without loss."""
     with av.open(str(path), "w") as container:
         stream_ = container.add_stream("ffv1", rate=rate)

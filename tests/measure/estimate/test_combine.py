@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import CorruptError, InputError
 from flagdata.rng import stream
 from measure.estimate import CARD_KEY, UNKNOWN, Dependence, combined, of_model
@@ -18,13 +18,13 @@ CLOTH = ("density",)
 BOTH = ("wind_speed", "density")
 
 
-def posterior(observed: float, noise: float, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def posterior(observed: float, noise: float, n: int, rng: np.random.Generator) -> FloatArray:
     """(n, 1) draws given one observation of variance `noise` under a standard normal prior."""
     variance = 1 / (1 + 1 / noise)
     return rng.normal(observed / noise * variance, np.sqrt(variance), size=(n, 1))
 
 
-def cloth_of(logits: NDArray[np.float64], correlation: float, seed: int = 0) -> NDArray[np.float64]:
+def cloth_of(logits: FloatArray, correlation: float, seed: int = 0) -> FloatArray:
     dependence = Dependence(wind=correlation, cloth=correlation, source="given")
     size = logits.shape[2]
     return combined(

@@ -16,6 +16,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.film_array import Frames
 from flagdata.findings import Severity
@@ -42,7 +43,7 @@ class Listed:
     def __init__(self, *values: float) -> None:
         self._values = iter(values)
 
-    def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
+    def judge(self, frames: UInt8Array, summary: NDArray[np.floating]) -> list[Reason]:
         assert frames.ndim == 3
         p = next(self._values)
         return [Reason(kind="listed", what=f"p = {p}", p=p)]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import UsageError
 from flagdata.film_array import Frames
 from flagdata.ingest import CropBox
@@ -21,7 +21,7 @@ def film(drawn: Drawn) -> Frames:
     return Frames(time=TIMES, images=drawn.frames())
 
 
-def read(made: ConditionedFilm, first: float = 0.0, last: float = 10.0) -> NDArray[np.uint8]:
+def read(made: ConditionedFilm, first: float = 0.0, last: float = 10.0) -> UInt8Array:
     return np.stack([picture for _, picture in made.frames(first, last)])
 
 

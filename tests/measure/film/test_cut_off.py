@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.film_array import Frames
 from measure.film import ConditionedFilm
 from measure.film.conditioned import CutOff
@@ -46,7 +46,7 @@ def test_a_whole_flag_is_not_reported() -> None:
     assert not cut().left_out(1.0)
 
 
-def read(images: NDArray[np.uint8]) -> ConditionedFilm:
+def read(images: UInt8Array) -> ConditionedFilm:
     made = ConditionedFilm(Frames(time=np.arange(len(images)) / RATE, images=images))
     assert list(made.frames(0.0, 10.0))
     return made

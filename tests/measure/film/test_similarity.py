@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import RefusedError, UsageError
 from flagdata.rng import stream
 from measure.film import FlagSize, scaled_back, sizes
@@ -20,7 +20,7 @@ from sim.scene import assemble, flag
 CAMEL = named("camel-ponte-roma")
 
 
-def flight(scale: float, *, wind: float, material: Material, frames: int = 12) -> NDArray[np.float64]:
+def flight(scale: float, *, wind: float, material: Material, frames: int = 12) -> FloatArray:
     """(frame, vertex, 3) positions of a flag of length 1.5 m · scale, in its own lengths, frames √scale/25 s apart."""
     scene = flag(material=material, wind_speed=wind, width=1.5 * scale, height=1.0 * scale, columns=6)
     stiffness = scene.handles.stiffness * scale**2

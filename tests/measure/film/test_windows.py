@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding
 from measure.film import WindowReader, findings_of
@@ -16,12 +16,12 @@ from models.conditioning import Distinct, Interpolator, TimedFrame
 from tests.measure.gate.made import small_model
 
 
-def numbered(times: NDArray[np.float64]) -> list[tuple[float, NDArray[np.uint8]]]:
+def numbered(times: FloatArray) -> list[tuple[float, UInt8Array]]:
     """Frames whose gray is their number."""
     return [(float(time), np.full((16, 16), k, dtype=np.uint8)) for k, time in enumerate(times)]
 
 
-def shown(window: NDArray[np.uint8]) -> list[int]:
+def shown(window: UInt8Array) -> list[int]:
     return window[:, 0, 0].tolist()
 
 

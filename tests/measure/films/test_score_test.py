@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.stats import binomtest, chi2, kstest, norm
 
-from flagdata.arrays import FloatArray
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.rng import stream
 from measure.films import Experiments, score
 from measure.films.score_test import ALIKE, Directions, Scene, Scored
@@ -43,7 +42,7 @@ def moved(one: Experiments, by: FloatArray) -> Experiments:
     return replace(one, summaries=tuple(own + by for own in one.summaries))
 
 
-KIND: NDArray[np.int64] = np.repeat(np.arange(KINDS), EACH)
+KIND: IntArray = np.repeat(np.arange(KINDS), EACH)
 
 
 def scene(own: Experiments, *, seed: int = 1, sigma: float = SIGMA, shift: FloatArray | None = None) -> Scene:

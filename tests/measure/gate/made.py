@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, UInt8Array
 from measure.gate import DISTORTIONS, ClipStatistics, Gate
 from measure.gate.checks import CHECKS
 from models.crops import Cropping
@@ -22,7 +22,7 @@ DIMENSION = len(CHECKS) + len(FEATURES) + 4 + 3
 KINDS = list(DISTORTIONS)
 
 
-def background(seed: int = 0) -> NDArray[np.float64]:
+def background(seed: int = 0) -> FloatArray:
     """(SIZE, SIZE) gray levels with structure of all lengths, 60 to 190."""
     from scipy import ndimage
 
@@ -34,7 +34,7 @@ def background(seed: int = 0) -> NDArray[np.float64]:
 
 def film(
     *, seed: int = 0, at: tuple[float, float] = (0.5, 0.5), frames: int = FRAMES, noise: float = 0.7
-) -> NDArray[np.uint8]:
+) -> UInt8Array:
     """(frames, SIZE, SIZE): a patch with travelling waves, its middle at (x, y) in sides of the picture."""
     rng = np.random.default_rng(seed)
     t = np.arange(frames)[:, None, None] / 25
@@ -46,7 +46,7 @@ def film(
     return np.clip(np.rint(gray), 0, 255).astype(np.uint8)
 
 
-def value(name: str, frames: NDArray[np.uint8]) -> float:
+def value(name: str, frames: UInt8Array) -> float:
     """One statistic of a clip."""
     return CHECKS[name].measure(ClipStatistics.of(frames))
 
@@ -70,14 +70,14 @@ def small_model(seed: int = 0) -> Estimator:
     )
 
 
-def plain(seed: int, count: int) -> NDArray[np.float64]:
+def plain(seed: int, count: int) -> FloatArray:
     """(count, DIMENSION) of a heavy-tailed law: Student's t with five degrees of freedom, correlated."""
     rng = np.random.default_rng(seed)
     mixing = np.eye(DIMENSION) + 0.3 * np.random.default_rng(0).normal(size=(DIMENSION, DIMENSION)) / DIMENSION**0.5
     return rng.standard_t(5, (count, DIMENSION)) @ mixing
 
 
-def distorted(seed: int, count: int, kind: str, strength: float = 40.0) -> NDArray[np.float64]:
+def distorted(seed: int, count: int, kind: str, strength: float = 40.0) -> FloatArray:
     """Plain vectors moved along a direction of the distortion's own, among the hand-made features."""
     moved = plain(seed, count)
     moved[:, len(CHECKS) + 2 * KINDS.index(kind)] += strength

@@ -5,15 +5,14 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.findings import Finding
 from flagdata.rng import stream
 from measure.gate import REASONS, FilmWatch
 from measure.gate.counted import reasons
 from models.conditioning import Follower, conditioning_of
 
-Frames = NDArray[np.uint8]
 RATE, COUNT, HEIGHT, WIDTH = 25.0, 60, 180, 240
 FLAG = (70, 50, 90, 60)
 """x, y, width and height at rest [px]."""
@@ -23,9 +22,9 @@ def drawn(
     *,
     box: tuple[int, int, int, int] = FLAG,
     scenery: bool = True,
-    shift: NDArray[np.float64] | None = None,
+    shift: FloatArray | None = None,
     noise: float = 1.0,
-) -> Frames:
+) -> UInt8Array:
     """(COUNT, HEIGHT, WIDTH): striped cloth whose waves grow towards its free end and never come again.
 
     Args:
@@ -58,7 +57,7 @@ def drawn(
     return np.clip(np.rint(out), 0, 255).astype(np.uint8)
 
 
-def counted(frames: Frames) -> list[Finding]:
+def counted(frames: UInt8Array) -> list[Finding]:
     """The faults of a film at 25 Hz."""
     found, watch = conditioning_of(frames, size=120), FilmWatch(rate=RATE)
     follower = Follower(found)
@@ -68,28 +67,28 @@ def counted(frames: Frames) -> list[Finding]:
     return list(reasons(watch, found, follower))
 
 
-def kinds(frames: Frames) -> list[str]:
+def kinds(frames: UInt8Array) -> list[str]:
     return [fault.kind for fault in counted(frames)]
 
 
 @pytest.fixture(scope="module")
-def plain() -> Frames:
+def plain() -> UInt8Array:
     return drawn()
 
 
-def test_a_whole_flag_before_a_background_has_no_fault(plain: Frames) -> None:
+def test_a_whole_flag_before_a_background_has_no_fault(plain: UInt8Array) -> None:
     assert kinds(plain) == []
     assert kinds(drawn(noise=3.0)) == []
 
 
-def test_faults_are_stated_in_the_order_of_the_table(plain: Frames) -> None:
+def test_faults_are_stated_in_the_order_of_the_table(plain: UInt8Array) -> None:
     dark = (plain[:, :, : FLAG[0] + FLAG[2] // 2] // 12).astype(np.uint8)
     found = kinds(dark)
     assert found[0] == "too-dark"
     assert found == sorted(found, key=list(REASONS).index)
 
 
-def test_cloth_at_an_edge_is_counted_by_frames_and_named_by_its_edge(plain: Frames) -> None:
+def test_cloth_at_an_edge_is_counted_by_frames_and_named_by_its_edge(plain: UInt8Array) -> None:
     middle = FLAG[0] + FLAG[2] // 2
     (fault,) = counted(np.ascontiguousarray(plain[:, :, :middle]))
     assert fault.kind == "cut-off"
@@ -100,14 +99,14 @@ def test_cloth_at_an_edge_is_counted_by_frames_and_named_by_its_edge(plain: Fram
     assert "the left edge in" in mirrored.what
 
 
-def test_a_cut_to_another_scene_has_its_instant(plain: Frames) -> None:
+def test_a_cut_to_another_scene_has_its_instant(plain: UInt8Array) -> None:
     other = 255 - np.roll(plain, WIDTH // 3, axis=2)
     fault = counted(np.concatenate([plain[:25], other[25:]]))[0]
     assert (fault.kind, fault.value) == ("scene-cut", 1.0)
     assert "once, first at 1.00 s" in fault.what
 
 
-def test_a_loop_is_counted_by_the_frames_that_look_like_others(plain: Frames) -> None:
+def test_a_loop_is_counted_by_the_frames_that_look_like_others(plain: UInt8Array) -> None:
     rng = stream(3, "loop")
     looped = plain[np.arange(2 * COUNT) % 13].astype(np.float64) + rng.normal(0, 1, (2 * COUNT, *plain.shape[1:]))
     fault = next(
@@ -117,7 +116,7 @@ def test_a_loop_is_counted_by_the_frames_that_look_like_others(plain: Frames) ->
     assert fault.what.endswith("100% of the frames look like another one")
 
 
-def test_a_film_in_which_nothing_moves_and_one_that_is_black_say_so(plain: Frames) -> None:
+def test_a_film_in_which_nothing_moves_and_one_that_is_black_say_so(plain: UInt8Array) -> None:
     noise = stream(4, "still").normal(0, 1, plain.shape)
     still = np.clip(plain[:1] + noise, 0, 255).astype(np.uint8)
     assert kinds(still) == ["no-motion"]

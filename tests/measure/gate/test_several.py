@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.special import ndtr, ndtri
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.gate.verdict import refused_share, refusing, window_rate
@@ -17,7 +17,7 @@ RECORDINGS = 40_000
 SLACK = 3 * np.sqrt(RATE * (1 - RATE) / RECORDINGS)
 
 
-def refused(scores: NDArray[np.float64]) -> float:
+def refused(scores: FloatArray) -> float:
     """Share of recordings that are refused, of normal scores (recording, window)."""
     windows = scores.shape[1]
     strange = ndtr(scores) <= window_rate(windows, RATE)

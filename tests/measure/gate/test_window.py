@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.checksums import write_sums
 from flagdata.errors import CorruptError, InputError, NotFoundError
 from measure.gate import DISTORTIONS, REASONS, CheckedGate, Gate, judge, read, write
@@ -19,7 +19,7 @@ from tests.studies.gate import calibrated
 PLAIN, DISTORTED, VALIDATION = 60, 4, 50
 
 
-def clip(seed: int, frames: int = 16) -> NDArray[np.uint8]:
+def clip(seed: int, frames: int = 16) -> UInt8Array:
     """A film like those that the small gate is calibrated by: one patch near the middle."""
     x, y = np.random.default_rng(seed).uniform(0.45, 0.55, 2)
     return film(seed=seed, at=(float(x), float(y)), frames=frames)

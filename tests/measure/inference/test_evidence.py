@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.stats import chi2, kstest, uniform
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from measure.forecasting import PRIOR, THETA, Design
 from measure.inference import Evidence, NullModel, Nulls, best_gain, gains
@@ -16,7 +16,6 @@ from measure.inference.fluctuation import fluctuation
 from measure.nulls import GUSTS, NullBank
 from measure.probes import Statistics
 
-Floats = NDArray[np.float64]
 COLUMNS, KINDS, CLOTHS, WINDS, SEGMENTS = 8, 40, 1, 4, 4
 RECORDINGS = KINDS * CLOTHS * WINDS
 
@@ -31,7 +30,7 @@ class World:
         self.slopes = self.rng.normal(size=(3, COLUMNS)) * np.array([[1.0], [0.2], [0.02]])
         self.direction = 2 * self.rng.normal(size=COLUMNS)
 
-    def draw(self, delta: Floats, *, recordings: int, numerics: Floats, speeds: Floats) -> Statistics:
+    def draw(self, delta: FloatArray, *, recordings: int, numerics: FloatArray, speeds: FloatArray) -> Statistics:
         """Segments of recordings with coefficients (recording, column)."""
         recording = np.repeat(np.arange(recordings), SEGMENTS)
         response = self.rng.normal(size=(len(recording), COLUMNS, COLUMNS)) + 4 * np.eye(COLUMNS)
@@ -60,7 +59,7 @@ class World:
             cloth=np.full(len(own.recording), "made"),
         )
 
-    def data(self, null: NullModel, delta: Floats) -> Evidence:
+    def data(self, null: NullModel, delta: FloatArray) -> Evidence:
         """Three recordings of one cloth in one kind of numerics."""
         speeds = np.array([3.5, 5.0, 7.0])
         shift = np.full(3, self.rng.normal())
@@ -79,7 +78,7 @@ def null(world: World) -> NullModel:
     return NullModel.fit(nulls, nulls.design)
 
 
-def effect(strength: float, column: int = 5) -> Floats:
+def effect(strength: float, column: int = 5) -> FloatArray:
     delta = np.zeros(COLUMNS)
     delta[column] = strength
     return delta
@@ -126,7 +125,7 @@ def test_the_mean_is_that_of_the_design_of_the_data(world: World) -> None:
     assert (np.abs(found - plain - 5.0) < bound).all()
 
 
-def of_cloths(world: World, moves: dict[str, Floats]) -> Nulls:
+def of_cloths(world: World, moves: dict[str, FloatArray]) -> Nulls:
     """Nulls of cloths in turn, one to a kind of numerics, whose means are moved."""
     nulls = world.nulls()
     cloth = np.array(list(moves))[nulls.numerics % len(moves)]

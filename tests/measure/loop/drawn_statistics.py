@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from measure.forecasting import PRIOR, THETA, EffectColumn, columns, names
 from measure.inference import Evidence, NullModel, Nulls
@@ -15,7 +15,6 @@ from measure.loop import GUST_COLUMN, LibraryJudgement, judge
 from measure.nulls import GUSTS, NullBank, Reference
 from measure.probes import REDUCED, Course, Statistics
 
-Floats = NDArray[np.float64]
 KINDS, CLOTHS, WINDS, SEGMENTS = 50, 1, 4, 4
 COUNT = len(names())
 SHED = REDUCED[40]
@@ -37,7 +36,7 @@ def expected(column: int) -> float:
 EXPECTED = np.array([expected(column) for column in range(COUNT)])
 
 
-def drawn(rng: np.random.Generator, delta: Floats, numerics: Floats, speeds: Floats) -> Statistics:
+def drawn(rng: np.random.Generator, delta: FloatArray, numerics: FloatArray, speeds: FloatArray) -> Statistics:
     """r = shift of the numerics + R δ + ε of recordings, with coefficients (segment, column) and ε ~ N(0, 1)."""
     recording = np.repeat(np.arange(len(speeds)), SEGMENTS)
     mixed = rng.normal(size=(len(recording), COUNT, COUNT)) + CLEAR * np.eye(COUNT)
@@ -53,20 +52,20 @@ def drawn(rng: np.random.Generator, delta: Floats, numerics: Floats, speeds: Flo
     )
 
 
-def blown(rng: np.random.Generator, segments: int, parts: Floats | float = 0.0) -> Course:
+def blown(rng: np.random.Generator, segments: int, parts: FloatArray | float = 0.0) -> Course:
     """What noise makes of the wind's course, and a wind of parts (segment, window, part)."""
     size = 100.0
     score = size * np.broadcast_to(parts, (segments, 10, 3)) + size**0.5 * rng.normal(size=(segments, 10, 3))
     return Course(score=score, curvature=np.broadcast_to(size * np.eye(3), (*score.shape, 3)))
 
 
-def pulses(strength: float, *, turned: float = 0.0) -> Floats:
+def pulses(strength: float, *, turned: float = 0.0) -> FloatArray:
     """(segment, window, part) of three recordings: a wind that is weaker for one window of every nine."""
     weaker = np.where(np.arange(3 * SEGMENTS * 10) % 9 < 3, -strength, 0.0).reshape(-1, 10, 1)
     return weaker * np.array([1.0, turned, 0.0])
 
 
-def slow(strength: float) -> Floats:
+def slow(strength: float) -> FloatArray:
     """The same of a wind that changes from one segment to another, and turns as well."""
     return strength * stream(5, "slow").normal(size=(3 * SEGMENTS, 1, 3)) * np.ones((1, 10, 1))
 
@@ -101,7 +100,7 @@ def made(seed: int, *, moments: bool = False, courses: bool = False, settled: bo
 Acting = Mapping[str, float | tuple[float, float, float]]
 
 
-def strengths(acting: Acting) -> Floats:
+def strengths(acting: Acting) -> FloatArray:
     """(segment, column) of three recordings, from shares of what is expected, of all or of each."""
     delta = np.zeros((3 * SEGMENTS, COUNT))
     for name, share in acting.items():
@@ -118,7 +117,7 @@ def seen(
     line: float = 0.0,
     seed: int = 2,
     moments: Acting | None = None,
-    course: Floats | None = None,
+    course: FloatArray | None = None,
 ) -> Evidence:
     """Of three recordings with strengths in units of what is expected, a pressure that fluctuates by `gusts`, and
     `line` of power more at `SHED`, across the wind; beside them moments of other strengths, and a course of the

@@ -6,12 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.stats import binom, binomtest
 
 from measure.nulls import GroupedConformal, kinds_needed
 
-Floats = NDArray[np.float64]
 KINDS = 39
 
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from measure.observables import ClothWindow, View, edges_of, seen_from
 
 LENGTH, HEIGHT = 1.5, 1.0
 RATE = 25.0
 SIDE_ON = View()
-Motion = Callable[[NDArray[np.float64], NDArray[np.float64], float], tuple[NDArray[np.float64], ...]]
+Motion = Callable[[FloatArray, FloatArray, float], tuple[FloatArray, ...]]
 """Material coordinates (u from the hoist, v above its middle) and time → x, y, z [m]."""
 
 
-def sheet(columns: int = 18, rows: int = 10) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def sheet(columns: int = 18, rows: int = 10) -> tuple[FloatArray, IntArray]:
     """Rest (vertex, 2) and faces of a flat flag."""
     u, v = np.meshgrid(np.linspace(0, LENGTH, columns + 1), np.linspace(-HEIGHT / 2, HEIGHT / 2, rows + 1))
     index = np.arange(u.size).reshape(u.shape)
@@ -36,7 +36,7 @@ def window(motion: Motion, *, view: View = SIDE_ON, seconds: float = 2.5, rate: 
 def hinged(angle: Callable[[float], float]) -> Motion:
     """A flag whose threads along the hoist stay upright while those across it droop by an angle [rad]."""
 
-    def motion(u: NDArray[np.float64], v: NDArray[np.float64], t: float) -> tuple[NDArray[np.float64], ...]:
+    def motion(u: FloatArray, v: FloatArray, t: float) -> tuple[FloatArray, ...]:
         return u * np.cos(angle(t)), 0 * u, v - u * np.sin(angle(t))
 
     return motion

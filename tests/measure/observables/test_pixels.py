@@ -9,8 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, table_of
 from measure.observables.watching import Watched
 from models.conditioning import HALVED, Outliner, conditioned, halved
@@ -24,7 +24,7 @@ HOIST = np.array([70.0, 130.0])
 POLE = 6
 
 
-def waving(u: NDArray[np.float64], v: NDArray[np.float64], t: float) -> tuple[NDArray[np.float64], ...]:
+def waving(u: FloatArray, v: FloatArray, t: float) -> tuple[FloatArray, ...]:
     """A flag that droops, swings and carries a wave; its threads turn with it, by half its droop at the free edge."""
     angle = 0.3 + 0.12 * math.sin(2 * math.pi * 1.5 * t) + 0.05 * math.sin(2 * math.pi * 0.7 * t)
     wave = 0.08 * u / LENGTH * np.sin(2 * np.pi * (u / 1.2 - 1.9 * t))
@@ -35,8 +35,8 @@ def waving(u: NDArray[np.float64], v: NDArray[np.float64], t: float) -> tuple[ND
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Painted:
     cloth: ClothWindow
-    frames: NDArray[np.uint8]
-    silhouettes: NDArray[np.bool_]
+    frames: UInt8Array
+    silhouettes: BoolArray
     """(n, SIDE / HALVED, SIDE / HALVED)."""
 
 
@@ -70,8 +70,8 @@ def painted(*, contrast: float, seconds: float = 2.6, house: bool = False) -> Pa
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Seen:
     painted: Painted
-    masks: NDArray[np.bool_]
-    expected: NDArray[np.float64]
+    masks: BoolArray
+    expected: FloatArray
     outliner: Outliner
     window: FilmWindow
 

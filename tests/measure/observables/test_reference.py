@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.observables import OBSERVABLES, View, edges_of, seen_from
 from tests.evidence import REFERENCE
 
@@ -31,7 +31,7 @@ SIGNS = {
 """Differences to the run in which nothing undeclared acts, in standard errors of the mean."""
 
 
-def blocks(name: str, wind: int, observable: str) -> NDArray[np.float64]:
+def blocks(name: str, wind: int, observable: str) -> FloatArray:
     """(4,) readings of the blocks of 2.5 s."""
     with np.load(RUNS / f"{name}_w{wind}.npz") as run:
         positions, rest, faces = run["q"] * 1e-4, run["rest"], run["faces"]

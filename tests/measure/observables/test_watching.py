@@ -7,8 +7,8 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.cli import main
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
@@ -25,7 +25,7 @@ class Still:
 
     name, rate, duration, start, width, height = "still", RATE, (COUNT - 1) / RATE, None, SIDE, SIDE
 
-    def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+    def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
         picture = np.random.default_rng(1).integers(40, 200, (SIDE, SIDE)).astype(np.uint8)
         for k in range(COUNT):
             if first <= k / RATE <= last:

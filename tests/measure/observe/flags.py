@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.observe import Hold, Known, Observation, Setup, WindTrack, sheet
 from sim.material import named
 from sim.mesh import grid
@@ -17,7 +17,7 @@ WIND = WindTrack.constant((5.0, 0.0, 0.0))
 _GRAIN = 400  # steps of the integral along u
 
 
-def unrolled(u: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
+def unrolled(u: FloatArray, times: FloatArray) -> FloatArray:
     """(frame, point, 2) a curve in the x–y plane whose direction is a travelling wave that grows from the hoist.
     Its arc length is u exactly, since it is the integral of a unit vector."""
     s = np.linspace(0.0, WIDTH, _GRAIN + 1)
@@ -29,7 +29,7 @@ def unrolled(u: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.f
     return np.stack([np.stack([np.interp(u, s, row) for row in part]) for part in (x, y)], axis=-1)
 
 
-def flutter(rest: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
+def flutter(rest: FloatArray, times: FloatArray) -> FloatArray:
     """(frame, marker, 3) a flag that streams along +x, flutters along y, and droops: sheared down by a fifth of u, held
     all along its hoist at x = y = 0. Lengths are kept along v and, to 2 %, along u."""
     plane = unrolled(rest[:, 0], times)
@@ -37,7 +37,7 @@ def flutter(rest: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np
     return np.concatenate([plane, np.broadcast_to(z, plane.shape[:2])[..., None]], axis=-1)
 
 
-def markers(columns: int = 9, rows: int = 6) -> NDArray[np.float64]:
+def markers(columns: int = 9, rows: int = 6) -> FloatArray:
     """(marker, 2) the corners of a grid over the flag."""
     return grid(width=WIDTH, height=HEIGHT, columns=columns, rows=rows).rest
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from flagdata.arrays import FloatArray
 from measure.observe import Hold, Known, Observation, Setup, Specimen, Trajectory, WindTrack, observe, sheet
 from measure.observe.checks.inertia import check_inertia, swing, wind_shown
 from sim.air import QuadraticNormal
@@ -22,7 +22,7 @@ REST = grid(width=WIDTH, height=HEIGHT, columns=12, rows=8).rest
 TIMES = np.arange(150) / RATE
 
 
-def experiment(positions: NDArray[np.float64], hold: Hold, wind: float) -> tuple[Trajectory, Specimen]:
+def experiment(positions: FloatArray, hold: Hold, wind: float) -> tuple[Trajectory, Specimen]:
     seen = Observation(
         name="plate",
         markers=REST,
@@ -38,7 +38,7 @@ def experiment(positions: NDArray[np.float64], hold: Hold, wind: float) -> tuple
     return made.recordings[0], made.specimen
 
 
-def angles(acceleration, start: float) -> NDArray[np.float64]:
+def angles(acceleration, start: float) -> FloatArray:
     """(frame,) of φ'' = acceleration(φ, φ') from rest."""
     solved = solve_ivp(
         lambda _, y: (y[1], acceleration(*y)), (0, TIMES[-1]), (start, 0.0), t_eval=TIMES, rtol=1e-9, atol=1e-11

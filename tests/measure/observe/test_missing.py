@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray
 from flagdata.errors import InputError
 from measure.observe import Known, Observation, Trajectory, observe
 from measure.observe.common import at_same_rate
@@ -25,7 +25,7 @@ def recording(name: str, *, rate: float = 25.0, seconds: float = 4.2, share: flo
     return Observation(name=name, markers=REST, positions=positions, times=times, known=Known(wind=WIND), noise=1e-3)
 
 
-def lost(shape: tuple[int, ...], share: float, seed: int) -> NDArray[np.bool_]:
+def lost(shape: tuple[int, ...], share: float, seed: int) -> BoolArray:
     return np.random.default_rng(seed).random(shape) < share
 
 

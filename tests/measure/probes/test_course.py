@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import UsageError
 from flagdata.rng import stream
 from measure.forecasting import Calibration, EffectColumn, Forecaster, Segments, winds
@@ -18,7 +18,6 @@ from measure.probes.course import Gauge
 from measure.probes.statistics import statistics
 from sim.wind import VonKarman
 
-Floats = NDArray[np.float64]
 COLUMNS = (EffectColumn(effect="lift", parameter="coefficient", step=0.3),)
 RECORDINGS, SEGMENTS, WINDOWS, FRAMES = 3, 4, 10, 5
 RECORDING = np.repeat(np.arange(RECORDINGS), SEGMENTS)
@@ -28,14 +27,14 @@ SWAY, OMEGA = 0.05, 2 * np.pi / 1.6
 """Of a wind that was not logged: a share of the mean one, and rad/s."""
 
 
-def seen(parts: Floats, *, noise: float = 0.0, seed: int = 0) -> Course:
+def seen(parts: FloatArray, *, noise: float = 0.0, seed: int = 0) -> Course:
     """What a wind of parts (recording · segment, window, part) leaves, beside noise in units of the errors."""
     eye = np.broadcast_to(SIZE * np.eye(3), (*parts.shape, 3))
     drawn = noise * SIZE**0.5 * stream(seed, "course").normal(size=parts.shape)
     return Course(score=SIZE * parts + drawn, curvature=eye)
 
 
-def turbulence(speed: float, length: float, *, left: float = 0.78, up: float = 0.52, seed: int = 0) -> Floats:
+def turbulence(speed: float, length: float, *, left: float = 0.78, up: float = 0.52, seed: int = 0) -> FloatArray:
     """Of an intensity of 0.2, across and upward with half the length, as in `Gusts`."""
     rng, count = stream(seed, "turbulence"), SEGMENTS * WINDOWS * FRAMES
     parts = []
@@ -46,7 +45,7 @@ def turbulence(speed: float, length: float, *, left: float = 0.78, up: float = 0
     return np.stack(parts, axis=-1).reshape(RECORDINGS * SEGMENTS, WINDOWS, FRAMES, 3).mean(axis=2)
 
 
-def pulses(period: float = 3.7, width: float = 0.5) -> Floats:
+def pulses(period: float = 3.7, width: float = 0.5) -> FloatArray:
     """A wind that is weaker for half a second, again and again, from wherever it comes."""
     time = np.arange(SEGMENTS * WINDOWS) * FRAMES * 0.04
     made = np.zeros((RECORDINGS, len(time), 3))

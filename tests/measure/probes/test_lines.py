@@ -7,25 +7,24 @@ import math
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.probes import REDUCED, Lines, strongest
 from measure.probes.lines import SHAPES, Spectrum
 from sim.mesh import grid
 
-Floats = NDArray[np.float64]
 PERIOD, FRAMES, SEGMENTS = 0.04, 50, 12
 SPEEDS = np.repeat([3.5, 5.0, 7.0], 4)
 MARKERS = grid(width=1.5, height=1.0, columns=8, rows=5).rest
 SPECTRUM = Spectrum.of(MARKERS, MARKERS, SPEEDS, PERIOD)
 
 
-def noise(seed: int) -> Floats:
+def noise(seed: int) -> FloatArray:
     """(frame, marker, 3, segment), white."""
     return np.random.default_rng(seed).normal(size=(FRAMES, len(MARKERS), 3, SEGMENTS))
 
 
-def swinging(reduced: float, size: float, *, axis: int = 1, goes: bool = True) -> Floats:
+def swinging(reduced: float, size: float, *, axis: int = 1, goes: bool = True) -> FloatArray:
     """The same everywhere along an axis, at `reduced` Hz for each m/s of wind, or whatever the wind at that of 5."""
     phase = np.random.default_rng(9).uniform(0, 2 * np.pi, SEGMENTS)
     frequency = reduced * (SPEEDS if goes else np.full(SEGMENTS, 5.0))
@@ -34,18 +33,18 @@ def swinging(reduced: float, size: float, *, axis: int = 1, goes: bool = True) -
     return errors
 
 
-def prominence(errors: Floats) -> Floats:
+def prominence(errors: FloatArray) -> FloatArray:
     return SPECTRUM.prominence(torch.as_tensor(errors))
 
 
 @pytest.fixture(scope="module")
-def nulls() -> tuple[Lines, Floats]:
+def nulls() -> tuple[Lines, FloatArray]:
     groups = np.stack([strongest(prominence(noise(seed))) for seed in range(200)])
     lines = Lines.of(groups)
     return lines, lines.standing_out(groups)
 
 
-def far(nulls: tuple[Lines, Floats], errors: Floats) -> tuple[float, float, int]:
+def far(nulls: tuple[Lines, FloatArray], errors: FloatArray) -> tuple[float, float, int]:
     lines, standing = nulls
     line = lines.line(prominence(errors), centre=float(standing.mean()), width=float(standing.std()))
     return line.far, line.reduced, line.axis
@@ -61,7 +60,7 @@ def test_white_noise_has_the_prominence_of_an_exponential_over_its_median() -> N
 
 @pytest.mark.parametrize(("reduced", "axis"), [(1.33, 1), (1.7, 2)])
 def test_what_goes_with_the_wind_is_found_with_its_frequency(
-    nulls: tuple[Lines, Floats], reduced: float, axis: int
+    nulls: tuple[Lines, FloatArray], reduced: float, axis: int
 ) -> None:
     # A third of a marker's noise, and 54 markers: 2.4 of their mean's.
     found = far(nulls, noise(3) + swinging(reduced, 0.33, axis=axis))
@@ -81,7 +80,7 @@ def test_what_swings_as_fast_in_any_wind_counts_in_one_wind_at_a_time() -> None:
     assert 1 / 3 < np.mean(shares) < 0.6
 
 
-def test_noise_alone_is_like_the_nulls(nulls: tuple[Lines, Floats]) -> None:
+def test_noise_alone_is_like_the_nulls(nulls: tuple[Lines, FloatArray]) -> None:
     found = [far(nulls, noise(seed))[0] for seed in range(1000, 1100)]
     # Standardised: mean 0 ± 0.1 of a hundred, and of the 200 nulls; few beyond what nulls reach.
     assert abs(np.mean(found)) < 0.45

@@ -7,22 +7,22 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import UsageError
 from measure.probes import StatisticRows
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Inner(StatisticRows):
-    size: NDArray[np.float64]
+    size: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outer(StatisticRows):
     _WHOLE: ClassVar = frozenset({"count"})
 
-    place: NDArray[np.int64]
+    place: IntArray
     count: int
     inner: Inner | None = None
 

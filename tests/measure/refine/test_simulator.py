@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 from flagdata.tables import Range, Scale
 from measure.refine import FilmCamera, FilmRequest, FixedView, Simulator
@@ -78,12 +78,12 @@ def test_only_a_range_of_damping_says_that_it_is_drawn(recipe: Recipe, view: Fix
 
 
 @pytest.fixture
-def filmed(monkeypatch: pytest.MonkeyPatch) -> list[NDArray[np.uint8]]:
+def filmed(monkeypatch: pytest.MonkeyPatch) -> list[UInt8Array]:
     """What cameras film while a test goes on, (frame, height, width) each."""
-    found: list[NDArray[np.uint8]] = []
+    found: list[UInt8Array] = []
     film = FilmCamera.filmed
 
-    def kept(self: FilmCamera, frames: NDArray[np.uint8], *, seed: int) -> NDArray[np.uint8]:
+    def kept(self: FilmCamera, frames: UInt8Array, *, seed: int) -> UInt8Array:
         found.append(film(self, frames, seed=seed))
         return found[-1]
 
@@ -93,7 +93,7 @@ def filmed(monkeypatch: pytest.MonkeyPatch) -> list[NDArray[np.uint8]]:
 
 @pytest.mark.parametrize("wind", [-1.0, 0.4], ids=["calm", "windy"])
 def test_a_simulated_clip_is_what_was_filmed_conditioned_once(
-    recipe: Recipe, view: FixedView, filmed: list[NDArray[np.uint8]], wind: float
+    recipe: Recipe, view: FixedView, filmed: list[UInt8Array], wind: float
 ) -> None:
     clip = of(recipe, view).films([FilmRequest(point=(*HERE[:-1], wind), seed=11)])[0].clip
     (film,) = filmed

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
 from models.conditioning import Conditioned, conditioned
@@ -31,13 +31,13 @@ class Drawn:
         noise: of the camera [gray levels].
     """
 
-    shift: NDArray[np.float64] | None = None
+    shift: FloatArray | None = None
     flags: tuple[tuple[int, int, int, int], ...] = (FLAG,)
     leaves: bool = False
     scenery: bool = True
     noise: float = 1.0
 
-    def frames(self) -> NDArray[np.uint8]:
+    def frames(self) -> UInt8Array:
         """(COUNT, HEIGHT, WIDTH) gray."""
         rng = stream(5, "drawn")
         pad = 12
@@ -66,7 +66,7 @@ class Drawn:
         return np.clip(np.rint(out), 0, 255).astype(np.uint8)
 
 
-def _cloth(picture: NDArray[np.float64], x: int, y: int, width: int, height: int, time: float, *, phase: float) -> None:
+def _cloth(picture: FloatArray, x: int, y: int, width: int, height: int, time: float, *, phase: float) -> None:
     """A striped cloth at its pole, whose waves grow towards the free edge."""
     along = np.arange(width)
     lift = 0.14 * height * (along / width) * np.sin(2 * np.pi * (along / (0.6 * width) - 2.3 * time) + phase)
@@ -84,11 +84,11 @@ def made(drawn: Drawn, **options: int) -> Conditioned:
     return conditioned(drawn.frames(), TIMES, size=120, **options)
 
 
-def outside(found: Conditioned) -> NDArray[np.bool_]:
+def outside(found: Conditioned) -> BoolArray:
     return found.found.weight == 0
 
 
-def swaying(amplitude: float) -> NDArray[np.float64]:
+def swaying(amplitude: float) -> FloatArray:
     """A slow drift of the camera with a shake on it."""
     rng = stream(2, "sway")
     drift = np.stack([3 * amplitude * np.sin(2.1 * TIMES), amplitude * np.cos(1.7 * TIMES)], axis=1)

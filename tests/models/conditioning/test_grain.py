@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from models.conditioning import grained
 from models.conditioning.grain import DEVIATION, STILL
 
 SHAPE = (30, 40, 50)
 
 
-def clip(*, still: float) -> NDArray[np.uint8]:
+def clip(*, still: float) -> UInt8Array:
     """Of whose columns a share never changes, below four rows that are black all the time, as beyond the picture."""
     rng = np.random.default_rng(3)
     made = np.repeat(rng.integers(60, 200, SHAPE[1:]).astype(np.uint8)[None], SHAPE[0], axis=0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.rng import stream
 from models.conditioning.regions import regions_of
 
@@ -14,14 +14,14 @@ BOX = (30, 30, 90, 70)
 """Left, top, right and bottom of the flag [px]."""
 
 
-def flag(picture: NDArray[np.float32], time: float) -> None:
+def flag(picture: Float32Array, time: float) -> None:
     """Shades that travel along a flag within `BOX`."""
     left, top, right, bottom = BOX
     along = np.arange(right - left)
     picture[top:bottom, left:right] = 90 + 60 * np.sin(2 * np.pi * (along / 30 - 2.1 * time))
 
 
-def cloudy(times: NDArray[np.float64]) -> NDArray[np.uint8]:
+def cloudy(times: FloatArray) -> UInt8Array:
     """A flag, and a cloud that drifts by 4 px a second."""
     rows, columns = np.indices((HEIGHT, WIDTH), dtype=np.float32)
     out = []

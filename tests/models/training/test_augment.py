@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array
 from flagdata.errors import InputError, UnknownNameError
 from models.training import Augment
 from models.training.augment import DISTURBANCES, Strength
@@ -38,7 +38,7 @@ def still(seed: int = 0) -> Film:
     return np.repeat(picture[None], FRAMES, axis=0)
 
 
-def disturbed(name: str, strength: float, *, source: str = "film", weight: NDArray[np.float32] = EVERYWHERE) -> Film:
+def disturbed(name: str, strength: float, *, source: str = "film", weight: Float32Array = EVERYWHERE) -> Film:
     augment = Augment(strengths={name: Strength(share=1.0, low=strength, high=strength)})
     if name in AFTER:
         return augment.after(still(), TIMES, source=source, variant=0, weight=weight)

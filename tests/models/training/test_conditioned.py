@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import flagdata
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake import Lake
 from models.training import FitFilm, Prepared, TrainingRecipe, parse, prepare_clips, prepare_films, sides_of
@@ -21,7 +21,7 @@ CONDITIONED = "variants = 2\nconditioned = true\n"
 DUSK = "[input.augment.dusk]\nshare = 1.0\nlow = 0.3\nhigh = 0.6\n"
 
 
-def swinging(times: NDArray[np.float64]) -> NDArray[np.uint8]:
+def swinging(times: FloatArray) -> UInt8Array:
     """(n, 64, 64) a bright patch on a still background, whose place across swings by 6 px in one second."""
     y, x = np.mgrid[:SIDE, :SIDE]
     background = 60 + 25 * np.sin(0.7 * x) * np.cos(0.9 * y)
@@ -30,7 +30,7 @@ def swinging(times: NDArray[np.float64]) -> NDArray[np.uint8]:
     return np.rint(background * (1 - patch) + 220 * patch).astype(np.uint8)
 
 
-def _place(times: NDArray[np.float64]) -> NDArray[np.float64]:
+def _place(times: FloatArray) -> FloatArray:
     return 32 + 6 * np.sin(2 * np.pi * times)
 
 

@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.record import Record
 
-Floats = NDArray[np.float64]
 RIDGE = 1.0
 NEIGHBOURS = 15
 FOLDS = 40
@@ -36,11 +35,11 @@ FEATURES = (
 class Surroundings:
     """Of all films: features (n, k) as in `FEATURES`, sequence (n,), and the parameters that must not be guessed."""
 
-    features: Floats
-    sequence: NDArray[np.int64]
+    features: FloatArray
+    sequence: IntArray
     parameters: Sequence[Mapping[str, float]]
 
-    def labels(self, targets: Sequence[str]) -> Floats:
+    def labels(self, targets: Sequence[str]) -> FloatArray:
         """(n, target) 1 where a parameter is above its median, else −1."""
         values = np.array([[film[target] for target in targets] for film in self.parameters])
         return np.where(values > np.median(values, axis=0), 1.0, -1.0)
@@ -80,7 +79,7 @@ def features_of(name: str, record: Record, *, order: int, size: int) -> list[flo
     ]
 
 
-def accuracies(features: Floats, labels: Floats, sequence: NDArray[np.int64]) -> dict[str, Floats]:
+def accuracies(features: FloatArray, labels: FloatArray, sequence: IntArray) -> dict[str, FloatArray]:
     """Share of right guesses (target,) of labels ±1 (film, target), on films of sequences that were not fitted to.
 
     Both labels weigh the same, so that a blind guess is right in half of the cases however often each occurs.
@@ -101,13 +100,13 @@ def accuracies(features: Floats, labels: Floats, sequence: NDArray[np.int64]) ->
     return {"ridge": _right(ridge, labels), "neighbours": _right(near, labels)}
 
 
-def _right(guesses: Floats, labels: Floats) -> Floats:
+def _right(guesses: FloatArray, labels: FloatArray) -> FloatArray:
     hits = np.sign(guesses) == labels
     shares = [(hits & (labels == label)).sum(axis=0) / (labels == label).sum(axis=0) for label in (-1, 1)]
     return (shares[0] + shares[1]) / 2
 
 
-def dealt_anew(sequence: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.int64]:
+def dealt_anew(sequence: IntArray, rng: np.random.Generator) -> IntArray:
     """(n,) which film each film's parameters are taken from, when sequences change places with one another."""
     films = [np.flatnonzero(sequence == own) for own in np.unique(sequence)]
     taken = np.empty(len(sequence), dtype=np.int64)

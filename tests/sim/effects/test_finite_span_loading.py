@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 from scipy.special import k0, k1
 
+from flagdata.arrays import FloatArray
 from sim.cloth import Cloth
 from sim.effects import FiniteSpanLoading, apply
 from sim.effects.finite_span_loading import cosines, profile_over_height, relative_masses, strip_mass
@@ -19,7 +19,7 @@ from sim.scene import assemble, flag
 from sim.system import InapplicableError
 
 
-def potential_flow(wavenumber: float, *, panels: int = 80) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+def potential_flow(wavenumber: float, *, panels: int = 80) -> tuple[float, FloatArray, FloatArray]:
     """m/ρ of a wave e^(ikx) on a strip of height 1 in potential flow, mean over it; and where, and the load there.
 
     Doublets of constant strength g on panels between ζ₁ and ζ₂, in air that obeys (∂yy + ∂zz − k²) φ = 0: the velocity
@@ -72,7 +72,7 @@ def test_a_wave_that_the_cells_resolve_has_its_own_mass_and_one_that_they_do_not
 U, SHARE, DENSITY, AMPLITUDE = 6.0, 0.5, 1.2, 1e-5
 
 
-def errors_at_the_ends(columns: int, *, still: float = 1.0, celerity: float = 0.0) -> NDArray[np.float64]:
+def errors_at_the_ends(columns: int, *, still: float = 1.0, celerity: float = 0.0) -> FloatArray:
     """(hoist, fly) of the load per area in the two outer rows of vertices, over the largest.
 
     A wave η = A cos(k u − ω t + φ) of half the cloth's length, ω = c U k: D V without the acceleration's term is

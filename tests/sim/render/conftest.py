@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from sim.render import Raster, RenderParameters
 from tests.sim.render.pieces import BLACK, WHITE, Given, plain
 
@@ -41,7 +40,7 @@ def look() -> Callable[..., RenderParameters]:
 def camera_of() -> Callable[..., Raster]:
     """A renderer with black and white, and more pictures by name."""
 
-    def make(**pictures: NDArray[np.uint8]) -> Raster:
+    def make(**pictures: UInt8Array) -> Raster:
         return Raster(assets=Given(pictures={"black": plain(BLACK), "white": plain(WHITE), **pictures}))
 
     return make

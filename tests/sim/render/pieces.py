@@ -8,17 +8,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray, UInt8Array
 from sim.assets import Assets
 from sim.render import Meshes
 
-Piece = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
+Piece = tuple[FloatArray, IntArray, FloatArray]
 """Positions (vertex, 3), faces (face, 3), texture places (vertex, 2)."""
 BLACK, WHITE = (0, 0, 0), (255, 255, 255)
 
 
-def plain(colour: tuple[int, int, int], *, rows: int = 8, columns: int = 8) -> NDArray[np.uint8]:
+def plain(colour: tuple[int, int, int], *, rows: int = 8, columns: int = 8) -> UInt8Array:
     """A picture of one colour."""
     return np.full((rows, columns, 3), colour, dtype=np.uint8)
 
@@ -27,12 +27,12 @@ def plain(colour: tuple[int, int, int], *, rows: int = 8, columns: int = 8) -> N
 class Given(Assets):
     """Pictures that a test names itself."""
 
-    pictures: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+    pictures: Mapping[str, UInt8Array] = field(default_factory=dict)
 
-    def texture(self, name: str) -> NDArray[np.uint8]:
+    def texture(self, name: str) -> UInt8Array:
         return self.pictures[name]
 
-    def background(self, name: str) -> NDArray[np.uint8]:
+    def background(self, name: str) -> UInt8Array:
         return self.pictures[name]
 
 
@@ -60,7 +60,7 @@ def together(*parts: Piece) -> Piece:
 def meshes(
     part: Piece,
     *,
-    moves: NDArray[np.float64] | None = None,
+    moves: FloatArray | None = None,
     rate: float = 25.0,
 ) -> Meshes:
     """A mesh that stands still for a frame, or is moved by (frame, 3); the anchor is the origin."""
@@ -75,7 +75,7 @@ def meshes(
     )
 
 
-def linear(image: torch.Tensor) -> NDArray[np.float64]:
+def linear(image: torch.Tensor) -> FloatArray:
     """(…, 3) bytes as linear values, by the formula of IEC 61966-2-1."""
     code = image.cpu().numpy() / 255
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)

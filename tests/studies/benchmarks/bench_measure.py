@@ -18,8 +18,8 @@ from typing import Any
 
 import av
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.film import Film
 from flagdata.rng import child_seed
 from measure.anemometer import Network, gate_beside, network
@@ -61,7 +61,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         }
 
 
-def _write(path: Path, frames: NDArray[np.uint8]) -> None:
+def _write(path: Path, frames: UInt8Array) -> None:
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=_RATE, options={"crf": "12"})
         stream.height, stream.width = frames.shape[1:]
@@ -115,12 +115,12 @@ def _stages(film: Film, shipped: Network) -> dict[str, float]:
     }
 
 
-def _first_clip(film: Film, shipped: Network) -> NDArray[np.uint8]:
+def _first_clip(film: Film, shipped: Network) -> UInt8Array:
     """(frame, height, width) conditioned, from the film's first frame on."""
     return np.stack([frame for _, frame in film.frames(0.0, film.duration)])[: shipped.estimator.front_end.frames]
 
 
-def _refinement(clip: NDArray[np.uint8], shipped: Network, *, seed: int) -> dict[str, Any]:
+def _refinement(clip: UInt8Array, shipped: Network, *, seed: int) -> dict[str, Any]:
     begun = time.perf_counter()
     found = refine(
         [Clip(name="flag", frames=clip)], shipped.estimator, budget=_BUDGET, seed=seed, level=Options().level

@@ -15,8 +15,8 @@ import numpy as np
 import simplejpeg
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.record import Coding, Record, RecordWriter
 from flagdata.rng import stream
 from flagdata.schema import CLIP_FRAMES, FRAME_SIZE, TOPIC_IMAGE
@@ -27,7 +27,7 @@ PERIOD = 40_000_000
 START = 1_767_225_600_000_000_000
 NOISE = 3.0  # gray levels, a camera by day
 
-Reader = Callable[[int], NDArray[np.uint8]]
+Reader = Callable[[int], UInt8Array]
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return result
 
 
-def _pictures(seed: int) -> NDArray[np.uint8]:
+def _pictures(seed: int) -> UInt8Array:
     """(50, 300, 300): two seconds that repeat."""
     rng = stream(seed, "pictures")
     row, column = np.mgrid[:FRAME_SIZE, :FRAME_SIZE]
@@ -69,14 +69,14 @@ def _pictures(seed: int) -> NDArray[np.uint8]:
     return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
 
-def _write(path: Path, pictures: NDArray[np.uint8], count: int, coding: Coding) -> None:
+def _write(path: Path, pictures: UInt8Array, count: int, coding: Coding) -> None:
     with RecordWriter(path, metadata={}, coding=coding) as record:
         for k in range(count):
             time_ = START + k * PERIOD
             record.frame(log_time=time_, publish_time=time_, timestamp=time_, image=pictures[k % len(pictures)])
 
 
-def _psnr(record: Record, pictures: NDArray[np.uint8]) -> float:
+def _psnr(record: Record, pictures: UInt8Array) -> float:
     error = record.frames(0, len(pictures)).astype(np.float64) - pictures
     return float(10 * np.log10(255**2 / np.mean(error**2)))
 
@@ -92,14 +92,14 @@ def _by_mcap(path: Path) -> Reader:
 
 
 def _by_mcap_anew(path: Path) -> Reader:
-    def read(first: int) -> NDArray[np.uint8]:
+    def read(first: int) -> UInt8Array:
         with path.open("rb") as file:
             return _clip(make_reader(file, decoder_factories=[DecoderFactory()]), first)
 
     return read
 
 
-def _clip(reader: Any, first: int) -> NDArray[np.uint8]:
+def _clip(reader: Any, first: int) -> UInt8Array:
     start = START + first * PERIOD
     found = reader.iter_decoded_messages([TOPIC_IMAGE], starting_at=start, ending_before=start + CLIP_FRAMES * PERIOD)
     return np.stack([simplejpeg.decode_jpeg(image.data, colorspace="GRAY")[..., 0] for *_, image in found])
@@ -120,7 +120,7 @@ def _decoding_share(record: Record, starts: list[int]) -> float:
     """Part of a clip's time that is JPEG decoding alone."""
     pictures = {first: [record.jpeg(k) for k in range(first, first + CLIP_FRAMES)] for first in starts}
 
-    def decode(first: int) -> list[NDArray[np.uint8]]:
+    def decode(first: int) -> list[UInt8Array]:
         return [simplejpeg.decode_jpeg(picture, colorspace="GRAY") for picture in pictures[first]]
 
     alone = np.median([_seconds(lambda first=first: decode(first)) for first in starts])

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.lake.objects import RemoteObjects
 from flagdata.record import Record, RecordWriter
 from flagdata.rng import stream
@@ -65,7 +65,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 def _write(path: Path, seed: int) -> None:
     rng = stream(seed, "pictures")
-    bodies: list[NDArray[np.uint8]] = [rng.integers(0, 255, _FRAME - 4, dtype=np.uint8) for _ in range(50)]
+    bodies: list[UInt8Array] = [rng.integers(0, 255, _FRAME - 4, dtype=np.uint8) for _ in range(50)]
     with RecordWriter(path, metadata={"provenance": {}}) as writer:
         for k in range(SIZE // _FRAME):
             time_ns = _START + k * _PERIOD

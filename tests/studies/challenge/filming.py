@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.lake import MeshSequence
 from flagdata.rng import child_seed, stream
 from flagdata.timebase import NANOSECONDS
@@ -25,7 +25,6 @@ from tests.studies.challenge.meshes import mesh_of
 from tests.studies.challenge.recipe import ChallengeRecipe, Filming
 from tests.studies.challenge.simulation import SimulatedSet, material_of
 
-Floats = NDArray[np.float64]
 _START = datetime(2026, 5, 14, 9, 30, tzinfo=UTC)
 _CUP = 2.3
 """Distance constant of the cup [m]."""
@@ -100,7 +99,7 @@ def films_of(
     }
 
 
-def logged(recipe: ChallengeRecipe, wind: Floats) -> tuple[Floats, Floats]:
+def logged(recipe: ChallengeRecipe, wind: FloatArray) -> tuple[FloatArray, FloatArray]:
     """What a cup logs once a second of a wind (sample, 3) from the first frame on: the middles of its seconds [s], and
     means over them [m/s]."""
     rate = recipe.log_rate

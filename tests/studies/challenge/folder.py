@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray
 from flagdata.documents import read_json
 from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
 from flagdata.outputs import rewrite
@@ -32,7 +32,6 @@ from sim.material import named
 from sim.mesh import grid
 from tests.studies.challenge.films import Filmed, read_films
 
-Floats = NDArray[np.float64]
 _EPOCH = 1_600_000_000  # of every file of a set: the time of writing would show which sets were simulated together
 MODEL_COLUMNS, MODEL_ROWS = 15, 10
 """Cells of the participant's mesh: 176 vertices."""
@@ -190,7 +189,7 @@ def write_json(path: Path, content: Mapping[str, Any]) -> str:
 
 
 def write_set(
-    folder: Path, *, about: Mapping[str, Any], markers: Floats, positions: Mapping[str, NDArray[np.float32]]
+    folder: Path, *, about: Mapping[str, Any], markers: FloatArray, positions: Mapping[str, Float32Array]
 ) -> str:
     """Write a set's files, all with one time of change; the hash over them."""
     folder.mkdir(parents=True)
@@ -248,7 +247,7 @@ def read_set(folder: Path) -> Experiment:
     return Experiment(specimen=as_seen(specimen, recordings), recordings=recordings)
 
 
-def _array(path: Path) -> Floats:
+def _array(path: Path) -> FloatArray:
     """The numbers of a file of NumPy.
 
     Raises:

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray
 from flagdata.documents import read_json
 from flagdata.errors import FlagdataError
 from flagdata.outputs import check_folder, fresh_folder
@@ -193,7 +193,7 @@ def _write_markers(
     weights = seen(recipe.numerics[key.numerics], markers, width=recipe.width, height=recipe.height)
     place = np.append(stream(seed, key.name, "place").uniform(-_AROUND, _AROUND, 2), files.HEIGHT)
     names = _NAMES[: recipe.count]
-    positions: dict[str, NDArray[np.float32]] = {}
+    positions: dict[str, Float32Array] = {}
     for index, (name, track) in enumerate(zip(names, made.positions, strict=True)):
         tracked = np.einsum("mv,fvx->fmx", weights, track.astype(np.float64)) + place
         noise = stream(seed, key.name, "noise", index).normal(0.0, 1.0, tracked.shape)
@@ -218,6 +218,6 @@ def _write_markers(
     return files.write_set(target.data(key.name), about=about, markers=markers, positions=positions)
 
 
-def _log(recipe: ChallengeRecipe, wind: NDArray[np.float64]) -> dict[str, Any]:
+def _log(recipe: ChallengeRecipe, wind: FloatArray) -> dict[str, Any]:
     times = np.arange(len(wind)) / recipe.log_rate
     return {"times": times.tolist(), "velocity": wind.tolist()}

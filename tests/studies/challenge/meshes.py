@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from flagdata.arrays import FloatArray
 from sim.mesh import Mesh, grid
 from tests.studies.challenge.recipe import ChallengeRecipe, Diagonals, Numerics
-
-Floats = NDArray[np.float64]
 
 
 def mesh_of(numerics: Numerics, *, width: float, height: float) -> Mesh:
@@ -24,7 +22,7 @@ def mesh_of(numerics: Numerics, *, width: float, height: float) -> Mesh:
     return Mesh(rest=mesh.rest, faces=faces.reshape(-1, 3))
 
 
-def layout(recipe: ChallengeRecipe, rng: np.random.Generator) -> Floats:
+def layout(recipe: ChallengeRecipe, rng: np.random.Generator) -> FloatArray:
     """(marker, 2) rest coordinates [m]: an uneven grid, each marker moved by up to `jitter` of the spacing, those on
     the edges along them only, in random order."""
     shape = (recipe.marker_columns, recipe.marker_rows)
@@ -36,7 +34,7 @@ def layout(recipe: ChallengeRecipe, rng: np.random.Generator) -> Floats:
     return rng.permutation((places + moved).reshape(-1, 2) * size)
 
 
-def seen(numerics: Numerics, markers: Floats, *, width: float, height: float) -> Floats:
+def seen(numerics: Numerics, markers: FloatArray, *, width: float, height: float) -> FloatArray:
     """(marker, vertex) weights of the surface through the vertices: cubic splines along u and v (not-a-knot).
 
     The fitter interpolates otherwise; facets would add an error of a few millimetres that no cloth has.
@@ -46,6 +44,6 @@ def seen(numerics: Numerics, markers: Floats, *, width: float, height: float) ->
     return (along_u[:, :, None] * along_v[:, None, :]).reshape(len(markers), -1)
 
 
-def _spline(cells: int, length: float, at: Floats) -> Floats:
+def _spline(cells: int, length: float, at: FloatArray) -> FloatArray:
     """(point, knot) weights of the cubic spline through values at equally spaced knots."""
     return make_interp_spline(np.linspace(0, length, cells + 1), np.eye(cells + 1), k=3)(at)

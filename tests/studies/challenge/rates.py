@@ -7,13 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import expit
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
-
-Floats = NDArray[np.float64]
 
 # Priors of the power curve, so that it exists where all or none were detected. The slope on ln strength: a threshold on
 # a statistic that grows as strength and has unit scatter at a threshold of 2 to 4 gives 2 to 6 (Gaussian ogive × 1.7).
@@ -36,7 +34,7 @@ class Power:
     half: dict[str, tuple[float, float, float]]
     overall: tuple[float, float, float]
 
-    def at(self, strength: Floats, group: str | None = None) -> Floats:
+    def at(self, strength: FloatArray, group: str | None = None) -> FloatArray:
         """The chance at strengths of any shape, of a group or of one outside those graded."""
         half = self.overall[0] if group is None else self.half[group][0]
         return expit(self.slope * np.log(np.asarray(strength) / half))
@@ -60,7 +58,7 @@ class Power:
         index = np.array([names.index(name) for name in group])
         middle, spread = float(np.median(x)), max(float(np.ptp(x)), 1.0)
 
-        def loss(p: Floats) -> float:
+        def loss(p: FloatArray) -> float:
             slope, common, offsets = math.exp(p[0]), p[1], p[2:]
             margin = slope * (x - common - offsets[index])
             fit = np.logaddexp(0.0, np.where(hit > 0, -margin, margin)).sum()
@@ -71,7 +69,7 @@ class Power:
         best = minimize(loss, start, method="BFGS").x
         covariance = np.linalg.inv(_hessian(loss, best))
 
-        def bounds(direction: Floats) -> tuple[float, float, float]:
+        def bounds(direction: FloatArray) -> tuple[float, float, float]:
             value, error = float(direction @ best), math.sqrt(float(direction @ covariance @ direction))
             return math.exp(value), math.exp(value - 1.645 * error), math.exp(value + 1.645 * error)
 
@@ -80,7 +78,7 @@ class Power:
         return cls(slope=math.exp(best[0]), half=half, overall=bounds(unit[1]))
 
 
-def _hessian(loss: Callable[[Floats], float], at: Floats) -> Floats:
+def _hessian(loss: Callable[[FloatArray], float], at: FloatArray) -> FloatArray:
     """By central differences, whose error of h² is far below the parameters' own uncertainty."""
     steps = _STEP * np.eye(len(at))
     rows = [[loss(at + a + b) - loss(at + a - b) - loss(at - a + b) + loss(at - a - b) for b in steps] for a in steps]

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import Float32Array, FloatArray
 from flagdata.errors import FlagdataError, UsageError
 from flagdata.rng import stream
 from sim.batch import Batch, DivergedError, Divergence
@@ -26,8 +26,6 @@ from sim.wind import Beyond, Even, SampledWind, VonKarman
 from tests.studies.challenge.answer_key import Acting, AnswerKey
 from tests.studies.challenge.meshes import mesh_of
 from tests.studies.challenge.recipe import ChallengeRecipe, Method, Numerics, effect_type
-
-Floats = NDArray[np.float64]
 
 WIDEST = 15
 """Recordings in a batch: the compiled kernel's lanes."""
@@ -51,8 +49,8 @@ class SimulatedSet:
         impact: see `AnswerKey`.
     """
 
-    positions: tuple[NDArray[np.float32], ...]
-    winds: tuple[Floats, ...]
+    positions: tuple[Float32Array, ...]
+    winds: tuple[FloatArray, ...]
     effects: tuple[Acting, ...]
     impact: float
 
@@ -134,7 +132,7 @@ def _frames(recipe: ChallengeRecipe, key: AnswerKey) -> int:
     return round(recipe.duration * key.rate)
 
 
-def _winds(recipe: ChallengeRecipe, seed: int, key: AnswerKey) -> tuple[Floats, ...]:
+def _winds(recipe: ChallengeRecipe, seed: int, key: AnswerKey) -> tuple[FloatArray, ...]:
     """The wind of each recording (sample, 3) [m/s], from the start of the run."""
     direction = np.array([math.cos(key.toward), math.sin(key.toward), 0.0])
     if not key.intensity:
@@ -154,7 +152,9 @@ def _winds(recipe: ChallengeRecipe, seed: int, key: AnswerKey) -> tuple[Floats, 
     return tuple(s[:, None] * direction for s in series)
 
 
-def _turbulent(recipe: ChallengeRecipe, key: AnswerKey, count: int, rng: np.random.Generator, speed: float) -> Floats:
+def _turbulent(
+    recipe: ChallengeRecipe, key: AnswerKey, count: int, rng: np.random.Generator, speed: float
+) -> FloatArray:
     """(sample, 3) of a wind along +x that is turbulent across and upwards as well, the same in all sets [m/s]."""
     gusts = Gusts(intensity=key.intensity)
     series = (
@@ -179,7 +179,7 @@ def _base(
     seed: int,
     numerics: Numerics,
     keys: Sequence[AnswerKey],
-    winds: dict[str, tuple[Floats, ...]],
+    winds: dict[str, tuple[FloatArray, ...]],
 ) -> tuple[System, State]:
     mesh = mesh_of(numerics, width=recipe.width, height=recipe.height)
     handles = Handles(vertices=corners(mesh.rest))
@@ -206,13 +206,13 @@ def _base(
     return replace(system, wind=SampledWind(times=times, samples=samples, beyond=Beyond.HOLD)), state
 
 
-def heading(key: AnswerKey) -> Floats:
+def heading(key: AnswerKey) -> FloatArray:
     """(3,) unit vector from the pole to where the flag starts."""
     angle = key.toward + key.heading
     return np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
-def _start(rest: Floats, key: AnswerKey, rng: np.random.Generator, handles: Handles) -> Floats:
+def _start(rest: FloatArray, key: AnswerKey, rng: np.random.Generator, handles: Handles) -> FloatArray:
     flat = rest[:, :1] * heading(key) + rest[:, 1:] * np.array([0.0, 0.0, 1.0])
     return roughened(flat, handles, rng, _START_NOISE)
 
@@ -268,14 +268,14 @@ class _Stepper:
 
 def _run(
     recipe: ChallengeRecipe, keys: Sequence[AnswerKey], stepper: _Stepper, system: System, state: State
-) -> tuple[dict[int, NDArray[np.float32]], list[State]]:
+) -> tuple[dict[int, Float32Array], list[State]]:
     """Tick → positions (vertex, 3, batch), and states at some instants."""
     ticks, settle = recipe.ticks, round(recipe.settle * recipe.ticks)
     wanted = {ticks // key.rate * frame for key in keys for frame in range(_frames(recipe, key))}
     span = round(recipe.duration * ticks)
     instants = {round(span * (i + 0.5) / INSTANTS) for i in range(INSTANTS)}
     stops = {ticks // recipe.log_rate * i - settle for i in range(1, (settle + span) * recipe.log_rate // ticks)}
-    frames: dict[int, NDArray[np.float32]] = {}
+    frames: dict[int, Float32Array] = {}
     snapshots: list[State] = []
     batch = Batch(system=system, state=state, integrator=stepper, divergence=Divergence.REFUSE)
     numbers = [tick + settle for tick in sorted(wanted | instants | {stop for stop in stops if stop < span})]

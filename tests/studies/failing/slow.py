@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.examples import example
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
@@ -107,7 +107,7 @@ def loop_scene(folder: Path) -> Scene:
     return Scene(folder=folder, ids={"kept": str(kept)})
 
 
-def _tracks(path: Path, markers: NDArray[np.float64], recordings: Sequence[NDArray[np.float64]]) -> None:
+def _tracks(path: Path, markers: FloatArray, recordings: Sequence[FloatArray]) -> None:
     lines = ["recording,time,marker,u,v,x,y,z"]
     for number, positions in enumerate(recordings):
         for frame, at in enumerate(positions):

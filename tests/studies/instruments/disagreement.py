@@ -23,17 +23,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from flagdata.arrays import FloatArray
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.stated import Stated
 from tests.studies.instruments.chain import Chain, about
 
-Mask = NDArray[np.bool_]
 _FEWEST = 12
 _EXPONENTS = (0.2, 3.0)
 # A log has steps of 0.01 m/s; a flag is not read better than to half a per cent.
@@ -156,7 +154,7 @@ def fit(
     log: Readings,
     effects: Sequence[str],
     *,
-    use: Mask | None = None,
+    use: BoolArray | None = None,
     known: Mapping[str, Stated] | None = None,
     near: Disagreement | None = None,
     seed: int = 0,
@@ -237,8 +235,8 @@ def jackknife(
     effects: Sequence[str],
     found: Disagreement,
     *,
-    blocks: NDArray[np.int64],
-    use: Mask | None = None,
+    blocks: IntArray,
+    use: BoolArray | None = None,
     known: Mapping[str, Stated] | None = None,
 ) -> tuple[Mapping[str, float], FloatArray]:
     """Standard errors of scale, exponent and the strengths, and errors (n,) of each row by the fit without its block

@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.lake import MeshSequence
 from flagdata.record import decode
 from flagdata.rng import child_seed, stream
@@ -53,10 +54,10 @@ class Example:
         hoist: (n, 2, 2) upper and lower end of the hoist: column and row, the first pixel's middle at 0.5 [px].
     """
 
-    pictures: NDArray[np.uint8]
+    pictures: UInt8Array
     stills: Stills
-    cloth: NDArray[np.uint8]
-    hoist: NDArray[np.float32]
+    cloth: UInt8Array
+    hoist: Float32Array
 
 
 def example(runs: Sequence[MeshSequence], *, seed: int, assets: Assets) -> Example | None:
@@ -109,7 +110,7 @@ def _joined(runs: Sequence[MeshSequence]) -> MeshSequence:
     )
 
 
-def _lit(colour: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+def _lit(colour: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     """Frames in a light that stays, or in one that changes evenly."""
     if rng.random() >= _DRIFTING:
         return colour
@@ -118,7 +119,7 @@ def _lit(colour: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint
     return np.clip(np.rint(colour * gain), 0, 255).astype(np.uint8)
 
 
-def _coded(colour: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+def _coded(colour: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     """(n, height, width) gray of frames (n, height, width, 3) after the noise and the coding of the data set's
     cameras."""
     camera = load(_CAMERA).camera
@@ -126,16 +127,14 @@ def _coded(colour: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.ui
     return np.stack(decode(coded(colour, settings(camera, seed=seed), camera, seed=seed), where="a simulated film"))
 
 
-def _places(meshes: Meshes, zeta: RenderParameters, picked: Sequence[int]) -> NDArray[np.float64]:
+def _places(meshes: Meshes, zeta: RenderParameters, picked: Sequence[int]) -> FloatArray:
     """(n, vertex, 2) of the film's pixels, the first pixel's middle at 0.5."""
     placed = stage(meshes, zeta)
     each = [meshes.positions[meshes.vertex_offset[k] : meshes.vertex_offset[k + 1]] for k in picked]
     return placed.camera.project(torch.stack(each).double() + torch.tensor(placed.shift).double())[0].numpy()
 
 
-def _cloth(
-    places: NDArray[np.float64], faces: NDArray[np.int32], zeta: RenderParameters, found: Conditioning
-) -> NDArray[np.uint8]:
+def _cloth(places: FloatArray, faces: NDArray[np.int32], zeta: RenderParameters, found: Conditioning) -> UInt8Array:
     fine = np.zeros((zeta.height * _FINE, zeta.width * _FINE), np.uint8)
     corners = np.rint((places * _FINE - 0.5) * 16).astype(np.int32)
     for face in faces:
@@ -145,7 +144,7 @@ def _cloth(
     return halved(picture)
 
 
-def _hoist(places: NDArray[np.float64], rest: NDArray[np.float32], found: Conditioning) -> NDArray[np.float32]:
+def _hoist(places: FloatArray, rest: Float32Array, found: Conditioning) -> Float32Array:
     hoist = np.flatnonzero(rest[:, 0] <= rest[:, 0].min() + 1e-4)
     ends = hoist[[int(rest[hoist, 1].argmax()), int(rest[hoist, 1].argmin())]]
     corner = np.array([found.square.x, found.square.y])

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from models.conditioning import MaskNetwork, inputs_of
 from tests.studies.masks.films import Example
@@ -88,7 +88,7 @@ def scores(network: MaskNetwork, examples: Sequence[Example]) -> Scores:
     """How well the cloth and the hoist of films are found."""
     network.eval()
     each: list[float] = []
-    apart: list[NDArray[np.float64]] = []
+    apart: list[FloatArray] = []
     with torch.inference_mode():
         for one in examples:
             maps = network(inputs_of(one.pictures, one.stills).contiguous(memory_format=torch.channels_last)).numpy()

@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.findings import Finding
 from flagdata.lake import Lake
 from measure.anemometer import Features, Network, Recording, calibrated, network
@@ -43,8 +43,6 @@ NETWORKS = ("flow-outdoor", "flow")
 """The default, and the network of flags as those of this data set."""
 AIMS = {FIRST: 0.30, "day": 0.35, "light": 0.35, "place": 0.45}
 """RMSE against the cup [m/s]; a film from another place may be refused instead."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -138,7 +136,7 @@ def _recording(lake: Lake, seen: Seen) -> Recording:
     )
 
 
-def _air(cast: Cast, index: int) -> tuple[Floats, Floats]:
+def _air(cast: Cast, index: int) -> tuple[FloatArray, FloatArray]:
     """Times since the first frame [s] and the wind that a simulation's flag was in [m/s]."""
     crew = Crew(cast.simulation)
     times, velocity = air(load("gusty").anemometer, crew, crew.member(index))
@@ -146,12 +144,14 @@ def _air(cast: Cast, index: int) -> tuple[Floats, Floats]:
     return times - time.settling / time.rate, np.hypot(velocity[:, 0], velocity[:, 1])
 
 
-def _over(starts: Floats, length: float, times: Floats, values: Floats) -> Floats:
+def _over(starts: FloatArray, length: float, times: FloatArray, values: FloatArray) -> FloatArray:
     """(w,) mean over each window."""
     return np.array([values[(times >= a) & (times < a + length)].mean() for a in starts])
 
 
-def _row(name: str, subject: Subject, seen: Seen, found: Measurement, truth: tuple[Floats, Floats]) -> dict[str, Any]:
+def _row(
+    name: str, subject: Subject, seen: Seen, found: Measurement, truth: tuple[FloatArray, FloatArray]
+) -> dict[str, Any]:
     features, wind = seen.features, None if subject.record is None else subject.record.wind()
     if wind is None or subject.film.start is None:
         raise ValueError("a film of the data set has a log")
@@ -177,12 +177,12 @@ def _row(name: str, subject: Subject, seen: Seen, found: Measurement, truth: tup
     }
 
 
-def _agreement(read: Floats, low: Floats, high: Floats, reference: Floats) -> dict[str, float]:
+def _agreement(read: FloatArray, low: FloatArray, high: FloatArray, reference: FloatArray) -> dict[str, float]:
     inside = (low <= reference) & (reference <= high)
     return {**_error(read - reference), "within": float(inside.mean())}
 
 
-def _error(off: Floats) -> dict[str, float]:
+def _error(off: FloatArray) -> dict[str, float]:
     return {"rmse": float(np.sqrt(np.mean(off**2))), "bias": float(off.mean())}
 
 

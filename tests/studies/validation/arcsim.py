@@ -15,6 +15,7 @@ import torch
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.rng import stream
 from sim.integrate import AirShape, BackwardEuler, Integrator, Symplectic
 from sim.scene import assemble, flag
@@ -49,7 +50,7 @@ class ReferenceMotion:
 
     wind: float
     step: str
-    statistics: NDArray[np.float64]
+    statistics: FloatArray
 
 
 def folder() -> Path | None:
@@ -58,17 +59,17 @@ def folder() -> Path | None:
     return runs if all((runs / f"{name}.npz").is_file() for name in RUNS.values()) else None
 
 
-def _positions(runs: Path, name: str) -> NDArray[np.float64]:
+def _positions(runs: Path, name: str) -> FloatArray:
     with np.load(runs / f"{name}.npz") as content:
         return content["positions"].astype(np.float64)
 
 
-def _edge() -> NDArray[np.int64]:
+def _edge() -> IntArray:
     rest = flag(material=CAMEL, wind_speed=0.0).mesh.rest
     return np.flatnonzero(rest[:, 0] > rest[:, 0].max() - 1e-6)
 
 
-def _statistics(edge: NDArray[np.floating]) -> NDArray[np.float64]:
+def _statistics(edge: NDArray[np.floating]) -> FloatArray:
     motion = edge_motion(edge, rate=RATE)
     return np.array([*motion.position, motion.speed, motion.frequency])
 
@@ -117,7 +118,7 @@ def distances(runs: Path) -> dict[str, dict[str, list[float | None]]]:
     return result
 
 
-def _gaps(expected: NDArray[np.float64], wind: float, damping: float, method: Integrator) -> list[float | None]:
+def _gaps(expected: FloatArray, wind: float, damping: float, method: Integrator) -> list[float | None]:
     scene = flag(material=replace(CAMEL, damping=damping), wind_speed=wind)
     system, state = assemble([scene], dtype=torch.float64)
     gaps: list[float | None] = []
@@ -128,7 +129,7 @@ def _gaps(expected: NDArray[np.float64], wind: float, damping: float, method: In
     return gaps
 
 
-def _travel(expected: NDArray[np.float64]) -> list[float | None]:
+def _travel(expected: FloatArray) -> list[float | None]:
     return np.linalg.norm(expected[1 : SHORT + 1] - expected[0], axis=2).mean(axis=1).tolist()
 
 
@@ -154,7 +155,7 @@ def _replicated(runs: Path, step: str, wind: float, seed: int) -> dict[str, Any]
     return _compared(ours, _statistics(_positions(runs, RUNS[step, wind])[FIRST:LAST, edge]))
 
 
-def _compared(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> dict[str, Any]:
+def _compared(ours: FloatArray, theirs: FloatArray) -> dict[str, Any]:
     rows: dict[str, Any] = {
         "position_off_m": float(np.linalg.norm(ours[:, :3].mean(0) - theirs[:3])),
         "position_deviation_m": float(np.linalg.norm(ours[:, :3].std(0, ddof=1))),

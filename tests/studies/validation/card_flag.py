@@ -39,9 +39,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from flagdata.align import pair_clocks
+from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.clock import NINETY
 from flagdata.pages.pictures import png
 from flagdata.rng import stream
@@ -69,9 +69,6 @@ EFFECTS = ("clock-offset", "anemometer-dead-zone", "anemometer-offset")
 FEWEST_POINTS = 5
 _GAP = 0.1
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tracked:
@@ -85,11 +82,11 @@ class Tracked:
         rate: frames a second [Hz].
     """
 
-    stamps: Floats
-    motion: Floats
-    frequency: Floats
-    estimate: Floats
-    sound: Mask
+    stamps: FloatArray
+    motion: FloatArray
+    frequency: FloatArray
+    estimate: FloatArray
+    sound: BoolArray
     clock: Stated
     log: Readings
     rate: float
@@ -131,7 +128,7 @@ def _lines(path: Path) -> Iterable[tuple[float, str]]:
             yield (parse(stamp, default=UTC) - ORIGIN) / NANOSECONDS, raw
 
 
-def rows_of(found: Tracked, *, rest: float | None = None) -> tuple[Rows, NDArray[np.int64]]:
+def rows_of(found: Tracked, *, rest: float | None = None) -> tuple[Rows, IntArray]:
     """Rows every quarter of a second, and the places of their frames."""
     wanted = np.arange(found.stamps[0], found.stamps[-1], EVERY)
     places = np.unique(np.searchsorted(found.stamps, wanted))
@@ -142,7 +139,7 @@ def rows_of(found: Tracked, *, rest: float | None = None) -> tuple[Rows, NDArray
     return Rows(times=middles, span=found.span, values=found.motion[places], rest=rest), places
 
 
-def fitted(found: Tracked, rows: Rows, *, seed: int) -> tuple[Disagreement, dict[str, Any], Floats]:
+def fitted(found: Tracked, rows: Rows, *, seed: int) -> tuple[Disagreement, dict[str, Any], FloatArray]:
     """The law and effects of the rows that were opened, a table of them, and errors by the fit without each block."""
     use = rows.times + rows.span / 2 < OPENED
     known = {"clock-offset": found.clock}
@@ -155,7 +152,7 @@ def fitted(found: Tracked, rows: Rows, *, seed: int) -> tuple[Disagreement, dict
     return answer, {**table, "reference": answer.law.reference, "share": answer.share}, errors
 
 
-def stages(found: Tracked, rows: Rows, places: NDArray[np.int64], answer: Disagreement) -> dict[str, Floats]:
+def stages(found: Tracked, rows: Rows, places: IntArray, answer: Disagreement) -> dict[str, FloatArray]:
     """Errors (n,) of each row as one thing after the other is put right [m/s]."""
     log, at = found.log, found.stamps[places]
     own, clock = found.estimate[places], found.clock.low
@@ -172,7 +169,7 @@ def stages(found: Tracked, rows: Rows, places: NDArray[np.int64], answer: Disagr
     }
 
 
-def root_mean_square(errors: Floats, rows: Rows, use: Mask, *, seed: int) -> dict[str, Any]:
+def root_mean_square(errors: FloatArray, rows: Rows, use: BoolArray, *, seed: int) -> dict[str, Any]:
     """With its interval over blocks of a second."""
     use = use & np.isfinite(errors)
     if not use.any():
@@ -263,7 +260,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return sheet
 
 
-def _picture(found: Tracked, rows: Rows, places: NDArray[np.int64], answer: Disagreement) -> Figure:
+def _picture(found: Tracked, rows: Rows, places: IntArray, answer: Disagreement) -> Figure:
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     wind, motion = figure.subplots(2, 1, sharex=True)
     at = found.log.times - found.clock.low

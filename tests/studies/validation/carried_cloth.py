@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from scipy.interpolate import CubicSpline
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed
 from measure.closing import close_loop
 from measure.forecasting import Calibration, Setting
@@ -30,7 +31,7 @@ from sim.material import named
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.robot_cloth import MATERIAL
 from tests.studies.validation.robot_cloth.model import Cloth
-from tests.studies.validation.robot_cloth.reading import Floats, Swing, read
+from tests.studies.validation.robot_cloth.reading import Swing, read
 
 RECORDINGS = ("range30_rep1", "range60_rep1", "range90_rep1", "range120_rep1")
 RATE = 10.0  # Hz
@@ -179,7 +180,7 @@ def _bank(experiment: Experiment, seed: int) -> LoopOptions:
     return LoopOptions(seed=seed, bank=plan.kept_in(setting, seed=seed))
 
 
-def _places(cloth: Cloth) -> Floats:
+def _places(cloth: Cloth) -> FloatArray:
     """(node, 2) columns from left to right, each from top to bottom [m]."""
     place = np.arange(cloth.side) / (cloth.side - 1)
     u, v = np.meshgrid(place * cloth.width, cloth.height * (1 - place), indexing="ij")

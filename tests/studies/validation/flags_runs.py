@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.rng import stream
 from sim.contact import Contact
 from sim.integrate import BackwardEuler, Integrator, Symplectic
@@ -51,7 +52,7 @@ class Ensemble:
         lasted: (group, replicate) how long each run was healthy [s]; those that diverged have NaN statistics.
     """
 
-    values: NDArray[np.float64]
+    values: FloatArray
     edge: NDArray[np.floating]
     first: NDArray[np.floating]
     energies: dict[str, NDArray[np.floating]]
@@ -64,7 +65,7 @@ class Ensemble:
         return self.edge[round(SETTLED * RATE) :]
 
     @property
-    def statistics(self) -> NDArray[np.float64]:
+    def statistics(self) -> FloatArray:
         """(group, replicate, 5) of the settled free edge: mean x, y, z [m], speed [m/s], frequency [Hz].
 
         From every other look, so that velocities are differences over 40 ms as in the reference's frames.
@@ -76,7 +77,7 @@ class Ensemble:
         return np.where(self.diverged[..., None], np.nan, values)
 
     @property
-    def diverged(self) -> NDArray[np.bool_]:
+    def diverged(self) -> BoolArray:
         """(group, replicate)."""
         return self.lasted < (len(self.edge) - 1) / RATE - 1e-9
 

@@ -12,6 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from sim.scene import flag
 from tests.studies.validation.flags_runs import CAMEL, RATE, Ensemble
 
@@ -30,14 +31,14 @@ class View:
     elevation: float
 
     @property
-    def axes(self) -> NDArray[np.float64]:
+    def axes(self) -> FloatArray:
         """(3, 3) rows: right, up, towards the eye."""
         a, e = self.azimuth, self.elevation
         toward = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
         right = np.array([-math.sin(a), math.cos(a), 0.0])
         return np.stack([right, np.cross(toward, right), toward])
 
-    def seen(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+    def seen(self, points: NDArray[np.floating]) -> FloatArray:
         """(…, 3) as right, up and towards the eye [m]."""
         return np.asarray(points, dtype=np.float64) @ self.axes.T
 
@@ -46,7 +47,7 @@ class View:
 SIDE = View(azimuth=math.radians(-68), elevation=math.radians(16))
 
 
-def draw_cloth(axes: Axes, position: NDArray[np.floating], faces: NDArray[np.int64], view: View = SIDE) -> None:
+def draw_cloth(axes: Axes, position: NDArray[np.floating], faces: IntArray, view: View = SIDE) -> None:
     """The faces from far to near, lit from the viewer's upper left; the two sides of the cloth differ in colour.
 
     Args:
@@ -66,7 +67,7 @@ def draw_cloth(axes: Axes, position: NDArray[np.floating], faces: NDArray[np.int
     axes.add_collection(PolyCollection(seen[order][..., :2], facecolors=paint, edgecolors=paint, linewidths=0.25))
 
 
-def _smoothed(normal: NDArray[np.float64], faces: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+def _smoothed(normal: FloatArray, faces: IntArray, count: int) -> FloatArray:
     """(face, 3) unit normals, each the mean of the means at its corners."""
     at_vertices = np.zeros((count, 3))
     for corner in faces.T:

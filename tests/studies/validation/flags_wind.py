@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.signal import welch
 
+from flagdata.arrays import FloatArray
 from sim.run import CRUMPLED
 from sim.scene import GRAVITY
 from tests.studies.validation.arcsim import ReferenceMotion
@@ -33,7 +34,7 @@ _SEGMENT = 4.0
 """Length of the pieces that spectra are averaged over [s]."""
 
 
-def _quantity(statistics: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+def _quantity(statistics: FloatArray, name: str) -> FloatArray:
     """(group, replicate) from `Ensemble.statistics`."""
     if name == "droop":
         return 0.5 - statistics[..., 2]
@@ -58,7 +59,7 @@ def summary(ensemble: Ensemble) -> dict[str, Any]:
     return result
 
 
-def moments(runs: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def moments(runs: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
     """Mean and standard deviation over the replicates (group, replicate) that are not NaN; NaN where fewer than two."""
     rows = [row[np.isfinite(row)].astype(np.float64) for row in runs]
     pairs = [(row.mean(), row.std(ddof=1)) if len(row) > 1 else (np.nan, np.nan) for row in rows]
@@ -66,7 +67,7 @@ def moments(runs: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np
     return mean, deviation
 
 
-def _plain(values: NDArray[np.float64]) -> list[float | None]:
+def _plain(values: FloatArray) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
 
 
@@ -83,7 +84,7 @@ def _scatter(axes: Axes, ensemble: Ensemble, name: str, colour: str, label: str,
     axes.errorbar(x, mean, yerr=deviation, color=colour, lw=1.2, capsize=2, label=label)
 
 
-def tip_spectrum(ensemble: Ensemble, group: int, corner: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def tip_spectrum(ensemble: Ensemble, group: int, corner: int) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz], and the power spectral density of a vertex of the free edge across the wind, in m²/Hz: one row
     a replicate."""
     across = ensemble.settled[:, corner, 1, group].astype(np.float64)

@@ -28,8 +28,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from tests.evidence import ABSENT, REFERENCE
 from tests.verification.flutter.beam import Strip, leading, onset, pipe_onset
 
@@ -45,7 +45,7 @@ _CLIPS = {7.64: 10.4, 8.09: 11.7, 9.30: 14.5}
 """Tunnel speed [m/s] → flutter frequency [Hz] of the clips, by the column centroids of the dark line at 1000 Hz."""
 
 
-def _columns(path: Path) -> dict[str, NDArray[np.float64]]:
+def _columns(path: Path) -> dict[str, FloatArray]:
     """Name → (n, 2) of the digitised curves: pairs of columns, the name above the first."""
     rows = list(csv.reader(path.read_text().splitlines()))
     found = {}

@@ -17,8 +17,8 @@ from typing import Any
 import av
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.errors import NotFoundError
 from measure.gate import Gate, judge, read
 from measure.gate.window import CONFIDENCE, FALSE_ALARM, Judgement
@@ -125,7 +125,7 @@ def _real(model: Estimator, gate: Gate) -> dict[str, Any]:
     return {"clip": _CLIP, "windows": [_window(window, model, gate) for window in windows]}
 
 
-def _window(window: NDArray[np.uint8], model: Estimator, gate: Gate) -> dict[str, Any]:
+def _window(window: UInt8Array, model: Estimator, gate: Gate) -> dict[str, Any]:
     one = judge(window, model, gate)
     return {"familiar": one.familiar, "p": one.p, "reasons": [reason.what for reason in one.reasons]}
 

@@ -14,10 +14,10 @@ from typing import TypeAlias
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.lake import MeshSequence
 from flagdata.record import VideoEncoder, decode
 from flagdata.rng import child_seed, stream
@@ -31,20 +31,19 @@ from sim.render import Meshes, Raster, plate, to_bytes
 from sim.render import named as prior
 from sim.scene import Scene, assemble, upright
 
-Film: TypeAlias = NDArray[np.uint8]
-Films: TypeAlias = Sequence[Film]
+Films: TypeAlias = Sequence[UInt8Array]
 SIZE, FRAMES, RATE = 300, 30, 25.0
 _BACKGROUNDS = ("sky", "hills", "foliage", "buildings")
 _WHITE = 255.0
 
 
-def no_flag(films: Films, rng: np.random.Generator) -> Film:
+def no_flag(films: Films, rng: np.random.Generator) -> UInt8Array:
     """A landscape without a flag, with the camera's noise and, in every other, light that changes as clouds pass."""
     clouds = 1 + rng.choice([0.0, 0.03]) * np.sin(2 * np.pi * 0.3 * np.arange(FRAMES) / RATE + rng.uniform(0, 6))
     return _filmed(_landscape(rng)[None] * clouds[:, None, None], rng)
 
 
-def cut_off(films: Films, rng: np.random.Generator) -> Film:
+def cut_off(films: Films, rng: np.random.Generator) -> UInt8Array:
     """The picture ends in the middle of what moves."""
     film = _one(films, rng)
     top, bottom, left, right = _box(film)
@@ -61,7 +60,7 @@ def cut_off(films: Films, rng: np.random.Generator) -> Film:
     return _resized(part[:, :, -keep:] if from_right else part[:, :, :keep])
 
 
-def moving_camera(films: Films, rng: np.random.Generator) -> Film:
+def moving_camera(films: Films, rng: np.random.Generator) -> UInt8Array:
     """A panning or a hand-held camera: a window of 0.75 of the frame moves over the film."""
     film, side = _one(films, rng), 225
     time = np.arange(FRAMES) / RATE
@@ -79,7 +78,7 @@ def moving_camera(films: Films, rng: np.random.Generator) -> Film:
     return _resized(np.clip(np.stack(seen), 0, 255).astype(np.uint8))
 
 
-def ten_frames(films: Films, rng: np.random.Generator) -> Film:
+def ten_frames(films: Films, rng: np.random.Generator) -> UInt8Array:
     """Ten frames: no more, forth and back, in a loop, or then standing still."""
     film = _one(films, rng)[:10]
     index = np.arange(FRAMES)
@@ -89,7 +88,7 @@ def ten_frames(films: Films, rng: np.random.Generator) -> Film:
     return film[(np.abs((index + 9) % 18 - 9), index % 10, np.minimum(index, 9))[kind - 1]]
 
 
-def night(films: Films, rng: np.random.Generator) -> Film:
+def night(films: Films, rng: np.random.Generator) -> UInt8Array:
     """Three to six stops under-exposed, with a sensor's noise at high gain, at times brightened afterwards."""
     film = _one(films, rng)[:FRAMES].astype(np.float64)
     light = (film / 255) ** 2.2 * 2.0 ** -rng.uniform(3, 6)
@@ -98,14 +97,14 @@ def night(films: Films, rng: np.random.Generator) -> Film:
     return np.clip(np.rint(255 * np.clip(code, 0, 1) ** (1 / 2.2)), 0, 255).astype(np.uint8)
 
 
-def ten_hertz(films: Films, rng: np.random.Generator) -> Film:
+def ten_hertz(films: Films, rng: np.random.Generator) -> UInt8Array:
     """10 frames a second, shown at 25: every 2.5th frame, held."""
     film = _one(films, rng)
     start = int(rng.integers(len(film) - FRAMES + 1))
     return film[start + (np.floor(np.arange(FRAMES) / 2.5) * 2.5).astype(int)]
 
 
-def two_flags(films: Films, rng: np.random.Generator) -> Film:
+def two_flags(films: Films, rng: np.random.Generator) -> UInt8Array:
     """Two films side by side, each cut to its flag; or a second flag before the first one's background."""
     one, two = (_one(films, rng) for _ in range(2))
     if rng.random() < 0.5:
@@ -125,7 +124,7 @@ def two_flags(films: Films, rng: np.random.Generator) -> Film:
     return clip
 
 
-def tree(films: Films, rng: np.random.Generator) -> Film:
+def tree(films: Films, rng: np.random.Generator) -> UInt8Array:
     """A tree in the wind: branches on branches that swing about where they grow, leaves at their ends."""
     behind, seed = _landscape(rng, kinds=("sky", "hills")), int(rng.integers(1 << 31))
     gust, leaf = rng.uniform(0.03, 0.12), rng.uniform(3, 7)
@@ -135,7 +134,7 @@ def tree(films: Films, rng: np.random.Generator) -> Film:
     )
 
 
-def sheet(films: Films, rng: np.random.Generator) -> Film:
+def sheet(films: Films, rng: np.random.Generator) -> UInt8Array:
     """A simulated sheet held by its four corners, more or less slack, that billows and then hardly moves."""
     mesh = grid(width=1.4, height=1.0, columns=21, rows=15)
     start = upright(mesh)
@@ -174,7 +173,7 @@ def sheet(films: Films, rng: np.random.Generator) -> Film:
     return _filmed(shown.numpy().astype(np.float64) @ (0.299, 0.587, 0.114), rng)
 
 
-def person(films: Films, rng: np.random.Generator) -> Film:
+def person(films: Films, rng: np.random.Generator) -> UInt8Array:
     """A person who waves one arm or both, and shifts from one leg to the other."""
     behind = _landscape(rng)
     rate, both, phase = rng.uniform(0.6, 1.8), rng.random() < 0.5, rng.uniform(0, 6)
@@ -186,7 +185,7 @@ def person(films: Films, rng: np.random.Generator) -> Film:
     return _filmed(np.stack(frames), rng)
 
 
-KINDS: dict[str, tuple[Callable[[Films, np.random.Generator], Film], tuple[str, ...]]] = {
+KINDS: dict[str, tuple[Callable[[Films, np.random.Generator], UInt8Array], tuple[str, ...]]] = {
     "no flag": (no_flag, ("no-motion",)),
     "cut off": (cut_off, ("cut-off",)),
     "moving camera": (moving_camera, ("moving-camera",)),
@@ -201,7 +200,7 @@ KINDS: dict[str, tuple[Callable[[Films, np.random.Generator], Film], tuple[str, 
 """Name → what makes it of films (n, 300, 300) that fly one flag each, and the reasons that are right for it."""
 
 
-def made(films: Films, *, seed: int, each: int = 6) -> list[tuple[str, Film]]:
+def made(films: Films, *, seed: int, each: int = 6) -> list[tuple[str, UInt8Array]]:
     """Name and clip of every one, coded as the data set's films are."""
     found = []
     for name, (make, _) in KINDS.items():
@@ -212,11 +211,11 @@ def made(films: Films, *, seed: int, each: int = 6) -> list[tuple[str, Film]]:
     return found
 
 
-def _one(films: Films, rng: np.random.Generator) -> Film:
+def _one(films: Films, rng: np.random.Generator) -> UInt8Array:
     return films[int(rng.integers(len(films)))]
 
 
-def _box(film: Film) -> tuple[int, int, int, int]:
+def _box(film: UInt8Array) -> tuple[int, int, int, int]:
     """Top, bottom, left and right of what moves [px]."""
     moves = film.astype(np.float32).std(axis=0) > 6
     rows, columns = np.flatnonzero(moves.any(axis=1)), np.flatnonzero(moves.any(axis=0))
@@ -225,7 +224,7 @@ def _box(film: Film) -> tuple[int, int, int, int]:
     return int(rows[0]), int(rows[-1]), int(columns[0]), int(columns[-1])
 
 
-def _landscape(rng: np.random.Generator, kinds: Sequence[str] = _BACKGROUNDS) -> NDArray[np.float64]:
+def _landscape(rng: np.random.Generator, kinds: Sequence[str] = _BACKGROUNDS) -> FloatArray:
     """(SIZE, SIZE) gray levels of a background of the data set's kinds."""
     assets = Assets()
     zeta = prior("flags").draw(int(rng.integers(1 << 31)), assets)
@@ -234,26 +233,26 @@ def _landscape(rng: np.random.Generator, kinds: Sequence[str] = _BACKGROUNDS) ->
     return colours.astype(np.float64) @ (0.299, 0.587, 0.114)
 
 
-def _filmed(light: NDArray[np.float64], rng: np.random.Generator) -> Film:
+def _filmed(light: FloatArray, rng: np.random.Generator) -> UInt8Array:
     """Gray levels with the data set's read and shot noise."""
     read, shot = rng.uniform(0.3, 1.5), rng.uniform(0.5, 3.0)
     sigma = np.sqrt(read**2 + shot**2 * np.clip(light, 0, None) / _WHITE)
     return np.clip(np.rint(light + sigma * rng.standard_normal(light.shape)), 0, 255).astype(np.uint8)
 
 
-def _coded(clip: Film, *, rate_factor: float) -> Film:
+def _coded(clip: UInt8Array, *, rate_factor: float) -> UInt8Array:
     encoder = VideoEncoder(height=SIZE, width=SIZE, rate_factor=rate_factor, preset="veryfast")
     return np.stack(decode([encoder.encode(frame) for frame in clip], where="gate clips"))
 
 
-def _resized(clip: Film, side: int = SIZE) -> Film:
+def _resized(clip: UInt8Array, side: int = SIZE) -> UInt8Array:
     size = (side, side)
     return np.stack([np.asarray(Image.fromarray(frame).resize(size, Image.Resampling.BICUBIC)) for frame in clip])
 
 
 def _tree(
-    behind: NDArray[np.float64], time: float, rng: np.random.Generator, gust: float, leaf: float, dark: float
-) -> NDArray[np.float64]:
+    behind: FloatArray, time: float, rng: np.random.Generator, gust: float, leaf: float, dark: float
+) -> FloatArray:
     """One frame; the generator begins anew in each, so that the tree is the same."""
     picture = Image.fromarray(np.clip(behind, 0, 255).astype(np.uint8)).resize((2 * SIZE, 2 * SIZE))
     draw = ImageDraw.Draw(picture)
@@ -280,9 +279,7 @@ def _tree(
     return np.asarray(picture.resize((SIZE, SIZE), Image.Resampling.BOX), dtype=np.float64)
 
 
-def _person(
-    behind: NDArray[np.float64], phase: float, *, height: float, x: float, tone: NDArray[np.float64], both: bool
-) -> NDArray[np.float64]:
+def _person(behind: FloatArray, phase: float, *, height: float, x: float, tone: FloatArray, both: bool) -> FloatArray:
     picture = Image.fromarray(np.clip(behind, 0, 255).astype(np.uint8)).resize((2 * SIZE, 2 * SIZE))
     draw = ImageDraw.Draw(picture)
     unit, foot = 2 * height / 8, 1.95 * SIZE

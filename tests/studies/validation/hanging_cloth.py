@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 import flagdata
+from flagdata.arrays import FloatArray
 from flagdata.dataset import Pairs
 from flagdata.rng import stream
 from flagdata.schema import Kind
@@ -35,7 +35,6 @@ LEVEL = 0.9
 DRAWS = 1000
 RESAMPLES = 2000
 _DATASET = "clothsim-wide"
-Array = NDArray[np.float64]
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -93,7 +92,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return result
 
 
-def _of(pairs: Pairs, quantity: str) -> Array:
+def _of(pairs: Pairs, quantity: str) -> FloatArray:
     known = pairs.table.parameter_columns()
     if quantity in known:
         return known[quantity]
@@ -101,7 +100,7 @@ def _of(pairs: Pairs, quantity: str) -> Array:
 
 
 def _scores(
-    truth: Array, mean: Array, low: Array, high: Array, known: Array, *, unit: str, seed: int
+    truth: FloatArray, mean: FloatArray, low: FloatArray, high: FloatArray, known: FloatArray, *, unit: str, seed: int
 ) -> dict[str, Any]:
     """RMSE with an interval over clips, one of each simulation, beside that of the training clips' mean."""
     drawn = stream(seed, "bootstrap", unit).integers(len(truth), size=(RESAMPLES, len(truth)))
@@ -123,11 +122,11 @@ def _scores(
     }
 
 
-def _rmse(error: Array) -> float:
+def _rmse(error: FloatArray) -> float:
     return float(np.sqrt((error**2).mean()))
 
 
-def _mean_of_each(values: Array, of: list[str]) -> Array:
+def _mean_of_each(values: FloatArray, of: list[str]) -> FloatArray:
     """The mean of all clips of a clip's own material, that clip left out; of a material with one clip that of all."""
     found = np.empty(len(values))
     for k, name in enumerate(of):
@@ -143,7 +142,9 @@ def _one_of_each(of: list[str], seed: int) -> list[int]:
     return [int(generator.choice([k for k, name in enumerate(of) if name == wanted])) for wanted in names]
 
 
-def _draw(path: Path, truth: Array, mean: Array, low: Array, high: Array, chosen: list[int]) -> None:
+def _draw(
+    path: Path, truth: FloatArray, mean: FloatArray, low: FloatArray, high: FloatArray, chosen: list[int]
+) -> None:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5, 4.2), dpi=110, layout="constrained")

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
-from flagdata.arrays import FloatArray
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import FlagdataError
 from flagdata.film_array import Frames
 from flagdata.record import decode
@@ -141,7 +140,7 @@ def filmed(
     return read(pictures, places(meshes, zeta), mesh, flag)
 
 
-def read(pictures: NDArray[np.uint8], projected: FloatArray, mesh: Mesh, flag: Flag) -> Filmed | None:
+def read(pictures: UInt8Array, projected: FloatArray, mesh: Mesh, flag: Flag) -> Filmed | None:
     """Read pictures (frame, height, width), and the geometry (frame, vertex, 2) [px] of the same windows."""
     times = np.arange(len(pictures)) / RATE
     film = ConditionedFilm(Frames(images=pictures, time=times), aspect=flag.length / flag.height)

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from flagdata.rng import stream
 from measure.calibrate import Flag
 from measure.observables import FilmWindow, edges_of
@@ -38,14 +37,14 @@ _LEVEL = 20
 class _Own(Assets):
     """A film's own cloth and background, whatever the name."""
 
-    cloth: NDArray[np.uint8] | None = None
-    behind: NDArray[np.uint8] | None = None
+    cloth: UInt8Array | None = None
+    behind: UInt8Array | None = None
 
-    def texture(self, name: str) -> NDArray[np.uint8]:
+    def texture(self, name: str) -> UInt8Array:
         assert self.cloth is not None
         return self.cloth
 
-    def background(self, name: str) -> NDArray[np.uint8]:
+    def background(self, name: str) -> UInt8Array:
         assert self.behind is not None
         return self.behind
 
@@ -62,8 +61,8 @@ class Look:
         noise: deviation of the camera's [gray levels].
     """
 
-    cloth: NDArray[np.uint8]
-    behind: NDArray[np.uint8]
+    cloth: UInt8Array
+    behind: UInt8Array
     hoist: FloatArray
     side: float
     noise: float
@@ -133,7 +132,7 @@ def aimed(
     return zeta
 
 
-def _exposure(shown: NDArray[np.uint8], projected: FloatArray, mesh: Mesh, look: Look) -> float:
+def _exposure(shown: UInt8Array, projected: FloatArray, mesh: Mesh, look: Look) -> float:
     """Stops by which pictures of the cloth are to be lighter, so that it is on average as light as in the film."""
     levels = []
     for picture, corners in zip(shown, projected, strict=True):
@@ -144,7 +143,7 @@ def _exposure(shown: NDArray[np.uint8], projected: FloatArray, mesh: Mesh, look:
     return float(np.clip(math.log2(to_linear(look.cloth).mean() / max(float(np.mean(levels)), 1e-4)), -6, 6))
 
 
-def _colours(windows: list[FilmWindow]) -> NDArray[np.uint8]:
+def _colours(windows: list[FilmWindow]) -> UInt8Array:
     """(rows, columns) mean gray of the cloth's places: shares of its area away from the hoist, shares of its height."""
     total, count = np.zeros(_CELLS), np.zeros(_CELLS)
     for window in windows:
@@ -165,12 +164,12 @@ def _colours(windows: list[FilmWindow]) -> NDArray[np.uint8]:
     return np.rint(np.where(count > 0, total / np.maximum(count, 1), mean)).astype(np.uint8)
 
 
-def _beyond(window: FilmWindow, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def _beyond(window: FilmWindow, shape: tuple[int, ...]) -> BoolArray:
     """(rows, columns) what is beyond the hoist, where no cloth is: the pole among it."""
     return np.broadcast_to(window.side * (np.arange(shape[1]) + 0.5 - window.hoist[:, 0].mean()) < 0, shape)
 
 
-def _behind(windows: list[FilmWindow], background: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _behind(windows: list[FilmWindow], background: UInt8Array) -> UInt8Array:
     """The picture made fit without its cloth: medians of what is bare, and what surrounds it where nothing is."""
     frames = np.concatenate([window.frames[::_EVERY] for window in windows])
     masks = np.concatenate([window.masks[::_EVERY] for window in windows])

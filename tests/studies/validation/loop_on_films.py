@@ -25,9 +25,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.rng import child_seed, stream
 from measure.calibrate import Batch, Design, Discretisation, Finer, Flag, Log, Normal, Observed, Uncertain
 from measure.calibrate.design import read
@@ -149,7 +148,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     base = of_base(sights, recordings, made, None, seed=SEED)
     weighed, along = weigh(sights, null, effects(), seed=SEED), directions(sights, effects(), None)
 
-    def found(own: Experiments, weighing: Weighing, place: int, by: NDArray[np.bool_]) -> Judged:
+    def found(own: Experiments, weighing: Weighing, place: int, by: BoolArray) -> Judged:
         """One experiment judged by some of the null flags. How far it departs from the base model is left out, which
         moves no rejection."""
         scored = score(rows_of(own, [place]), base, rows_of(null, by), kinds[by], along, level=LEVEL)
@@ -180,7 +179,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     }
 
 
-def rows_of(several: Experiments, which: NDArray[np.bool_] | Sequence[int]) -> Experiments:
+def rows_of(several: Experiments, which: BoolArray | Sequence[int]) -> Experiments:
     """Some of several experiments of cloths that were not weighed."""
     return Experiments(summaries=tuple(own[which] for own in several.summaries))
 

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.console import progress
 from flagdata.rng import child_seed, stream
 from measure.estimate import OWN, combined, of_model
@@ -34,8 +34,6 @@ FILMS = int(os.environ.get("FLAGDATA_WINDOWS_FILMS", "300"))
 WINDOWS = 6
 TOGETHER = (1, 2, 4, 6)
 _DRAWS = 400
-
-Array = NDArray[np.float64]
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -149,13 +147,13 @@ def _scores(answer: Predictions, name: str, resamples: Resamples) -> dict[str, A
     }
 
 
-def _widths(answer: Predictions) -> Array:
+def _widths(answer: Predictions) -> FloatArray:
     assert answer.samples is not None
     low, high = np.quantile(answer.samples, [0.05, 0.95], axis=1)
     return high - low
 
 
-def _wind(answer: Predictions, chosen: NDArray[np.bool_]) -> dict[str, Any]:
+def _wind(answer: Predictions, chosen: BoolArray) -> dict[str, Any]:
     assert answer.samples is not None
     column = answer.column(WIND)
     known, draws = answer.truth[chosen, column], answer.samples[chosen, :, column]

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import FlagdataError
 from measure.film import FlagSize, Reading, subjects
 from measure.observables import OBSERVABLES, ClothWindow, Observable, edges_of, watched
@@ -88,7 +88,7 @@ def compared(design: Design) -> dict[str, Any]:
     return row
 
 
-def seen(design: Design, motion: Motion, times: NDArray[np.float64]) -> ClothWindow:
+def seen(design: Design, motion: Motion, times: FloatArray) -> ClothWindow:
     """The cloth of a window of a film as the film's camera projects it."""
     view = scene_of(design, motion).view
     outward, right = view.outward, view.right

@@ -21,6 +21,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from measure.observables import OBSERVABLES, WINDOW, Observable, View, edges_of, seen_from
 from sim.effects import EFFECTS, Parameter, Role
 from sim.run import Crew, Stepper, parse
@@ -169,7 +170,7 @@ def _errors(own: Mapping[str, list[float | None]], base: Mapping[str, list[float
     return found
 
 
-def _shown(values: list[float | None]) -> NDArray[np.float64]:
+def _shown(values: list[float | None]) -> FloatArray:
     return np.array([value for value in values if value is not None])
 
 

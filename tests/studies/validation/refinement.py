@@ -25,8 +25,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.console import progress
 from flagdata.dataset import Source
 from flagdata.rng import child_seed, stream
@@ -225,7 +225,7 @@ def _peer(method: str, evaluator: Evaluator, target: Target, *, budget: int, see
     """An optimiser of the paper's objective: the squared distance of embeddings, one clip an evaluation."""
     wanted = evaluator.embed(target.clip[None])[0]
 
-    def evaluate(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def evaluate(points: FloatArray) -> tuple[FloatArray, FloatArray]:
         made = evaluator.evaluate(points, 1)
         seconds = np.array([sum(entry.seconds[stage] for stage in STAGES) for entry in made])
         return np.array([float(squared(entry.embedding, wanted)[0]) for entry in made]), seconds
@@ -342,7 +342,7 @@ def _rows(scores: Sequence[Score], *, seed: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _resampled(values: NDArray[np.float64], of: Callable[..., Any], seed: int, *names: str) -> list[float]:
+def _resampled(values: FloatArray, of: Callable[..., Any], seed: int, *names: str) -> list[float]:
     """Statistic, low and high (percentile bootstrap; Efron and Tibshirani 1993)."""
     rng = stream(seed, "refinement", "bootstrap", *names)
     drawn = of(values[rng.integers(len(values), size=(_RESAMPLES, len(values)))], axis=1)

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from PIL import Image
 
+from flagdata.arrays import BoolArray, FloatArray
 from flagdata.lake import MeshSequence
 from sim.assets import Assets
 from sim.render import Cycles, Meshes, Raster, Renderer, RenderParameters, Workbench, named, plate, stage, to_bytes
@@ -92,11 +92,11 @@ def _black(zeta: RenderParameters) -> RenderParameters:
     return replace(zeta, sun_strength=0.0, sky_strength=0.0, exposure_time=0.0, background="sky/1", cycles_samples=8)
 
 
-def _covered(renderer: Renderer, meshes: Meshes, zeta: RenderParameters) -> NDArray[np.bool_]:
+def _covered(renderer: Renderer, meshes: Meshes, zeta: RenderParameters) -> BoolArray:
     return renderer.render(meshes, _black(zeta))[0].numpy().astype(int).sum(-1) < DARK
 
 
-def _behind(zeta: RenderParameters) -> NDArray[np.float64]:
+def _behind(zeta: RenderParameters) -> FloatArray:
     """The background alone, the sum of its three bytes."""
     return to_bytes(torch.from_numpy(plate(Assets().background(zeta.background), zeta))).double().sum(-1).numpy()
 

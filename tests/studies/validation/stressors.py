@@ -27,9 +27,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.rng import child_seed, stream
 from measure.forecasting import Setting
@@ -43,8 +43,6 @@ from sim.material import MATERIALS, named
 from sim.mesh import grid
 from sim.wind import VonKarman
 from tests.studies.validation.flags_runs import CAMEL
-
-Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT = 1.5, 1.0
 SPEEDS = (4.0, 5.0, 6.0)
@@ -71,8 +69,8 @@ class Truth:
         parameters: density and bending as shares of the declared ones, damping [s].
     """
 
-    positions: Floats
-    winds: Floats
+    positions: FloatArray
+    winds: FloatArray
     parameters: Mapping[str, float]
 
 
@@ -80,7 +78,7 @@ class Truth:
 class Recorded:
     """What a user would bring of one recording: markers, their stated noise [m], and a log."""
 
-    positions: Floats
+    positions: FloatArray
     rate: float
     wind: WindTrack
     noise: float = NOISE
@@ -241,7 +239,7 @@ def experiment(truth: Truth, stressor: str, seed: int, *, across: int = ACROSS_M
     return observe(observations, setup).experiment
 
 
-def _observation(made: Recorded, speed: float, rest: Floats) -> Observation:
+def _observation(made: Recorded, speed: float, rest: FloatArray) -> Observation:
     return from_arrays(
         name=f"{speed:g} m-s",
         positions=made.positions,
@@ -252,7 +250,7 @@ def _observation(made: Recorded, speed: float, rest: Floats) -> Observation:
     )
 
 
-def markers(across: int = ACROSS_MARKERS) -> Floats:
+def markers(across: int = ACROSS_MARKERS) -> FloatArray:
     """(70, 2) rest coordinates [m], up to the edges, or with so many along the flag as many as are needed."""
     rows = round(across * 7 / ACROSS_MARKERS)
     grid_of = np.meshgrid(np.linspace(0, WIDTH, across), np.linspace(0, HEIGHT, rows), indexing="ij")
@@ -317,7 +315,7 @@ def simulated(case: str, number: int, seed: int, *, across: int = ACROSS_MARKERS
     return Truth(positions=positions, winds=winds, parameters=parameters)
 
 
-def _wind(speed: float, rng: np.random.Generator, *, turbulent: bool) -> Floats:
+def _wind(speed: float, rng: np.random.Generator, *, turbulent: bool) -> FloatArray:
     """(sample, 3) from before the first frame to behind the last [m/s]."""
     duration = _SETTLED + DURATION + 1.5
     along = VonKarman(mean=speed, intensity=INTENSITY, length=LENGTH).series(rng, duration=duration, rate=LOG_RATE)

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.arrays import FloatArray, IntArray
 from measure.calibrate import OBSERVED, Design, posterior
 from measure.observables import WINDOW
 from tests.measure.calibrate.conftest import readings
@@ -28,7 +27,7 @@ def _geometry(truth: Mapping[str, Any], at: Path) -> FloatArray:
     return readings(values, _winds(weighed.design()), seed=truth["seed"])[0]
 
 
-def _finer(design: Design) -> tuple[FloatArray, NDArray[np.int64]]:
+def _finer(design: Design) -> tuple[FloatArray, IntArray]:
     places = np.arange(16)
     values = {name: own[places] for name, own in design.values().items()}
     return readings(values, _winds(design), seed=2) + 0.01, places

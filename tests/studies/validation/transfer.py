@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray, UInt8Array
 from flagdata.lake import MeshSequence
 from flagdata.record import Record
 from flagdata.rng import child_seed, stream
@@ -68,7 +68,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return result
 
 
-Clip = tuple[NDArray[np.uint8], float, float]
+Clip = tuple[UInt8Array, float, float]
 """Frames (n, height, width) gray, the true wind speed [m/s] and area weight [kg/m²]."""
 
 
@@ -121,7 +121,7 @@ CHANGES: dict[str, Callable[[DatasetRecipe], DatasetRecipe]] = {
 }
 
 
-def filmed(recipe: DatasetRecipe, *, folder: Path | None = None) -> Iterator[tuple[NDArray[np.uint8], dict[str, Any]]]:
+def filmed(recipe: DatasetRecipe, *, folder: Path | None = None) -> Iterator[tuple[UInt8Array, dict[str, Any]]]:
     """Frames (n, height, width) of each flag's film, and the parameters that its recording states.
 
     Args:
@@ -151,7 +151,7 @@ def filmed(recipe: DatasetRecipe, *, folder: Path | None = None) -> Iterator[tup
         yield frames, stated
 
 
-def _frames(recipe: DatasetRecipe, film: Film, sequence: MeshSequence) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+def _frames(recipe: DatasetRecipe, film: Film, sequence: MeshSequence) -> tuple[UInt8Array, dict[str, Any]]:
     done = jobs.film(recipe, film, sequence, "cpu")
     with tempfile.NamedTemporaryFile(suffix=".mcap") as kept:
         kept.write(done.data)
@@ -159,7 +159,7 @@ def _frames(recipe: DatasetRecipe, film: Film, sequence: MeshSequence) -> tuple[
         return Record.open(Path(kept.name)).frames(0, len(sequence)), json.loads(done.parameters)
 
 
-def _clip(frames: NDArray[np.uint8], stated: dict[str, Any]) -> Clip:
+def _clip(frames: UInt8Array, stated: dict[str, Any]) -> Clip:
     return frames, stated["wind_speed"], stated["density"]
 
 
@@ -188,7 +188,7 @@ def _sequences(folder: Path, frames: int) -> Iterator[tuple[str, float, MeshSequ
             yield name, wind, _sequence(positions, stored["faces"], stored["rest"])
 
 
-def _sequence(positions: NDArray[Any], faces: NDArray[Any], rest: NDArray[Any]) -> MeshSequence:
+def _sequence(positions: AnyArray, faces: AnyArray, rest: AnyArray) -> MeshSequence:
     times = np.arange(len(positions), dtype=np.int64) * 40_000_000
     return MeshSequence(
         time=times,

@@ -15,9 +15,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 from scipy.special import jn_zeros
 
+from flagdata.arrays import FloatArray
 from tests.studies.validation.flags_runs import one_core
 from tests.studies.validation.verification_tables import check, draw_tables
 from tests.verification.cases import (
@@ -133,7 +133,7 @@ def _pendulum() -> dict[str, Any]:
     }
 
 
-def _summary(runs: NDArray[np.float64]) -> dict[str, list[float]]:
+def _summary(runs: FloatArray) -> dict[str, list[float]]:
     """Droop, downwind distance, speed and frequency of the free edge, powers of the tip: means and standard errors."""
     error = runs.std(0, ddof=1) / math.sqrt(len(runs))
     mean = runs.mean(0)
@@ -141,9 +141,7 @@ def _summary(runs: NDArray[np.float64]) -> dict[str, list[float]]:
     return {"mean": mean.tolist(), "error": error.tolist()}
 
 
-def observed_order(
-    sizes: NDArray[np.float64], values: NDArray[np.float64], errors: NDArray[np.float64]
-) -> tuple[float, float, float, float]:
+def observed_order(sizes: FloatArray, values: FloatArray, errors: FloatArray) -> tuple[float, float, float, float]:
     """Weighted least squares of v = v0 + c sᵖ: p with its 68 % range (χ² within 1 of its least), and v0.
 
     The range ends at the ends of what is tried where the values give no bound.
@@ -261,7 +259,7 @@ def _draw_order(axes: Axes, how: _Order, result: dict[str, Any]) -> None:
     _mark_sizes(axes, size)
 
 
-def _mark_sizes(axes: Axes, size: NDArray[np.float64]) -> None:
+def _mark_sizes(axes: Axes, size: FloatArray) -> None:
     axes.set_xticks(size, [f"{value:.3g}" for value in size])
     axes.xaxis.set_minor_locator(NullLocator())
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import torch
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from sim.tables import (
     CURVATURE_SPACING,
     GRIDS,
@@ -31,7 +31,7 @@ _FULL = 7 / 6
 _CURVES = np.linspace(-45, 35, 641)
 
 
-def stretching(stretch: NDArray[np.float64], angle: NDArray[np.float64], evaluation: Evaluation) -> NDArray[np.float64]:
+def stretching(stretch: FloatArray, angle: FloatArray, evaluation: Evaluation) -> FloatArray:
     """Stiffness of the camel ponte roma pulled along a direction, its width kept.
 
     Args:
@@ -49,7 +49,7 @@ def stretching(stretch: NDArray[np.float64], angle: NDArray[np.float64], evaluat
     return torch.cat(values, dim=1).numpy()
 
 
-def tabulated(stretch: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
+def tabulated(stretch: FloatArray, angle: FloatArray) -> FloatArray:
     """What the table says there, by its definition alone: linear in the stretch up to 7/6 and between its directions,
     doubled; negative entries as they stand."""
     weight = np.clip((stretch - 1) / (_FULL - 1), 0, 1)[:, None]
@@ -57,7 +57,7 @@ def tabulated(stretch: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArr
     return 2 * (CAMEL.stretching[0] * (1 - weight) + rows * weight)
 
 
-def bending(curvature: NDArray[np.float64], degrees: float, evaluation: Evaluation) -> NDArray[np.float64]:
+def bending(curvature: FloatArray, degrees: float, evaluation: Evaluation) -> FloatArray:
     """(n,) bending stiffness [N·m] of edges in a direction from u, at curvatures [1/m]."""
     rows = torch.tensor(direction_rows(np.full(len(curvature), math.radians(degrees))))
     column = torch.tensor(curvature / CURVATURE_SPACING)[:, None]
@@ -123,9 +123,7 @@ def draw_tables(path: Path) -> None:
     figure.savefig(path, dpi=90)
 
 
-def _draw_stiffness(
-    axes: Any, x: NDArray[np.float64], stretch: NDArray[np.float64], angle: NDArray[np.float64]
-) -> None:
+def _draw_stiffness(axes: Any, x: FloatArray, stretch: FloatArray, angle: FloatArray) -> None:
     for evaluation, style in _LINES.items():
         for values, colour, name in zip(stretching(stretch, angle, evaluation).T, _COLOURS, _NAMES, strict=True):
             axes.plot(x, values, style, color=colour, lw=1.2, label=name if style == "-" else None)

@@ -39,9 +39,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.rng import stream
 from measure.calibrate import MEASURED, OBSERVED, Design, Flag, Log, Normal, Observed, Options, Uncertain, simulated
 from measure.calibrate.calibrate import answered
@@ -287,7 +286,7 @@ def film(truth: Mapping[str, Any], at: Path) -> FloatArray:
     return kept(at / f"film-{truth['number']}.npy", lambda: filmed(truth, positions(truth, at), own, at))
 
 
-def finer(design: Design) -> tuple[FloatArray, NDArray[np.int64]]:
+def finer(design: Design) -> tuple[FloatArray, IntArray]:
     """(flag, window, observable) of flags of the fourth to the last batch on a finer mesh, and their
     places in the design's order. Those before have shorter steps."""
     places = np.arange(4 * BATCH, design.count, 4)[:BATCH]

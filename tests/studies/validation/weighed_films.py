@@ -11,9 +11,8 @@ from typing import Any
 import av
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.rng import stream
 from measure.calibrate import OBSERVED
 from measure.film import FlagSize, Reading, subjects
@@ -52,7 +51,7 @@ def filmed(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh, at: Path
     )
 
 
-def pictures(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh) -> NDArray[np.uint8]:
+def pictures(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh) -> UInt8Array:
     """(frame, height, width, 3) of a look that is drawn, from the truth's place."""
     assets = Assets()
     zeta = placed(prior.named("flags").draw(truth["seed"], assets), truth, positions, mesh)
@@ -88,7 +87,7 @@ def placed(drawn: RenderParameters, truth: Mapping[str, Any], positions: FloatAr
     )
 
 
-def write(path: Path, frames: NDArray[np.uint8], *, seed: int) -> None:
+def write(path: Path, frames: UInt8Array, *, seed: int) -> None:
     """A coded film with a camera's noise."""
     rng = stream(seed, "weighed", "noise")
     with av.open(str(path), "w") as container:

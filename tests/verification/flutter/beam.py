@@ -25,6 +25,8 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from flagdata.arrays import FloatArray
+
 TERMS = 14
 _NO_FLUID = 1e-12
 
@@ -77,7 +79,7 @@ def pipe(*, beta: float, gravity: float = 0.0, damping: float = 0.0) -> Strip:
 
 
 @functools.cache
-def _integrals(terms: int) -> dict[str, NDArray[np.float64]]:
+def _integrals(terms: int) -> dict[str, FloatArray]:
     """∫ f_i g_j dξ of the basis and its derivatives, exact by Gauss quadrature: (terms, terms) each."""
     nodes, weights = legendre.leggauss(terms + 4)
     xi, weight = (nodes + 1) / 2, weights / 2

@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from sim.effects import Effect, ReactiveLoading, TangentialLinearDrag, apply
 from sim.handles import Handles
 from sim.integrate import Integrator, Symplectic
@@ -97,7 +98,7 @@ def deflections(
     rows: int = 1,
     deflection: float = _DEFLECTION,
     stretching: float = _STRETCHING,
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """(samples, vertex, member) out of the plane [m], every `interval` [s]."""
     system, state = assembled(members, columns=columns, rows=rows, deflection=deflection, stretching=stretching)
     frames = []
@@ -107,7 +108,7 @@ def deflections(
     return np.stack(frames)
 
 
-def last_mode(frames: NDArray[np.float64], interval: float) -> complex:
+def last_mode(frames: FloatArray, interval: float) -> complex:
     """The rate [1/s] of the largest of the exponentials that a motion consists of at its end.
 
     By dynamic mode decomposition (Schmid, J. Fluid Mech. 656:5, 2010) with one delay: the eigenvalues of the matrix
@@ -148,7 +149,7 @@ def growth(
     return np.array([last_mode(frames[..., index], interval) for index in range(len(members))])
 
 
-def crossing(speeds: NDArray[np.float64], rates: NDArray[np.complex128]) -> Onset:
+def crossing(speeds: FloatArray, rates: NDArray[np.complex128]) -> Onset:
     """Where the growth passes zero, linear between the two speeds around it.
 
     Raises:
@@ -165,6 +166,6 @@ def crossing(speeds: NDArray[np.float64], rates: NDArray[np.complex128]) -> Onse
     )
 
 
-def sweep(strip: Strip, speeds: NDArray[np.float64]) -> list[Strip]:
+def sweep(strip: Strip, speeds: FloatArray) -> list[Strip]:
     """This strip in streams of these speeds."""
     return [replace(strip, speed=float(speed)) for speed in speeds]

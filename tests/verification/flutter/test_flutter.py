@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from tests.verification.flutter.beam import Onset, Strip, eigenvalues, leading, onset
 from tests.verification.flutter.strip import crossing, growth, sweep
 
@@ -28,7 +29,7 @@ class Sweep:
 
     strip: Strip
     theory: Onset
-    speeds: NDArray[np.float64]
+    speeds: FloatArray
     rates: NDArray[np.complex128]
 
 

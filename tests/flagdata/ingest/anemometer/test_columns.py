@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -192,17 +190,3 @@ def test_stamps_by_arrow_are_those_of_the_pattern(monkeypatch: pytest.MonkeyPatc
 
 
 EVENING = dt.datetime(2026, 5, 1, 23)  # noqa: DTZ001  a logger that writes no zone
-STAMPED: dict[str, tuple[str, Callable[[int], str], dict[str, Any]]] = {
-    "a row of another site": (
-        "time,station,wind [m/s]\n",
-        lambda i: f"2026-05-01 12:00:{i // 3:02d},{('north', 'south', 'west')[i % 3]},{3 + i / 10:.1f}",
-        {"wind": "south", "zone": "UTC"},
-    ),
-    "midnight as a bare date": (
-        "time,wind [m/s]\n",
-        lambda i: f"{(EVENING + dt.timedelta(minutes=2 * i)).isoformat(sep=' ').removesuffix(' 00:00:00')},{i}",
-        {"zone": "UTC"},
-    ),
-    "a counter": ("millis,wind [m/s]\n", lambda i: f"{i * 100 + 7},{3 + i / 10:.1f}", {"start": 1_777 * 10**15}),
-    "times of day": ("time,wind [m/s]\n", lambda i: f"23:59:{i:02d},{i}", {"date": dt.date(2026, 5, 1), "zone": "UTC"}),
-}

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import UnknownNameError
 from flagdata.ingest import OpenFactsError, Reading, WindOptions, read_log
 from flagdata.ingest.anemometer import recipe as recipes
@@ -184,7 +184,7 @@ def test_a_recipe_is_read_and_what_speaks_against_its_column_is_reported(log_fil
     assert "doubtful-numbers" not in {found.kind for found in log.findings}
 
 
-def seen(speed: NDArray[np.float64], unit_name: str, days: float = 0.01) -> str:
+def seen(speed: FloatArray, unit_name: str, days: float = 0.01) -> str:
     """What the check of steps says of speeds as they are written."""
     time = np.linspace(0, days * 86_400e9, len(speed)).astype(np.int64)
     channels = {"wind_speed": unit(unit_name).to_si(speed)}
@@ -204,7 +204,7 @@ def seen(speed: NDArray[np.float64], unit_name: str, days: float = 0.01) -> str:
     return "; ".join(one.text for one in doubts(reading, recipe, assumed=frozenset(), left_out=0, now=0))
 
 
-WIND: NDArray[np.float64] = np.asarray(5 * np.abs(np.random.default_rng(7).weibull(2.0, 400)), dtype=np.float64)
+WIND: FloatArray = np.asarray(5 * np.abs(np.random.default_rng(7).weibull(2.0, 400)), dtype=np.float64)
 """m/s."""
 
 

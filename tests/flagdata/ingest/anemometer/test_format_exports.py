@@ -389,30 +389,6 @@ def test_statistics_of_components_are_no_wind_of_a_table_read_without_its_format
     assert labels == ()  # one: components that were turned into the mean wind are none of their own
 
 
-STATISTICS = (
-    "spikes",
-    "skewness",
-    "kurtosis",
-    "flag",
-    "qc",
-    "var",
-    "cov",
-    "rand_err",
-    "strg",
-    "stdev",
-    "sd",
-    "skw",
-    "kur",
-    "se",
-    "quality_flag",
-    "itc",
-    "timelag_hf",
-    "mask",
-    "error",
-    "count",
-)
-
-
 def test_flux_networks_have_fixed_units_and_stamp_the_end(read: Read) -> None:
     head = "TIMESTAMP_START,TIMESTAMP_END,WS_F,WS_1_1_1,WD_1_1_1,TA_1_1_1,PA_1_1_1,RH_1_1_1"
     rows = [f"2026050112{30 * (i % 2):02d},2026050112{30 + i},9.9,2.{5 + i},200,15.0,101.3,60" for i in range(4)]

@@ -31,9 +31,6 @@ steps = st.integers(1, 10_000)
 """Milliseconds between rows."""
 
 
-NMEA_UNITS = [("N", "kn"), ("K", "km/h"), ("M", "m/s"), ("S", "mph")]
-
-
 def read(content: bytes, options: WindOptions | None = None) -> WindLog:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "wind.log"

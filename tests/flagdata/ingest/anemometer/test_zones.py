@@ -16,7 +16,6 @@ _NRG = (
     "Timestamp\tCh1_Anem_30.00m_S_Avg_m/s\n"
     + "".join(f"2026-03-14 08:{minute:02d}:00\t{4 + minute / 10}\n" for minute in range(0, 60, 5))
 )
-_TABLE = "Time,Wind (m/s)\n2026-07-14 12:00:00,4.1\n2026-07-14 12:00:01,5.2\n"
 
 
 def kinds(log: WindLog) -> list[str]:

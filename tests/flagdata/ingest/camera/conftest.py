@@ -9,8 +9,8 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from flagdata.ingest import CameraOptions
 
 SIDE = 96
@@ -18,7 +18,7 @@ CELL = 16
 START = 1_777_629_600_000_000_000  # 2026-05-01T10:00:00Z
 
 
-def numbered(number: int) -> NDArray[np.uint8]:
+def numbered(number: int) -> UInt8Array:
     """(96, 96) gray picture of 6 × 6 cells: `number` in binary in the upper rows, then a white and a black corner."""
     cells = np.full((6, 6), 64, dtype=np.uint8)
     for bit in range(18):
@@ -27,7 +27,7 @@ def numbered(number: int) -> NDArray[np.uint8]:
     return np.kron(cells, np.ones((CELL, CELL), dtype=np.uint8))
 
 
-def number_of(image: NDArray[np.uint8]) -> int:
+def number_of(image: UInt8Array) -> int:
     """The number in a square picture of any size that shows all of `numbered`."""
     cell = image.shape[0] / 6
     middle = [round((i + 0.5) * cell) for i in range(6)]
@@ -35,12 +35,12 @@ def number_of(image: NDArray[np.uint8]) -> int:
 
 
 @pytest.fixture(name="numbered", scope="session")
-def numbered_fixture() -> Callable[[int], NDArray[np.uint8]]:
+def numbered_fixture() -> Callable[[int], UInt8Array]:
     return numbered
 
 
 @pytest.fixture(name="number_of", scope="session")
-def number_of_fixture() -> Callable[[NDArray[np.uint8]], int]:
+def number_of_fixture() -> Callable[[UInt8Array], int]:
     return number_of
 
 
@@ -72,7 +72,7 @@ def write_video() -> Callable[..., Path]:
         metadata: dict[str, str] | None = None,
         rotation: int | None = None,
         aspect: Fraction | None = None,
-        picture: Callable[[int], NDArray[np.uint8]] = numbered,
+        picture: Callable[[int], UInt8Array] = numbered,
         rate: int | Fraction = 25,
     ) -> Path:
         with av.open(str(path), "w", format=container, options=muxer or {}) as out:

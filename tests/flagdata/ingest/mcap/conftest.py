@@ -17,8 +17,9 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.writer import Writer as ProtobufWriter
-from numpy.typing import NDArray
 from PIL import Image
+
+from flagdata.arrays import UInt8Array
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z
 STEP = 40_000_000
@@ -26,7 +27,7 @@ FRAMES = 50
 LATE = 15_000_000  # a picture is logged 15 ms after its exposure
 
 
-def pictures() -> list[NDArray[np.uint8]]:
+def pictures() -> list[UInt8Array]:
     """Gray pictures (48, 64), each all of one value, 40 and up by 3."""
     return [np.full((48, 64), 40 + 3 * k, np.uint8) for k in range(FRAMES)]
 
@@ -36,7 +37,7 @@ def stamped(message: Any, k: int) -> Any:
     return message
 
 
-def encoded(image: NDArray[np.uint8], form: str) -> bytes:
+def encoded(image: UInt8Array, form: str) -> bytes:
     buffer = io.BytesIO()
     Image.fromarray(image).save(buffer, form)
     return buffer.getvalue()

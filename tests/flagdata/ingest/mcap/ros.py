@@ -11,6 +11,7 @@ import numpy as np
 from mcap.writer import Writer
 from numpy.typing import NDArray
 
+from flagdata.arrays import UInt8Array
 from tests.flagdata.ingest.mcap.conftest import NOON, STEP, encoded
 
 TIME = "=" * 80 + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
@@ -50,7 +51,7 @@ class Cdr:
         return bytes(self._data) if self._ros1 else b"\0\1\0\0" + bytes(self._data)
 
 
-def gray(k: int) -> NDArray[np.uint8]:
+def gray(k: int) -> UInt8Array:
     """A picture (48, 64) of one gray, by its number."""
     return np.full((48, 64), 40 + 3 * k, np.uint8)
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import IntArray
 from flagdata.errors import InputError
 from flagdata.ingest import Obj, findings, frame_files, obj_text, read_folder
 from flagdata.ingest.meshes.store import continuity
@@ -39,7 +39,7 @@ def kinds(sequence: MeshSequence | RaggedMeshSequence) -> set[str]:
     return {finding.kind for finding in findings(sequence)}
 
 
-def renumbered(whole: MeshSequence, frame: int, order: NDArray[np.int64]) -> MeshSequence:
+def renumbered(whole: MeshSequence, frame: int, order: IntArray) -> MeshSequence:
     positions = whole.positions.copy()
     positions[frame] = positions[frame][order]
     return replace(whole, positions=positions)

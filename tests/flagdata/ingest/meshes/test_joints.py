@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.ingest import findings
 from flagdata.ingest.meshes.store import t_joints
 from flagdata.lake import MeshSequence
@@ -16,7 +16,7 @@ JOINED = [[0, 1, 2], [0, 2, 3], [1, 4, 7], [1, 7, 6], [6, 7, 5], [6, 5, 2]]
 SPLIT = [[0, 1, 6], [0, 6, 2], [0, 2, 3], *JOINED[2:]]
 
 
-def sheet(faces: list[list[int]], positions: NDArray[np.float64]) -> MeshSequence:
+def sheet(faces: list[list[int]], positions: FloatArray) -> MeshSequence:
     return MeshSequence(
         time=np.array([0]),
         positions=positions[None].astype(np.float32),
@@ -25,7 +25,7 @@ def sheet(faces: list[list[int]], positions: NDArray[np.float64]) -> MeshSequenc
     )
 
 
-def flat(turn: float = 0.0) -> NDArray[np.float64]:
+def flat(turn: float = 0.0) -> FloatArray:
     """The square upright, turned about the vertical."""
     return np.stack([REST[:, 0] * np.cos(turn), REST[:, 0] * np.sin(turn), REST[:, 1]], axis=1)
 

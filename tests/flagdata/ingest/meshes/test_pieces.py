@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from flagdata.arrays import Float32Array
 from flagdata.ingest import MeshIngest, ingest_meshes
 from flagdata.ingest.meshes.pieces import in_pieces, slits, welded
 from flagdata.lake import Lake, MeshSequence, RaggedMeshSequence, read_meshes
@@ -45,7 +46,7 @@ def soup(whole: MeshSequence, **changes: object) -> MeshSequence:
     return MeshSequence(**(parts | changes))  # type: ignore[arg-type]
 
 
-def surface(sequence: MeshSequence) -> NDArray[np.float32]:
+def surface(sequence: MeshSequence) -> Float32Array:
     """(face, corner, frame, xyz) of all faces, in their order."""
     return sequence.positions[:, sequence.faces].transpose(1, 2, 0, 3)
 

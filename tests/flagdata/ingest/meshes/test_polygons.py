@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.ingest import read_obj
 from flagdata.ingest.meshes.obj import ears
@@ -17,7 +17,7 @@ from flagdata.ingest.meshes.obj import ears
 ELL = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.1), (0.1, 0.1), (0.1, 0.2), (0.0, 0.2)]
 
 
-def areas(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.float64]:
+def areas(points: FloatArray, triangles: IntArray) -> FloatArray:
     a, b, c = (points[triangles[:, i]] for i in range(3))
     return ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import IntArray
 from sim.cloth import Cloth
 from sim.effects.geometry import boundary_edges
 from sim.mesh import Mesh
@@ -14,14 +14,14 @@ from sim.mesh import Mesh
 _TOLERANCE = 1e-6
 
 
-def fly(mesh: Mesh) -> NDArray[np.int64]:
+def fly(mesh: Mesh) -> IntArray:
     """(edge, 2) vertices of the boundary edges that are as far from the hoist as any."""
     pairs = boundary_edges(mesh)
     far = mesh.rest[:, 0] > mesh.rest[:, 0].max() - _TOLERANCE * float(np.ptp(mesh.rest[:, 0]))
     return pairs[far[pairs].all(axis=1)]
 
 
-def half_lengths(cloth: Cloth, pairs: NDArray[np.int64]) -> Tensor:
+def half_lengths(cloth: Cloth, pairs: IntArray) -> Tensor:
     """(vertex,) half the rest length of these edges at each vertex [m]."""
     rest = cloth.mesh.rest
     half = np.hypot(*(rest[pairs[:, 1]] - rest[pairs[:, 0]]).T) / 2

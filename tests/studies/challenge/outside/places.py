@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from sim.mesh import Mesh
 
 _TOLERANCE = 1e-9
 
 
-def shares(mesh: Mesh, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def shares(mesh: Mesh, points: FloatArray) -> FloatArray:
     """(point, vertex) barycentric weights at points (point, 2) of the cloth [m]: a point's centre of mass is kept."""
     corners = mesh.rest[mesh.faces]
     relative = points[:, None] - corners[None, :, 0]
@@ -26,7 +26,7 @@ def shares(mesh: Mesh, points: NDArray[np.float64]) -> NDArray[np.float64]:
     return result
 
 
-def inside(mesh: Mesh, u: float, v: float) -> NDArray[np.float64]:
+def inside(mesh: Mesh, u: float, v: float) -> FloatArray:
     """(2,) the point at shares of the cloth's width and height [m]."""
     low, high = mesh.rest.min(axis=0), mesh.rest.max(axis=0)
     return low + np.array([u, v]) * (high - low)

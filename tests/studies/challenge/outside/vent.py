@@ -7,9 +7,9 @@ from typing import Annotated
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from sim.air import face_wind
 from sim.cloth import Cloth
 from sim.effects import Effect, Value, strength
@@ -63,7 +63,7 @@ class Panel:
         return cloth.shared_out(-size * seen.across.abs() * seen.across * seen.normal)
 
 
-def covered(mesh: Mesh) -> NDArray[np.float64]:
+def covered(mesh: Mesh) -> FloatArray:
     """(face,) share of the faces that the panel covers, from points spread evenly over them."""
     i, j = np.divmod(np.arange(_FINE**2), _FINE)
     i, j = i[i + j < _FINE], j[i + j < _FINE]

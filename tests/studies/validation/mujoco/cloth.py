@@ -16,12 +16,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from sim.mesh import Mesh
 from tests.studies.validation.environments import UnusableError
 
-Floats = NDArray[np.float64]
 _WORKER = Path(__file__).with_name("worker.py")
 
 
@@ -79,7 +78,7 @@ class Sheet:
     poisson: float = 0.0
     bending: float
     damping: float = 0.0
-    added: Floats | None = None
+    added: FloatArray | None = None
 
     @property
     def thickness(self) -> float:
@@ -87,7 +86,7 @@ class Sheet:
         return math.sqrt(12 * (1 - self.poisson**2) * self.bending / self.stretching)
 
     @property
-    def mass(self) -> Floats:
+    def mass(self) -> FloatArray:
         """(vertex,) a third of each face's at its corners, and what is added [kg]."""
         own = self.density * self.mesh.vertex_areas
         return own if self.added is None else own + self.added
@@ -114,8 +113,8 @@ class Flight:
         positions, velocities: (frame, vertex, 3) [m], [m/s].
     """
 
-    positions: Floats
-    velocities: Floats
+    positions: FloatArray
+    velocities: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,16 +126,16 @@ class Wind:
         velocity: (n, 3) where the air goes to [m/s].
     """
 
-    times: Floats = field(default_factory=lambda: np.zeros(1))
-    velocity: Floats = field(default_factory=lambda: np.zeros((1, 3)))
+    times: FloatArray = field(default_factory=lambda: np.zeros(1))
+    velocity: FloatArray = field(default_factory=lambda: np.zeros((1, 3)))
 
 
 def fly(
     python: Path,
     sheet: Sheet,
     *,
-    start: Floats,
-    reference: Floats | None = None,
+    start: FloatArray,
+    reference: FloatArray | None = None,
     air: Air,
     wind: Wind,
     method: Method,

@@ -14,14 +14,14 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 from pyarrow import csv
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.rng import stream
 from sim import handles
 from sim.effects import AIR_DENSITY
 from sim.mesh import Diagonals, grid
-from tests.studies.validation.mujoco.cloth import Air, Floats, Integrator, Method, Sheet, Wind, fly
+from tests.studies.validation.mujoco.cloth import Air, Integrator, Method, Sheet, Wind, fly
 
 WIDTH, HEIGHT = 1.5, 1.0  # m
 COLUMNS, ROWS = 20, 14
@@ -229,7 +229,7 @@ def _file(speed: float) -> str:
     return f"wind-{1e3 * speed:.0f}mm-s.csv"
 
 
-def _markers(rest: Floats) -> NDArray[np.int64]:
+def _markers(rest: FloatArray) -> IntArray:
     """Every `SEEN`-th vertex of the grid, by its place."""
     column, row = (
         np.rint(rest[:, axis] / size * cells) for axis, size, cells in ((0, WIDTH, COLUMNS), (1, HEIGHT, ROWS))
@@ -237,7 +237,7 @@ def _markers(rest: Floats) -> NDArray[np.int64]:
     return np.flatnonzero((column % SEEN == 0) & (row % SEEN == 0))
 
 
-def _hem(rest: Floats, density: float) -> Floats | None:
+def _hem(rest: FloatArray, density: float) -> FloatArray | None:
     """(vertex,) mass of a hem around the cloth, of so much for each metre, half of each edge at its ends [kg]."""
     if not density:
         return None
@@ -250,7 +250,7 @@ def _hem(rest: Floats, density: float) -> Floats | None:
     return density * length
 
 
-def _table(path: Path, rest: Floats, positions: Floats) -> None:
+def _table(path: Path, rest: FloatArray, positions: FloatArray) -> None:
     frames, markers = positions.shape[:2]
     columns = {
         "frame": np.repeat(np.arange(frames), markers),

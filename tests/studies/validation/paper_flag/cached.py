@@ -14,8 +14,8 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray
 from flagdata.checksums import is_sealed, sealed
 from flagdata.outputs import rewrite
 from flagdata.provenance import file_hash, recipe_hash
@@ -27,8 +27,8 @@ def cached(
     folder: Path | None,
     inputs: Mapping[str, Any],
     method: Sequence[ModuleType],
-    make: Callable[[], Mapping[str, NDArray[Any]]],
-) -> Mapping[str, NDArray[Any]]:
+    make: Callable[[], Mapping[str, AnyArray]],
+) -> Mapping[str, AnyArray]:
     """The arrays that `make` returns, computed once for the same inputs and method.
 
     Args:

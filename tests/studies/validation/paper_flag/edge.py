@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Severity
 from flagdata.ingest import CameraOptions, open_camera
@@ -81,10 +81,10 @@ class EdgeTrack:
         seen: (frame, column) `Seen`.
     """
 
-    time: NDArray[np.float64]
-    height: NDArray[np.float64]
-    width: NDArray[np.float64]
-    seen: NDArray[np.uint8]
+    time: FloatArray
+    height: FloatArray
+    width: FloatArray
+    seen: UInt8Array
 
     def __post_init__(self) -> None:
         frames = (len(self.time), self.height.shape[-1])
@@ -105,9 +105,7 @@ class EdgeTrack:
         return float((self.seen == what).mean())
 
 
-def line_in(
-    image: NDArray[np.uint8], options: EdgeOptions
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8]]:
+def line_in(image: UInt8Array, options: EdgeOptions) -> tuple[FloatArray, FloatArray, UInt8Array]:
     """Height, width and kind of what each column of one picture shows.
 
     Args:
@@ -142,14 +140,14 @@ def line_in(
     return np.where(located, height, np.nan), np.where(located, width, np.nan), seen
 
 
-def _run_around(counted: NDArray[np.bool_], middle: int) -> NDArray[np.bool_]:
+def _run_around(counted: BoolArray, middle: int) -> BoolArray:
     """The unbroken run of each column that holds its middle row."""
     above = np.logical_and.accumulate(counted[middle::-1], axis=0)[::-1]
     below = np.logical_and.accumulate(counted[middle:], axis=0)
     return np.concatenate([above, below[1:]])
 
 
-def _joined(height: NDArray[np.float64], line: NDArray[np.bool_], options: EdgeOptions) -> NDArray[np.bool_]:
+def _joined(height: FloatArray, line: BoolArray, options: EdgeOptions) -> BoolArray:
     """The columns of the longest chain in which neighbours lie within `step` a column and gaps within `bridge`."""
     columns = np.flatnonzero(line)
     sheet = np.zeros_like(line)
@@ -163,14 +161,14 @@ def _joined(height: NDArray[np.float64], line: NDArray[np.bool_], options: EdgeO
     return sheet
 
 
-def _slope(height: NDArray[np.float64]) -> NDArray[np.float64]:
+def _slope(height: FloatArray) -> FloatArray:
     """Central differences over 8 columns; 0 where they are not known."""
     slope = np.zeros_like(height)
     slope[4:-4] = np.nan_to_num((height[8:] - height[:-8]) / 8)
     return slope
 
 
-def scatter(track: EdgeTrack) -> NDArray[np.float64]:
+def scatter(track: EdgeTrack) -> FloatArray:
     """Standard error of single heights, (frame,) [px]: residuals of the parabola through 15 columns around each.
 
     The residual of the middle point of a parabola through k points, with independent errors σ, has the variance

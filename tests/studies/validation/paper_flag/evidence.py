@@ -14,9 +14,9 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import UsageError
 from tests.studies.validation.paper_flag.candidates import Load, Shear, loaded
 from tests.studies.validation.paper_flag.sheet import Sheet, leading, onset
@@ -64,7 +64,7 @@ class Predictor(Protocol):
     @property
     def loads(self) -> Sequence[Load]: ...
 
-    def predict(self, load: int, factors: NDArray[np.float64], condition: Condition) -> NDArray[np.float64]:
+    def predict(self, load: int, factors: FloatArray, condition: Condition) -> FloatArray:
         """(factor,) what the load at this index gives at `factors` times the tunnel's speed; NaN without flutter."""
         ...
 
@@ -87,7 +87,7 @@ class LinearTable:
         return [loaded(load, bare=self._bare, length=length, density=self._density) for load in self.loads]
 
     @cached_property
-    def _frequencies(self) -> NDArray[np.float64]:
+    def _frequencies(self) -> FloatArray:
         """(load, speed) [Hz], NaN where no oscillation grows."""
         found = np.full((len(self.loads), len(_SPEEDS)), np.nan)
         for row, sheet in enumerate(self._sheets(self._bare.length)):
@@ -98,12 +98,12 @@ class LinearTable:
         return found
 
     @cached_property
-    def _onsets(self) -> NDArray[np.float64]:
+    def _onsets(self) -> FloatArray:
         """(load, length) [m/s], NaN without."""
         columns = [[onset(sheet, highest=_HIGHEST) for sheet in self._sheets(float(h))] for h in self._lengths]
         return np.array(columns).T
 
-    def predict(self, load: int, factors: NDArray[np.float64], condition: Condition) -> NDArray[np.float64]:
+    def predict(self, load: int, factors: FloatArray, condition: Condition) -> FloatArray:
         """As `Predictor.predict`.
 
         Raises:
@@ -128,14 +128,12 @@ class Fitted:
     loss: float
 
 
-def errors(predictor: Predictor, load: int, factor: float, conditions: Sequence[Condition]) -> NDArray[np.float64]:
+def errors(predictor: Predictor, load: int, factor: float, conditions: Sequence[Condition]) -> FloatArray:
     """(condition,) logarithms of predicted over measured; NEVER where there is no prediction."""
     return _errors(predictor, load, np.array([factor]), conditions)[:, 0]
 
 
-def _errors(
-    predictor: Predictor, load: int, factors: NDArray[np.float64], conditions: Sequence[Condition]
-) -> NDArray[np.float64]:
+def _errors(predictor: Predictor, load: int, factors: FloatArray, conditions: Sequence[Condition]) -> FloatArray:
     """(condition, factor)."""
     predicted = np.array([predictor.predict(load, factors, condition) for condition in conditions])
     predicted = predicted.reshape(len(conditions), len(factors))
@@ -175,7 +173,7 @@ class Interval:
     count: int
 
     @classmethod
-    def of(cls, values: NDArray[np.float64]) -> Interval:
+    def of(cls, values: FloatArray) -> Interval:
         half = math.inf
         if len(values) > 1:
             half = float(stats.t.ppf(0.95, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
@@ -186,6 +184,6 @@ class Interval:
         return {k: v if math.isfinite(v) else None for k, v in vars(self).items()}
 
 
-def paired(before: NDArray[np.float64], after: NDArray[np.float64]) -> Interval:
+def paired(before: FloatArray, after: FloatArray) -> Interval:
     """How much smaller the errors became, condition by condition: |before| − |after|."""
     return Interval.of(np.abs(before) - np.abs(after))

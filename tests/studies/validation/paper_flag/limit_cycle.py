@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from sim.air import QuadraticNormal
 from sim.effects import Effect, apply
@@ -67,10 +67,10 @@ class StripMotion:
         arc: (point,) distance from the clamp along the sheet [m].
     """
 
-    time: NDArray[np.float64]
-    along: NDArray[np.float64]
-    across: NDArray[np.float64]
-    arc: NDArray[np.float64]
+    time: FloatArray
+    along: FloatArray
+    across: FloatArray
+    arc: FloatArray
 
 
 def simulate(
@@ -135,7 +135,7 @@ def simulate(
     )
 
 
-def as_columns(motion: StripMotion, member: int, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+def as_columns(motion: StripMotion, member: int, columns: FloatArray) -> FloatArray:
     """The member's line as a camera sees it: heights at fixed distances from the clamp along the stream [m].
 
     Args:

@@ -6,11 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray, FloatArray
 from flagdata.errors import NotFoundError
 from flagdata.provenance import file_hash
 from flagdata.rng import stream
@@ -59,7 +58,7 @@ class Clip:
     tip: tuple[float, float, float]
     waves: Waves
     stretch: Stretch | None
-    lines: NDArray[np.float64]
+    lines: FloatArray
     still: float | None
 
 
@@ -171,7 +170,7 @@ def observe(case: Case, data: Path, *, keep: Path | None = None) -> Observations
 
 
 def _tracked(path: Path, case: Case, keep: Path | None) -> EdgeTrack:
-    def make() -> dict[str, NDArray[Any]]:
+    def make() -> dict[str, AnyArray]:
         track = track_edge(path, true_rate=case.true_rate)
         return {"time": track.time, "height": track.height, "width": track.width, "seen": track.seen}
 

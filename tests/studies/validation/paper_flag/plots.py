@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from tests.studies.validation.paper_flag.candidates import Candidate, Shear
 from tests.studies.validation.paper_flag.evidence import Condition, Kind, factor_that_meets
 from tests.studies.validation.paper_flag.limit_cycle import as_columns
@@ -29,7 +30,7 @@ _MET = 0.03  # of a mean log error: half again the step of the factors
 
 def lines(case: Case, clip: Clip, study: Study) -> Figure:
     """The sheet over one cycle: as filmed, and as each model in time moves at the same tunnel speed."""
-    panels: list[tuple[str, str, list[tuple[NDArray[np.float64], NDArray[np.float64]]]]] = [
+    panels: list[tuple[str, str, list[tuple[FloatArray, FloatArray]]]] = [
         (f"filmed, {clip.spec.speed:g} m/s", _INK, [(clip.waves.columns, line) for line in clip.lines])
     ]
     for candidate, motion in study.shapes.items():
@@ -105,7 +106,7 @@ def along(seen: Observations, study: Study, case: Case) -> Figure:
 def _profile(
     size: Axes,
     phase: Axes,
-    columns: NDArray[np.float64],
+    columns: FloatArray,
     profile: NDArray[np.complex128],
     colour: str,
     style: str,

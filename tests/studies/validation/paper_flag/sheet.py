@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 
 MODES = 8
@@ -80,7 +81,7 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 @functools.cache
-def _integrals() -> dict[str, NDArray[np.float64]]:
+def _integrals() -> dict[str, FloatArray]:
     """∫ f g dξ of the modes in a vacuum and their derivatives: (MODES, MODES) each, and the roots λ."""
 
     def characteristic(root: float) -> float:

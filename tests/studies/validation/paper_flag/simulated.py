@@ -7,11 +7,10 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import AnyArray, FloatArray
 from flagdata.errors import InputError
 from tests.studies.validation.paper_flag import limit_cycle
 from tests.studies.validation.paper_flag import waves as waves_module
@@ -84,7 +83,7 @@ def flutters(loads: Sequence[Load], speeds: Sequence[float], *, case: Case, keep
 
 
 def _batch(loads: Sequence[Load], speeds: Sequence[float], case: Case, keep: Path | None) -> list[Flutter]:
-    def make() -> dict[str, NDArray[Any]]:
+    def make() -> dict[str, AnyArray]:
         motion = simulate(
             length=case.sheet.length,
             mass=case.sheet.mass,
@@ -137,12 +136,12 @@ class SimulatedTable:
             for kind, name in parts.items()
         }
 
-    def predict(self, load: int, factors: NDArray[np.float64], condition: Condition) -> NDArray[np.float64]:
+    def predict(self, load: int, factors: FloatArray, condition: Condition) -> FloatArray:
         """As `Predictor.predict`; linear between the speeds simulated, NaN beyond them and next to no flutter."""
         if condition.kind is Kind.STOP:
             return self._linear.predict(load, factors, condition)
         return self.curve(condition.kind, load, factors * condition.at)
 
-    def curve(self, kind: Kind, load: int, speeds: NDArray[np.float64]) -> NDArray[np.float64]:
+    def curve(self, kind: Kind, load: int, speeds: FloatArray) -> FloatArray:
         """(speed,) of one load, at speeds at the sheet [m/s]."""
         return np.interp(speeds, self.speeds, self._values[kind][load], left=math.nan, right=math.nan)

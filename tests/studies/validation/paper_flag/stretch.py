@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from tests.studies.validation.paper_flag.edge import EdgeTrack
 
@@ -43,7 +43,7 @@ class Stretch:
     spread_square: float
 
 
-def arc_lengths(track: EdgeTrack, ratios: NDArray[np.float64], *, least: int = 50) -> NDArray[np.float64]:
+def arc_lengths(track: EdgeTrack, ratios: FloatArray, *, least: int = 50) -> FloatArray:
     """(frame, ratio) from the first to the last column seen [columns]; NaN for frames with fewer than `least`."""
     found = np.full((len(track.height), len(ratios)), np.nan)
     for index, height in enumerate(track.height):
@@ -88,6 +88,6 @@ def stretch(track: EdgeTrack, rng: np.random.Generator) -> Stretch:
     )
 
 
-def _spread(arcs: NDArray[np.float64]) -> NDArray[np.float64]:
+def _spread(arcs: FloatArray) -> FloatArray:
     low, high = np.percentile(arcs, _UPPER, axis=0)
     return (high - low) / high

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from tests.studies.validation.paper_flag.candidates import Candidate, Load, Shear, effects, tried
 from tests.studies.validation.paper_flag.evidence import (
     Condition,
@@ -52,7 +52,7 @@ class Cell:
 
     load: Load
     factor: float
-    errors: Mapping[Kind, NDArray[np.float64]]
+    errors: Mapping[Kind, FloatArray]
     tips: Mapping[float, float]
 
 
@@ -75,9 +75,9 @@ class Outcome:
     factor: float
     factors: tuple[float, float]
     loads: tuple[Load, ...]
-    fit: Mapping[Kind, NDArray[np.float64]]
-    held_out: Mapping[Kind, NDArray[np.float64]]
-    others: NDArray[np.float64]
+    fit: Mapping[Kind, FloatArray]
+    held_out: Mapping[Kind, FloatArray]
+    others: FloatArray
     gains: Mapping[Kind, Interval]
 
     def held_out_error(self, kind: Kind) -> float:

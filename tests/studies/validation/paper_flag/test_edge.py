@@ -8,8 +8,8 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
 from tests.studies.validation.paper_flag.edge import EdgeOptions, EdgeTrack, Seen, line_in, scatter, track_edge
@@ -17,7 +17,7 @@ from tests.studies.validation.paper_flag.edge import EdgeOptions, EdgeTrack, See
 ROWS, COLUMNS = 240, 320
 
 
-def drawn(height: NDArray[np.float64], *, thickness: float = 2.0, smear: float = 0.0) -> NDArray[np.float64]:
+def drawn(height: FloatArray, *, thickness: float = 2.0, smear: float = 0.0) -> FloatArray:
     """A bright picture with a dark line: a Gaussian profile, its place averaged over an even motion of `smear` rows."""
     rows = np.arange(ROWS)[:, None]
     places = [0.0] if smear == 0 else np.linspace(-smear / 2, smear / 2, 41)
@@ -25,17 +25,17 @@ def drawn(height: NDArray[np.float64], *, thickness: float = 2.0, smear: float =
     return 250 - 200.0 * np.nan_to_num(dark)
 
 
-def picture(values: NDArray[np.float64], noise: float = 0.0, *names: int) -> NDArray[np.uint8]:
+def picture(values: FloatArray, noise: float = 0.0, *names: int) -> UInt8Array:
     grain = noise * stream(3, "grain", *names).standard_normal(values.shape)
     return np.clip(np.rint(values + grain), 0, 255).astype(np.uint8)
 
 
-def sheet(phase: float = 0.0) -> NDArray[np.float64]:
+def sheet(phase: float = 0.0) -> FloatArray:
     x = np.arange(COLUMNS)
     return 120.3 + 30 * (x / COLUMNS) ** 2 * np.sin(phase - 6 * x / COLUMNS)
 
 
-def tracked(images: list[NDArray[np.uint8]], rate: float = 1000.0) -> EdgeTrack:
+def tracked(images: list[UInt8Array], rate: float = 1000.0) -> EdgeTrack:
     found = [line_in(image, EdgeOptions()) for image in images]
     height, width, seen = (np.stack([one[part] for one in found]) for part in range(3))
     return EdgeTrack(time=np.arange(len(images)) / rate, height=height, width=width, seen=seen.astype(np.uint8))

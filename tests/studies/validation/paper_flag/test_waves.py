@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from tests.studies.validation.paper_flag.waves import Estimate, waves
@@ -17,7 +17,7 @@ X = np.linspace(0, 0.14, 15)
 TIME = np.arange(500) / RATE
 
 
-def travelling(frequency: float, speed: float, *, amplitude: float = 0.03) -> NDArray[np.float64]:
+def travelling(frequency: float, speed: float, *, amplitude: float = 0.03) -> FloatArray:
     """(frame, column) a wave that grows towards the tip and runs there, with a second harmonic of a tenth."""
     angle = 2 * np.pi * frequency * (TIME[:, None] - X / speed)
     return amplitude * (0.2 + X / X[-1]) / 1.2 * (np.cos(angle) + 0.1 * np.cos(2 * angle + 1)) + 0.01 * X

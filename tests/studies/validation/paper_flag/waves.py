@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 
 HARMONICS = 3
@@ -79,18 +80,18 @@ class Waves:
     amplitude: Estimate
     speed: Estimate
     travelling: float
-    columns: NDArray[np.float64]
+    columns: FloatArray
     profile: NDArray[np.complex128]
-    mean: NDArray[np.float64]
-    lowest: NDArray[np.float64]
-    highest: NDArray[np.float64]
+    mean: FloatArray
+    lowest: FloatArray
+    highest: FloatArray
     two_modes: float
 
 
 def waves(
-    time: NDArray[np.float64],
-    columns: NDArray[np.float64],
-    heights: NDArray[np.float64],
+    time: FloatArray,
+    columns: FloatArray,
+    heights: FloatArray,
     *,
     band: tuple[float, float] = (3.0, 60.0),
     harmonics: int = HARMONICS,
@@ -149,7 +150,7 @@ def waves(
     )
 
 
-def wave_speed(columns: NDArray[np.float64], profile: NDArray[np.complex128], frequency: float) -> float:
+def wave_speed(columns: FloatArray, profile: NDArray[np.complex128], frequency: float) -> float:
     """ω / (−d arg a / dx), the slope weighted with |a|²: columns where nothing moves say nothing."""
     phase = np.unwrap(np.angle(profile))
     weight = profile.real**2 + profile.imag**2
@@ -157,14 +158,12 @@ def wave_speed(columns: NDArray[np.float64], profile: NDArray[np.complex128], fr
     return float(-2 * np.pi * frequency / slope) if slope else math.inf
 
 
-def _slope(x: NDArray[np.float64], y: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
+def _slope(x: FloatArray, y: FloatArray, weight: FloatArray) -> float:
     centre = (weight * x).sum() / weight.sum()
     return float((weight * (x - centre) * y).sum() / (weight * (x - centre) ** 2).sum())
 
 
-def _frequency(
-    time: NDArray[np.float64], heights: NDArray[np.float64], band: tuple[float, float], harmonics: int
-) -> float:
+def _frequency(time: FloatArray, heights: FloatArray, band: tuple[float, float], harmonics: int) -> float:
     """Least residual: of the fundamental alone on a coarse grid, of the whole model on a fine one around the best.
 
     Of the fundamental alone first, since a motion of frequency f is also one of f/2 with twice the harmonics.
@@ -178,12 +177,12 @@ def _frequency(
     return float(finer[np.argmin([_residual(time, chosen, float(f), harmonics) for f in finer])])
 
 
-def _design(time: NDArray[np.float64], frequency: float, harmonics: int) -> NDArray[np.float64]:
+def _design(time: FloatArray, frequency: float, harmonics: int) -> FloatArray:
     angle = 2 * np.pi * frequency * time[:, None] * np.arange(1, harmonics + 1)
     return np.concatenate([np.ones((len(time), 1)), np.cos(angle), np.sin(angle)], axis=1)
 
 
-def _residual(time: NDArray[np.float64], heights: NDArray[np.float64], frequency: float, harmonics: int) -> float:
+def _residual(time: FloatArray, heights: FloatArray, frequency: float, harmonics: int) -> float:
     """Sum of squares that the model leaves of all columns, each fitted to its own frames by the normal equations."""
     design = _design(time, frequency, harmonics)
     seen = np.isfinite(heights).astype(np.float64)
@@ -197,8 +196,8 @@ def _residual(time: NDArray[np.float64], heights: NDArray[np.float64], frequency
 
 
 def _fit(
-    time: NDArray[np.float64], heights: NDArray[np.float64], frequency: float, harmonics: int
-) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    time: FloatArray, heights: FloatArray, frequency: float, harmonics: int
+) -> tuple[FloatArray, NDArray[np.complex128]]:
     """m, (column,), and a_k, (harmonic, column)."""
     design = _design(time, frequency, harmonics)
     found = np.empty((design.shape[1], heights.shape[1]))
@@ -208,18 +207,18 @@ def _fit(
     return found[0], found[1 : harmonics + 1] - 1j * found[harmonics + 1 :]
 
 
-def _harmonic(time: NDArray[np.float64], coefficients: NDArray[np.complex128], frequency: float) -> NDArray[np.float64]:
+def _harmonic(time: FloatArray, coefficients: NDArray[np.complex128], frequency: float) -> FloatArray:
     turning = np.exp(2j * np.pi * frequency * time[:, None] * np.arange(1, len(coefficients) + 1))
     return (turning @ coefficients).real
 
 
 def _cycles(
-    time: NDArray[np.float64],
-    columns: NDArray[np.float64],
-    moving: NDArray[np.float64],
+    time: FloatArray,
+    columns: FloatArray,
+    moving: FloatArray,
     profile: NDArray[np.complex128],
     frequency: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Phase and amplitude of each whole cycle on the mean shape, relative to the mean motion, and its wave speed."""
     phases, amplitudes, speeds = [], [], []
     cycle = np.floor((time - time[0]) * frequency + 1e-9).astype(int)
@@ -241,13 +240,13 @@ def _cycles(
     return np.array(phases), np.array(amplitudes), np.array(speeds)
 
 
-def _drift(phases: NDArray[np.float64]) -> float:
+def _drift(phases: FloatArray) -> float:
     """Radians a cycle by which the phase runs ahead of the fitted frequency."""
     turned = np.unwrap(phases)
     return float(np.polyfit(np.arange(len(turned)), turned, 1)[0]) if len(turned) > 1 else 0.0
 
 
-def _about(value: float, each: NDArray[np.float64]) -> Estimate:
+def _about(value: float, each: FloatArray) -> Estimate:
     """Student's interval about `value` from the means of blocks of cycles."""
     each = each[np.isfinite(each)]
     blocks = len(each) // _BLOCK
@@ -265,7 +264,7 @@ def _travelling(profile: NDArray[np.complex128]) -> float:
     return float(sizes[1] / sizes[0])
 
 
-def _two_modes(heights: NDArray[np.float64]) -> float:
+def _two_modes(heights: FloatArray) -> float:
     whole = np.isfinite(heights).all(axis=1)
     if whole.sum() < heights.shape[1] / 4 or whole.sum() < 50:
         return math.nan

@@ -10,8 +10,8 @@ import warnings
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed, stream, torch_draws
 from tests.studies.validation.peers.gaussian import fitted, signed
 from tests.studies.validation.peers.library import library
@@ -28,7 +28,7 @@ class BayesianOptimisation:
         self._points = np.zeros((0, dimension))
         self._values = np.zeros(0)
 
-    def ask(self) -> NDArray[np.float64]:
+    def ask(self) -> FloatArray:
         count = len(self._points)
         if count == 0:
             return np.zeros((1, self._dimension))
@@ -64,6 +64,6 @@ class BayesianOptimisation:
             )
         return signed(found)
 
-    def tell(self, points: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    def tell(self, points: FloatArray, values: FloatArray) -> None:
         self._points = np.concatenate([self._points, points])
         self._values = np.concatenate([self._values, values])

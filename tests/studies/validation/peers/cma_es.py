@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed
 from tests.studies.validation.peers.library import library
 
@@ -31,12 +31,12 @@ class CmaEs:
             {"bounds": [-1.0, 1.0], "seed": 1 + child_seed(seed, "peers", "cma-es") % (2**31 - 2), "verbose": -9},
         )
 
-    def ask(self) -> NDArray[np.float64]:
+    def ask(self) -> FloatArray:
         if not self._begun:
             return np.zeros((1, self._dimension))
         return np.array(self._strategy.ask())
 
-    def tell(self, points: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    def tell(self, points: FloatArray, values: FloatArray) -> None:
         if not self._begun:
             self._begun = True
             return

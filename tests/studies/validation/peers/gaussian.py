@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.arrays import FloatArray
 from tests.studies.validation.peers.library import library
 
 _OF = "botorch"
 _STEPS = 100  # of the fit; more change the length scales by little, and a noise-free surface takes them all
 
 
-def fitted(points: NDArray[np.float64], values: NDArray[np.float64]) -> Any:
+def fitted(points: FloatArray, values: FloatArray) -> Any:
     """A SingleTaskGP of −log(1 + value), larger being better, on [0, 1]ᵈ.
 
     Squared distances vary by orders of magnitude; their logarithm is nearer to a Gaussian process. Failed evaluations
@@ -57,18 +57,18 @@ def fitted(points: NDArray[np.float64], values: NDArray[np.float64]) -> Any:
     return model
 
 
-def gains(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def gains(values: FloatArray) -> FloatArray:
     """−log(1 + value) of (n,); failed ones as the worst of the others, 0 if there are none."""
     finite = np.isfinite(values)
     worst = float(values[finite].max()) if finite.any() else 0.0
     return -np.log1p(np.where(finite, values, worst))
 
 
-def unit(points: NDArray[np.float64]) -> Tensor:
+def unit(points: FloatArray) -> Tensor:
     """[−1, 1]ᵈ to [0, 1]ᵈ, as BoTorch's priors expect."""
     return torch.from_numpy((points + 1) / 2).double()
 
 
-def signed(points: Tensor) -> NDArray[np.float64]:
+def signed(points: Tensor) -> FloatArray:
     """[0, 1]ᵈ to [−1, 1]ᵈ."""
     return np.clip(points.detach().cpu().numpy() * 2 - 1, -1.0, 1.0)

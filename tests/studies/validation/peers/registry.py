@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.registry import Registry
 from measure.refine import Trace
 
@@ -27,16 +27,16 @@ PEERS = Registry(
 class Optimiser(Protocol):
     """Asks for points and gets their values. The same seed and answers give the same questions."""
 
-    def ask(self) -> NDArray[np.float64]:
+    def ask(self) -> FloatArray:
         """Points (q, d) of [−1, 1]ᵈ to be evaluated next; the first is the centre."""
         ...
 
-    def tell(self, points: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    def tell(self, points: FloatArray, values: FloatArray) -> None:
         """What `ask`'s points gave: (q,), to be made small; infinite where a simulation failed."""
         ...
 
 
-Evaluate = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
+Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Points (q, d) → values (q,) and the seconds that each took when it was made (q,)."""
 
 
@@ -54,7 +54,7 @@ def minimise(method: str, evaluate: Evaluate, *, dimension: int, budget: int, se
         InputError: its library is not installed.
     """
     optimiser: Optimiser = PEERS[method](dimension, seed=seed, batch=batch)
-    points: list[NDArray[np.float64]] = []
+    points: list[FloatArray] = []
     values: list[float] = []
     seconds: list[float] = []
     spent = 0.0

@@ -12,8 +12,8 @@ import warnings
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed, stream, torch_draws
 from tests.studies.validation.peers.gaussian import fitted, gains, signed, unit
 from tests.studies.validation.peers.library import library
@@ -49,14 +49,14 @@ class Turbo:
         if self._restart == 0:
             self._initial[0] = np.zeros(self._dimension)
 
-    def ask(self) -> NDArray[np.float64]:
+    def ask(self) -> FloatArray:
         if len(self._points) < _INITIAL:
             first = len(self._points)
             return np.array(self._initial[first : first + self._batch])
         self._asked += 1
         return self._thompson()
 
-    def _thompson(self) -> NDArray[np.float64]:
+    def _thompson(self) -> FloatArray:
         generation = library("botorch.generation", of="botorch")
         rng = stream(self._seed, "peers", "turbo", "candidates", self._asked)
         with torch_draws(self._seed, "peers", "turbo", "fit", self._asked), warnings.catch_warnings():
@@ -75,7 +75,7 @@ class Turbo:
             chosen = generation.MaxPosteriorSampling(model, replacement=False)(candidates, num_samples=self._batch)
         return signed(chosen)
 
-    def tell(self, points: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    def tell(self, points: FloatArray, values: FloatArray) -> None:
         judged = len(self._points) >= _INITIAL
         before = gains(np.append(self._values, values)) if judged else None
         self._points = np.concatenate([self._points, points])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 
 
@@ -16,11 +16,11 @@ class RandomSearch:
         self._rng = stream(seed, "peers", "random")
         self._begun = False
 
-    def ask(self) -> NDArray[np.float64]:
+    def ask(self) -> FloatArray:
         if not self._begun:
             self._begun = True
             return np.zeros((1, self._dimension))
         return self._rng.uniform(-1.0, 1.0, (self._batch, self._dimension))
 
-    def tell(self, points: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    def tell(self, points: FloatArray, values: FloatArray) -> None:
         """Learns nothing."""

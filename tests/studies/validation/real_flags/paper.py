@@ -22,8 +22,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from sim.air import QuadraticNormal
 from sim.effects import FiniteSpanLoading, apply
 from sim.handles import Handles
@@ -76,7 +76,7 @@ VARIANTS = {
 }
 
 
-def frequencies(case: Case, shares: Sequence[float], speeds: Sequence[float], how: Sheet) -> NDArray[np.float64]:
+def frequencies(case: Case, shares: Sequence[float], speeds: Sequence[float], how: Sheet) -> FloatArray:
     """(member,) [Hz] of a share and a speed at the sheet [m/s] each; NaN without flutter or after divergence."""
     length, height = case.sheet.length, HEIGHT
     cell = length / (how.columns - 0.5)
@@ -144,7 +144,7 @@ class Model:
         return sum(abs(error) < bound for error in errors), len(errors)
 
 
-def stop(hz: NDArray[np.float64]) -> float:
+def stop(hz: FloatArray) -> float:
     """Share of the measured stop speed, of `STOPS`, midway below the least from which on all flutter; NaN for none."""
     still = np.flatnonzero(~np.isfinite(hz))
     first = int(still[-1]) + 1 if len(still) else 0
@@ -157,7 +157,7 @@ def measured() -> dict[str, tuple[float, float, str]]:
     return {c["name"]: (c["tunnel_speed"], c["frequency_hz"]["value"], c["group"]) for c in clips}
 
 
-def fitted(table: NDArray[np.float64], shares: Sequence[float]) -> Model:
+def fitted(table: FloatArray, shares: Sequence[float]) -> Model:
     """The share of some and the factor that suit the clips of the group "fit" best.
 
     Args:
@@ -178,7 +178,7 @@ def fitted(table: NDArray[np.float64], shares: Sequence[float]) -> Model:
     return predicted(table, *best[1:])
 
 
-def predicted(table: NDArray[np.float64], share: float, factor: float) -> Model:
+def predicted(table: FloatArray, share: float, factor: float) -> Model:
     """A model's errors at all clips, of a table as `fitted` takes it."""
     row = _at(table, share)
     errors = {
@@ -187,11 +187,11 @@ def predicted(table: NDArray[np.float64], share: float, factor: float) -> Model:
     return Model(share=share, factor=factor, errors=errors)
 
 
-def _at(table: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+def _at(table: FloatArray, share: float) -> FloatArray:
     return np.array([np.interp(share, SHARES, column) for column in table.T])
 
 
-def _miss(row: NDArray[np.float64], factor: float, speed: float, hz: float) -> float:
+def _miss(row: FloatArray, factor: float, speed: float, hz: float) -> float:
     """ln of predicted over measured."""
     return math.log(float(np.interp(factor * speed, SPEEDS, row, left=math.nan, right=math.nan)) / hz)
 
@@ -224,7 +224,7 @@ def study(case: Case, share: float, keep: Path | None) -> Paper:
         keep: folder of intermediate results.
     """
 
-    def simulated(shares: Sequence[float], speeds: Sequence[float], how: Sheet, of: Case = case) -> NDArray[np.float64]:
+    def simulated(shares: Sequence[float], speeds: Sequence[float], how: Sheet, of: Case = case) -> FloatArray:
         given = {
             "sheet": asdict(of.sheet),
             "density": of.density,

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from tests.studies.validation.real_flags.runs import AIR, HEIGHT, LENGTH, READINGS, Flag
 
 DENSITIES = (0.284, 0.11)
@@ -53,7 +53,7 @@ class Published:
     role: Role
     unit: str = "1"
     bands: dict[str, tuple[float, float]]
-    predicted: Callable[[NDArray[np.float64]], list[float]] | None = None
+    predicted: Callable[[FloatArray], list[float]] | None = None
 
 
 def about(value: float, share: float) -> tuple[float, float]:
@@ -71,7 +71,7 @@ def label(flag: Flag) -> str:
     return f"{1e3 * flag.density:g} g/m², {flag.speed:g} m/s"
 
 
-def _each(reading: str, flags: tuple[Flag, ...]) -> Callable[[NDArray[np.float64]], list[float]]:
+def _each(reading: str, flags: tuple[Flag, ...]) -> Callable[[FloatArray], list[float]]:
     rows, column = [FLAGS.index(flag) for flag in flags], READINGS.index(reading)
     return lambda values: values[rows, column].tolist()
 
@@ -80,7 +80,7 @@ def _of(flags: tuple[Flag, ...], band: Callable[[Flag], tuple[float, float]]) ->
     return {label(flag): band(flag) for flag in flags}
 
 
-def _speed_of_droop(values: NDArray[np.float64]) -> list[float]:
+def _speed_of_droop(values: FloatArray) -> list[float]:
     """The wind [m/s] at which the droop is 45°, by density; the slowest simulated where it is less there."""
     column = READINGS.index("droop")
     found = []
@@ -91,14 +91,14 @@ def _speed_of_droop(values: NDArray[np.float64]) -> list[float]:
     return found
 
 
-def _exponents(values: NDArray[np.float64]) -> list[float]:
+def _exponents(values: FloatArray) -> list[float]:
     """n of F ∝ Uⁿ from 6 to 10 m/s, by density."""
     column = READINGS.index("drag")
     drags = [[values[FLAGS.index(Flag(density=d, speed=u)), column] for u in (6.0, 10.0)] for d in DENSITIES]
     return [2 + math.log(fast / slow) / math.log(10 / 6) for slow, fast in drags]
 
 
-def _amplitude_exponents(values: NDArray[np.float64]) -> list[float]:
+def _amplitude_exponents(values: FloatArray) -> list[float]:
     """n of amplitude ∝ mⁿ, by wind."""
     column = READINGS.index("amplitude")
     heavy, light = DENSITIES

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from sim.contact import Contact
 from sim.effects import EFFECTS, apply
@@ -89,7 +89,7 @@ def scenes_of(one: Flag, numerics: Numerics) -> list[Scene]:
 
 def simulated(
     flags: Sequence[Flag], *, effects: Mapping[str, Mapping[str, float]] | None = None, numerics: Numerics | None = None
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """(flag, start, reading) of flags with effects, name → parameters, the same for all."""
     how = numerics or Numerics()
     scenes = [scene for one in flags for scene in scenes_of(one, how)]
@@ -119,9 +119,7 @@ def simulated(
     return np.array(rows).reshape(len(flags), how.starts, len(READINGS))
 
 
-def read(
-    course: NDArray[np.float64], force: NDArray[np.float64], along: NDArray[np.float64], one: Flag, rate: float
-) -> tuple[float, ...]:
+def read(course: FloatArray, force: FloatArray, along: FloatArray, one: Flag, rate: float) -> tuple[float, ...]:
     """The readings of one run.
 
     Args:

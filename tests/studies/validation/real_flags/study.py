@@ -14,15 +14,14 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray
 from tests.studies.validation.paper_flag.cached import cached
 from tests.studies.validation.real_flags import runs, waves
 from tests.studies.validation.real_flags.published import FLAGS, PUBLISHED, STREAMING, Published, Role
 from tests.studies.validation.real_flags.runs import READINGS, Flag, Numerics, simulated
 
 Effects = Mapping[str, Mapping[str, float]]
-Values = NDArray[np.float64]
 
 NAMED = "finite-span-loading"
 CANDIDATES: Mapping[str, tuple[str, tuple[float, ...]]] = {
@@ -59,7 +58,7 @@ class Fit:
     name: str
     strength: float
     interval: tuple[float, float]
-    readings: Values
+    readings: FloatArray
 
     @property
     def effects(self) -> Effects:
@@ -77,9 +76,9 @@ class Predictions:
         changes: variant → (probed flag, reading) its means, for the sheet.
     """
 
-    mean: Values
-    error: Values
-    changes: Mapping[str, Values]
+    mean: FloatArray
+    error: FloatArray
+    changes: Mapping[str, FloatArray]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +93,7 @@ class Bench:
     keep: Path | None
     seed: int = 1
 
-    def run(self, flags: Sequence[Flag], effects: Effects, numerics: Numerics) -> Values:
+    def run(self, flags: Sequence[Flag], effects: Effects, numerics: Numerics) -> FloatArray:
         """(flag, start, reading)."""
         numerics = replace(numerics, seed=self.seed)
         inputs = {"flags": [asdict(flag) for flag in flags], "effects": effects, "numerics": asdict(numerics)}
@@ -120,19 +119,19 @@ class Bench:
         return fitted(name, grid, np.array([on_all(table) for table in tables]))
 
 
-def on_all(values: Values) -> Values:
+def on_all(values: FloatArray) -> FloatArray:
     """(flag, reading) of `STREAMING` among those of `FLAGS`, NaN elsewhere."""
     table = np.full((len(FLAGS), len(READINGS)), np.nan)
     table[[FLAGS.index(flag) for flag in STREAMING]] = values
     return table
 
 
-def scatter(values: Values) -> Values:
+def scatter(values: FloatArray) -> FloatArray:
     """(reading,) relative standard deviation between starts, of all flags (flag, start, reading) that show it."""
     return np.sqrt(np.nanmean(values.var(1, ddof=1) / values.mean(1) ** 2, axis=0))
 
 
-def numerical_error(probed: Sequence[Values]) -> Values:
+def numerical_error(probed: Sequence[FloatArray]) -> FloatArray:
     """(reading,) largest relative change by a variant, less what starts alone would change; the first is the reference.
 
     Args:
@@ -147,19 +146,19 @@ def numerical_error(probed: Sequence[Values]) -> Values:
     return largest
 
 
-def misfit(one: Published, values: Values) -> Values:
+def misfit(one: Published, values: FloatArray) -> FloatArray:
     """(band,) what predictions are off the middle of their bands by, in halves of the width."""
     low, high = np.array(list(one.bands.values())).T
     predicted = [] if one.predicted is None else one.predicted(values)
     return (np.array(predicted) - (low + high) / 2) / ((high - low) / 2)
 
 
-def misfits(values: Values, role: Role) -> Values:
+def misfits(values: FloatArray, role: Role) -> FloatArray:
     """The same of all numbers of a role that are comparable, one after the other."""
     return np.concatenate([misfit(one, values) for one in PUBLISHED if one.role is role and one.predicted is not None])
 
 
-def fitted(name: str, grid: Values, tables: Values) -> Fit:
+def fitted(name: str, grid: FloatArray, tables: FloatArray) -> Fit:
     """The least mean square misfit over strengths, by readings linear between those of the grid.
 
     Args:

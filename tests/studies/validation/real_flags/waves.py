@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import hilbert
+
+from flagdata.arrays import FloatArray
 
 FROM = 0.3
 """Share of the length from which on the phase is read: nearer to the hoist the wave hardly moves."""
@@ -32,7 +33,7 @@ class Waves:
     share: float
 
 
-def waves(deflection: NDArray[np.float64], along: NDArray[np.float64], rate: float) -> Waves:
+def waves(deflection: FloatArray, along: FloatArray, rate: float) -> Waves:
     """The wave in a deflection.
 
     Args:

@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import rankdata
 
+from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from tests.studies.validation.robot_cloth.calibrate import Fit, calibrated
 from tests.studies.validation.robot_cloth.model import Cloth, predicted
-from tests.studies.validation.robot_cloth.reading import Floats, Swing
+from tests.studies.validation.robot_cloth.reading import Swing
 from tests.studies.validation.robot_cloth.tracker import TRACKER, latencies, left, shifts, upper
 
 OF_CLOTH = (
@@ -115,31 +116,31 @@ def sought(
         fits, before = tried[chosen], squares[chosen]
 
 
-def _judged(cloth: Cloth, folds: Sequence[tuple[list[Swing], list[Swing]]], fits: Sequence[Fit]) -> Floats:
+def _judged(cloth: Cloth, folds: Sequence[tuple[list[Swing], list[Swing]]], fits: Sequence[Fit]) -> FloatArray:
     return np.concatenate(
         [lower(left_errors(cloth, unseen, fit)) for (_, unseen), fit in zip(folds, fits, strict=True)]
     )
 
 
 def _numerics(
-    cloth: Cloth, folds: Sequence[tuple[list[Swing], list[Swing]]], fits: Sequence[Fit], before: Floats
+    cloth: Cloth, folds: Sequence[tuple[list[Swing], list[Swing]]], fits: Sequence[Fit], before: FloatArray
 ) -> float:
     """By how much twice as fine a mesh changes the mean square error of the lower halves [m²], up or down."""
     finer = _judged(replace(cloth, cells=2 * cloth.cells), folds, fits)
     return abs(float((finer - before).mean()))
 
 
-def _gain(name: str, gained: Floats, floor: float) -> Gain:
+def _gain(name: str, gained: FloatArray, floor: float) -> Gain:
     error = float(gained.std(ddof=1) / np.sqrt(len(gained)))
     return Gain(name=name, value=float(gained.mean()), error=error, floor=floor)
 
 
-def left_errors(cloth: Cloth, swings: Sequence[Swing], fit: Fit) -> list[Floats]:
+def left_errors(cloth: Cloth, swings: Sequence[Swing], fit: Fit) -> list[FloatArray]:
     """(frame, node, 3) errors on each recording [m], with its own latencies where the model has any."""
     return left(swings, predicted(cloth, swings, [fit.parameters] * len(swings)), fit.tracker, fit.parameters.lag)
 
 
-def lower(of: Sequence[Floats]) -> Floats:
+def lower(of: Sequence[FloatArray]) -> FloatArray:
     """(recording,) mean square distance of the nodes of the lower half [m²]."""
     below = ~upper(round(of[0].shape[1] ** 0.5))
     return np.array([np.nanmean((error[:, below] ** 2).sum(axis=2)) for error in of])
@@ -178,7 +179,7 @@ def late(cloth: Cloth, swings: Sequence[Swing], fit: Fit, *, without: Fit, seed:
     intervals = [np.diff(swing.times) for swing in swings]
     rng = stream(seed, "held", "latencies")
 
-    def correlation(of: Sequence[Floats]) -> float:
+    def correlation(of: Sequence[FloatArray]) -> float:
         ranks = (tuple(map(rankdata, pair)) for pair in zip(of, intervals, strict=True))
         return float(np.mean([np.corrcoef(*pair)[0, 1] for pair in ranks]))
 
@@ -186,7 +187,7 @@ def late(cloth: Cloth, swings: Sequence[Swing], fit: Fit, *, without: Fit, seed:
     as_large = sum(correlation([rng.permutation(values) for values in found]) >= own for _ in range(_SHUFFLES))
     plain = predicted(cloth, swings, [without.parameters] * len(swings))
     lag = without.parameters.lag
-    shifted: list[Floats] = []
+    shifted: list[FloatArray] = []
     unshifted = left(swings, plain, without.tracker, lag)
     for swing, run, error in zip(swings, plain, unshifted, strict=True):
         moved = error.copy()

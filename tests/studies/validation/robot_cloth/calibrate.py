@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from flagdata.arrays import FloatArray
 from tests.studies.validation.robot_cloth.model import NAMES, Cloth, Parameters, described, predicted
-from tests.studies.validation.robot_cloth.reading import Floats, Swing
+from tests.studies.validation.robot_cloth.reading import Swing
 from tests.studies.validation.robot_cloth.tracker import (
     CAMERA,
     LATENCY,
@@ -77,8 +78,8 @@ class Linear:
             of `Parameters.moved`.
     """
 
-    error: Floats
-    change: Floats
+    error: FloatArray
+    change: FloatArray
 
 
 def linear(cloth: Cloth, swings: Sequence[Swing], fit: Fit) -> tuple[list[Linear], list[CubicSpline]]:
@@ -112,7 +113,7 @@ def _linear(swing: Swing, models: Sequence[CubicSpline], fit: Fit, sizes: Sequen
     return Linear(error=base, change=np.stack(moved))
 
 
-def weights(error: Floats) -> Floats:
+def weights(error: FloatArray) -> FloatArray:
     """(frame, node) Huber's, of distances; 0 where nothing is compared."""
     distance = np.linalg.norm(error, axis=2)
     usual = float(np.nanmedian(distance)) / 1.538  # the median distance of three normal coordinates, σ = 1
@@ -145,7 +146,7 @@ def _observed(fit: Fit, swings: Sequence[Swing], runs: Sequence[CubicSpline], pa
     return replace(fit, tracker=min(tried, key=lambda own: _of_lower(swings, runs, own, fit.parameters.lag)))
 
 
-def _with_offsets(fit: Fit, error: Floats) -> Fit:
+def _with_offsets(fit: Fit, error: FloatArray) -> Fit:
     """Offsets that leave no node with a mean error."""
     if OFFSETS not in fit.sought:
         return fit
@@ -189,7 +190,7 @@ def _stepped(fit: Fit, swings: Sequence[Swing], runs: Sequence[CubicSpline], par
     return replace(fit, parameters=parameters, tracker=tracker)
 
 
-def _mapped(places: Floats) -> Floats:
+def _mapped(places: FloatArray) -> FloatArray:
     """(12, frame, node, 3) what each element of the camera's map does, by rows of A and of the shift."""
     made = np.zeros((3, 4, *places.shape))
     for row in range(3):

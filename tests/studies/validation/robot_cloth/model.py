@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import UsageError
 from sim import handles
 from sim.anchors import AnchorTracks
@@ -20,7 +20,7 @@ from sim.integrate import BackwardEuler, SplitEuler
 from sim.material import Material
 from sim.mesh import Mesh, grid
 from sim.scene import Scene, assemble
-from tests.studies.validation.robot_cloth.reading import Floats, Swing
+from tests.studies.validation.robot_cloth.reading import Swing
 from tests.studies.validation.robot_cloth.tracker import instants
 
 PERIOD = 0.02  # s, of predictions and of the corners' tracks
@@ -96,7 +96,7 @@ class Cloth:
     width: float
     height: float
     side: int
-    hanging: Floats
+    hanging: FloatArray
     cells: int = 1
 
     @classmethod
@@ -119,7 +119,7 @@ class Cloth:
         """The nodes at the upper corners, left and right."""
         return 0, self.side * (self.side - 1)
 
-    def carried(self, swing: Swing, nodes: Sequence[int]) -> Floats:
+    def carried(self, swing: Swing, nodes: Sequence[int]) -> FloatArray:
         """(pose, node, 3) where the tool takes nodes as if they were fixed to it [m]."""
         return np.einsum("tij,nj->tni", swing.turns, self.hanging[list(nodes)]) + swing.tool[:, None]
 
@@ -129,7 +129,7 @@ class Cloth:
         cells = self.cells * (self.side - 1)
         return grid(width=self.width, height=self.height, columns=cells, rows=cells)
 
-    def nodes(self, mesh: Mesh) -> NDArray[np.int64]:
+    def nodes(self, mesh: Mesh) -> IntArray:
         """(node,) vertices at the nodes: columns from left to right, each from top to bottom."""
         place = np.arange(self.side) / (self.side - 1)
         u, v = np.meshgrid(place * self.width, self.height * (1 - place), indexing="ij")
@@ -171,7 +171,7 @@ def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parame
     return [CubicSpline(times, found[..., member]) for member in range(len(swings))]
 
 
-def rigid(cloth: Cloth, swing: Swing, lag: float) -> Floats:
+def rigid(cloth: Cloth, swing: Swing, lag: float) -> FloatArray:
     """(frame, node, 3) observed less what a board would do that hangs from the tool as the cloth does at rest [m]."""
     board = CubicSpline(swing.tool_times, cloth.carried(swing, range(cloth.side**2)))
     return swing.positions - board(instants(swing, lag))
@@ -186,13 +186,13 @@ def _effects(parameters: Sequence[Parameters], dtype: torch.dtype) -> list[Effec
     return made
 
 
-def _track(cloth: Cloth, swing: Swing, times: Floats) -> Floats:
+def _track(cloth: Cloth, swing: Swing, times: FloatArray) -> FloatArray:
     """(n, 2, 3) displacement of the corners at times [m]; still after the last pose."""
     corners = cloth.carried(swing, cloth.upper)
     return CubicSpline(swing.tool_times, corners)(np.minimum(times, swing.tool_times[-1])) - corners[0]
 
 
-def _hung(mesh: Mesh, held: tuple[int, int], left: Floats, right: Floats) -> Floats:
+def _hung(mesh: Mesh, held: tuple[int, int], left: FloatArray, right: FloatArray) -> FloatArray:
     """(vertex, 3) the cloth hanging straight down from its corners [m]."""
     u, v = mesh.rest.T
     share = (u / u.max())[:, None]

@@ -14,13 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError, NotFoundError
 from flagdata.timebase import NANOSECONDS
 
-Floats = NDArray[np.float64]
 _STILL = 5e-3  # m: a tool that is nearer to where it began has not moved
 _FIRST_NODE = 5  # column of the mesh file: after its stamps, frame and size
 _STAMP = 2
@@ -42,14 +41,14 @@ class Swing:
 
     name: str
     side: int
-    times: Floats
-    positions: Floats
-    tool_times: Floats
-    tool: Floats
-    turns: Floats
+    times: FloatArray
+    positions: FloatArray
+    tool_times: FloatArray
+    tool: FloatArray
+    turns: FloatArray
 
     @property
-    def hanging(self) -> Floats:
+    def hanging(self) -> FloatArray:
         """(node, 3) median places before the tool moves [m]."""
         moved = np.linalg.norm(self.tool - self.tool[0], axis=1) > _STILL
         until = self.tool_times[int(np.argmax(moved))] if moved.any() else np.inf
@@ -117,7 +116,7 @@ def read_all(folder: Path, programmes: Sequence[str]) -> dict[str, list[Swing]]:
     return {programme: [read(folder, name) for name in names(folder, programme)] for programme in programmes}
 
 
-def _stamped(path: Path) -> tuple[NDArray[np.int64], Floats]:
+def _stamped(path: Path) -> tuple[IntArray, FloatArray]:
     """Stamps [ns], and the table, of rows whose stamps increase."""
     table = _rows(path, _FIRST_NODE + 1)
     stamps = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=[_STAMP], dtype=np.int64)
@@ -125,7 +124,7 @@ def _stamped(path: Path) -> tuple[NDArray[np.int64], Floats]:
     return stamps[later], table[later]
 
 
-def _rows(path: Path, least: int) -> Floats:
+def _rows(path: Path, least: int) -> FloatArray:
     if not path.is_file():
         raise NotFoundError("no such file", where=str(path), fix="give the folder of the recordings")
     table = np.genfromtxt(path, delimiter=",", skip_header=1)

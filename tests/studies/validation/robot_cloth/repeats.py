@@ -13,21 +13,22 @@ from itertools import product
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from tests.studies.validation.robot_cloth.calibrate import Linear, weights
-from tests.studies.validation.robot_cloth.reading import Floats, Swing
+from tests.studies.validation.robot_cloth.reading import Swing
 
 SEGMENT = 1.5  # s
 _FRAMES = 5  # frames that a segment must have
 _MOVED = 5e-3  # m: the tool moves
 
 
-def features(swing: Swing, model: Linear, lag: float) -> Floats:
+def features(swing: Swing, model: Linear, lag: float) -> FloatArray:
     """(segment, 5): errors along density, bending, damping and lag, in their units, and the logarithm of their size."""
     begun = float(swing.tool_times[np.argmax(np.linalg.norm(swing.tool - swing.tool[0], axis=1) > _MOVED)])
     place = np.floor((swing.times - lag - begun) / SEGMENT).astype(np.int64)
     weight = weights(model.error)[..., None]
     error, change = (np.nan_to_num(values) for values in (model.error, model.change))  # of weight 0
-    rows: list[Floats] = []
+    rows: list[FloatArray] = []
     for segment in range(int(place.max()) + 1):
         own = (place == segment) & (weight[:, :, 0].sum(axis=1) > 0)
         if own.sum() < _FRAMES:
@@ -39,7 +40,7 @@ def features(swing: Swing, model: Linear, lag: float) -> Floats:
     return np.array(rows)
 
 
-def shuffled(repeats: Sequence[Floats], rng: np.random.Generator) -> list[Floats]:
+def shuffled(repeats: Sequence[FloatArray], rng: np.random.Generator) -> list[FloatArray]:
     """Repeats of one programme whose features (segment, feature) have changed places, segment by segment: what they
     might have been, if they did not differ. All are cut to the shortest."""
     count = min(len(own) for own in repeats)
@@ -48,7 +49,7 @@ def shuffled(repeats: Sequence[Floats], rng: np.random.Generator) -> list[Floats
     return list(stacked[order, np.arange(count)])
 
 
-def tail_probability(first: Floats, second: Floats, scale: Floats) -> float:
+def tail_probability(first: FloatArray, second: FloatArray, scale: FloatArray) -> float:
     """p of no difference between two repeats, by all sign flips of the differences between their segments.
 
     Args:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flagdata.arrays import FloatArray
 from flagdata.console import progress
 from flagdata.rng import stream
 from measure.shares import Share
@@ -17,7 +18,7 @@ from sim.material import Material
 from tests.studies.validation.robot_cloth.attribution import Late, Round, late, left_errors, lower, sought
 from tests.studies.validation.robot_cloth.calibrate import Fit, Linear, at_bounds, calibrated, linear
 from tests.studies.validation.robot_cloth.model import Cloth, Parameters, rigid
-from tests.studies.validation.robot_cloth.reading import Floats, Swing, read_all
+from tests.studies.validation.robot_cloth.reading import Swing, read_all
 from tests.studies.validation.robot_cloth.repeats import features, shuffled, tail_probability
 from tests.studies.validation.robot_cloth.tracker import LATENCY
 
@@ -177,7 +178,7 @@ def _completed(cloth: Cloth, known: Sequence[Swing], base: Fit, added: Sequence[
 
 def _reductions(cloth: Cloth, unseen: Sequence[Swing], fits: Mapping[str, Fit]) -> tuple[Reduction, ...]:
     made: list[Reduction] = []
-    before: Floats | None = None
+    before: FloatArray | None = None
     for name, fit in fits.items():
         squares = lower(left_errors(cloth, unseen, fit))
         gained = (squares if before is None else before) - squares
@@ -212,7 +213,7 @@ def _compared(cloth: Cloth, swings: Sequence[Swing], models: Mapping[str, Fit], 
     return made | {name: _error(left_errors(cloth, swings, fit)) for name, fit in models.items()}
 
 
-def _error(of: Sequence[Floats]) -> Error:
+def _error(of: Sequence[FloatArray]) -> Error:
     squares = [np.nanmean((error**2).sum(axis=2)) for error in of]
     each = np.sqrt(squares)
     return Error(
@@ -220,7 +221,7 @@ def _error(of: Sequence[Floats]) -> Error:
     )
 
 
-def _parts(left: Sequence[Floats]) -> dict[str, float]:
+def _parts(left: Sequence[FloatArray]) -> dict[str, float]:
     steady, shared, rest = [], [], []
     for error in left:
         mean = np.nanmean(error, axis=0)
@@ -233,7 +234,7 @@ def _parts(left: Sequence[Floats]) -> dict[str, float]:
     return {name: float(np.sqrt(np.mean(values))) for name, values in parts.items()}
 
 
-def _extents(swings: Sequence[Swing], left: Sequence[Floats]) -> dict[str, tuple[float, float]]:
+def _extents(swings: Sequence[Swing], left: Sequence[FloatArray]) -> dict[str, tuple[float, float]]:
     """Distances of the upper corners, and of the ends of the nodes' columns, over frames in which the tool moves."""
     tracked, modelled = [], []
     for swing, error in zip(swings, left, strict=True):

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, NotFoundError, UsageError
 from sim.material import named
 from tests.studies.validation.robot_cloth.attribution import late, left_errors, lower, sought
 from tests.studies.validation.robot_cloth.calibrate import Fit, calibrated, linear
 from tests.studies.validation.robot_cloth.model import Cloth, Parameters, described, predicted, rigid
-from tests.studies.validation.robot_cloth.reading import Floats, Swing, names, read
+from tests.studies.validation.robot_cloth.reading import Swing, names, read
 from tests.studies.validation.robot_cloth.repeats import features, shuffled, tail_probability
 from tests.studies.validation.robot_cloth.tracker import (
     CAMERA,
@@ -31,7 +32,7 @@ SIDE, SIZE = 3, 0.3
 CAMEL = named("camel-ponte-roma")
 
 
-def _square() -> Floats:
+def _square() -> FloatArray:
     """(node, 3) columns from left to right, each from top to bottom, hanging below (0, 0, 1)."""
     place = np.arange(SIDE) / (SIDE - 1) * SIZE
     across, down = np.meshgrid(place - SIZE / 2, place, indexing="ij")
@@ -62,7 +63,9 @@ def _filmed(swing: Swing, cloth: Cloth, truth: Parameters, *, seed: int, noise: 
     return replace(swing, positions=seen + noise * np.random.default_rng(seed).standard_normal(seen.shape))
 
 
-def _write(folder: Path, name: str, *, nodes: Floats, stamps: list[int], camera: Rotation, place: Floats) -> None:
+def _write(
+    folder: Path, name: str, *, nodes: FloatArray, stamps: list[int], camera: Rotation, place: FloatArray
+) -> None:
     """Files in the recordings' format; nodes (frame, node, 3) in the robot's frame."""
     folder.mkdir(exist_ok=True)
     in_camera = camera.inv().apply((nodes - place).reshape(-1, 3)).reshape(nodes.shape)
@@ -145,7 +148,7 @@ def test_repeats_that_differ_by_noise_have_uniform_p_and_a_moved_one_does_not() 
 
 
 def test_shuffled_repeats_keep_every_segment_and_lose_their_differences() -> None:
-    repeats: list[Floats] = [np.full((7, 2), float(k)) for k in range(5)]
+    repeats: list[FloatArray] = [np.full((7, 2), float(k)) for k in range(5)]
     mixed = shuffled([*repeats[:4], np.concatenate([repeats[4], repeats[4]])], np.random.default_rng(3))
     assert [own.shape for own in mixed] == [(7, 2)] * 5
     for segment in range(7):
@@ -182,7 +185,7 @@ class Truth:
     offsets: float = 0.0
 
 
-def _followed(swing: Swing, cloth: Cloth, truth: Truth, *, seed: int) -> tuple[Swing, Floats]:
+def _followed(swing: Swing, cloth: Cloth, truth: Truth, *, seed: int) -> tuple[Swing, FloatArray]:
     """A cloth as a tracker reports it, with 1 mm of noise, and its latencies. Offsets are alike in all recordings.
 
     Stamps are given when a frame has been worked on: its latency makes the interval before it longer. The cloth is that
@@ -199,7 +202,7 @@ def _followed(swing: Swing, cloth: Cloth, truth: Truth, *, seed: int) -> tuple[S
     return replace(swing, positions=measured, times=swing.times + lates), lates
 
 
-def _programmes(truth: Truth) -> tuple[Cloth, dict[str, list[Swing]], dict[str, Floats]]:
+def _programmes(truth: Truth) -> tuple[Cloth, dict[str, list[Swing]], dict[str, FloatArray]]:
     """Two programmes of two repeats each, as a tracker reports them; latencies by recording."""
     plain = {
         (name, k): _swing(f"{name}_rep{k}", frequency=frequency, duration=3.0 + 0.1 * k)
@@ -208,7 +211,7 @@ def _programmes(truth: Truth) -> tuple[Cloth, dict[str, list[Swing]], dict[str, 
     }
     cloth = Cloth.seen(list(plain.values()), CAMEL)
     tracked: dict[str, list[Swing]] = {"slow": [], "fast": []}
-    lates: dict[str, Floats] = {}
+    lates: dict[str, FloatArray] = {}
     for seed, ((programme, _), swing) in enumerate(plain.items()):
         seen, lates[swing.name] = _followed(swing, cloth, truth, seed=seed)
         tracked[programme].append(seen)

@@ -17,10 +17,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from tests.studies.validation.robot_cloth.reading import Floats, Swing
+from flagdata.arrays import BoolArray, FloatArray
+from tests.studies.validation.robot_cloth.reading import Swing
 
 OFFSETS, CAMERA, LATENCY = "node offsets", "camera pose and depth scale", "latency of single frames"
 TRACKER = (OFFSETS, CAMERA, LATENCY)
@@ -43,10 +43,10 @@ class Tracker:
             the nodes' usual error to the usual latency. None: all frames have the usual lag.
     """
 
-    offsets: Floats
-    camera: Floats
-    shift: Floats
-    about: Floats
+    offsets: FloatArray
+    camera: FloatArray
+    shift: FloatArray
+    about: FloatArray
     stiffness: float | None = None
 
     @classmethod
@@ -58,17 +58,17 @@ class Tracker:
             offsets=np.zeros((nodes, 3)), camera=np.zeros((3, 3)), shift=np.zeros(3), about=np.nanmean(places, axis=0)
         )
 
-    def seen(self, places: Floats) -> Floats:
+    def seen(self, places: FloatArray) -> FloatArray:
         """(frame, node, 3) where the tracker reports nodes that are at `places` [m]."""
         return self.offsets + self.shift + places + (places - self.about) @ self.camera.T
 
 
-def upper(side: int) -> NDArray[np.bool_]:
+def upper(side: int) -> BoolArray:
     """(node,) whether a node is in the upper half of the cloth: columns from left to right, each from top to bottom."""
     return np.arange(side * side) % side < side // 2
 
 
-def errors(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float, late: Floats | None = None) -> Floats:
+def errors(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float, late: FloatArray | None = None) -> FloatArray:
     """(frame, node, 3) observed less predicted [m]; NaN where a node was not tracked, or before the first pose.
 
     Args:
@@ -82,12 +82,12 @@ def errors(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float, late: F
     return np.where(within[:, None, None], swing.positions - predicted, np.nan)
 
 
-def instants(swing: Swing, lag: float, late: Floats | float | None = None) -> Floats:
+def instants(swing: Swing, lag: float, late: FloatArray | float | None = None) -> FloatArray:
     """(frame,) when frames were taken, on the tool's clock and within its time [s]."""
     return np.clip(swing.times - lag - (0.0 if late is None else late), 0.0, swing.tool_times[-1])
 
 
-def left(swings: Sequence[Swing], runs: Sequence[CubicSpline], tracker: Tracker, lag: float) -> list[Floats]:
+def left(swings: Sequence[Swing], runs: Sequence[CubicSpline], tracker: Tracker, lag: float) -> list[FloatArray]:
     """(frame, node, 3) errors on each recording [m], with its own latencies where the tracker has any."""
     return [
         errors(swing, run, tracker, lag, latencies(swing, run, tracker, lag))
@@ -95,7 +95,7 @@ def left(swings: Sequence[Swing], runs: Sequence[CubicSpline], tracker: Tracker,
     ]
 
 
-def latencies(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float) -> Floats:
+def latencies(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float) -> FloatArray:
     """(frame,) τ [s]: that which brings the upper half of the nodes nearest to their run, within 0.2 s; 0 without
     latencies, and where no node was tracked."""
     if tracker.stiffness is None:
@@ -113,7 +113,7 @@ def latencies(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float) -> F
     return tried[np.argmin(costs, axis=0)]
 
 
-def shifts(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float) -> Floats:
+def shifts(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float) -> FloatArray:
     """(frame,) a vertical shift of each frame [m], sought by the upper half of the nodes as a latency is: as free, and
     what no clock does. The control of `latencies`."""
     above = errors(swing, run, tracker, lag)[:, upper(swing.side), 2]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tests.studies.validation.vtk_films.scene import Body, Floats, Light, View
+from flagdata.arrays import FloatArray
+from tests.studies.validation.vtk_films.scene import Body, Light, View
 
 _SIDES = 16
 
@@ -42,7 +42,7 @@ def sun(view: View, rng: np.random.Generator) -> list[Light]:
     ]
 
 
-def smooth(times: Floats, rng: np.random.Generator, *, slowest: float, fastest: float) -> Floats:
+def smooth(times: FloatArray, rng: np.random.Generator, *, slowest: float, fastest: float) -> FloatArray:
     """(n,) of zero mean and unit deviation: twelve sines, of frequencies [Hz] evenly spread by their logarithm."""
     frequency = np.exp(rng.uniform(math.log(slowest), math.log(fastest), 12))
     waves = np.sin(2 * np.pi * (frequency * times[:, None] + rng.random(12))) / frequency**0.5
@@ -50,13 +50,13 @@ def smooth(times: Floats, rng: np.random.Generator, *, slowest: float, fastest: 
     return (total - total.mean()) / total.std()
 
 
-def shaking(times: Floats, strength: float, rng: np.random.Generator) -> Floats:
+def shaking(times: FloatArray, strength: float, rng: np.random.Generator) -> FloatArray:
     """(n, 3) of a hand: root mean square of each direction [px], and a tenth of a degree of roll for each pixel."""
     parts = [smooth(times, rng, slowest=0.2, fastest=6.0) for _ in range(3)]
     return strength * np.stack(parts, axis=1) * np.array([1.0, 1.0, 0.1])
 
 
-def tree(times: NDArray[np.float64], view: View, rng: np.random.Generator, *, leaves: int = 1800) -> list[Body]:
+def tree(times: FloatArray, view: View, rng: np.random.Generator, *, leaves: int = 1800) -> list[Body]:
     """One that sways beside the flag, at the picture's edge and behind."""
     aside, inward = view.right, -view.outward
     half = 0.5 * view.extent * view.size[0] / min(view.size) * (view.distance + 4.0) / view.distance

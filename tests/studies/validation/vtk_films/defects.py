@@ -16,8 +16,8 @@ from pathlib import Path
 import av
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from flagdata.arrays import BoolArray, UInt8Array
 from flagdata.rng import stream
 from tests.evidence import REFERENCE
 from tests.studies.validation.gate_clips import person
@@ -28,8 +28,6 @@ from tests.studies.validation.vtk_films.pictures import background, texture
 from tests.studies.validation.vtk_films.runs import read
 from tests.studies.validation.vtk_films.scene import Body, Scene, developed, pictures, write
 
-Frames = NDArray[np.uint8]
-"""(n, height, width, 3)."""
 EACH = 6
 _SECONDS = 4.0
 _MOVES = 12.0
@@ -40,10 +38,10 @@ _MOVES = 12.0
 class Source:
     """A film that a defect is made of, or what takes its place."""
 
-    frames: Frames
+    frames: UInt8Array
     rate: Fraction
 
-    def of(self, frames: Frames) -> Source:
+    def of(self, frames: UInt8Array) -> Source:
         """The same with other frames."""
         return replace(self, frames=frames)
 
@@ -98,21 +96,21 @@ class Makings:
         return Source(frames=np.stack(shown), rate=scene.rate)
 
 
-def _moving(frames: Frames) -> NDArray[np.bool_]:
+def _moving(frames: UInt8Array) -> BoolArray:
     """(n, height, width) where a frame differs from the median in time."""
     gray = frames.mean(axis=3, dtype=np.float32)
     away = np.abs(gray - np.median(gray[::5], axis=0)) > _MOVES
     return np.stack([cv2.morphologyEx(one.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3))) > 0 for one in away])
 
 
-def _box(moving: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+def _box(moving: BoolArray) -> tuple[int, int, int, int]:
     """Left, top, right and bottom of what moves in a twentieth of the frames or more."""
     often = moving.mean(axis=0) > 0.05
     rows, columns = np.flatnonzero(often.any(axis=1)), np.flatnonzero(often.any(axis=0))
     return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
-def _even(frames: Frames) -> Frames:
+def _even(frames: UInt8Array) -> UInt8Array:
     """With an even height and width, at least 240 px of the smaller one."""
     height, width = frames.shape[1:3]
     finer = max(1.0, 240 / min(height, width))
@@ -241,14 +239,14 @@ def no_flag(makings: Makings) -> Source:
     return Source(frames=np.repeat(gray[..., None], 3, axis=3), rate=Fraction(25))
 
 
-def _longer(rng: np.random.Generator) -> NDArray[np.uint8]:
+def _longer(rng: np.random.Generator) -> UInt8Array:
     """A person for four seconds: the drawing of `gate_clips` forth and back, three times."""
     once = person([], rng)
     there = np.concatenate([once, once[-2:0:-1]])
     return np.concatenate([there, there])[: round(_SECONDS * 25)]
 
 
-def _water(rng: np.random.Generator) -> Frames:
+def _water(rng: np.random.Generator) -> UInt8Array:
     """Waves that run over the lower part of a picture, finer towards the horizon."""
     shown = cv2.resize(background("field", rng), (640, 480), interpolation=cv2.INTER_AREA)
     horizon = int(rng.uniform(0.3, 0.6) * 480)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-Floats = NDArray[np.float64]
+from flagdata.arrays import FloatArray, IntArray
+
 RATE = 25.0
 DENSITY = 0.284
 """Area weight of the cloth of all runs, Camel Ponte Roma [kg/m²]."""
@@ -48,9 +48,9 @@ class Motion:
         wind: its speed [m/s].
     """
 
-    positions: Floats
-    faces: NDArray[np.int64]
-    rest: Floats
+    positions: FloatArray
+    faces: IntArray
+    rest: FloatArray
     wind: float
 
     @property
@@ -59,11 +59,11 @@ class Motion:
         return (len(self.positions) - 1) / RATE
 
     @property
-    def uv(self) -> Floats:
+    def uv(self) -> FloatArray:
         """(vertex, 2) on the flag's picture, from the hoist and from below."""
         return (self.rest - self.rest.min(axis=0)) / np.ptp(self.rest, axis=0)
 
-    def at(self, times: Floats) -> Floats:
+    def at(self, times: FloatArray) -> FloatArray:
         """(n, vertex, 3) at instants (n,) from its first frame [s]."""
         first = max(0, int(times.min() * RATE) - 10)
         last = min(len(self.positions), int(times.max() * RATE) + 12)

@@ -18,9 +18,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arrays import FloatArray, UInt8Array
 from tests.studies.validation.environments import UnusableError
 
-Floats = NDArray[np.float64]
 _WORKER = Path(__file__).with_name("worker.py")
 _PLATE = 30.0
 """Distance of the background from what the camera looks at [m]."""
@@ -40,11 +40,11 @@ class Body:
         lit: whether light falls on it; a background brings its own.
     """
 
-    positions: Floats
+    positions: FloatArray
     faces: NDArray[np.integer]
     colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    texture: NDArray[np.uint8] | None = None
-    uv: Floats | None = None
+    texture: UInt8Array | None = None
+    uv: FloatArray | None = None
     lit: bool = True
     ambient: float = 0.35
     diffuse: float = 0.65
@@ -86,16 +86,16 @@ class View:
     side: int
     distance: float
     extent: float
-    turned: Floats
+    turned: FloatArray
 
     @property
-    def outward(self) -> Floats:
+    def outward(self) -> FloatArray:
         """(3,) unit vector from the target to the camera."""
         yaw, up = math.radians(self.yaw), math.radians(self.elevation)
         return np.array([math.sin(yaw) * math.cos(up), self.side * math.cos(yaw) * math.cos(up), math.sin(up)])
 
     @property
-    def right(self) -> Floats:
+    def right(self) -> FloatArray:
         """(3,) unit vector to the right of the picture."""
         across = np.cross(-self.outward, [0.0, 0.0, 1.0])
         return across / np.linalg.norm(across)
@@ -116,11 +116,11 @@ class View:
             "size": list(self.size),
         }
 
-    def degrees(self) -> Floats:
+    def degrees(self) -> FloatArray:
         """(subframe, 3) of `turned`."""
         return self.turned * np.array([self.view_angle / self.size[1], self.view_angle / self.size[1], 1.0])
 
-    def plate(self, picture: NDArray[np.uint8]) -> Body:
+    def plate(self, picture: UInt8Array) -> Body:
         """What lies behind."""
         inward, right = -self.outward, self.right
         up = np.cross(right, inward)
@@ -178,7 +178,7 @@ class Scene:
     camera: Camera = field(default_factory=Camera)
 
 
-def pictures(python: Path, scene: Scene) -> Iterator[NDArray[np.uint8]]:
+def pictures(python: Path, scene: Scene) -> Iterator[UInt8Array]:
     """(height, width, 3) of each frame, as VTK draws it.
 
     Raises:
@@ -244,7 +244,7 @@ def film(python: Path, scene: Scene, path: Path, rng: np.random.Generator) -> No
     partial.replace(path)
 
 
-def developed(picture: NDArray[np.uint8], camera: Camera, rng: np.random.Generator) -> NDArray[np.uint8]:
+def developed(picture: UInt8Array, camera: Camera, rng: np.random.Generator) -> UInt8Array:
     """As the camera records it: exposed, with its noise, mirrored."""
     shown = cv2.GaussianBlur(picture.astype(np.float32), (0, 0), camera.blur)
     if camera.exposure != 1.0:
@@ -254,7 +254,7 @@ def developed(picture: NDArray[np.uint8], camera: Camera, rng: np.random.Generat
     return np.ascontiguousarray(out[:, ::-1]) if camera.mirrored else out
 
 
-def write(path: Path, frames: Iterable[NDArray[np.uint8]], *, rate: Fraction, crf: int) -> None:
+def write(path: Path, frames: Iterable[UInt8Array], *, rate: Fraction, crf: int) -> None:
     """An MP4 file of H.264 with 4:2:0 colours, of pictures (height, width, 3)."""
     stream: Any = None
     with av.open(str(path), "w") as container:
