@@ -29,8 +29,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from flagdata.durable import confirming, disk_errors, flush_file, flush_folder
 from flagdata.errors import ConflictError, InputError
-from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder
 from flagdata.manifest import remove_listed, unlisted, write_manifest
 
 _COMMENTS = {

@@ -37,10 +37,10 @@ import pyarrow.parquet as pq
 from deltalake import CommitProperties, DeltaTable
 from deltalake.exceptions import CommitFailedError, DeltaError
 
+from flagdata.durable import confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.files import is_beside, open_regular
 from flagdata.forks import OneProcess
-from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
 from flagdata.lake.log import CHECKPOINT, COPY_BACK, FILE_HASH, PREVIOUS_HASH, Entry, Log, Summaries, is_stated
 from flagdata.lake.rowfiles import RowFiles, Scan, changed_file
 from flagdata.provenance import file_hash

@@ -19,8 +19,8 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from flagdata.durable import disk_errors
 from flagdata.lake.artifact import OBJECT_NAME
-from flagdata.lake.durable import disk_errors
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import STORES, check_own
 from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased

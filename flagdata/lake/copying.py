@@ -15,9 +15,9 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
+from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.findings import Finding, Severity
-from flagdata.lake.durable import disk_errors
 from flagdata.lake.lake import Lake
 from flagdata.lake.marking import Marked, mark
 from flagdata.lake.transaction import Transaction

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from flagdata.durable import SCRATCH
 from flagdata.errors import FlagdataError
 from flagdata.files import is_beside
 from flagdata.findings import Finding, Severity
 from flagdata.lake.artifact import OBJECT_NAME, Artifact
 from flagdata.lake.collection import left_uploads
-from flagdata.lake.durable import SCRATCH
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import FOLDERS, STORES, foreign_entries
 from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased

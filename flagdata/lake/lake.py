@@ -14,10 +14,10 @@ from urllib.parse import unquote
 from flagdata import provenance
 from flagdata.addresses import lake_place
 from flagdata.documents import from_json
+from flagdata.durable import disk_errors, put_if_absent
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.files import is_beside, open_regular
 from flagdata.lake.catalog import newer
-from flagdata.lake.durable import disk_errors, put_if_absent
 from flagdata.lake.labels import Value, put
 from flagdata.lake.layout import FOLDERS, STAGING, STORES, scratch_files
 from flagdata.lake.lineage import removals

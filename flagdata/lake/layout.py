@@ -19,8 +19,8 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from flagdata.durable import SCRATCH, disk_errors
 from flagdata.errors import CorruptError, ErrorKind, FlagdataError, RefusedError
-from flagdata.lake.durable import SCRATCH, disk_errors
 from flagdata.storage import Place, RemotePath, StoreError
 from flagdata.storage.refusals import DeniedError
 

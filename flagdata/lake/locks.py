@@ -42,8 +42,8 @@ from pathlib import Path
 from typing import IO, Any, Protocol
 
 from flagdata.documents import from_json
+from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError
-from flagdata.lake.durable import disk_errors
 from flagdata.lake.layout import LinkError
 from flagdata.storage import Place, RemotePath
 

@@ -32,9 +32,9 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.documents import from_json
+from flagdata.durable import put_if_absent, unreadable
 from flagdata.errors import CorruptError, ErrorKind, FlagdataError
 from flagdata.files import open_regular
-from flagdata.lake.durable import put_if_absent, unreadable
 from flagdata.provenance import digest, file_hash
 from flagdata.storage import Place
 

@@ -35,9 +35,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.arrays import AnyArray, Float32Array, FloatArray, IntArray
+from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, LimitError
 from flagdata.html import table
-from flagdata.lake.durable import disk_errors
 from flagdata.provenance import canonical
 from flagdata.schema import CHANNELS
 from flagdata.timebase import NANOSECONDS

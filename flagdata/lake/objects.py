@@ -20,10 +20,10 @@ from functools import partial
 from pathlib import Path
 
 from flagdata.checksums import content_hash, files_of, read_sums, size_of, sums_of
+from flagdata.durable import flush_file, flush_folder
 from flagdata.errors import CorruptError, FlagdataError, InputError, NotFoundError
 from flagdata.files import is_beside
 from flagdata.lake.artifact import OBJECT_NAME
-from flagdata.lake.durable import flush_file, flush_folder
 from flagdata.lake.layout import STORES, LinkError
 from flagdata.object_cache import copy_of, fetched, forget, kept
 from flagdata.storage import Place, RemotePath

@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.documents import from_json
+from flagdata.durable import confirming, disk_errors, flush_folder, put_if_absent, unreadable
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, TimeError, UnknownNameError, UsageError
 from flagdata.files import open_regular
-from flagdata.lake.durable import confirming, disk_errors, flush_folder, put_if_absent, unreadable
 from flagdata.provenance import recipe_hash
 from flagdata.storage import Place
 from flagdata.timebase import NANOSECONDS, from_datetime, names_zone, parse

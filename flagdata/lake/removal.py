@@ -27,10 +27,10 @@ from functools import partial
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UnknownNameError, UsageError
 from flagdata.lake import naming
 from flagdata.lake.catalog import persist
-from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import leases, looking
 from flagdata.lake.lineage import Removal, removals
 from flagdata.lake.locks import Check

@@ -12,12 +12,12 @@ from tempfile import TemporaryFile
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from flagdata.durable import disk_errors
 from flagdata.errors import NotFoundError, UnknownNameError
 from flagdata.lake import naming
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Catalog
-from flagdata.lake.durable import disk_errors
 from flagdata.lake.layout import STAGING, check_writable
 from flagdata.lake.leases import collecting, keeping_collectors_out
 from flagdata.lake.lineage import Lineage, with_labels

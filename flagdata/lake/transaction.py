@@ -19,10 +19,10 @@ from types import TracebackType
 import pyarrow as pa
 
 from flagdata.checksums import files_of
+from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
-from flagdata.lake.durable import disk_errors
 from flagdata.lake.healing import Healing, healing
 from flagdata.lake.leases import Lease, collecting
 from flagdata.lake.removal import remove

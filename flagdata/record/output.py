@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError
 
 
@@ -56,7 +57,5 @@ def _clear_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError:
-        from flagdata.lake.durable import disk_errors  # only now: records are read without a lake
-
         with disk_errors("writing a record", path):
             raise

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from flagdata.arrays import FloatArray, IntArray, read_arrays
+from flagdata.durable import put_if_absent
 from flagdata.errors import CorruptError
-from flagdata.lake.durable import put_if_absent
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed, stream
 from measure.calibrate.prior import (

@@ -19,8 +19,8 @@ import numpy as np
 import torch
 
 from flagdata.arrays import FloatArray, read_arrays
+from flagdata.durable import put_if_absent
 from flagdata.errors import CorruptError, NotFoundError, UsageError
-from flagdata.lake.durable import put_if_absent
 from flagdata.provenance import code_version
 from flagdata.rng import child_seed, stream
 from measure.forecasting.calibration import Calibration

@@ -19,8 +19,8 @@ import torch
 from torch import Tensor
 
 from flagdata.checksums import SUMS, check_sums, files_of, write_sums
+from flagdata.durable import flush_file
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, RefusedError
-from flagdata.lake.durable import flush_file
 from flagdata.locks import LOCK
 from models.learner import Learner
 from models.storage import CARD, WEIGHTS, read_card, read_tensors, write_card, write_tensors

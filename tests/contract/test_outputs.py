@@ -17,7 +17,7 @@ LAKE = "writes inside a lake or its staging, under names of its own"
 INSIDE = "writes into a scratch folder that the caller made with flagdata.outputs"
 SCRATCH = "writes into a temporary folder of its own"
 ALLOWED = {
-    "flagdata/lake/durable.py": LAKE,
+    "flagdata/durable.py": LAKE,
     "flagdata/lake/leases.py": LAKE,
     "flagdata/lake/lake.py": LAKE,
     "flagdata/lake/log.py": LAKE,

@@ -9,7 +9,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "a change of bytes between two reads": (("flagdata/lake/copying.py", "run flagdata verify"),),
     "a definition, no remedy": (("flagdata/pages/glossary.py", "A regression that makes"),),
-    "a disk that fails while it confirms": (("flagdata/lake/durable.py", "check the disk, then run"),),
+    "a disk that fails while it confirms": (("flagdata/durable.py", "check the disk, then run"),),
     "a film of a minute or more that is itself looked at by a network, beside a log whose clock is off": (
         ("measure/anemometer/calibration.py", "align the film with the"),
         ("measure/anemometer/calibration.py", "check the clocks with fl"),

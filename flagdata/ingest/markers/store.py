@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from flagdata.durable import disk_errors
 from flagdata.findings import Finding, quality_flags
 from flagdata.ingest.markers.table import MarkerOptions, read_table
 from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
 from flagdata.ingest.store import IngestResult, Labels, find, kept, result_of
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.durable import disk_errors
 from flagdata.lake.meshes import MarkerSequence, write_markers
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS

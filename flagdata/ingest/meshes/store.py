@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from flagdata.arrays import FloatArray, IntArray
+from flagdata.durable import disk_errors
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.meshes.folder import read_folder
@@ -32,7 +33,6 @@ from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
 from flagdata.ingest.store import IngestResult, Labels, find, kept, result_of
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.durable import disk_errors
 from flagdata.lake.meshes import Mesh, MeshSequence, RaggedMeshSequence, write_meshes
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
