@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flagdata.addresses import local_path
-from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
-from flagdata.examples import example_of
+from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.examples import check_without_lake, path_of
 from flagdata.film import CameraFilm, RecordFilm
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.naming import COLUMNS, meant
@@ -33,15 +32,11 @@ def film_at(
         UsageError: options of files for artifacts.
         FlagdataError: a file that is no film.
     """
-    example = example_of(source)
-    path = local_path(source) if example is None else example.film
-    if path.exists():
-        return CameraFilm(path, true_fps=true_fps, sequence_fps=sequence_fps), path
+    path = path_of(source)
     if lake is None:
-        raise NotFoundError(
-            f"there is no file {str(source)!r}, and no lake was named",
-            fix="correct the path, or name the lake by --lake",
-        )
+        check_without_lake(source)
+    if lake is None or path.exists():
+        return CameraFilm(path, true_fps=true_fps, sequence_fps=sequence_fps), path
     if true_fps is not None or sequence_fps is not None:
         raise frames_have_instants()
     artifact = named(lake, str(source), at)

@@ -11,8 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from flagdata.addresses import local_path
 from flagdata.arguments import checked
-from flagdata.errors import UnknownNameError
+from flagdata.errors import NotFoundError, UnknownNameError
 from flagdata.html import table
 
 PREFIX = "example:"
@@ -111,3 +112,30 @@ def example_of(source: Path | str) -> Example | None:
     """
     text = str(source)
     return example(text.removeprefix(PREFIX)) if text.startswith(PREFIX) else None
+
+
+def path_of(source: Path | str) -> Path:
+    """Returns the path that a source names: the film of an example, or a file or folder, which need not exist.
+
+    Raises:
+        UnknownNameError: no example of that name.
+        UsageError: an address, see `flagdata.addresses.local_path`.
+    """
+    named = example_of(source)
+    return local_path(source) if named is None else named.film
+
+
+def check_without_lake(*sources: Path | str) -> None:
+    """Checks that sources are files or folders, where no lake was named that could have them.
+
+    It needs no module that takes long to import, so that a mistyped path is reported at once.
+
+    Raises:
+        NotFoundError: one is neither.
+    """
+    for source in sources:
+        if not path_of(source).exists():
+            raise NotFoundError(
+                f"there is no file {str(source)!r}, and no lake was named",
+                fix="correct the path, or name the lake by --lake",
+            )

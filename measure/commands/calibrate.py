@@ -12,6 +12,7 @@ import click
 from flagdata.api.measuring import LENGTHS, Calibrating
 from flagdata.console import LocalPath, document, echo, following, progress, say, say_finding
 from flagdata.errors import InputError, RefusedError, UsageError
+from flagdata.examples import check_without_lake
 from flagdata.findings import Severity
 from flagdata.option_types import POSITIVE
 from flagdata.options import argument, command, described, option, options, typed
@@ -90,6 +91,8 @@ def calibrate(chosen: CalibrateCommand) -> None:
             where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
         )
+    if chosen.lake is None:
+        check_without_lake(*chosen.recordings)
     from flagdata.lake.results import placed
     from flagdata.outputs import check_file, write_file
     from measure.calibrate.arrays import folder_of, options_of, sources_of

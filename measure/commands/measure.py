@@ -13,6 +13,7 @@ import click
 from flagdata.api.measuring import Measuring
 from flagdata.console import LocalPath, csv_rows, document, echo, following, progress, say, say_finding
 from flagdata.errors import RefusedError, UsageError
+from flagdata.examples import check_without_lake
 from flagdata.findings import Finding, Severity
 from flagdata.options import argument, command, option, options
 from flagdata.printable import SHORT
@@ -87,6 +88,8 @@ def measure(chosen: MeasureCommand) -> None:
         raise UsageError("more than one form of output", fix="choose one of --json and --csv")
     if chosen.cache is not None and chosen.refine is None:
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
+    if chosen.source is not None and chosen.lake is None:
+        check_without_lake(chosen.source)
     from flagdata.outputs import check_file, check_folder
     from measure.anemometer.networks import network
     from measure.commands.measuring import Request

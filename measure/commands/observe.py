@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from flagdata.api.measuring import Observing
 from flagdata.console import LocalPath, document, echo, progress, say
 from flagdata.errors import RefusedError, UsageError
+from flagdata.examples import check_without_lake
 from flagdata.options import command, option, options
 from flagdata.printable import SHORT
 from flagdata.shared_options import WRITTEN, AsJson, Keeping
@@ -50,6 +51,8 @@ def observe(chosen: ObserveCommand) -> None:
       flagdata observe clip.mp4 --flag-size 1.5x1.0 --parquet clip.parquet --picture clip.png
       flagdata observe recording-7 --lake lake --flag-size 1.5x1.0 --json
     """
+    if chosen.lake is None:
+        check_without_lake(str(chosen.source))
     from flagdata.outputs import check_file, check_folder, fresh_folder, write_file
     from flagdata.pages.pictures import png
     from measure.observables.artifact import keep

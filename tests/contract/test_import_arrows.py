@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.contract.imports import PACKAGES, ROOT, imported_from, modules, tree
 
 ALLOWED = {
@@ -46,6 +48,25 @@ def test_help_loads_neither_torch_nor_arrow_nor_a_decoder() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "LOADED []"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("measure", "missing.mp4"),
+        ("observe", "missing.mp4", "--flag-size", "1.5x1.0"),
+        ("calibrate", "missing.csv", "--flag-size", "1.5x1.0"),
+    ],
+)
+def test_a_file_that_is_missing_is_reported_before_anything_heavy_is_loaded(arguments: tuple[str, ...]) -> None:
+    heavy = ("torch", "scipy", "cv2", "pyarrow", "av", "deltalake")
+    code = (
+        f"import sys\nfrom flagdata.cli import main\ntry:\n    main({list(arguments)!r})\nexcept SystemExit as stop:\n"
+        f"    print(stop.code, sorted(set({heavy!r}) & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "1 []\n"
+    assert f"there is no file '{arguments[1]}', and no lake was named" in done.stderr
 
 
 def test_a_measurement_loads_neither_torchs_compiler_nor_what_only_other_commands_need() -> None:
