@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from flagdata.arrays import FloatArray
-from measure.cloth import OBSERVED, TABLES, Design, Flag, FlagBatch, Log, cloth, mean_bending, simulated
+from measure.cloth import OBSERVED, TABLES, Design, Flag, FlagBatch, Log, mean_bending, simulated
+from measure.cloth.simulation import cloth
 from sim.integrate import BackwardEuler, Symplectic
 from sim.material import named
 from tests.pools import Here
