@@ -220,7 +220,7 @@ def calibrate(chosen: Calibrating) -> Calibrated:
         UnknownNameError: a material like which no cloth was measured.
         UsageError: options that do not fit.
     """
-    return call("measure.calibrate.arrays:calibrated", chosen)
+    return call("measure.cloth.arrays:calibrated", chosen)
 
 
 @options

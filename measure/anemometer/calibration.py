@@ -20,7 +20,7 @@ from measure.anemometer.networks import Network
 from measure.anemometer.novelty import Familiar
 from measure.anemometer.reading import ReadingModel
 from measure.anemometer.regression import BLOCK, Ridge, blocks_of, validated, with_neighbours
-from measure.calibrate.wind import STEADY, Log
+from measure.cloth.wind import STEADY, Log
 from measure.film.similarity import FlagSize
 from measure.film.source import Subject
 from measure.gate.reasons import REASONS

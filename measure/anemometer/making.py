@@ -23,7 +23,7 @@ from measure.anemometer.calibration import ANSWER, ENOUGH, LEAST, Calibrated, Re
 from measure.anemometer.features import VERSION
 from measure.anemometer.networks import CALIBRATED, network
 from measure.anemometer.storage import write
-from measure.calibrate.leaving_out import usable
+from measure.cloth.recording import usable
 from measure.film.similarity import FlagSize
 from measure.film.source import Reading, Subject, subjects
 from models.conditioning.conditioning import VERSION as CONDITIONED

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -15,13 +15,21 @@ from flagdata.errors import UsageError
 from flagdata.ingest.anemometer import WindOptions
 from flagdata.ingest.anemometer.confirm import UNASKED, Confirm
 from flagdata.lake import Lake
-from measure.calibrate.observed import Observed
 from measure.observe import Observation, Up
 from measure.observe.recipe import RecordingSource, WindSource, blown, opened
 from measure.observe.wind import LogPlacement
 
-Recorded = TypeVar("Recorded", Observation, Observed)
+Recorded = TypeVar("Recorded", bound="_Recording")
 _HERE = Path()
+
+
+class _Recording(Protocol):
+    """A frozen dataclass with a name."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def name(self) -> str: ...
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ from flagdata.shared_options import FLAG, HOW, WRITTEN, AsJson, Keeping
 if TYPE_CHECKING:
     from flagdata.lake import Lake
     from measure.anemometer.making import Made
-    from measure.calibrate.calibrate import Calibration
+    from measure.cloth.calibration import Calibration
     from measure.estimate.page import Section
     from measure.film.similarity import FlagSize
     from measure.film.source import Reading
@@ -95,12 +95,12 @@ def calibrate(chosen: CalibrateCommand) -> None:
         check_without_lake(*chosen.recordings)
     from flagdata.lake.results import placed
     from flagdata.outputs import check_file, write_file
-    from measure.calibrate.arrays import folder_of, options_of, sources_of
-    from measure.calibrate.artifact import artifact, keep
-    from measure.calibrate.calibrate import calibrate as calibrated
-    from measure.calibrate.numerics import FLAGS, effort
-    from measure.calibrate.page import page
-    from measure.calibrate.workload import announced
+    from measure.cloth.arrays import folder_of, options_of, sources_of
+    from measure.cloth.artifact import artifact, keep
+    from measure.cloth.calibration import calibrate as calibrated
+    from measure.cloth.calibration_page import calibration_page as page
+    from measure.cloth.design import announced
+    from measure.cloth.numerics import FLAGS, effort
     from measure.film.similarity import FlagSize
     from measure.film.source import Reading
 
@@ -185,7 +185,7 @@ def _check_only(chosen: CalibrateCommand) -> None:
 def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: Reading, lake: Lake | None) -> Made | None:
     """The reading model; None with the reason on stderr where none can be made and the weight was asked for as well."""
     from measure.anemometer.making import made
-    from measure.calibrate.filmed import is_table
+    from measure.cloth.sources import is_table
 
     if any(is_table(source) for source in chosen.recordings):
         if chosen.only is None and chosen.name is None and chosen.model is None:
@@ -264,7 +264,7 @@ def _provenance(found: Calibration, artifact: str | None) -> dict[str, str]:
 
 
 def _print(found: Calibration) -> None:
-    from measure.calibrate.page import shown
+    from measure.cloth.calibration_page import shown_quantity as shown
 
     echo(found.sentence)
     for one in found.cloth[1:]:

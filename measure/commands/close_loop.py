@@ -17,7 +17,7 @@ from flagdata.options import argument, command, option, options, typed
 from flagdata.shared_options import AsJson, NamedLake, OnBranch
 from measure.closing.command_line import TEST, nulls_given, refuse, stage_bars
 from measure.closing.findings import with_warnings
-from measure.films.command_line import JudgingFilms, refuse_of_others
+from measure.cloth.command_line import JudgingFilms, refuse_of_others
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -174,7 +174,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     from measure.closing.models import models
     from measure.closing.output import FILES, JOINT, KINDS, deliver, deliver_joint
     from measure.closing.sources import read
-    from measure.films.sources import films_among
+    from measure.cloth.sources import films_among
     from measure.forecasting.strengths import Suspicion, on_markers
     from measure.loop.run import LoopOptions
     from measure.nulls.workload import of_recordings
@@ -250,7 +250,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         return answer, cloth.material
 
     def of_films(level: float | None) -> VerdictAnswer:
-        from measure.films.command import close_films
+        from measure.cloth.command import close_films
 
         return close_films(films, chosen, lake=lake, branch=branch, name=names["films"], level=level)
 
@@ -258,8 +258,8 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         answer = of_films(chosen.level) if films else of_markers(chosen.level)[0]
         deliver(answer, out=out, lake=lake, branch=branch, as_json=chosen.as_json)
         return
-    from measure.calibrate.simulation import mean_bending
     from measure.closing.joint import joined
+    from measure.cloth.simulation import mean_bending
     from measure.verdict.criteria import CRITERIA
 
     level_of_both = chosen.level or (None if recipe is None else recipe.level) or CRITERIA.level

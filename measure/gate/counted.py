@@ -5,7 +5,9 @@ The reasons are in the order of `REASONS`: a fault of the recording comes before
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from flagdata.findings import Finding, Severity
 from measure.gate.reasons import REASONS
@@ -32,6 +34,121 @@ _SMALL = 40.0
 """Pixels of the film that the cloth's places span at least."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Film:
+    """A film as it was counted; see `reasons`."""
+
+    watch: FilmWatch
+    conditioning: Conditioning
+    follower: Follower
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """Returns left, top, right and bottom of the cloth's places [px of the film]; zeros where none was found."""
+        region = self.conditioning.region
+        if region is None:
+            return 0.0, 0.0, 0.0, 0.0
+        left, top, right, bottom = (edge / self.conditioning.scale for edge in region.box)
+        return left, top, right, bottom
+
+
+Figure = tuple[float, str]
+"""What was counted, and the words that state it."""
+Rule = tuple[str, Callable[[_Film], Figure | None]]
+"""The kind of a fault, and what shows it; None of a film without it."""
+
+
+def _cuts(film: _Film) -> Figure | None:
+    cuts = film.watch.cuts()
+    if not cuts:
+        return None
+    times = "once" if len(cuts) == 1 else f"{len(cuts)} times"
+    return len(cuts), f"{times}, first at {cuts[0]:.2f} s"
+
+
+def _dark(film: _Film) -> Figure | None:
+    brightness, contrast = film.watch.brightness, film.watch.contrast
+    if not (brightness < _DARK or contrast < _FLAT):
+        return None
+    words = f"its brightest hundredth has gray level {brightness:.0f} of 255, its contrast is {contrast:.1f}"
+    return brightness, words
+
+
+def _noisy(film: _Film) -> Figure | None:
+    noise, contrast = film.watch.noise, film.watch.contrast
+    if not noise > _NOISY * contrast:
+        return None
+    return noise / contrast, f"noise of {noise:.1f} gray levels at a contrast of {contrast:.1f}"
+
+
+def _spot(film: _Film) -> Figure | None:
+    spot = film.watch.spot()
+    return (spot, f"what moves spans {spot:.0f} px, {_SMALL:.0f} are needed") if 0 < spot < _SMALL else None
+
+
+def _still(film: _Film) -> Figure | None:
+    return 0.0, "no region of the picture changes as cloth does"
+
+
+def _twins(film: _Film) -> Figure | None:
+    height, width = film.watch.shape
+    left, top, right, bottom = film.box
+    twins = film.watch.twins((left / width, top / height, min(right / width, 1.0), min(bottom / height, 1.0)))
+    return (twins, f"{twins:.0%} of the frames look like another one") if twins > _REPEATED else None
+
+
+def _lost(film: _Film) -> Figure | None:
+    lost, total = film.follower.lost, max(len(film.follower.path), 1)
+    if not lost > _LOST * total:
+        return None
+    return lost / total, f"in {lost} of {total} frames the background was not found"
+
+
+def _cut_off(film: _Film) -> Figure | None:
+    edges = {name: share for name, share in film.conditioning.cut_share.items() if share > _AT_EDGE}
+    if not edges:
+        return None
+    return max(edges.values()), ", ".join(
+        f"the {name} edge in {share:.0%} of the frames" for name, share in edges.items()
+    )
+
+
+def _restless(film: _Film) -> Figure | None:
+    if len(film.conditioning.camera.corners) or film.watch.resting() >= _RESTING:
+        return None
+    return float(film.watch.resting()), "no edge in the picture stays in its place"
+
+
+def _small(film: _Film) -> Figure | None:
+    left, top, right, bottom = film.box
+    span = max(right - left, bottom - top)
+    return (span, f"it spans {span:.0f} px, {_SMALL:.0f} are needed") if span < _SMALL else None
+
+
+def _fine(film: _Film) -> Figure | None:
+    region = film.conditioning.region
+    grain = math.inf if region is None else film.watch.grain(region.mask)
+    if not grain < _GRAIN:
+        return None
+    return grain, f"averaged over a fortieth of the picture, {grain:.0%} of it is left, of cloth {_GRAIN:.0%} or more"
+
+
+OF_PICTURES: tuple[tuple[Rule, ...], ...] = (
+    (("scene-cut", _cuts),),
+    (("too-dark", _dark), ("too-dark", _noisy)),
+)
+"""Rules for every film. Of each row the first that finds its fault holds, since that hides or brings about the next."""
+WITHOUT_CLOTH: tuple[tuple[Rule, ...], ...] = ((("scale", _spot), ("no-motion", _still)),)
+"""The same for films in which no cloth was found."""
+OF_CLOTH: tuple[tuple[Rule, ...], ...] = (
+    (("repeated-frames", _twins),),
+    (("moving-camera", _lost),),
+    (("cut-off", _cut_off), ("moving-camera", _restless)),  # cloth that is cut off hides what stands still
+    (("scale", _small), ("unlike-cloth", _fine)),
+)
+"""The same for films of cloth."""
+
+
 def reasons(watch: FilmWatch, conditioning: Conditioning, follower: Follower) -> tuple[Finding, ...]:
     """Returns all reasons.
 
@@ -40,56 +157,16 @@ def reasons(watch: FilmWatch, conditioning: Conditioning, follower: Follower) ->
         conditioning: camera and flag.
         follower: that followed the camera through all frames.
     """
-    of = {finding.kind: finding for finding in _all(watch, conditioning, follower)}
+    film = _Film(watch=watch, conditioning=conditioning, follower=follower)
+    of = {finding.kind: finding for finding in _faults(film)}
     return tuple(of[kind] for kind in REASONS if kind in of)
 
 
-def _all(watch: FilmWatch, conditioning: Conditioning, follower: Follower) -> Iterator[Finding]:
-    height, width = watch.shape
-    region = conditioning.region
-    box = None if region is None else tuple(edge / conditioning.scale for edge in region.box)
-    cuts = watch.cuts()
-    if cuts:
-        times = "once" if len(cuts) == 1 else f"{len(cuts)} times"
-        yield _reason("scene-cut", len(cuts), f"{times}, first at {cuts[0]:.2f} s")
-    if watch.brightness < _DARK or watch.contrast < _FLAT:
-        figure = f"its brightest hundredth has gray level {watch.brightness:.0f} of 255, its contrast is "
-        yield _reason("too-dark", watch.brightness, f"{figure}{watch.contrast:.1f}")
-    elif watch.noise > _NOISY * watch.contrast:
-        figure = f"noise of {watch.noise:.1f} gray levels at a contrast of {watch.contrast:.1f}"
-        yield _reason("too-dark", watch.noise / watch.contrast, figure)
-    if region is None or box is None:
-        spot = watch.spot()
-        if 0 < spot < _SMALL:
-            yield _reason("scale", spot, f"what moves spans {spot:.0f} px, {_SMALL:.0f} are needed")
-        else:
-            yield _reason("no-motion", 0.0, "no region of the picture changes as cloth does")
-        return
-    shares = (box[0] / width, box[1] / height, min(box[2] / width, 1.0), min(box[3] / height, 1.0))
-    twins = watch.twins(shares)
-    if twins > _REPEATED:
-        yield _reason("repeated-frames", twins, f"{twins:.0%} of the frames look like another one")
-    total = max(len(follower.path), 1)
-    if follower.lost > _LOST * total:
-        figure = f"in {follower.lost} of {total} frames the background was not found"
-        yield _reason("moving-camera", follower.lost / total, figure)
-    if edges := {name: share for name, share in conditioning.cut_share.items() if share > _AT_EDGE}:
-        figure = ", ".join(f"the {name} edge in {share:.0%} of the frames" for name, share in edges.items())
-        yield _reason("cut-off", max(edges.values()), figure)
-    elif (
-        not len(conditioning.camera.corners) and watch.resting() < _RESTING
-    ):  # cloth that is cut off hides what stands still
-        yield _reason("moving-camera", float(watch.resting()), "no edge in the picture stays in its place")
-    span = max(box[2] - box[0], box[3] - box[1])
-    if span < _SMALL:
-        yield _reason("scale", span, f"it spans {span:.0f} px, {_SMALL:.0f} are needed")
-    elif (grain := watch.grain(region.mask)) < _GRAIN:
-        figure = f"averaged over a fortieth of the picture, {grain:.0%} of it is left, of cloth {_GRAIN:.0%} or more"
-        yield _reason("unlike-cloth", grain, figure)
-
-
-def _reason(kind: str, value: float, figure: str) -> Finding:
-    reason = REASONS[kind]
-    return Finding(
-        kind=kind, severity=Severity.ERROR, what=f"{reason.sentence}: {figure}", value=float(value), fix=reason.fix
-    )
+def _faults(film: _Film) -> Iterator[Finding]:
+    for row in (*OF_PICTURES, *(WITHOUT_CLOTH if film.conditioning.region is None else OF_CLOTH)):
+        for kind, look in row:
+            if (figure := look(film)) is not None:
+                value, words = figure
+                what = f"{REASONS[kind].sentence}: {words}"
+                yield Finding(kind=kind, severity=Severity.ERROR, what=what, value=float(value), fix=REASONS[kind].fix)
+                break

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reason:
+class Fault:
     """Attributes:
     sentence: what was found and what it may mean, without a final stop; the figure follows it.
     fix: what the user can do.
@@ -18,45 +18,45 @@ class Reason:
     of_motion: bool = False
 
 
-REASONS: dict[str, Reason] = {
-    "scene-cut": Reason(
+REASONS: dict[str, Fault] = {
+    "scene-cut": Fault(
         sentence="the picture changes at once, as where two scenes are joined",
         fix="choose a part of the film between two such places, three frames from each, by --start and --end",
     ),
-    "too-few-frames": Reason(sentence="there are too few frames", fix="give a longer film"),
-    "low-frame-rate": Reason(sentence="there are too few frames a second", fix="film at 25 frames a second or more"),
-    "repeated-frames": Reason(
+    "too-few-frames": Fault(sentence="there are too few frames", fix="give a longer film"),
+    "low-frame-rate": Fault(sentence="there are too few frames a second", fix="film at 25 frames a second or more"),
+    "repeated-frames": Fault(
         sentence="many frames look alike, as in a film that loops, stands still or was made with fewer frames a second",
         fix="give a film whose frames are all different, as the camera wrote it",
     ),
-    "too-dark": Reason(
+    "too-dark": Fault(
         sentence="the cloth may not stand out from darkness, haze or noise",
         fix="film by daylight, or expose longer",
     ),
-    "no-motion": Reason(
+    "no-motion": Fault(
         sentence="no motion like a flag's was found",
         fix="crop to the flag, or choose a part of the film in which it flies",
     ),
-    "unlike-cloth": Reason(
+    "unlike-cloth": Fault(
         sentence="the motion is finer than cloth's, as of leaves or water",
         fix="make sure that the crop shows a flag on a pole and little else that moves",
         of_motion=True,
     ),
-    "moving-camera": Reason(
+    "moving-camera": Fault(
         sentence="the camera may move: its motion could not be followed",
         fix="film from a tripod, with something that stands still in the picture",
     ),
-    "cut-off": Reason(
+    "cut-off": Fault(
         sentence="part of the cloth may lie outside the picture: motion reaches the picture's edge",
         of_motion=True,
         fix="film so that the whole flag is in the picture, or choose another by --flag",
     ),
-    "scale": Reason(
+    "scale": Fault(
         sentence="the flag fills less or more of the picture than in the training clips",
         fix="film from nearer, so that the flag spans 100 pixels or more",
         of_motion=True,
     ),
-    "several-flags": Reason(
+    "several-flags": Fault(
         sentence="more than one region moves", fix="choose one by --flag, or crop to it", of_motion=True
     ),
 }

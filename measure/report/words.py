@@ -36,39 +36,39 @@ def words(verdict: Verdict) -> str:
 def _parts(verdict: Verdict) -> Iterator[list[str]]:
     yield [sentences.heading(verdict)]
     if power := sentences.power_mean(verdict):
-        yield _wrapped(f"{power}.")
-    yield [*_wrapped(verdict.words), ""]
+        yield wrapped(f"{power}.")
+    yield [*wrapped(verdict.words), ""]
     remark = sentences.test_remark(verdict.test)
-    yield _item("test", " ".join([sentences.test_sentence(verdict), remark]).strip())
+    yield item("test", " ".join([sentences.test_sentence(verdict), remark]).strip())
     if power := sentences.power_text(verdict):
-        yield _item("power", power)
+        yield item("power", power)
     for candidate in sentences.named_candidates(verdict):
-        yield _item(sentences.candidate_title(verdict, candidate), _candidate_text(candidate))
+        yield item(sentences.candidate_title(verdict, candidate), _candidate_text(candidate))
     for comparison in verdict.comparisons:
-        yield _item(comparison.what, _compared(comparison, sentences.after_label(verdict)))
+        yield item(comparison.what, _compared(comparison, sentences.after_label(verdict)))
     if control := sentences.control_summary(verdict):
-        yield _item("control", control)
+        yield item("control", control)
     for warning in sentences.control_warnings(verdict) + sentences.reduction_warnings(verdict):
-        yield _item("beware", warning)
+        yield item("beware", warning)
     for parameter in verdict.parameters:
         moved = ""
         if known(parameter.after):
             moved = f" → {estimate_text(parameter.after)}, a shift of {in_errors(parameter.shift)} standard errors"
-        yield _item(parameter.name, f"{sentences.parameter_text(parameter.before)}{moved}")
+        yield item(parameter.name, f"{sentences.parameter_text(parameter.before)}{moved}")
     rejected = sentences.rejected(verdict)
     for candidate in rejected[:_RUNNERS_UP]:
-        yield _item(
+        yield item(
             f"not {sentences.candidate_title(verdict, candidate)}", candidate.why_not or "no reason was recorded"
         )
     if len(rejected) > _RUNNERS_UP:
-        yield _item("", f"and {len(rejected) - _RUNNERS_UP} more were weighed; the page has them all")
+        yield item("", f"and {len(rejected) - _RUNNERS_UP} more were weighed; the page has them all")
     for label, text in (("would separate", verdict.separating), ("proposal", verdict.proposal)):
         if text:
-            yield _item(label, text)
+            yield item(label, text)
     for assumption in verdict.assumptions:
-        yield _item("assumed", assumption)
+        yield item("assumed", assumption)
     for kind, text in verdict.findings:
-        yield _item(kind, text)
+        yield item(kind, text)
 
 
 def _candidate_text(candidate: Candidate) -> str:
@@ -105,11 +105,12 @@ def _joined(parts: Sequence[str]) -> str:
     return "; ".join(part.replace(" ", _NO_BREAK) for part in parts)
 
 
-def _item(label: str, text: str) -> list[str]:
+def item(label: str, text: str) -> list[str]:
     """Wraps `label: text`, its further lines set in."""
-    return _wrapped(f"  {label}: {text}" if label else f"  {text}", indent="    ")
+    return wrapped(f"  {label}: {text}" if label else f"  {text}", indent="    ")
 
 
-def _wrapped(text: str, *, indent: str = "") -> list[str]:
+def wrapped(text: str, *, indent: str = "") -> list[str]:
+    """Breaks a text into lines of at most 100 characters, but for longer names."""
     lines = textwrap.wrap(text, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     return [line.replace(_NO_BREAK, " ") for line in lines]

@@ -23,8 +23,7 @@ FITTING = (
     "measure/film",
     "measure/propose",
     "measure/observables",
-    "measure/calibrate",
-    "measure/films",
+    "measure/cloth",
 )
 MODULES = modules(*FITTING)
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from measure.calibrate import OBSERVED, observed
+from measure.cloth import OBSERVED
+from measure.cloth import recording as observed
 from measure.observables import OBSERVABLES, Observable
 from tests.studies.validation.power import reference_table, table
 

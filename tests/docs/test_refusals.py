@@ -29,7 +29,7 @@ VERBS = {
     ),
     "observe": ("measure/observables", "measure/film", "measure/commands/observe"),
     "calibrate": (
-        "measure/calibrate",
+        "measure/cloth",
         "measure/commands/calibrate",
         "measure/anemometer",
         "measure/observables",
@@ -41,9 +41,8 @@ VERBS = {
     "close-loop": (
         "measure/closing",
         "measure/commands/close_loop",
-        "measure/films",
         "measure/observe",
-        "measure/calibrate",
+        "measure/cloth",
     ),
 }
 """Where the refusals of each command are."""

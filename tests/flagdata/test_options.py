@@ -111,7 +111,7 @@ def test_a_measurement_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pyte
 
 
 def test_a_calibration_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pytest.MonkeyPatch) -> None:
-    from measure.calibrate import options_of
+    from measure.cloth import options_of
     from measure.commands import CloseLoopCommand
     from measure.commands.calibrate import CalibrateCommand
     from measure.film import FlagSize
@@ -120,7 +120,7 @@ def test_a_calibration_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pyte
     of_command = typed_words("calibrate", CalibrateCommand, *words.split(), "--level", "0.8", "--attachment", "hoist")
     of_films = typed_words("close-loop", CloseLoopCommand, *words.split(), "--attachment", "hoist")
     of_call = called_with(
-        "measure.calibrate.arrays.calibrated",
+        "measure.cloth.arrays.calibrated",
         lambda: flagdata.calibrate(
             "t.csv",
             flag_size=(1.5, 1.0),

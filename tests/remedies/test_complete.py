@@ -31,7 +31,7 @@ OF_PARTS = {
     "measure/commands/observe": ("observe",),
     "measure/commands/close_loop": ("close-loop",),
     "measure/gate": ("measure",),
-    "measure/calibrate": ("calibrate", "observe"),
+    "measure/cloth": ("calibrate", "observe", "close-loop"),
     "measure/anemometer": ("calibrate", "measure"),
     "measure/observables": ("observe",),
     "measure/closing": ("close-loop",),

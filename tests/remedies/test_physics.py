@@ -78,9 +78,7 @@ def test_what_a_remedy_says_heals(case: Case, user: User, monkeypatch: pytest.Mo
 
 
 def test_a_film_without_a_log_is_aligned_before_it_is_calibrated(user: User) -> None:
-    user.meets(
-        "calibrate/filmed.py", "and name the recording that comes out", "calibrate", "first", "--flag-size", "1x1"
-    )
+    user.meets("cloth/sources.py", "and name the recording that comes out", "calibrate", "first", "--flag-size", "1x1")
     recording = user.follows(*STAMPS.split(), "--json").document["recording"]
     assert "no log of the wind is beside" not in user.types("calibrate", recording, "--flag-size", "1x1").err
 

@@ -1,6 +1,7 @@
 """Remedies of `flagdata calibrate` that weighs a cloth: simulations are a known function, films are read as they show.
 
-What a table or a film shows comes from `tests.measure.calibrate`; the messages and what is typed are the program's.
+What a table or a film shows comes from `tests.measure.cloth.calibration`; the messages and what is typed are the
+program's.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import pytest
 
 from flagdata.arrays import FloatArray
 from flagdata.timebase import NANOSECONDS
-from measure.calibrate import Design, calibrate
-from tests.measure.calibrate.conftest import cheap as cheap
-from tests.measure.calibrate.conftest import known, readings
+from measure.cloth import Design
+from measure.cloth import calibration as calibrate
+from tests.measure.cloth.calibration.conftest import cheap as cheap
+from tests.measure.cloth.calibration.conftest import known, readings
 from tests.remedies.cases import Case, heal
 from tests.remedies.user import User
 
@@ -59,7 +61,7 @@ GAP = "time,wind_speed (m/s),wind_direction (deg)\n" + "".join(
 """A log of three minutes that was interrupted."""
 CASES = [
     Case(
-        "calibrate/filmed.py",
+        "cloth/table_clock.py",
         "name a wind artifact: flagdata ls",
         f"calibrate t.csv {SIZED} --log first",
         ("ls --kind wind",),
@@ -67,7 +69,7 @@ CASES = [
         shows="mast",
     ),
     Case(
-        "calibrate/filmed.py",
+        "cloth/table_clock.py",
         "state the offset of the clocks",
         f"calibrate t.csv {SIZED} --log mast",
         (JOINED,),
@@ -76,7 +78,7 @@ CASES = [
         code=3,
     ),
     Case(
-        "calibrate/filmed.py",
+        "cloth/table_clock.py",
         "or state what is added to the table's clock",
         f"calibrate t.csv {SIZED} --log mast",
         (JOINED,),
@@ -84,7 +86,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "calibrate/filmed.py",
+        "cloth/sources.py",
         "name the log: --log ARTIFACT --lake LAKE",
         f"calibrate t.csv {SIZED} --clock-offset 1777629605±0.1",
         (f"{JOINED} --lake lake",),
@@ -92,7 +94,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "calibrate/tables.py",
+        "cloth/tables.py",
         "give the wind in the table or as a log",
         f"calibrate t.csv {SIZED}",
         (JOINED,),
@@ -100,7 +102,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "calibrate/filmed.py",
+        "cloth/sources.py",
         "give them to flagdata observe",
         f"calibrate t.csv {SIZED} --crop 0,0,9,9",
         ("observe --help", f"calibrate t.csv {SIZED}"),
@@ -116,7 +118,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "calibrate/observed.py",
+        "cloth/recording.py",
         "add recordings in other winds",
         f"calibrate t.csv {SIZED}",
         (f"calibrate t.csv u.csv {SIZED}",),
@@ -124,7 +126,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "calibrate/wind.py",
+        "cloth/wind.py",
         "choose a part of the fil",
         f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1",
         (f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1 --start 0s --end 100s",),
@@ -132,7 +134,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "calibrate/wind.py",
+        "cloth/wind.py",
         "choose a part without ga",
         f"calibrate t.csv {SIZED} --log gap --clock-offset 1777629605±0.1",
         (f"calibrate t.csv {SIZED} --log gap --clock-offset 1777629605±0.1 --start 0s --end 60s",),
@@ -141,7 +143,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "calibrate/observed.py",
+        "cloth/recording.py",
         "choose others with --start and --end",
         f"calibrate t.csv {SIZED}",
         (f"calibrate t.csv {SIZED} --start 60s --end 150s",),
@@ -160,7 +162,7 @@ def test_what_a_remedy_says_heals(case: Case, user: User) -> None:
 def test_a_log_of_a_table_is_in_a_lake(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
     (user.folder / "t.csv").write_text(DROOPING)
     monkeypatch.delenv("FLAGDATA_LAKE")
-    user.meets("calibrate/filmed.py", "name the lake that it was ingested into", *JOINED.split())
+    user.meets("cloth/sources.py", "name the lake that it was ingested into", *JOINED.split())
     user.again("--lake", "lake")
 
 
@@ -194,7 +196,7 @@ def test_flags_that_are_simulated_otherwise_do_not_show_what_the_film_shows(
     simulated(monkeypatch, shows)
     (user.folder / "t.csv").write_text(GUSTY)
     command = ("calibrate", "t.csv", "--flag-size", "2.5x1.0", "--azimuth", "70±7")
-    user.meets("calibrate/emulator.py", "check --flag-size, --attachment and --azimuth", *command)
+    user.meets("cloth/emulator.py", "check --flag-size, --attachment and --azimuth", *command)
     user.follows("calibrate", "t.csv", "--flag-size", "1.5x1.0", "--azimuth", "70±7", shows=WEIGHED)
     user.leaves(["--attachment", "--azimuth", "--simulations"])
 
@@ -210,7 +212,7 @@ def test_windows_with_more_wind_show_the_cloth(user: User, monkeypatch: pytest.M
     simulated(monkeypatch, shows)
     (user.folder / "t.csv").write_text(windy(np.concatenate([gusts(24) - 3.4, gusts(24)])))
     command = ("calibrate", "t.csv", *SIZED.split())
-    user.meets("calibrate/emulator.py", "or windows with more wind", *command, "--end", "60s")
+    user.meets("cloth/emulator.py", "or windows with more wind", *command, "--end", "60s")
     user.leaves(["--simulations"])
     user.succeeds(*command, "--start", "60s", shows=WEIGHED)
 
@@ -227,7 +229,7 @@ def test_more_simulations_widen_intervals_that_are_too_narrow(user: User, monkey
     monkeypatch.setattr(calibrate, "checked", checked)
     (user.folder / "t.csv").write_text(GUSTY)
     user.meets(
-        "calibrate/calibrate.py",
+        "cloth/calibration.py",
         "give more simulations with --simulations",
         "calibrate",
         "t.csv",
@@ -242,6 +244,6 @@ def test_more_simulations_widen_intervals_that_are_too_narrow(user: User, monkey
 def test_a_flag_from_another_side_looks_like_no_simulated_one(user: User) -> None:
     (user.folder / "t.csv").write_text(GUSTY)
     command = ("calibrate", "t.csv", "--flag-size", "1.5x1.0")
-    user.meets("calibrate/calibrate.py", "look at the readings with flagdata observe", *command, "--azimuth", "160±2")
+    user.meets("cloth/calibration.py", "look at the readings with flagdata observe", *command, "--azimuth", "160±2")
     user.follows(*command, "--azimuth", "70±7", shows=WEIGHED)
     user.leaves(["observe", "--picture", "--flag-size", "--attachment", "--elevation", "--distance", "close-loop"])

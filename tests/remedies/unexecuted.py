@@ -20,8 +20,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("measure/estimate/measuring.py", "the film's stamps have g"),
     ),
     "a film, real or rendered, whose flag or camera is lost in the whole and found in a part": (
-        ("measure/calibrate/filmed.py", "film from a tripod, or c"),
-        ("measure/calibrate/observed.py", "look at the film with fl"),
+        ("measure/cloth/sources.py", "film from a tripod, or c"),
+        ("measure/cloth/recording.py", "look at the film with fl"),
         ("measure/commands/observe.py", "give --crop around one w"),
         ("measure/film/conditioned.py", "choose a part of the fil"),
         ("models/conditioning/conditioning.py", "give --crop around the f"),
@@ -99,7 +99,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("sim/blender/environment.py", "try again on a machine t"),
     ),
     "more recordings than the simulations that a test can run tell apart": (
-        ("measure/calibrate/scatter.py", "give fewer recordings, o"),
+        ("measure/cloth/emulator.py", "give fewer recordings, o"),
     ),
     "said by `import flagdata` only: the command takes the other way": (
         ("flagdata/align/cloth.py", "name a camera artifact;"),

@@ -12,7 +12,7 @@ from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from flagdata.signals import Sensor
 from measure.anemometer import Calibrated, Features, Place, Recording, calibrated
-from measure.calibrate import Log
+from measure.cloth import Log
 from measure.film import FlagSize, Layout
 
 SIZE = FlagSize(length=1.5, height=1.0)

@@ -10,7 +10,7 @@ import pytest
 from flagdata.errors import InputError, RefusedError
 from measure.anemometer.intervals import half_width, mean_errors
 from measure.anemometer.regression import Ridge, blocks_of, validated, with_neighbours
-from measure.calibrate import Log
+from measure.cloth import Log
 from tests.measure.anemometer.made import STEP, features, gusts, model, recording, slow
 
 _RNG = np.random.default_rng(3)

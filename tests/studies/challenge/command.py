@@ -136,8 +136,8 @@ def bank(
 def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
     """Judge the sets that have no verdict yet, and file the verdicts with their hashes."""
     from flagdata.caches import user_cache
-    from measure.calibrate import announced
-    from measure.films.command import workload
+    from measure.cloth import announced
+    from measure.cloth.command import workload
     from measure.loop import LoopOptions
     from measure.nulls import of_recordings
     from tests.studies.challenge.filing import filed

@@ -21,7 +21,7 @@ import numpy as np
 from flagdata.documents import read_json
 from flagdata.errors import InputError, NotFoundError
 from flagdata.findings import Finding
-from measure.calibrate import AZIMUTH, ELEVATION, Flag, Log, Normal, Observed, Uncertain
+from measure.cloth import AZIMUTH, ELEVATION, Flag, Log, Normal, Observed, Uncertain
 
 SCHEMA = "flagdata.challenge-films/1"
 
@@ -53,7 +53,7 @@ class Filmed:
             FlagdataError: in none of the films a flag is found.
         """
         from flagdata.film import CameraFilm
-        from measure.calibrate import Part, usable
+        from measure.cloth import Part, usable
         from measure.film import ConditionedFilm, FlagSize
 
         size = FlagSize(length=self.flag.length, height=self.flag.height)

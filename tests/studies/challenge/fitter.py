@@ -11,7 +11,7 @@ from measure.verdict import CRITERIA, Verdict
 from tests.studies.challenge.films import Filmed
 
 if TYPE_CHECKING:
-    from measure.films import Options
+    from measure.cloth import FilmLoopOptions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,22 +59,21 @@ class ClosingTheLoopOnFilms:
             FlagdataError: films that do not do.
         """
         del seed
-        from measure.films import close_loop
+        from measure.cloth import close_loop
 
         shown, left_out = given.observed()
         verdict = close_loop(shown, self.options(given), folder=self.folder, workers=self.workers)
         return replace(verdict, findings=(*left_out, *verdict.findings))
 
-    def options(self, given: Filmed) -> Options:
+    def options(self, given: Filmed) -> FilmLoopOptions:
         """How a set is judged, by what is stated of it."""
-        from measure.calibrate import Options as Calibrating
-        from measure.films import Options, simulations_of
+        from measure.cloth import CalibrationOptions, FilmLoopOptions, simulations_of
 
-        calibration = Calibrating(
+        calibration = CalibrationOptions(
             flag=given.flag,
             azimuth=given.azimuth,
             elevation=given.elevation,
             distance=given.distance,
             simulations=self.simulations or simulations_of(len(given.recordings)),
         )
-        return Options(calibration=calibration, kinds=self.kinds, area_weight=given.area_weight)
+        return FilmLoopOptions(calibration=calibration, kinds=self.kinds, area_weight=given.area_weight)

@@ -14,7 +14,7 @@ import pytest
 
 from flagdata.errors import CorruptError, InputError, RefusedError, UnknownNameError
 from flagdata.film import CameraFilm
-from measure.calibrate import AZIMUTH, ELEVATION, Flag, Part
+from measure.cloth import AZIMUTH, ELEVATION, Flag, Part
 from measure.film import FlagSize
 from measure.verdict import Conclusion
 from tests.studies.challenge.cases import TINY, acting, filing, key, verdict

@@ -153,7 +153,7 @@ def weigh_scene(folder: Path) -> Scene:
     seconds = np.arange(24) * 2.5
     speed = 5.0 + 1.5 * np.sin(np.arange(24) / 1.7)
     values = {"area_weight": np.array([0.2]), "gain": np.array([1.0]), "damping": np.array([0.01])}
-    from tests.measure.calibrate.conftest import readings
+    from tests.measure.cloth.calibration.conftest import readings
 
     shown = readings({**values, "azimuth": np.array([1.2])}, speed, seed=3)[0, :, :3]
     lines = [",".join(map(str, row)) for row in np.column_stack([seconds, speed, shown]).tolist()]
@@ -226,14 +226,14 @@ def kept_windows(kept: str) -> None:
 
 def known_flags(kept: str) -> None:
     """Simulated flags are a known function of their cloth, and few walkers weigh it."""
-    import measure.calibrate.calibrate
-    import measure.calibrate.posterior
-    from tests.measure.calibrate.conftest import known
+    import measure.cloth.calibration
+    import measure.cloth.posterior
+    from tests.measure.cloth.calibration.conftest import known
 
     del kept
-    measure.calibrate.calibrate.simulated = known
-    measure.calibrate.posterior.WALKERS, measure.calibrate.posterior.STEPS = 96, 300
-    measure.calibrate.posterior.CHECK = (32, 120)
+    measure.cloth.calibration.simulated = known
+    measure.cloth.posterior.WALKERS, measure.cloth.posterior.STEPS = 96, 300
+    measure.cloth.posterior.CHECK = (32, 120)
 
 
 def _name(arguments: Sequence[object]) -> str:

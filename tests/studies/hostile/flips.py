@@ -29,7 +29,7 @@ from flagdata.errors import UnforeseenError
 from flagdata.lake import Artifact, Lake, catalog, expire
 from flagdata.object_cache import block_of, keep_blocks
 from flagdata.schema import Kind
-from measure.calibrate import design
+from measure.cloth import design
 from measure.nulls import bank
 from measure.refine import evaluator
 

@@ -27,7 +27,7 @@ from flagdata.lake import Lake
 from measure.anemometer import Features, Network, Recording, calibrated, network
 from measure.anemometer.features import features_of
 from measure.anemometer.measuring import measured_from
-from measure.calibrate import Log
+from measure.cloth import Log
 from measure.estimate import Measurement, Options, beside
 from measure.film import FlagSize, Reading, Subject, subjects
 from sim.datasets import Cast, load

@@ -36,8 +36,8 @@ from torch import Tensor
 
 from flagdata.arrays import FloatArray
 from flagdata.rng import child_seed, stream
-from measure.calibrate import CLOTH, COLUMNS, NUISANCES, OBSERVED, Batch, Flag, draws
-from measure.calibrate.prior import FABRIC
+from measure.cloth import CLOTH, COLUMNS, NUISANCES, OBSERVED, Flag, FlagBatch, draws
+from measure.cloth.prior import FABRIC
 from measure.observables import OBSERVABLES
 from sim.assets import Assets
 from sim.mesh import Mesh
@@ -156,7 +156,7 @@ def cloths(seed: int, film: int) -> tuple[dict[str, float], dict[str, float]]:
 
 def moved(cloth: Mapping[str, float], wind: float, mesh: Mesh, seconds: float, seed: int) -> FloatArray:
     """(frame, vertex, 3) [m] of a cloth in a wind of a mean [m/s], with a frame beyond the last window."""
-    batch = Batch(
+    batch = FlagBatch(
         flag=FLAG,
         log=log(wind),
         duration=30.0,

@@ -14,7 +14,7 @@ from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import FlagdataError
 from flagdata.film_array import Frames
 from flagdata.record import decode
-from measure.calibrate import OBSERVED, Flag
+from measure.cloth import OBSERVED, Flag
 from measure.film import ConditionedFilm, FlagSize
 from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, edges_of, watched
 from sim.assets import Assets

@@ -13,7 +13,7 @@ import torch
 
 from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from flagdata.rng import stream
-from measure.calibrate import Flag
+from measure.cloth import Flag
 from measure.observables import FilmWindow, edges_of
 from models.conditioning import HALVED
 from sim.assets import Assets

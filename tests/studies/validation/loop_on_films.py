@@ -28,13 +28,28 @@ import torch
 
 from flagdata.arrays import BoolArray, FloatArray
 from flagdata.rng import child_seed, stream
-from measure.calibrate import Batch, Design, Discretisation, Finer, Flag, Log, Normal, Observed, Uncertain
-from measure.calibrate.design import read
-from measure.films import TOGETHER, Experiments, lasting, nulls, pairs, score, weighable
-from measure.films.judge import Judged, judge
-from measure.films.library import Weighable
-from measure.films.simulations import Simulations, of_base, of_nulls, sights_of
-from measure.films.weigh import Weighing, directions, weigh
+from measure.cloth import (
+    TOGETHER,
+    Design,
+    Discretisation,
+    Experiments,
+    Finer,
+    Flag,
+    FlagBatch,
+    Log,
+    Normal,
+    Observed,
+    Uncertain,
+    lasting,
+    nulls,
+    pairs,
+    score,
+    weighable,
+)
+from measure.cloth.design import Weighable, read
+from measure.cloth.evidence import Weighing, weigh
+from measure.cloth.score_test import Judged, directions, judge
+from measure.cloth.simulations import Simulations, of_base, of_nulls, sights_of
 from sim.effects import AnemometerLag
 from sim.wind import VonKarman
 
@@ -91,7 +106,7 @@ def designs() -> list[Design]:
     ]
 
 
-def truths(effect: Weighable, number: int) -> list[list[Batch]]:
+def truths(effect: Weighable, number: int) -> list[list[FlagBatch]]:
     """For each recording the flags with an effect, of one kind of numerics."""
     seed = child_seed(SEED, "truths", number)
     made = nulls(designs(), (0, 1), kinds=1, seed=seed)
@@ -117,7 +132,7 @@ def simulations(folder: Path) -> Simulations:
     own, workers = designs(), len(os.sched_getaffinity(0))
     null = nulls(own, (0, 1), kinds=KINDS, seed=SEED)
 
-    def seen(batches: Sequence[Batch]) -> FloatArray:
+    def seen(batches: Sequence[FlagBatch]) -> FloatArray:
         return read(batches, folder=folder, workers=workers)[:, 0]
 
     finer = [Finer.of(own[place]) for place in chosen()]

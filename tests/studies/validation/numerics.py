@@ -3,7 +3,7 @@
 Three batches of sixteen flags of a design, of little, middle and much damping, are simulated for half a minute as a
 calibration does, and by others: a mesh of 1.5 times as many vertices along a side, an irregular mesh of as many, and a
 quarter of the step. Cloth, place, wind and start are the same, so that the differences' mean is the bias and their
-standard deviation that of numerics and of chaos. Reported for each batch and of all: what `measure.calibrate.numerics`
+standard deviation that of numerics and of chaos. Reported for each batch and of all: what `measure.cloth.numerics`
 states of meshes. Cases that were simulated are kept in FLAGDATA_NUMERICS, by default a new folder.
 
 `python -m tests.studies numerics`: some three minutes of a core.
@@ -22,19 +22,19 @@ from typing import Any
 import numpy as np
 
 from flagdata.arrays import FloatArray
-from measure.calibrate import (
+from measure.cloth import (
     OBSERVED,
-    Batch,
     Design,
     Discretisation,
     Flag,
+    FlagBatch,
     Log,
     Normal,
     Projection,
     Uncertain,
     numerics,
 )
-from measure.calibrate.design import read
+from measure.cloth.design import read
 
 DURATION = 30.0  # s
 BATCHES = {"little damping": 0, "middle": 3, "much damping": 7}
@@ -53,7 +53,7 @@ def design() -> Design:
     return Design(flag=Flag(length=1.5, height=1.0), log=log, duration=DURATION, azimuth=_VIEW, seed=20261127)
 
 
-def other(batch: Batch, kind: str) -> Batch | None:
+def other(batch: FlagBatch, kind: str) -> FlagBatch | None:
     """A batch by other numerics; None where leapfrog has no step to shorten."""
     finer, uneven, share = OTHERS[kind]
     if share < 1 and batch.step is None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flagdata.rng import stream
-from measure.calibrate import OBSERVED, Flag
+from measure.cloth import OBSERVED, Flag
 from measure.observables import edges_of
 from sim.render import RenderParameters
 from tests.studies.validation.looks import common_of_all, factors, judged, share

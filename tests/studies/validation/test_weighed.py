@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from flagdata.arrays import FloatArray, IntArray
-from measure.calibrate import OBSERVED, Design, posterior
+from measure.cloth import OBSERVED, Design, posterior
 from measure.observables import WINDOW
-from tests.measure.calibrate.conftest import readings
+from tests.measure.cloth.calibration.conftest import readings
 from tests.studies.validation import weighed
 
 

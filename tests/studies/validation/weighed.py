@@ -14,7 +14,7 @@ MuJoCo, whose flags cost half a second of a core a second: isotropic cloth of co
 *Procedure*, that of `flagdata calibrate` at its commit: 128 simulations of the design below, of fabrics drawn evenly;
 of each observable its mean and its slope with the wind, those that a linear regression on cloth, place and gain
 predicts to 0.8 of their spread; the predictive covariance of their residuals, S/(n − p − k − 1), with what meshes add
-(`measure.calibrate.numerics`) and, of films, the sigma of pixels; a multivariate t of 10 degrees of freedom; the
+(`measure.cloth.numerics`) and, of films, the sigma of pixels; a multivariate t of 10 degrees of freedom; the
 posterior by an ensemble of walkers; withheld below a tail probability of 0.01. What is stated is the azimuth (± 7°),
 the elevation (± 5°) and the distance (8 m, where it is 7 to 9 m). All are weighed as geometry seen from their place;
 those of `FILMED` are filmed by the raster renderer as well, before sky, hills, foliage or buildings, and weighed from
@@ -42,9 +42,20 @@ import torch
 
 from flagdata.arrays import FloatArray, IntArray
 from flagdata.rng import stream
-from measure.calibrate import MEASURED, OBSERVED, Design, Flag, Log, Normal, Observed, Options, Uncertain, simulated
-from measure.calibrate.calibrate import answered
-from measure.calibrate.simulation import BATCH, RATE, windows
+from measure.cloth import (
+    MEASURED,
+    OBSERVED,
+    CalibrationOptions,
+    Design,
+    Flag,
+    Log,
+    Normal,
+    Observed,
+    Uncertain,
+    simulated,
+)
+from measure.cloth.calibration import answered
+from measure.cloth.simulation import BATCH, RATE, windows
 from measure.observables import View
 from sim import handles
 from sim.batch import Batch, Divergence, after
@@ -304,10 +315,10 @@ def finer(design: Design) -> tuple[FloatArray, IntArray]:
     return batch.read()[:, 0], places
 
 
-def options() -> Options:
+def options() -> CalibrationOptions:
     """What is stated."""
     own = design()
-    return Options(
+    return CalibrationOptions(
         flag=FLAG, azimuth=own.azimuth, elevation=own.elevation, distance=DISTANCE, simulations=own.count, seed=SEED
     )
 
@@ -319,9 +330,9 @@ def weigh(
     *,
     sigma: FloatArray,
     truth: Mapping[str, Any],
-    of: tuple[Design, Options],
+    of: tuple[Design, CalibrationOptions],
 ) -> Row:
-    """What `measure.calibrate` answers to a truth's readings (window, observable).
+    """What `measure.cloth` answers to a truth's readings (window, observable).
 
     Args:
         base: readings of the design's simulations.

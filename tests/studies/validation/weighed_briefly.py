@@ -26,12 +26,12 @@ import torch
 
 from flagdata.arrays import FloatArray
 from flagdata.rng import stream
-from measure.calibrate import (
+from measure.cloth import (
     MEASURED,
     OBSERVED,
+    CalibrationOptions,
     Emulator,
     Observed,
-    Options,
     Sight,
     informative,
     simulated,
@@ -147,7 +147,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
                 "code": "kernel",
             }
         )
-    options = Options(flag=loop.FLAG, azimuth=own.azimuth, elevation=own.elevation, simulations=own.count, seed=SEED)
+    options = CalibrationOptions(
+        flag=loop.FLAG, azimuth=own.azimuth, elevation=own.elevation, simulations=own.count, seed=SEED
+    )
     filmed = []
     for number in FILMED:
         truth, make = some[number], films.filmed

@@ -14,7 +14,7 @@ import torch
 
 from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.rng import stream
-from measure.calibrate import OBSERVED
+from measure.cloth import OBSERVED
 from measure.film import FlagSize, Reading, subjects
 from measure.observables import OBSERVABLES, watched
 from sim.assets import Assets

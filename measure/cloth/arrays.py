@@ -1,0 +1,159 @@
+"""Calibration from Python: `flagdata.calibrate`, with recordings as arrays, tables or names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from flagdata.api.measuring import Calibrating, OfFlag
+from flagdata.caches import user_cache
+from flagdata.calibrated import Calibrated, Weighed
+from flagdata.dataset.source import lake_of
+from flagdata.errors import InputError
+from flagdata.lake import Lake
+from flagdata.provenance import array_hash
+from flagdata.stated import Stated
+from measure.cloth.calibration import Calibration, CalibrationOptions, calibrate
+from measure.cloth.design import FAR
+from measure.cloth.prior import AZIMUTH, ELEVATION, Uncertain, fabric, stated_angle
+from measure.cloth.recording import Observed, cut
+from measure.cloth.simulation import Flag
+from measure.cloth.sources import Opened, Sources, opened
+from measure.cloth.tables import TIME, Columns, known_columns, of_columns
+from measure.film.similarity import FlagSize
+from measure.film.source import Reading
+
+Arrays = Mapping[str, ArrayLike]
+Number = float | tuple[float, float] | str | Stated
+
+
+def options_of(chosen: OfFlag, size: FlagSize, *, simulations: int, level: float, seed: int) -> CalibrationOptions:
+    """Returns how a flag of such a size is calibrated.
+
+    Args:
+        simulations: for each recording.
+        level: of the intervals.
+        seed: of all draws.
+
+    Raises:
+        UsageError, UnknownNameError: angles or a material that no flag has.
+    """
+
+    def angle(name: str, value: Number | None, usual: Uncertain) -> Uncertain:
+        return usual if value is None else stated_angle(usual, Stated.of(value), where=f"--{name}")
+
+    return CalibrationOptions(
+        flag=Flag(length=size.length, height=size.height, attachment=chosen.attachment),
+        azimuth=angle("azimuth", chosen.azimuth_deg, AZIMUTH),
+        elevation=angle("elevation", chosen.elevation_deg, ELEVATION),
+        distance=FAR if chosen.distance is None else chosen.distance,
+        simulations=simulations,
+        level=level,
+        seed=seed,
+        material=None if chosen.material is None else fabric(chosen.material, where="--material"),
+    )
+
+
+def folder_of(chosen: OfFlag) -> Path:
+    """Returns the folder in which simulations are kept."""
+    return user_cache() / "calibrate" if chosen.cache is None else Path(chosen.cache)
+
+
+def sources_of(
+    recordings: Sequence[Arrays | Path | str], chosen: OfFlag, size: FlagSize, lake: Lake | None, *, at: str
+) -> Sources:
+    """Opens recordings: tables that are given as arrays, paths of tables, and recordings of a lake.
+
+    Raises:
+        FlagdataError: see `Sources`.
+    """
+    first, last = chosen.start or 0.0, chosen.end
+    offset = None if chosen.clock_offset is None else Stated.of(chosen.clock_offset)
+    reading = Reading.of(chosen, size)
+
+    def name(numbered: tuple[int, Arrays | Path | str]) -> str:
+        number, one = numbered
+        return f"recording {number}" if isinstance(one, Mapping) else str(one)
+
+    def opening(numbered: tuple[int, Arrays | Path | str]) -> Opened:
+        _, one = numbered
+        if isinstance(one, Mapping):
+            rows = of_arrays(one, name=name(numbered))
+            cuts = tuple(cut(each, first, last) if each.place is None else each for each in rows)
+            return Opened(name=name(numbered), parent=None, rows=cuts)
+        part = {"first": first, "last": last, "log": chosen.log, "offset": offset}
+        return opened(str(one), size, reading, lake=lake, at=at, **part)
+
+    return Sources.of(list(enumerate(recordings, start=1)), opening, name=name)
+
+
+def calibrated(chosen: Calibrating) -> Calibrated:
+    """Calibrates a flag from Python; see `flagdata.calibrate`.
+
+    Raises:
+        FlagdataError: see `flagdata.calibrate`.
+    """
+    several = chosen.recordings
+    several = [several] if isinstance(several, Mapping | Path | str) else list(several)
+    if not several:
+        raise InputError("no recordings", where="recordings", fix="give at least one")
+    size = FlagSize.of(chosen.flag_size)
+    drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
+    options = options_of(chosen, size, **drawn)
+    gathered = sources_of(several, chosen, size, lake_of(chosen.lake), at=chosen.at or "main").read(size)
+    found = calibrate(
+        gathered.recordings,
+        options,
+        folder=folder_of(chosen),
+        workers=chosen.workers,
+        left_out=gathered.left_out,
+    )
+    return _answer(found)
+
+
+def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
+    """The recordings of a table that is given as arrays, in the units of the table of observables.
+
+    Raises:
+        InputError: a column that is not known, columns of different lengths, or as `measure.cloth.tables.of_table`.
+    """
+    values = {key.replace("_", "-"): np.asarray(column, dtype=np.float64) for key, column in columns.items()}
+    lengths = {column.shape for column in values.values()}
+    if len(lengths) != 1 or len(next(iter(lengths), ())) != 1:
+        raise InputError(f"columns of shapes {sorted(lengths)}", where=name, fix="give (n,) for each, of one n")
+    known_columns(tuple(values), where=name)
+    if TIME in values:
+        values[TIME] = values[TIME] - values[TIME][0]
+    rows = next(iter(lengths))[0]
+    table = Columns(where=name, values=values, lines=tuple(range(1, rows + 1)))
+    names = sorted(values)
+    identity = array_hash({"columns": names}, [values[key] for key in names])
+    return of_columns(table, name=name, identity=identity, beside=None)
+
+
+def _answer(found: Calibration) -> Calibrated:
+    quantities = {
+        one.name: Weighed(
+            unit=one.unit,
+            value=one.value,
+            sigma=one.sigma,
+            interval=one.interval,
+            assumed=one.assumed,
+            bound=one.span.worded(lambda value: f"{value:.4g}", f" {one.unit}") if one.bounded else None,
+            level=one.span.level,
+        )
+        for one in found.cloth
+    }
+    return Calibrated(
+        sentence=found.sentence,
+        level=found.options.level,
+        quantities=quantities,
+        draws={name: found.draws.cloth[name] for name in quantities},
+        withheld=found.withheld,
+        stated=found.stated,
+        findings=found.findings,
+        document=found.as_dict(),
+    )

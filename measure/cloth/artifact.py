@@ -1,0 +1,86 @@
+"""A calibration in the lake: the answer, draws of the posterior, and the recordings, in one commit.
+
+Its identity is a hash of what went in: the recordings, the options and the seed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from flagdata.findings import quality_flags
+from flagdata.lake import Artifact, Lake, results
+from flagdata.lake.meshes import write_plain
+from flagdata.lake.results import Placed
+from flagdata.provenance import canonical
+from flagdata.schema import Kind
+from measure.cloth.calibration import ANSWER, Calibration
+from measure.cloth.simulation import OBSERVED, VERSION
+from measure.film.source import Reading
+from measure.observables.artifact import VERSION as READINGS
+from models.conditioning.conditioning import VERSION as CONDITIONED
+
+_FORMAT = 1
+_HEAD = "flagdata_calibration"
+
+
+def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...]) -> Artifact:
+    """The row of a calibration, without its object.
+
+    Args:
+        reading: how films were read.
+        parents: artifacts that the recordings were read from; none for tables.
+    """
+    values = {q.name: q.value for q in found.cloth if q.value is not None}
+    sources = [one.observed.source for one in found.recordings]
+    spans = [[one.observed.first, one.observed.duration] for one in found.recordings]
+    return Artifact(
+        kind=Kind.MEASUREMENT,
+        name=", ".join(one.observed.name for one in found.recordings),
+        parents=parents,
+        seed=found.options.seed,
+        parameters=canonical(values),
+        recipe={
+            "calibrate": ANSWER,
+            "simulations": VERSION,
+            "observe": READINGS,
+            "conditioned": CONDITIONED,
+            "sources": sources,
+            "spans": spans,
+            **reading.recipe(),
+            **found.options.recipe(),
+        },
+        quality=quality_flags(found.findings),
+        report=canonical({"schema": "flagdata.calibrate-report/1", **found.as_dict()}),
+    )
+
+
+def keep(lake: Lake, found: Calibration, reading: Reading, parents: tuple[str, ...], *, branch: str) -> Placed:
+    """Commit a calibration where it is new, see `flagdata.lake.results`.
+
+    Raises:
+        FlagdataError: as `Lake.transaction`.
+    """
+    row = artifact(found, reading, parents)
+    return results.keep(lake, row, lambda staged: write(staged, found), f"calibrate {row.name}", branch=branch)
+
+
+def write(path: Path, found: Calibration) -> None:
+    """A new Zarr folder: `cloth` (draw, quantity) where the weight is not withheld, and for each recording `readings-N`
+    (window, observable) and `wind-N` (window)."""
+    import zarr
+
+    group = zarr.open_group(path, mode="w-", zarr_format=3)
+    names = [q.name for q in found.cloth]
+    group.update_attributes(
+        {_HEAD: {"format": _FORMAT}, "quantities": names, "observables": list(OBSERVED), "answer": found.as_dict()}
+    )
+    if found.withheld is None:
+        cloth = np.stack([found.draws.cloth[name] for name in names], axis=1)
+        write_plain(group, "cloth", cloth.astype(np.float32), ("draw", "quantity"))
+    for number, one in enumerate(found.recordings):
+        write_plain(
+            group, f"readings-{number}", one.observed.readings.astype(np.float32), (f"window-{number}", "observable")
+        )
+        write_plain(group, f"wind-{number}", one.observed.speed.astype(np.float32), (f"window-{number}",))

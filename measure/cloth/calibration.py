@@ -1,0 +1,591 @@
+"""From recordings of one flag to its cloth: simulated, emulated, weighed, and checked on simulations left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from flagdata.rng import child_seed, stream
+from measure.cloth.design import FAR, Design, simulated
+from measure.cloth.emulator import TAKEN_APART, Emulator, informative
+from measure.cloth.numerics import Correction, corrected
+from measure.cloth.posterior import Posterior, Sight, posterior, weighed
+from measure.cloth.prior import AZIMUTH, CLOTH, ELEVATION, FABRIC, NUISANCES, Fabric, Uncertain
+from measure.cloth.recording import LEAST_IN_ALL, LEFT_OUT, Observed, check_in_all, constant_wind, shown, usable
+from measure.cloth.simulation import OBSERVED, Flag
+from measure.ends import PILED, WITHIN, Bound, Span, span
+from measure.observables.observable import WINDOW
+
+ANSWER = 5
+"""Raised when the same recordings and options get another answer."""
+DETERMINED = 0.8
+"""Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior."""
+_FOLDS = 8
+_CHECKED = 48
+"""Simulations left out that are weighed to check the intervals."""
+_UNLIKE = 0.01
+"""Tail probability of a recording's summary among those that the answer predicts below which the weight is withheld: of
+recordings that are as the model has them one in a hundred."""
+_LOOK = (
+    "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, --elevation and "
+    "--distance; flagdata close-loop looks for what is missing"
+)
+_APART = 2.0
+"""σ from which on a summary is named as what is unlike."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrationOptions:
+    """How a flag is calibrated.
+
+    Attributes:
+        flag: its size and attachment.
+        azimuth, elevation: of the camera's axis to the wind, as far as they are known.
+        distance: of the camera [m].
+        simulations: for each recording.
+        level: of the intervals.
+        seed: of all draws.
+        material: what the flag is stated to be made of; None for any fabric.
+    """
+
+    flag: Flag
+    azimuth: Uncertain = AZIMUTH
+    elevation: Uncertain = ELEVATION
+    distance: float = FAR
+    simulations: int = 128
+    level: float = 0.9
+    seed: int = 0
+    material: Fabric | None = None
+
+    def recipe(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "flag_size": [self.flag.length, self.flag.height],
+            "attachment": self.flag.attachment,
+            "azimuth": self.azimuth.prior.as_dict(),
+            "elevation": self.elevation.prior.as_dict(),
+            "distance": self.distance,
+            "simulations": self.simulations,
+            "level": self.level,
+            "seed": self.seed,
+            **({} if self.material is None else {"material": self.material.name}),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """One quantity of the answer.
+
+    Attributes:
+        name, unit: as in tables.
+        value: the posterior's median; None where the film does not determine it, or bounds it on one side only.
+        sigma: its standard deviation; None where it is bounded on one side only.
+        span: the interval at the level, or a bound (`measure.ends`).
+        assumed: the prior's interval at the same level.
+        range: the ends of the prior; None of a normal one.
+    """
+
+    name: str
+    unit: str
+    value: float | None
+    sigma: float | None
+    span: Span
+    assumed: tuple[float, float]
+    range: tuple[float, float] | None = None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Its ends, of a bound one at infinity or where the quantity ends."""
+        return self.span.low, self.span.high
+
+    @property
+    def bounded(self) -> bool:
+        """Whether only a bound is known of it, since the posterior piles up where the prior ends."""
+        return self.value is None and self.span.bound in (Bound.LEAST, Bound.MOST)
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values; an end of the interval that nothing bounds is null."""
+        return {
+            "unit": self.unit,
+            "value": self.value,
+            "sigma": self.sigma,
+            "interval": self.span.ends(),
+            "level": self.span.level,
+            "bound": None if self.span.bound is None else self.span.bound.value,
+            "assumed": list(self.assumed),
+            "determined": self.value is not None,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """What the same procedure says of simulations that it was not fitted to.
+
+    Attributes:
+        count: of them.
+        held: of them, those whose area weight lies in its interval.
+        error: median error of its value, as a share.
+    """
+
+    count: int
+    held: int
+    error: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {"count": self.count, "held": self.held, "median_error": self.error}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fitted:
+    """A recording with what simulations of the answer look like.
+
+    Attributes:
+        observed: the recording.
+        low, middle, high: (window, observable) of simulated flags of the posterior at the level, by the emulator.
+        used: (observable,) those whose mean or slope the answer rests on.
+        misfit: tail probability of its summary among those that the answer predicts.
+        apart: (2·observable,) summaries less those that the answer predicts, in their standard deviations.
+        failed: simulations that diverged or hardly show the flag.
+    """
+
+    observed: Observed
+    low: FloatArray
+    middle: FloatArray
+    high: FloatArray
+    used: BoolArray
+    misfit: float
+    apart: FloatArray
+    failed: int
+
+    @property
+    def unlike(self) -> str | None:
+        """What no simulated flag shows, in words; None where some look like it."""
+        if self.misfit >= _UNLIKE:
+            return None
+        names = [*OBSERVED, *(f"the change of {name} with the wind" for name in OBSERVED)]
+        order = np.argsort(-np.abs(np.nan_to_num(self.apart)))
+        far = [(names[place], float(self.apart[place])) for place in order.tolist() if abs(self.apart[place]) > _APART]
+        if not far:
+            return "its observables together"
+        return ", ".join(f"{name} {abs(z):.1f} σ too {'large' if z > 0 else 'small'}" for name, z in far[:4])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Calibration:
+    """The answer.
+
+    Attributes:
+        options: how it was calibrated.
+        draws: of the posterior.
+        cloth: area weight, bending and damping.
+        places: for each recording gain, azimuth and elevation.
+        recordings: in order.
+        check: on simulations left out.
+        findings: what a reader has to know.
+    """
+
+    options: CalibrationOptions
+    draws: Posterior
+    cloth: tuple[Quantity, ...]
+    places: tuple[tuple[Quantity, ...], ...]
+    recordings: tuple[Fitted, ...]
+    check: Check
+    findings: tuple[Finding, ...] = field(default_factory=tuple)
+
+    @property
+    def weight(self) -> Quantity:
+        """The area weight."""
+        return self.cloth[0]
+
+    @property
+    def withheld(self) -> str | None:
+        """Why no value is given, where no simulated flag looks like a recording."""
+        return next((f"{one.observed.name}: {one.unlike}" for one in self.recordings if one.unlike is not None), None)
+
+    @property
+    def stated(self) -> str | None:
+        """The area weight as `flagdata measure --area-weight` takes it; None where it is not determined or a bound."""
+        weight = self.weight
+        if weight.value is None or weight.sigma is None:
+            return None
+        return f"{weight.value:.4g}±{weight.sigma:.2g}"
+
+    @property
+    def weighs(self) -> bool:
+        """Whether anything is given of the area weight: a value or a bound."""
+        return self.withheld is None and (self.weight.value is not None or self.weight.bounded)
+
+    @property
+    def sentence(self) -> str:
+        """The answer in words."""
+        weight = self.weight
+        level = f"{self.options.level * 100:.3g} %"
+        windows = sum(len(one.observed.readings) for one in self.recordings)
+        if self.withheld is not None:
+            return f"area weight: withheld, since no simulated flag looks like {self.withheld}"
+        if weight.bounded:
+            low, high = weight.range or weight.assumed
+            bound = f"{weight.span.phrase(3, ' kg/m²')}, {weight.span.level * 100:.3g} %"
+            return f"area weight {bound}, n = {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
+        if weight.value is None:
+            low, high = weight.assumed
+            return f"area weight: not determined by {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
+        low, high = weight.interval
+        return f"area weight {weight.value:.3f} kg/m² [{low:.3f}, {high:.3f}] {level}, n = {windows} windows"
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        weight = self.weight
+        return {
+            "sentence": self.sentence,
+            "cloth": {q.name: q.as_dict() for q in self.cloth},
+            "recordings": [
+                {
+                    "name": one.observed.name,
+                    "source": one.observed.source,
+                    "windows": len(one.observed.readings),
+                    "wind_speed": float(one.observed.speed.mean()),
+                    "misfit": one.misfit,
+                    "failed": one.failed,
+                    "observables": [name for name, there in zip(OBSERVED, one.used, strict=True) if there],
+                    "place": {q.name: q.as_dict() for q in place},
+                }
+                for one, place in zip(self.recordings, self.places, strict=True)
+            ],
+            "area_weight_stated": self.stated,
+            "withheld": self.withheld,
+            "close_loop": None
+            if weight.value is None or weight.sigma is None
+            else {"density": weight.value, "density-uncertainty": weight.sigma / weight.value},
+            "check": self.check.as_dict(),
+            "options": self.options.recipe(),
+            "level": self.options.level,
+            "findings": [finding.as_dict() for finding in self.findings],
+        }
+
+
+def calibrate(
+    recordings: Sequence[Observed],
+    options: CalibrationOptions,
+    *,
+    folder: Path,
+    workers: int = 1,
+    left_out: Sequence[Finding] = (),
+    advance: Callable[[int], object] | None = None,
+) -> Calibration:
+    """Weigh the cloth of one flag.
+
+    Args:
+        recordings: of it, each cut to what is to be used.
+        left_out: a warning for each recording of it that cannot be used.
+        folder: where simulations are kept.
+        workers: processes that simulate.
+        advance: called with the number of flags that were simulated or found.
+
+    Raises:
+        InputError: see `Observed` and `designs_of`.
+        RefusedError: see `answered`.
+    """
+    made: list[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]] = []
+    for one, design in zip(recordings, designs_of(recordings, options), strict=True):
+        readings = simulated(design, folder=folder, workers=workers, advance=advance)
+        correction = corrected(design, readings, folder=folder, workers=workers, advance=advance)
+        made.append((one, design.values(), readings, correction))
+    return answered(made, options, left_out=left_out)
+
+
+def designs_of(recordings: Sequence[Observed], options: CalibrationOptions) -> list[Design]:
+    """What is simulated for each of several recordings of one cloth.
+
+    Raises:
+        InputError: a recording that is given twice, or too short recordings in all.
+    """
+    check_in_all(recordings)
+    names = [f"{one.source} {one.name} {one.first:g}" for one in recordings]
+    twice = [one.name for place, one in enumerate(recordings) if names[place] in names[:place]]
+    if twice:
+        raise InputError(f"{twice[0]} is given twice", where="recordings", fix="give each recording of the flag once")
+    return [
+        Design(
+            flag=options.flag,
+            log=one.log,
+            duration=one.duration,
+            azimuth=options.azimuth,
+            elevation=options.elevation,
+            count=options.simulations,
+            seed=options.seed,
+            distance=options.distance,
+            recording=name,
+            place=name if one.place is None else one.place,
+            fabric=FABRIC if options.material is None else options.material.drawn,
+        )
+        for one, name in zip(recordings, names, strict=True)
+    ]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Simulated:
+    """A recording with its simulations.
+
+    Attributes:
+        values: name → (simulation,).
+        summaries: (simulation, summary) with what numerics and pixels may add to them.
+        used: (summary,) those that are weighed by.
+    """
+
+    observed: Observed
+    values: Mapping[str, FloatArray]
+    summaries: FloatArray
+    used: BoolArray
+
+    def rows(self, which: IntArray) -> _Simulated:
+        """With some of the simulations."""
+        values = {name: own[which] for name, own in self.values.items()}
+        return replace(self, values=values, summaries=self.summaries[which])
+
+    def sight(self, options: CalibrationOptions) -> Sight:
+        """With an emulator fitted to the simulations.
+
+        Raises:
+            RefusedError: see `Emulator.fit`.
+        """
+        one = self.observed
+        return Sight(
+            emulator=Emulator.fit(self.values, self.summaries, self.used, name=one.name),
+            azimuth=options.azimuth,
+            elevation=options.elevation,
+            place=one.place,
+        )
+
+
+def answered(
+    simulations: Sequence[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]],
+    options: CalibrationOptions,
+    *,
+    left_out: Sequence[Finding] = (),
+) -> Calibration:
+    """The answer from recordings, each with its simulations' values, name → (simulation,), their readings (simulation,
+    window, observable), and how far these lie from those of a finer mesh. Those whose simulations do not show what they
+    show are left out.
+
+    Args:
+        left_out: a warning for each recording that is not among them.
+
+    Raises:
+        RefusedError: simulations show nothing of any recording, see `informative` and `Emulator.fit`.
+        InputError: too little is left.
+    """
+
+    def seen(one: tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]) -> tuple[_Simulated, Sight]:
+        observed, values, readings, correction = one
+        summaries = with_errors(observed, readings, correction, seed=options.seed)
+        looked = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
+        used = informative(values, summaries, looked, name=observed.name)
+        own = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
+        return own, own.sight(options)
+
+    both, unshown = usable(simulations, seen, name=lambda one: one[0].name)
+    left_out = (*left_out, *unshown)
+    check_in_all([one.observed for one, _ in both], left_out=left_out)
+    found = _answered(both, options, left_out=left_out)
+    return _without_unlike(found, both, options, left_out=left_out)
+
+
+def _without_unlike(
+    found: Calibration,
+    both: Sequence[tuple[_Simulated, Sight]],
+    options: CalibrationOptions,
+    *,
+    left_out: Sequence[Finding],
+) -> Calibration:
+    """The answer of those recordings that simulated flags look like, if there are such; otherwise the answer as it is,
+    which then is withheld with the reason."""
+    unlike = [one for one in found.recordings if one.unlike is not None]
+    like = [own for own, one in zip(both, found.recordings, strict=True) if one.unlike is None]
+    if not unlike or sum(own.observed.duration for own, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
+        return found
+    warned = [Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(one), fix=_LOOK) for one in unlike]
+    again = _answered(like, options, left_out=(*left_out, *warned))
+    return found if again.withheld is not None else again
+
+
+def _answered(
+    both: Sequence[tuple[_Simulated, Sight]], options: CalibrationOptions, *, left_out: Sequence[Finding]
+) -> Calibration:
+    """The answer from recordings whose simulations show what they show."""
+    made, sights = [own for own, _ in both], [own for _, own in both]
+    found = posterior(sights, [one.observed.summary for one in made], seed=options.seed)
+    fitted = tuple(
+        _fitted(one, sight, found, place, options) for place, (one, sight) in enumerate(zip(made, sights, strict=True))
+    )
+    calibration = Calibration(
+        options=options,
+        draws=found,
+        recordings=fitted,
+        check=checked(made, options),
+        cloth=tuple(quantity(q, found.cloth[q.name], options.level) for q in CLOTH),
+        places=tuple(
+            tuple(quantity(q, place[q.name], options.level) for q in _placed(options)) for place in found.places
+        ),
+    )
+    findings = (*left_out, *_findings(calibration))
+    if calibration.withheld is not None:
+        calibration = replace(calibration, cloth=tuple(_assumed(q, options.level) for q in CLOTH))
+    return replace(calibration, findings=findings)
+
+
+def with_errors(observed: Observed, readings: FloatArray, correction: Correction, *, seed: int) -> FloatArray:
+    """(simulation, summary) of readings (simulation, window, observable) with errors of numerics and of pixels."""
+    summaries = correction.of(observed.projection.of(readings), seed=seed)
+    return (summaries + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
+
+
+def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
+    """What draws of the posterior say of a quantity."""
+    assumed = about.at(np.array([(1 - level) / 2, (1 + level) / 2])).tolist()
+    shares = np.linspace(0.0, 1.0, 1001)
+    ranks = np.interp(draws, about.at(shares), shares)
+    determined = float(ranks.std()) < DETERMINED / math.sqrt(12)
+    # What is not determined has the prior's interval, which has no end where draws pile up.
+    places = ranks if determined and about.ends is not None else None
+    own = span(draws, places, level=level, limits=about.limits, assumed=about.ends or about.limits)
+    return Quantity(
+        name=about.name,
+        unit=about.unit,
+        value=float(np.median(draws)) if determined and own.estimated else None,
+        sigma=float(draws.std()) if own.estimated else None,
+        span=own,
+        assumed=(assumed[0], assumed[1]),
+        range=about.ends,
+    )
+
+
+def _assumed(about: Uncertain, level: float) -> Quantity:
+    """What is assumed of a quantity, where nothing is found."""
+    return quantity(about, about.at(np.linspace(0.0, 1.0, 1001)), level)
+
+
+def checked(made: Sequence[_Simulated], options: CalibrationOptions) -> Check:
+    """Weigh simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
+    first recording alone where the others are of other cloths."""
+    weights = [one.values[CLOTH[0].name] for one in made]
+    made = [one for one, own in zip(made, weights, strict=True) if np.array_equal(own, weights[0])]
+    complete = np.flatnonzero(np.all([np.isfinite(one.summaries[:, one.used]).all(axis=1) for one in made], axis=0))
+    rng = stream(options.seed, "calibrate", "check")
+    chosen = rng.permutation(complete)[:_CHECKED]
+    errors: list[float] = []
+    held = 0
+    for fold in range(min(_FOLDS, len(chosen))):
+        own = chosen[fold::_FOLDS]
+        rest = np.setdiff1d(np.arange(len(weights[0])), own)
+        sights = [one.rows(rest).sight(options) for one in made]
+        seed = child_seed(options.seed, "check", fold)
+        weight = weighed(sights, [one.summaries[own] for one in made], seed=seed)[CLOTH[0].name]
+        truth = weights[0][own]
+        low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
+        held += int(((low <= truth) & (truth <= high)).sum())
+        errors.extend(np.abs(middle / truth - 1).tolist())
+    return Check(count=len(errors), held=held, error=float(np.median(errors)) if errors else math.nan)
+
+
+def _placed(options: CalibrationOptions) -> tuple[Uncertain, ...]:
+    return (*(q for q in NUISANCES if q.name == "gain"), options.azimuth, options.elevation)
+
+
+def _fitted(made: _Simulated, sight: Sight, found: Posterior, place: int, options: CalibrationOptions) -> Fitted:
+    """What the emulator says that flags of the posterior show."""
+    one, summaries = made.observed, made.summaries
+    values = {**found.cloth, **found.places[place]}
+    predicted = sight.emulator.draw(values, seed=options.seed)
+    used = sight.emulator.used
+    count = len(OBSERVED)
+    # What depends on nothing that is regressed on is that of simulations at random.
+    rows = stream(options.seed, "calibrate", "rows").integers(len(summaries), size=len(predicted))
+    whole = np.where(np.isfinite(summaries), summaries, np.nanmean(summaries, axis=0))[rows]
+    whole[:, used] = predicted
+    windows = one.projection.at(whole.reshape(len(predicted), -1, count))
+    low, middle, high = np.quantile(windows, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=0)
+    looked = np.isfinite(one.summary) & np.isfinite(whole).all(axis=0)
+    centre, inverse = whole[:, looked].mean(axis=0), np.linalg.pinv(np.cov(whole[:, looked].T))
+    offsets = np.concatenate([whole[:, looked], one.summary[None, looked]]) - centre
+    *distances, own = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
+    distance = np.array(distances)
+    spread = whole.std(axis=0)
+    apart = np.where(
+        looked & (spread > 0), (one.summary - whole.mean(axis=0)) / np.where(spread > 0, spread, 1.0), np.nan
+    )
+    return Fitted(
+        observed=one,
+        low=low,
+        middle=middle,
+        high=high,
+        used=np.asarray(used.reshape(-1, count).any(axis=0)),
+        misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))),
+        apart=apart,
+        failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
+    )
+
+
+def _findings(calibration: Calibration) -> tuple[Finding, ...]:
+    found = list(constant_wind([one.observed for one in calibration.recordings]))
+    for one in calibration.recordings:
+        found.extend(one.observed.findings)
+        if one.unlike is not None:
+            what = f"{_unlike(one)}. The weight is withheld"
+            found.append(Finding.of("unlike-simulations", what, fix=_LOOK))
+        if one.failed > 0.1 * calibration.options.simulations:
+            what = f"{one.failed} of {calibration.options.simulations} simulations of {one.observed.name} were left out"
+            found.append(Finding.of("failed-simulations", what))
+    if not calibration.draws.together:
+        found.append(TAKEN_APART)
+    check, level = calibration.check, calibration.options.level
+    if check.held < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
+        what = (
+            f"of {check.count} simulations left out, the intervals of {check.held} contain the area weight, where "
+            f"{check.count * level:.0f} are expected: they are too narrow"
+        )
+        fix = "give more simulations with --simulations"
+        found.append(Finding.of("narrow-intervals", what, fix=fix))
+    found.extend(_leaning(calibration))
+    undetermined = [q.name.replace("_", " ") for q in calibration.cloth if q.value is None and not q.bounded]
+    if undetermined:
+        what = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
+        found.append(Finding.of("not-determined", what))
+    return tuple(found)
+
+
+def _unlike(one: Fitted) -> str:
+    """What is unlike about a recording, and what may be the cause."""
+    return (
+        f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth may not be "
+        "separated from what is behind it, or its size, attachment or place be another than stated, or something may "
+        "act on it that the model lacks"
+    )
+
+
+def _leaning(calibration: Calibration) -> list[Finding]:
+    """Quantities of which only a bound is known."""
+    found = []
+    for own in calibration.cloth:
+        if not own.bounded or own.range is None:
+            continue
+        most = own.span.bound is Bound.MOST
+        what = (
+            f"{own.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within {WITHIN:.0%} of the end of "
+            f"what is assumed, {own.range[0 if most else 1]:.3g} {own.unit}; {'less' if most else 'more'} would look "
+            "the same, so that only a bound is given"
+        )
+        fix = "check the flag's size and where the camera stood" + (
+            ", or weigh a piece of the cloth on a scale" if own is calibration.weight else ""
+        )
+        found.append(Finding.of("leans-on-prior", what, fix=fix))
+    return found

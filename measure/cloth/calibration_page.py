@@ -1,0 +1,149 @@
+"""A calibration as one HTML file that refers to no other, with each recording's observables against the wind."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flagdata.arrays import FloatArray
+from flagdata.pages.pictures import figure_url
+from flagdata.pages.render import render
+from flagdata.provenance import code_version
+from flagdata.tables import Range, Scale
+from measure.cloth.calibration import Calibration, Fitted, Quantity
+from measure.cloth.prior import CLOTH
+from measure.cloth.recording import Observed
+from measure.cloth.simulation import OBSERVED
+from measure.estimate.page import Section
+from measure.observables import OBSERVABLES
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Band:
+    """What a model shows.
+
+    Attributes:
+        found: (low middle high, window, observable).
+        colour: of the band and of its middle.
+    """
+
+    found: FloatArray
+    colour: str
+
+
+def against_wind(observed: Observed, names: Sequence[str], bands: Sequence[Band], *, dots: str, opacity: float) -> str:
+    """A picture with a panel an observable, as a data URL.
+
+    Args:
+        names: of the observables.
+        dots: colour of the windows.
+        opacity: of the bands.
+    """
+    from matplotlib.figure import Figure
+
+    columns = min(4, len(names))
+    rows = math.ceil(len(names) / columns)
+    figure = Figure(figsize=(2.75 * columns, 2.5 * rows), layout="constrained")
+    cells = figure.subplots(rows, columns, squeeze=False).ravel()
+    speed = observed.speed
+    order = np.argsort(speed)
+    for axes, name in zip(cells, names, strict=False):
+        column = OBSERVED.index(name)
+        for band in bands:
+            low, middle, high = band.found[:, order, column]
+            axes.fill_between(speed[order], low, high, color=band.colour, alpha=opacity)
+            axes.plot(speed[order], middle, color=band.colour)
+        axes.plot(speed, observed.readings[:, column], ".", color=dots)
+        unit = OBSERVABLES[name].unit
+        axes.set_title(name if unit == "1" else f"{name} [{unit}]", fontsize=10)
+        axes.set_xlabel("wind [m/s]")
+    for axes in cells[len(names) :]:
+        axes.remove()
+    return figure_url(figure)
+
+
+_BLUE, _RUST = "#2b6f8f", "#c4622d"
+_DEGREES = ("azimuth", "elevation")
+
+
+def calibration_page(found: Calibration, provenance: Mapping[str, str], *, sections: Sequence[Section] = ()) -> str:
+    """The page.
+
+    Args:
+        provenance: rows of a table, in order.
+        sections: what comes before it, each under its own heading.
+    """
+    check = found.check
+    values = {
+        "name": ", ".join(one.observed.name for one in found.recordings),
+        "sentence": found.sentence,
+        "tone": "settled" if found.weight.value is not None else "open" if found.weighs else "missed",
+        "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in found.findings],
+        "level": f"{found.options.level * 100:.3g} %",
+        "cloth": [shown_quantity(q) for q in found.cloth],
+        "stated": found.stated,
+        "posterior": None if found.withheld else _posterior(found),
+        "recordings": [
+            {
+                "name": one.observed.name,
+                "windows": len(one.observed.readings),
+                "wind": f"{one.observed.speed.mean():.1f}",
+                "misfit": f"{one.misfit:.2g}",
+                "place": [shown_quantity(q) for q in place],
+                "picture": _windows(one),
+            }
+            for one, place in zip(found.recordings, found.places, strict=True)
+        ],
+        "check": {"count": check.count, "held": check.held, "error": f"{check.error:.1%}"},
+        "sections": list(sections),
+        "provenance": {**provenance, "code": code_version()},
+    }
+    return render("measure.cloth", "calibration.html.j2", values)
+
+
+def shown_quantity(one: Quantity) -> dict[str, str]:
+    """A quantity as text: angles in degrees, and as `interval` what its values can be: both ends, or a bound with its
+    level."""
+    turn = 180 / math.pi if one.name in _DEGREES else 1.0
+    least, most = one.assumed
+    unit = "" if one.unit == "1" else one.unit
+    known = one.span.worded(lambda value: f"{value * turn:.3g}")
+    return {
+        "name": one.name.replace("_", " "),
+        "unit": "°" if one.name in _DEGREES else unit,
+        "value": "" if one.value is None else f"{one.value * turn:.3g}",
+        "bounded": "yes" if one.bounded else "",
+        "interval": known,
+        "level": f"{one.span.level * 100:.3g} %",
+        "assumed": f"{least * turn:.3g} to {most * turn:.3g}",
+    }
+
+
+def _posterior(found: Calibration) -> str:
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    figure = Figure(figsize=(9.0, 2.6), layout="constrained")
+    for axes, about in zip(figure.subplots(1, len(CLOTH)), CLOTH, strict=True):
+        low, high = about.at(np.array([0.0, 1.0])).tolist()
+        logarithmic = isinstance(about.prior, Range) and about.prior.scale is Scale.LOG
+        edges = np.geomspace(low, high, 41) if logarithmic else np.linspace(low, high, 41)
+        axes.hist(found.draws.cloth[about.name], bins=edges, color=_BLUE)
+        axes.axhline(len(found.draws.cloth[about.name]) / 40, color=_RUST)
+        if logarithmic:
+            axes.set_xscale("log")
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30 * low else (1.0,)))
+            axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.set_xlabel(f"{about.name.replace('_', ' ')} [{about.unit}]")
+        axes.set_yticks([])
+    return figure_url(figure)
+
+
+def _windows(one: Fitted) -> str:
+    names = [name for name, used in zip(OBSERVED, one.used, strict=True) if used]
+    band = Band(found=np.stack([one.low, one.middle, one.high]), colour=_RUST)
+    return against_wind(one.observed, names, [band], dots=_BLUE, opacity=0.3)

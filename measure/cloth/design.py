@@ -1,0 +1,348 @@
+"""What is simulated for a recording, in batches, each kept under its hash: the base model, effects, null experiments.
+
+An interrupted calibration goes on where it was, and another one of the same film, log and seed simulates nothing.
+
+The base model's simulations of a verdict are those of `flagdata calibrate`, so that a loop after a calibration makes
+none of them anew. Those with an effect are pairs of some of these: the same cloth, place and turbulence, so that the
+difference is the effect's and chaos's alone. Null experiments are of the same minutes of wind, of cloths and places
+over the same priors, each kind of numerics a batch.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from functools import cached_property
+from io import BytesIO
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from flagdata import workload
+from flagdata.arrays import FloatArray, IntArray, read_arrays
+from flagdata.durable import put_if_absent
+from flagdata.errors import CorruptError
+from flagdata.provenance import canonical, digest
+from flagdata.rng import child_seed, stream
+from flagdata.tables import Range, Scale
+from measure.cloth.prior import (
+    AZIMUTH,
+    CLOTH,
+    DISTANCE,
+    ELEVATION,
+    FABRIC,
+    NUISANCES,
+    STRETCHING,
+    Uncertain,
+    clock_error,
+    draws,
+)
+from measure.cloth.simulation import BATCH, LITTLE, Discretisation, Flag, FlagBatch
+from measure.cloth.wind import Log
+from measure.forecasting.strengths import Strengths, all_strengths
+from measure.observables.observable import WINDOW
+from measure.workers import single_threaded
+
+_HOIST = "full-hoist.stiffness"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weighable(Strengths):
+    """An effect with the prior of its strength."""
+
+    @cached_property
+    def prior(self) -> Uncertain:
+        """Of the strength beyond its null value."""
+        scale = Scale.LOG if self.low > 0 else Scale.LINEAR
+        return Uncertain(
+            name=self.name,
+            unit=self.column.unit,
+            prior=Range(low=self.low, high=self.high, scale=scale),
+            source="from what a minute of film hardly shows to beyond what is expected in the field",
+        )
+
+
+def weighable(flag: Flag) -> tuple[Weighable, ...]:
+    """The effects that are weighed for a flag: one that is held along its hoist cannot be held more."""
+    return tuple(
+        Weighable(column=one.column, low=one.low, high=one.high)
+        for one in all_strengths()
+        if flag.attachment == "corners" or one.name != _HOIST
+    )
+
+
+FAR = 15.0
+"""m from which a flag is filmed where the user gives no distance: beyond some flag lengths it hardly matters."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Design:
+    """All simulations for one recording.
+
+    Attributes:
+        flag: that was filmed.
+        log: of the wind, from the film's first frame on.
+        duration: of the film, a whole number of windows [s].
+        azimuth, elevation: of the camera's axis, as far as they are known.
+        count: of simulations.
+        seed: of all draws.
+        distance: of the camera [m].
+        recording: what recordings of one cloth differ by: their simulations are of the same cloths, each recording's in
+            turbulence of its own.
+        place: the same of places and anemometers, which recordings may share.
+        fabric: which measured tables the cloths have.
+    """
+
+    flag: Flag
+    log: Log
+    duration: float
+    azimuth: Uncertain = AZIMUTH
+    elevation: Uncertain = ELEVATION
+    count: int = 128
+    seed: int = 0
+    distance: float = FAR
+    recording: str = ""
+    place: str = ""
+    fabric: Uncertain = FABRIC
+
+    @property
+    def cloth(self) -> tuple[Uncertain, ...]:
+        """What differs among the cloths."""
+        return (*CLOTH, STRETCHING, self.fabric)
+
+    def quantities(self) -> tuple[Uncertain, ...]:
+        """What differs among the simulations."""
+        known = self.log.distance is not None
+        return (
+            *self.cloth,
+            *NUISANCES,
+            self.azimuth,
+            self.elevation,
+            *(() if known else (DISTANCE,)),
+            *((clock_error(self.log.clock),) if self.log.clock else ()),
+        )
+
+    def values(self) -> Mapping[str, FloatArray]:
+        """Name → (count,), by ascending damping, so that batches can be simulated in long steps."""
+        # In another order in each place: two scramblings of a Sobol sequence are correlated, row by row.
+        own = child_seed(self.seed, "calibrate", "place", self.place)
+        order = stream(own, "calibrate", "order").permutation(self.count)
+        there = draws(self.quantities(), self.count, seed=own, name="design")
+        drawn = {name: values[order] for name, values in there.items()}
+        drawn |= draws(self.cloth, self.count, seed=self.seed, name="cloths")
+        if self.log.distance is not None:
+            drawn[DISTANCE.name] = np.full(self.count, self.log.distance)
+        order = np.argsort(drawn["damping"], kind="stable")
+        return {name: own[order] for name, own in drawn.items()}
+
+    def batches(self) -> list[FlagBatch]:
+        """In the order of `values`."""
+        return [
+            self.batch(np.arange(first, min(first + BATCH, self.count), dtype=np.int64))
+            for first in range(0, self.count, BATCH)
+        ]
+
+    def batch(self, which: IntArray) -> FlagBatch:
+        """Some of the simulations, by their places in `values`."""
+        values = {name: own[which] for name, own in self.values().items()}
+        view = [values.pop("azimuth"), values.pop("elevation"), np.full(len(which), self.distance)]
+        return FlagBatch(
+            flag=self.flag,
+            log=self.log,
+            duration=self.duration,
+            values=values,
+            places=np.stack(view, axis=1)[:, None],
+            seeds=tuple(child_seed(self.seed, "calibrate", "flag", self.recording, int(place)) for place in which),
+        )
+
+    def damped(self) -> IntArray:
+        """Places of the simulations in the longest steps that the design has."""
+        own = self.batches()
+        steps = [batch.step or 0.0 for batch in own]
+        sizes = [len(batch.seeds) for batch in own]
+        return np.flatnonzero(np.repeat(np.array(steps) == max(steps), sizes))
+
+
+def simulated(
+    design: Design, *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
+) -> FloatArray:
+    """(simulation, window, observable) in the order of the design's values; NaN where a flag diverged.
+
+    Args:
+        folder: where batches are kept.
+        advance: called with the number of flags that were simulated or found.
+
+    Raises:
+        CorruptError: a kept batch that cannot be read.
+    """
+    return read(design.batches(), folder=folder, workers=workers, advance=advance)[:, 0]
+
+
+def read(
+    batches: Sequence[FlagBatch], *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
+) -> FloatArray:
+    """(flag, place, window, observable) of batches, in order; those that the folder lacks are simulated. As
+    `simulated`."""
+    paths = [folder / f"{digest(canonical(dict(batch.content())))[:32]}.npz" for batch in batches]
+    missing = [place for place, path in enumerate(paths) if not path.exists()]
+    if advance is not None and len(missing) < len(batches):
+        advance(sum(len(batch.seeds) for place, batch in enumerate(batches) if place not in set(missing)))
+    folder.mkdir(parents=True, exist_ok=True)
+    if missing:
+        with ProcessPoolExecutor(
+            min(workers, len(missing)), mp_context=get_context("spawn"), initializer=single_threaded
+        ) as pool:
+            running = {pool.submit(_make, batches[place], paths[place]): place for place in missing}
+            for done in as_completed(running):
+                done.result()
+                if advance is not None:
+                    advance(len(batches[running[done]].seeds))
+    return np.concatenate([_read(path) for path in paths])
+
+
+def _make(batch: FlagBatch, path: Path) -> None:
+    buffer = BytesIO()
+    np.savez_compressed(buffer, readings=batch.read())
+    put_if_absent(path, buffer.getvalue())
+
+
+def _read(path: Path) -> FloatArray:
+    again = "delete the file: it is made anew"
+    content = read_arrays(path, what="a file of kept simulations", fix=again)
+    try:
+        return np.asarray(content["readings"], dtype=np.float64)
+    except (ValueError, KeyError, TypeError) as error:
+        raise CorruptError(f"kept simulations cannot be read: {error}", where=str(path), fix=again) from None
+
+
+TOGETHER = 8
+"""Flags of a batch: eight take as long as one, and sixteen take 2.7 times as long."""
+PAIRS = 16
+"""Flags with each effect, for each recording."""
+LONGEST_PAIRS = 120.0
+"""s of all recordings together in which flags with an effect are simulated, a minute of each at most."""
+MINUTE = 60.0
+FEWEST_WINDOWS = 8
+_DAMPING = next(one for one in CLOTH if one.name == "damping")
+
+
+def lasting(recordings: int) -> float:
+    """s of each of so many recordings in which flags with an effect are simulated: a whole number of windows."""
+    most = min(MINUTE, LONGEST_PAIRS / recordings)
+    return WINDOW * max(FEWEST_WINDOWS, int(most / WINDOW + 1e-9))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pairs:
+    """Flags with one effect, each a pair of one without.
+
+    Attributes:
+        effect: which.
+        places: (pair,) among the design's simulations.
+        strengths: (pair,) beyond the null value.
+        batches: of them, in that order.
+    """
+
+    effect: Weighable
+    places: IntArray
+    strengths: FloatArray
+    batches: tuple[FlagBatch, ...]
+
+
+def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
+    """The flags of a recording's design that are simulated with an effect, those of its longest steps.
+
+    Args:
+        until: part of the film that is simulated [s].
+    """
+    candidates = design.damped()
+    rng = stream(design.seed, "films", "pairs", effect.name)
+    count = min(PAIRS, len(candidates))
+    places = np.sort(rng.choice(candidates, count, replace=False))
+    shares = (rng.permutation(count) + rng.random(count)) / count
+    strengths = effect.prior.at(shares)
+    batches = []
+    for begin in range(0, count, TOGETHER):
+        part = places[begin : begin + TOGETHER]
+        batches.append(
+            replace(
+                design.batch(part),
+                until=min(until, design.duration),
+                effects=((effect.column, strengths[begin : begin + TOGETHER]),),
+            )
+        )
+    return Pairs(effect=effect, places=places, strengths=strengths, batches=tuple(batches))
+
+
+def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed: int) -> list[list[FlagBatch]]:
+    """Null experiments: for each recording a batch a kind of numerics, of `TOGETHER` cloths each. A cloth is the same
+    in all recordings, its place and anemometer are not.
+
+    Args:
+        places: for each recording the first one of its place.
+    """
+    count = kinds * TOGETHER
+    cloths = draws(designs[0].cloth, count, seed=seed, name="null cloths")
+    found = []
+    for number, design in zip(places, designs, strict=True):
+        own = {
+            one.name: one.at(stream(seed, "films", "null places", number, one.name).random(count))
+            for one in design.quantities()
+        }
+        own |= cloths
+        if design.log.distance is not None:
+            own["distance_constant"] = np.full(count, design.log.distance)
+        seen = np.stack([own["azimuth"], own["elevation"], np.full(count, design.distance)], axis=1)
+        first = design.batches()[0]
+        batches = []
+        for kind in range(kinds):
+            part = np.arange(kind * TOGETHER, (kind + 1) * TOGETHER)
+            numerics = Discretisation.drawn(stream(seed, "films", "kind", kind), explicit=_little())
+            values = {name: own[name][part] for name in first.values}
+            values["damping"] = _damping(values["damping"], explicit=numerics.step is None)
+            batches.append(
+                replace(
+                    first,
+                    values=values,
+                    places=seen[part][:, None],
+                    discretisation=numerics,
+                    seeds=tuple(child_seed(seed, "films", "null", design.recording, int(place)) for place in part),
+                )
+            )
+        found.append(batches)
+    return found
+
+
+def _little() -> float:
+    """Share of the cloths that damp less than what leapfrog is for."""
+    low, high = _DAMPING.at(np.array([0.0, 1.0])).tolist()
+    return math.log(max(LITTLE / low, 1.0)) / math.log(high / low)
+
+
+def _damping(drawn: FloatArray, *, explicit: bool) -> FloatArray:
+    """Dampings of the prior as those of the part below `LITTLE`, or of the part above it [s]."""
+    low, high = _DAMPING.at(np.array([0.0, 1.0])).tolist()
+    shares, edge = np.log(drawn / low) / math.log(high / low), _little()
+    return _DAMPING.at(shares * edge if explicit else edge + shares * (1 - edge))
+
+
+_PACE = 25.0
+"""Seconds of one flag that one core simulates in a second: 128 flags for two minutes took some ten minutes."""
+
+
+def announced(flag_seconds: float, *, workers: int) -> str:
+    """What is to be simulated, and for about how long.
+
+    Args:
+        flag_seconds: simulated seconds of all flags together.
+        workers: processes that share them.
+    """
+    return workload.announced(
+        f"simulating flags for {flag_seconds / 60:.0f} minutes in all",
+        flag_seconds / _PACE,
+        workers=workers,
+        kept="what was simulated before is kept and taken up",
+    )

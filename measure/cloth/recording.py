@@ -1,0 +1,347 @@
+"""What is calibrated on: the observables of a film's windows, the log of the wind beside it, and their summary.
+
+A summary is each observable at the log's mean wind, and how it changes with wind,
+
+    y_w = a + b ln(U_w/⟨U⟩) + n_w
+
+by least squares over the windows that show it. a and b of a simulation scatter about those of another one of the same
+cloth as n_w lets them, correlated between neighbouring windows or not: so no correlation has to be modelled.
+
+A part of an observable's error by pixels lasts: it is the same in all windows of a film. How large that part is differs
+by observable: an area is off by the same amount in every window, a frequency by another one in each. Of what lasts in a
+film a part is the flag's look, its colours, background and view, and the same in all recordings of it; the rest is the
+film's, whose wind bends the flag otherwise and whose light is another. Errors of observables that are read from the
+same outline are correlated. All is from films whose geometry is known (`python -m tests.studies looks`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from flagdata.arrays import BoolArray, FloatArray
+from flagdata.errors import InputError, RefusedError
+from flagdata.findings import Finding, Severity
+from flagdata.rng import stream
+from measure.cloth.simulation import OBSERVED
+from measure.cloth.wind import STEADY, Log
+from measure.observables.film import FilmWindow
+from measure.observables.observable import WINDOW
+
+SHOWN = 0.6
+"""Share of the windows that are to show an observable."""
+LEAST_WINDOWS = 4
+"""Fewest windows of a recording: 10 s."""
+LEAST_IN_ALL = 8
+"""Fewest windows of all recordings of a cloth together: 20 s."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Projection:
+    """From windows to summaries.
+
+    Attributes:
+        speed: (window,) mean of the logged wind [m/s].
+        changes: whether slopes are taken: not where the wind is constant.
+    """
+
+    speed: FloatArray
+    changes: bool
+
+    @property
+    def regressors(self) -> FloatArray:
+        """(window, 1 or 2)."""
+        relative = np.log(self.speed / np.exp(np.log(self.speed).mean()))
+        constant = np.ones_like(relative)
+        return np.stack([constant, relative], axis=1) if self.changes else constant[:, None]
+
+    def of(self, readings: FloatArray) -> FloatArray:
+        """(…, 1 or 2, observable) of readings (…, window, observable); NaN where too few windows show one."""
+        x = self.regressors
+        there = np.isfinite(readings)
+        y = np.where(there, readings, 0.0)
+        products = np.einsum("wi,wj,...wk->...kij", x, x, there.astype(np.float64))
+        enough = there.mean(axis=-2) >= SHOWN
+        products = np.where(enough[..., None, None], products, np.eye(x.shape[1]))
+        right = np.einsum("wi,...wk->...ki", x, y)
+        found = np.linalg.solve(products, right[..., None])[..., 0]
+        return np.swapaxes(np.where(enough[..., None], found, np.nan), -1, -2)
+
+    def at(self, summaries: FloatArray) -> FloatArray:
+        """(…, window, observable) that summaries stand for."""
+        return np.einsum("wi,...ik->...wk", self.regressors, summaries)
+
+
+def shown(readings: FloatArray) -> BoolArray:
+    """(observable,) whether enough windows (window, observable) show it."""
+    return np.asarray(np.isfinite(readings).mean(axis=0) >= SHOWN)
+
+
+LASTING = np.array([0.70, 0.93, 0.79, 0.31, 0.57, 0.31, 0.56, 0.97])
+"""(observable of `simulation.OBSERVED`) share of the variance that lasts: of 118 windows of 64 films by VTK, whose
+deviation is `Observable.sigma` (docs/results/validate-looks.md)."""
+COMMON = 0.63
+"""Share of what lasts in a film that is the same in all recordings of the flag: 0.37 to 0.77, of two films each of
+twelve looks by the raster renderer, of all observables together."""
+LASTING_TOGETHER = {
+    ("extension", "area"): 0.77,
+    ("frequency", "bandwidth"): 0.85,
+    ("middle-speed", "amplitude-across"): 0.56,
+    ("amplitude-up", "amplitude-across"): 0.56,
+}
+"""Correlations of these films' mean errors. All others are within three standard errors of none."""
+PASSING_TOGETHER = {("frequency", "bandwidth"): 0.75, ("bandwidth", "amplitude-up"): -0.44}
+"""The same of the differences of their two windows."""
+
+
+def pixel_errors(projection: Projection, windows: int, count: int, *, name: str, seed: int) -> FloatArray:
+    """(count, 1 or 2, observable) errors of summaries of films whose windows err by a standard deviation of one.
+
+    Args:
+        projection: of the film's windows.
+        windows: how many they are.
+        name: of the recording.
+    """
+    size = len(OBSERVED)
+    passing = stream(seed, "pixels", "passing", name).standard_normal((count, windows, size)) @ _PASSING.T
+    look, film = (stream(seed, "pixels", "lasting", *own).standard_normal((count, size)) for own in ((), (name,)))
+    lasting = (np.sqrt(COMMON) * look + np.sqrt(1 - COMMON) * film) @ _LASTING.T
+    found = projection.of(np.sqrt(1 - LASTING) * passing)
+    found[:, 0] += np.sqrt(LASTING) * lasting
+    return found
+
+
+def correlations(together: Mapping[tuple[str, str], float]) -> FloatArray:
+    """(observable, observable) of pairs of names."""
+    found = np.eye(len(OBSERVED))
+    for (one, other), value in together.items():
+        a, b = OBSERVED.index(one), OBSERVED.index(other)
+        found[a, b] = found[b, a] = value
+    return found
+
+
+_LASTING, _PASSING = (np.linalg.cholesky(correlations(one)) for one in (LASTING_TOGETHER, PASSING_TOGETHER))
+LONGEST = 120.0
+"""s of a film that are simulated: two minutes cost minutes."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Excerpt:
+    """A window of the film in pictures.
+
+    Attributes:
+        number: of the window.
+        window: its pictures, and where its hoist is in them.
+    """
+
+    number: int
+    window: FilmWindow
+
+    @classmethod
+    def of(cls, windows: Sequence[FilmWindow | None]) -> Excerpt | None:
+        """The window nearest to the middle of a film's second half; None where no window of that half was read."""
+        half = len(windows) // 2
+        later = [cls(number=half + k, window=one) for k, one in enumerate(windows[half:]) if one is not None]
+        return min(later, key=lambda own: abs(own.number - (half + len(windows)) / 2), default=None)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Observed:
+    """A recording.
+
+    Attributes:
+        name: what people call it.
+        source: identity of what it was read from.
+        readings: (window, observable) of windows of `WINDOW` seconds that follow one another, in the order of
+            `simulation.OBSERVED`; NaN where a window does not show one.
+        sigma: (observable,) what a window's readings of a film are off by; 0 for geometry.
+        log: of the wind, its times since the first window begins.
+        first: where the first window begins in the film or table [s].
+        place: what is shared by recordings from one place with one anemometer, whose gain and view are one; None for
+            a recording of a place of its own.
+        findings: what was noticed.
+        excerpt: some of its film; None where there is no film.
+
+    Raises:
+        InputError: shapes that disagree, or too few windows.
+        RefusedError: no observable is shown in enough of them.
+    """
+
+    name: str
+    source: str
+    readings: FloatArray
+    log: Log
+    first: float = 0.0
+    place: str | None = None
+    sigma: FloatArray = field(default_factory=lambda: np.zeros(len(OBSERVED)))
+    findings: tuple[Finding, ...] = ()
+    excerpt: Excerpt | None = None
+
+    def __post_init__(self) -> None:
+        count = len(OBSERVED)
+        if self.readings.ndim != 2 or self.readings.shape[1] != count or self.sigma.shape != (count,):
+            raise InputError(
+                f"readings of shape {self.readings.shape}", where=self.name, fix=f"give (window, {count}) of {OBSERVED}"
+            )
+        check_duration(len(self.readings) * WINDOW, where=self.name)
+        if not shown(self.readings).any():
+            raise RefusedError(
+                f"no observable could be read in {SHOWN:.0%} of the windows: what is followed may not be the flag",
+                where=self.name,
+                fix="look at the film with flagdata observe --picture, and choose the flag with --crop or --flag",
+            )
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return len(self.readings) * WINDOW
+
+    @property
+    def speed(self) -> FloatArray:
+        """(window,) mean of the logged wind [m/s]."""
+        starts = np.arange(len(self.readings)) * WINDOW
+        return self.log.mean_speed(starts, starts + WINDOW)
+
+    @property
+    def steady(self) -> bool:
+        """Whether the wind is constant."""
+        speed = self.speed
+        return float(speed.std()) < STEADY * float(speed.mean())
+
+    @property
+    def projection(self) -> Projection:
+        """From its windows to its summary."""
+        return Projection(speed=self.speed, changes=not self.steady)
+
+    @property
+    def summary(self) -> FloatArray:
+        """(summary,)."""
+        return self.projection.of(self.readings).ravel()
+
+    def pixels(self, count: int, *, seed: int) -> FloatArray:
+        """(count, 1 or 2, observable) draws of what errors of pixels add to its summary."""
+        return self.sigma * pixel_errors(self.projection, len(self.readings), count, name=self.name, seed=seed)
+
+
+def constant_wind(recordings: Sequence[Observed]) -> tuple[Finding, ...]:
+    """What recordings of a flag leave open where all their winds are one."""
+    speed = np.concatenate([one.speed for one in recordings])
+    if speed.std() >= STEADY * speed.mean():
+        return ()
+    what = (
+        f"the wind hardly changes ({speed.mean():.1f} m/s, its windows within {speed.std():.2f} m/s): "
+        "air density, drag coefficient, the anemometer's gain and the weight act alike, and the weight rests on "
+        "what is assumed of the others"
+    )
+    fix = "add recordings in other winds: flagdata calibrate takes several of one flag"
+    return (Finding.of("constant-wind", what, fix=fix),)
+
+
+def cut(found: Observed, first: float, last: float | None) -> Observed:
+    """The windows from `first` to `last` [s], `LONGEST` at most.
+
+    Raises:
+        InputError: the log does not cover them, or too few are left.
+    """
+    begin = math.ceil(first / WINDOW - 1e-9)
+    end = len(found.readings) if last is None else math.floor(last / WINDOW + 1e-9)
+    most = begin + round(LONGEST / WINDOW)
+    findings = found.findings
+    if min(end, len(found.readings)) > most:
+        findings = (*findings, first_part((min(end, len(found.readings)) - begin) * WINDOW))
+    readings = found.readings[begin : min(end, most)]
+    log = found.log.cut(begin * WINDOW, (begin + len(readings)) * WINDOW)
+    return replace(found, readings=readings, log=log, first=found.first + begin * WINDOW, findings=findings)
+
+
+def check_duration(seconds: float, *, where: str) -> None:
+    """Refuse a recording that has too few windows.
+
+    Raises:
+        InputError: so it is.
+    """
+    if seconds < LEAST_WINDOWS * WINDOW:
+        raise InputError(
+            f"{max(seconds, 0.0):.3g} s of film with a log beside them",
+            where=where,
+            fix=f"give {LEAST_WINDOWS * WINDOW:g} s or more; two minutes are better",
+        )
+
+
+class _Lasting(Protocol):
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def duration(self) -> float: ...
+
+
+def check_in_all(recordings: Sequence[_Lasting], *, left_out: Sequence[Finding] = ()) -> None:
+    """Refuses recordings of one flag that are together too short to weigh it.
+
+    Args:
+        left_out: a warning for each of those that do not count.
+
+    Raises:
+        InputError: so they are.
+    """
+    seconds = sum(recording.duration for recording in recordings)
+    if seconds < LEAST_IN_ALL * WINDOW - 1e-9:
+        without = "".join(f"; {finding.what}" for finding in left_out)
+        raise InputError(
+            f"{seconds:.3g} s of film with a log beside them{without}",
+            where=", ".join(recording.name for recording in recordings),
+            fix=f"give {LEAST_IN_ALL * WINDOW:g} s or more in all; two minutes are better",
+        )
+
+
+def first_part(duration: float) -> Finding:
+    """What a recording of that duration [s] above `LONGEST` is reported with."""
+    what = f"of {duration:.1f} s the first {LONGEST:g} are used"
+    return Finding.of("first-part", what, fix="choose others with --start and --end")
+
+
+S = TypeVar("S")
+T = TypeVar("T")
+LEFT_OUT = "left-out"
+"""Kind of the finding that names one."""
+
+
+def usable(
+    recordings: Sequence[S], use: Callable[[S], T], *, name: Callable[[S], str]
+) -> tuple[list[T], tuple[Finding, ...]]:
+    """What those recordings come to that can be used, and a warning for each that cannot. Errors of a kind that is not
+    the recording's, such as a name that nothing has, are raised.
+
+    Args:
+        use: raises InputError or RefusedError where a recording cannot be used.
+        name: by which a person knows it.
+
+    Raises:
+        InputError, RefusedError: the error of a single recording.
+        RefusedError: none of several can be used.
+    """
+    found: list[T] = []
+    failed: list[tuple[str, InputError | RefusedError]] = []
+    for one in recordings:
+        try:
+            found.append(use(one))
+        except (InputError, RefusedError) as error:
+            if len(recordings) == 1:
+                raise
+            failed.append((name(one), error))
+    if failed and not found:
+        reasons = "; ".join(f"{who}: {error.what}" for who, error in failed)
+        raise RefusedError(
+            f"none of {len(failed)} recordings can be used: {reasons}",
+            where=", ".join(who for who, _ in failed),
+            fix="; ".join(dict.fromkeys(error.fix for _, error in failed)),
+        )
+    return found, tuple(
+        Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=f"{who} is left out: {error.what}", fix=error.fix)
+        for who, error in failed
+    )

@@ -1,0 +1,212 @@
+"""Errors on windows that a model was not fitted to: each observable in its unit, beside the scatter of replicates.
+
+The model is calibrated on one half of each recording and predicts the means of the other half, both ways; where there
+are several recordings, also on all but one of them, in turn. Errors are of means over windows, since single windows
+scatter by chaos whatever the model is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+from flagdata.arrays import FloatArray
+from flagdata.rng import stream
+from measure.cloth.design import Weighable
+from measure.cloth.evidence import Sight, fitted, hypothesis
+from measure.cloth.recording import LEAST_WINDOWS, Observed
+from measure.cloth.simulation import OBSERVED
+from measure.cloth.simulations import Simulations, of_recordings, part_of, sights_of
+from measure.observables import OBSERVABLES
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Comparison, Estimate
+
+_DRAWS = 500
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prediction:
+    """What was predicted of windows that were not fitted.
+
+    Attributes:
+        observed: (observable,) mean over them; NaN where they do not show one.
+        before, after, control: predicted by the base model, with the effect, with the best wrong one.
+        scatter: (observable,) standard deviation of replicates.
+        windows: how many.
+    """
+
+    observed: FloatArray
+    before: FloatArray
+    after: FloatArray | None
+    control: FloatArray | None
+    scatter: FloatArray
+    windows: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Task:
+    """Sights that are fitted, and those that are predicted: (place of the fitted one or None, sight, observed)."""
+
+    fitted: tuple[tuple[Sight, Observed], ...]
+    predicted: tuple[tuple[int | None, Sight, Observed], ...]
+
+
+def compared(
+    recordings: Sequence[Observed],
+    simulations: Simulations,
+    sights: Sequence[Sight],
+    *,
+    effect: Weighable | None,
+    control: Weighable | None,
+    weighed: tuple[float, float] | None = None,
+    seed: int,
+) -> tuple[Comparison, ...]:
+    """Comparisons for each observable: on other halves, and on recordings left out.
+
+    Args:
+        sights: of whole recordings.
+        effect: that is named; None for none.
+        control: the best wrong effect; None for none.
+        weighed: mean and standard deviation of a stated area weight [kg/m²].
+    """
+    found: list[Comparison] = []
+    for words, tasks in (
+        ("other halves", _halves(recordings, simulations)),
+        ("recordings left out", _left_out(recordings, sights)),
+    ):
+        predictions = [
+            one
+            for task in tasks
+            for one in _predicted(task, effect=effect, control=control, weighed=weighed, seed=seed)
+        ]
+        for place, name in enumerate(OBSERVED):
+            own = [one for one in predictions if math.isfinite(one.observed[place] + one.before[place])]
+            if own:
+                found.append(_comparison(f"{name}, {words}", name, place, own, control, seed=seed))
+    return tuple(found)
+
+
+def _halves(recordings: Sequence[Observed], simulations: Simulations) -> list[_Task]:
+    """One half of each recording fitted and the other predicted, both ways; none where `halved` gives none."""
+    return [
+        _Task(fitted=a, predicted=tuple((place, s, o) for place, (s, o) in enumerate(b)))
+        for a, b in permutations(halved(recordings, simulations), 2)
+    ]
+
+
+def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[tuple[tuple[Sight, Observed], ...], ...]:
+    """The models and windows of all first halves, and those of all second halves; nothing of recordings that are too
+    short, or that are rows of a table against wind, whose windows are the same."""
+    if min(len(one.readings) for one in recordings) < 2 * LEAST_WINDOWS or any(one.place for one in recordings):
+        return ()
+    middles = [len(one.readings) // 2 for one in recordings]
+    sides = []
+    for halves in ([slice(0, middle) for middle in middles], [slice(middle, None) for middle in middles]):
+        models = sights_of(recordings, simulations, windows=halves)
+        parts = [part_of(one, windows) for one, windows in zip(recordings, halves, strict=True)]
+        sides.append(tuple(zip(models, parts, strict=True)))
+    return tuple(sides)
+
+
+def _left_out(recordings: Sequence[Observed], sights: Sequence[Sight]) -> list[_Task]:
+    """Each recording predicted by all others."""
+    both = list(zip(sights, recordings, strict=True))
+    if len(both) < 2:
+        return []
+    return [
+        _Task(fitted=(*both[:place], *both[place + 1 :]), predicted=((None, *both[place]),))
+        for place in range(len(both))
+    ]
+
+
+def _predicted(
+    task: _Task, *, effect: Weighable | None, control: Weighable | None, weighed: tuple[float, float] | None, seed: int
+) -> list[Prediction]:
+    sights = [one for one, _ in task.fitted]
+    seen = of_recordings(sights, [own for _, own in task.fitted], weighed)
+    rng = stream(seed, "films", "places")
+
+    def means(which: Weighable | None) -> list[FloatArray]:
+        """(observable,) of each predicted sight."""
+        found = fitted(sights, seen, which, seed=seed)
+        own, places, strength = hypothesis(sights, which).values(found.scores[0])
+        made = []
+        for place, one, _ in task.predicted:
+            values = (
+                places[place]
+                if place is not None
+                else {q.name: q.at(rng.random(len(found.weights[0]))) for q in one.quantities}
+            )
+            mean, _ = one.predict({**own, **values}, None if which is None else which.name, strength)
+            full = np.full(len(one.used), np.nan)
+            full[one.used] = found.weights[0] @ mean
+            made.append(full[: len(OBSERVED)])
+        return made
+
+    known = all(
+        one is None or all(one.name in s.responses for s in (*sights, *(p for _, p, _ in task.predicted)))
+        for one in (effect, control)
+    )
+    before = means(None)
+    after = means(effect) if effect is not None and known else None
+    wrong = means(control) if control is not None and known else None
+    result = []
+    for number, (_, one, own) in enumerate(task.predicted):
+        scatter = np.full(len(one.used), np.nan)
+        scatter[one.used] = one.emulator.deviations
+        result.append(
+            Prediction(
+                observed=own.summary[: len(OBSERVED)],
+                before=before[number],
+                after=None if after is None else after[number],
+                control=None if wrong is None else wrong[number],
+                scatter=scatter[: len(OBSERVED)],
+                windows=len(own.readings),
+            )
+        )
+    return result
+
+
+def _comparison(
+    words: str, name: str, place: int, own: Sequence[Prediction], control: Weighable | None, *, seed: int
+) -> Comparison:
+    """Root mean squares over the predicted parts, with intervals by the scatter of replicates."""
+    unit = OBSERVABLES[name].unit
+    observed, scatter = (np.array([getattr(one, key)[place] for one in own]) for key in ("observed", "scatter"))
+    noise = scatter * stream(seed, "films", "unseen", words).standard_normal((_DRAWS, len(own)))
+
+    def errors(predicted: Sequence[FloatArray]) -> tuple[float, FloatArray]:
+        off = observed - np.array([one[place] for one in predicted])
+        return float(np.sqrt(np.square(off).mean())), np.sqrt(np.square(off + noise).mean(axis=1))
+
+    before = errors([one.before for one in own])
+    with_effect = [one.after for one in own if one.after is not None]
+    with_control = [one.control for one in own if one.control is not None]
+    after, wrong = errors(with_effect) if with_effect else None, errors(with_control) if with_control else None
+    floor = float(np.sqrt(np.square(scatter).mean()))
+    reduction = None if after is None else (before[0] - after[0], before[1] - after[1])
+    stated = _estimate(before, unit)
+    return Comparison(
+        what=words,
+        frames=sum(one.windows for one in own),
+        before=stated,
+        after=_estimate(after, unit),
+        reduction=_estimate(reduction, unit),
+        floor=Estimate(value=floor, low=floor, high=floor, unit=unit, level=CRITERIA.interval),
+        share=None if reduction is None or stated.low <= floor else reduction[0] / (before[0] - floor),
+        control=None if wrong is None else _estimate(wrong, unit),
+        control_name="" if wrong is None or control is None else control.column.effect,
+    )
+
+
+def _estimate(found: tuple[float, FloatArray] | None, unit: str) -> Estimate:
+    if found is None:
+        return Estimate(value=math.nan, low=math.nan, high=math.nan, unit=unit, level=CRITERIA.interval)
+    value, draws = found
+    tails = [(1 - CRITERIA.interval) / 2, (1 + CRITERIA.interval) / 2]
+    low, high = np.quantile(draws, tails).tolist()
+    return Estimate(value=value, low=min(low, value), high=max(high, value), unit=unit, level=CRITERIA.interval)

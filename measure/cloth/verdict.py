@@ -1,0 +1,285 @@
+"""The verdict on films in numbers: which effects may be missing, how strong, and what the cloth is with them.
+
+verdict = close_loop(recordings, FilmLoopOptions(calibration=...), folder=..., workers=2)
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.special import ndtr
+
+from flagdata.arrays import FloatArray
+from flagdata.findings import Severity
+from flagdata.provenance import code_version
+from measure.cloth.design import Weighable
+from measure.cloth.evidence import (
+    Fit,
+    expected,
+    fitted,
+    hypothesis,
+    quantiles,
+)
+from measure.cloth.loop import (
+    FilmLoopOptions,
+    SolvedLoop,
+    solve,
+)
+from measure.cloth.prior import CLOTH
+from measure.cloth.recording import Observed
+from measure.cloth.simulations import of_recordings
+from measure.cloth.statement import stated
+from measure.cloth.unseen import compared
+from measure.ends import Bound, span
+from measure.forecasting.setting import Stage
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.decided import NOT_REJECTED
+from measure.verdict.record import Candidate, Estimate, NullTest, Parameter, Power, Verdict
+
+SEEN = 2.0
+"""Standard errors below which even a strong effect is not seen."""
+_EVEN = 1000
+"""Draws of a posterior that are taken evenly from importance samples."""
+
+
+def close_loop(
+    recordings: Sequence[Observed],
+    options: FilmLoopOptions,
+    *,
+    folder: Path,
+    workers: int = 1,
+    stage: Stage | None = None,
+) -> Verdict:
+    """The verdict on recordings of one flag.
+
+    Args:
+        recordings: each cut to what is to be used; in different winds they say most.
+        folder: where simulations are kept.
+        workers: processes that simulate.
+        stage: called with what is simulated, and how many flags of how many are done.
+
+    Raises:
+        InputError: recordings that too few simulations resemble.
+        CorruptError: a kept batch that cannot be read.
+    """
+    begun = time.monotonic()
+    verdict = verdict_of(solve(recordings, options, folder=folder, workers=workers, stage=stage))
+    return replace(verdict, seconds=time.monotonic() - begun)
+
+
+def verdict_of(outcome: SolvedLoop) -> Verdict:
+    """The verdict in numbers and sentences."""
+    judged, options = outcome.judged, outcome.options
+    effects = outcome.weighing.effects
+    named = tuple(dict.fromkeys(effects[place].column.effect for place in judged.named))
+    acting = outcome.best if judged.named else None
+    others = [place for place in np.argsort(-judged.probability) if place not in judged.confident]
+    comparisons = compared(
+        outcome.recordings,
+        outcome.simulations,
+        outcome.sights,
+        effect=None if acting is None else acting[0],
+        control=effects[others[0]] if others and acting is not None else None,
+        weighed=options.area_weight,
+        seed=options.calibration.seed,
+    )
+    verdict = Verdict(
+        conclusion=judged.conclusion,
+        named=named,
+        words="",
+        test=_test(outcome),
+        parameters=_parameters(outcome),
+        ranking=_ranking(outcome),
+        comparisons=comparisons,
+        residuals=(),
+        provenance={
+            "seed": options.calibration.seed,
+            "code": code_version(),
+            "criteria": CRITERIA.as_dict(),
+            "options": options.recipe(),
+        },
+        power=_power(outcome),
+        open=judged.open,
+        findings=tuple((f.kind, f.what) for f in outcome.findings if f.severity is not Severity.NOTE),
+    )
+    unseen = [
+        one.column.effect for one, errors in zip(effects, outcome.sensitivity.tolist(), strict=True) if errors < SEEN
+    ]
+    return stated(
+        verdict,
+        outcome.recordings,
+        weighed=options.area_weight is not None,
+        unseen=tuple(dict.fromkeys(unseen)),
+        departing=tuple(one for one in outcome.departures if abs(one.deviations) >= SEEN),
+    )
+
+
+def _test(outcome: SolvedLoop) -> NullTest:
+    scored, level, suspected = outcome.judged.scored, outcome.options.level, outcome.options.suspected
+    nulls, statistic = scored.nulls, scored.statistic
+    low, high = nulls.interval(statistic, level=CRITERIA.interval)
+    return NullTest(
+        statistic=statistic,
+        null=nulls.null.tolist(),
+        kinds=nulls.count,
+        level=level,
+        p_value=Estimate(value=scored.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
+        critical=nulls.critical(level),
+        open=low <= level <= high,
+        settling=nulls.settling(statistic, at=level, level=CRITERIA.interval) if low <= level <= high else None,
+        effective=nulls.effective,
+        correlation=nulls.correlation,
+        tail=nulls.tail(statistic),
+        suspected="" if suspected is None else suspected.words,
+        nulls=f"{len(nulls.null)} flags of {nulls.count} meshes and methods in the same minutes of wind, over "
+        "the priors of cloth, view and anemometer",
+    )
+
+
+def _power(outcome: SolvedLoop) -> tuple[Power, ...]:
+    """Of each effect, the surest first."""
+    effects, power = outcome.weighing.effects, outcome.judged.scored.power
+    return tuple(
+        Power(
+            effect=effects[place].column.effect,
+            parameter=effects[place].column.parameter,
+            strength=expected(outcome.sights, effects[place]),
+            unit=effects[place].column.unit,
+            share=float(power[place]),
+        )
+        for place in np.argsort(-power, kind="stable").tolist()
+    )
+
+
+def _parameters(outcome: SolvedLoop) -> tuple[Parameter, ...]:
+    """Area weight, bending and damping, of the base model and with the effect."""
+    before = _cloths(outcome, None, outcome.base)
+    after = None
+    if outcome.judged.named and outcome.best is not None:
+        after = _cloths(outcome, *outcome.best)
+    made = []
+    for place, one in enumerate(CLOTH):
+        later = None if after is None else after[place]
+        made.append(
+            Parameter(
+                name=one.name,
+                before=before[place][0],
+                after=None if later is None else later[0],
+                shift=None if later is None else (later[0].value - before[place][0].value) / before[place][1],
+            )
+        )
+    return tuple(made)
+
+
+def _cloths(outcome: SolvedLoop, effect: Weighable | None, fit: Fit) -> list[tuple[Estimate, float]]:
+    own, _, _ = hypothesis(outcome.sights, effect).values(fit.scores[0])
+    return [_marginal(own[one.name], fit.weights[0], one.unit) for one in CLOTH]
+
+
+def _marginal(values: FloatArray, weights: FloatArray, unit: str) -> tuple[Estimate, float]:
+    tail = (1 - CRITERIA.interval) / 2
+    low, middle, high = quantiles(values, weights, (tail, 0.5, 1 - tail))
+    mean = float(weights @ values)
+    sigma = float(np.sqrt(weights @ np.square(values - mean)))
+    return Estimate(value=middle, low=low, high=high, unit=unit, level=CRITERIA.interval), sigma
+
+
+def strength_of(effect: Weighable, fit: Fit) -> Estimate:
+    """A strength, its interval widened by what meshes and cloths do to effects, as on trajectories; a bound where the
+    posterior leans on an end of what is assumed of it (`measure.ends`)."""
+    shares = ndtr(fit.scores[0][:, -1])  # the last coordinate
+    strengths, whole = effect.prior.at(shares), float(np.exp(CRITERIA.reach * CRITERIA.strength_factor))
+    found, _ = _marginal(strengths, fit.weights[0], effect.column.unit)
+    if (bound := _bound(effect, strengths, shares, fit.weights[0], whole=whole)) is not None:
+        return bound
+    value, size, null = found.value, abs(found.value), effect.column.described.null
+    inward, outward = size * (1 - 1 / whole), size * (whole - 1)
+    below, above = (inward, outward) if value > 0 else (outward, inward)
+    return Estimate(
+        value=null + value,
+        low=null + value - float(np.hypot(below, value - found.low)),
+        high=null + value + float(np.hypot(above, found.high - value)),
+        unit=found.unit,
+        level=found.level,
+    )
+
+
+def _bound(
+    effect: Weighable, strengths: FloatArray, shares: FloatArray, weights: FloatArray, *, whole: float
+) -> Estimate | None:
+    """A strength that is known on one side only; None of one with two ends.
+
+    Args:
+        strengths, shares: (n,) of it beyond null, and their places in its prior, of importance samples.
+        weights: (n,) of them, of sum 1.
+        whole: factor by which a strength may be off.
+    """
+    even = (np.arange(_EVEN) + 0.5) / _EVEN
+    drawn = np.minimum(np.searchsorted(np.cumsum(weights), even), len(weights) - 1)
+    found = span(
+        strengths[drawn],
+        shares[drawn],
+        level=CRITERIA.interval,
+        limits=(0.0, np.inf) if effect.low > 0 else (-np.inf, np.inf),
+        assumed=(effect.low, effect.high),
+    )
+    if found.bound is None:
+        return None
+    least = found.bound is Bound.LEAST
+    end = found.high if found.bound is Bound.MOST else found.low if least else float(np.median(strengths[drawn]))
+    # A bound gives way by the factor: upwards where it is one from above, and towards zero where it holds a size.
+    wider = end / whole if (end > 0) == least else end * whole
+    null = effect.column.described.null
+    ends = {Bound.LEAST: (wider, found.high), Bound.MOST: (found.low, wider)}.get(found.bound, (found.low, found.high))
+    return Estimate(
+        value=null + (end if found.bound is Bound.NOTHING else wider),
+        low=null + ends[0],
+        high=null + ends[1],
+        unit=effect.column.unit,
+        level=found.level,
+        bound=found.bound.value,
+    )
+
+
+def _ranking(outcome: SolvedLoop) -> tuple[Candidate, ...]:
+    judged, own = outcome.judged, outcome.weighing
+    seen = of_recordings(outcome.sights, outcome.recordings, outcome.options.area_weight)
+    made = []
+    for place in np.argsort(-judged.probability).tolist():
+        effect = own.effects[place]
+        fit = fitted(outcome.sights, seen, effect, seed=outcome.options.calibration.seed)
+        made.append(
+            Candidate(
+                effect=effect.column.effect,
+                parameter=effect.column.parameter,
+                strength=strength_of(effect, fit),
+                z=float(judged.scored.z[place]),
+                p_value=float(judged.scored.alone[place]),
+                p_family=float(judged.scored.family[place]),
+                gain=float(own.factors[0, place]),
+                gain_error=float("nan"),
+                behind=0.0,
+                leftover=float(judged.leftover[place]),
+                null=effect.column.described.null,
+                probability=float(judged.probability[place]),
+                why_not=_why_not(outcome, place),
+            )
+        )
+    return tuple(made)
+
+
+def _why_not(outcome: SolvedLoop, place: int) -> str:
+    judged = outcome.judged
+    if place in judged.named:
+        return ""
+    if judged.conclusion in NOT_REJECTED:
+        return "the base model is not rejected"
+    if judged.leftover[place] <= outcome.options.level:
+        return "what remains with it is larger than in null experiments"
+    if place in judged.confident:
+        return "another effect explains more"
+    return f"its probability is {judged.probability[place]:.1g}, given that one effect is missing"
