@@ -133,7 +133,7 @@ def features_of(
         summaries=summaries,
         winds=winds,
         clip=clip,
-        place=_place(film, *hoist.found()),
+        place=_place_of(film, *hoist.found()),
     )
 
 
@@ -159,7 +159,7 @@ class _Hoist:
         return np.median(self._ends, axis=0), float(np.sign(self._side))
 
 
-def _place(film: ConditionedFilm, hoist: FloatArray, side: float) -> Place:
+def _place_of(film: ConditionedFilm, hoist: FloatArray, side: float) -> Place:
     """Returns the place, as the last reading of the film shows it."""
     detection, reference = film.found, film.reference
     if detection is None or reference is None or detection.region is None:

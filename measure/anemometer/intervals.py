@@ -25,7 +25,7 @@ def half_width(errors: FloatArray, level: float) -> float:
 def mean_errors(
     errors: FloatArray, *, count: int, length: int, draws: int, generator: np.random.Generator
 ) -> FloatArray:
-    """(draw,) errors of the mean over `count` windows [m/s]: blocks of neighbouring errors drawn with replacement
+    """Draws errors (draw,) of the mean over `count` windows [m/s]: blocks of neighbouring errors drawn with replacement
     (moving blocks: Künsch, Annals of Statistics 17, 1989).
 
     Args:

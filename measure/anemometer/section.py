@@ -28,8 +28,8 @@ def section(result: Calibrated) -> Section:
                 "name": recording.name,
                 "windows": int(recording.usable.sum()),
                 "anemometer": recording.sensor.name,
-                "accuracy": _stated(recording.sensor.accuracy, "m/s"),
-                "distance": _stated(recording.sensor.distance_constant, "m"),
+                "accuracy": _with_unit(recording.sensor.accuracy, "m/s"),
+                "distance": _with_unit(recording.sensor.distance_constant, "m"),
             }
             for recording in result.recordings
         ],
@@ -50,7 +50,7 @@ def page(result: Calibrated, name: str, provenance: Mapping[str, str]) -> str:
     return render("measure.anemometer", "page.html.j2", values)
 
 
-def _stated(value: float | None, unit: str) -> str:
+def _with_unit(value: float | None, unit: str) -> str:
     return "not stated" if value is None else f"{value:g} {unit}"
 
 

@@ -29,8 +29,8 @@ _FAMILIAR: Mapping[str, tuple[str, ...]] = {
 
 
 def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
-    """A new Zarr folder: the regression over `column`, the windows' `winds` and `errors` over `window`, what windows
-    show beside the wind over `feature`, and the `hoist`, `background` and `bare` of each camera's place.
+    """Writes a new Zarr folder: the regression over `column`, the windows' `winds` and `errors` over `window`, what
+    windows show beside the wind over `feature`, and the `hoist`, `background` and `bare` of each camera's place.
 
     Args:
         about: what is reported of the calibration, JSON values.

@@ -83,11 +83,11 @@ def weighing_step(shell: Transcript, recording: Recording) -> None:
         f"{math.degrees(noted.azimuth):.0f}° from the wind's direction and {noted.distance:.1f} m away."
     )
     with _Step(shell, "What the cloth weighs", done, page="weighed.html") as step:
-        step.took(shell.attempt("calibrate", "flag", *_filmed(recording), "--report", "weighed.html"))
+        step.took(shell.attempt("calibrate", "flag", *_film_options(recording), "--report", "weighed.html"))
         step.beside(
             "area weight, by the model without what acts",
             f"{recording.area_weight:.3f} kg/m²",
-            _judged(step.found, recording.area_weight),
+            _judgement(step.found, recording.area_weight),
         )
 
 
@@ -103,7 +103,7 @@ def loop_step(shell: Transcript, recording: Recording) -> None:
         printed = shell.attempt(
             "close-loop",
             "flag",
-            *_filmed(recording),
+            *_film_options(recording),
             "--area-weight",
             scale_weight,
             "--nulls",
@@ -132,7 +132,7 @@ def _beside_what_acts(step: _Step, acting: Acting, verdict: dict[str, Any] | Non
         step.beside(subject, acting.sentence, Judgement.RIGHT, inferred=several if len(named) > 1 else "")
 
 
-def _filmed(recording: Recording) -> tuple[str, ...]:
+def _film_options(recording: Recording) -> tuple[str, ...]:
     """Returns options of the film that weighing and the loop have in common, so that they share simulations."""
     noted = recording.noted
     return (
@@ -287,11 +287,11 @@ def _measured(shell: Transcript, recording: Recording) -> None:
         step.took(None if printed is None else _first(printed))
         if printed is not None:
             step.picture = _series(shell.folder / "lake", recording)
-        mean = float(_during(recording).mean())
-        step.beside("mean wind at the flag", f"{mean:.2f} m/s", _judged(step.found, mean))
+        mean = float(_wind_of_film(recording).mean())
+        step.beside("mean wind at the flag", f"{mean:.2f} m/s", _judgement(step.found, mean))
 
 
-def _during(recording: Recording) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _wind_of_film(recording: Recording) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Returns the true wind from the first frame to the last [m/s]."""
     first = round(BEFORE * AIR_RATE)
     return recording.wind[first : len(recording.wind) - first]
@@ -306,7 +306,7 @@ def _series(lake_path: Path, recording: Recording) -> str:
     time_, value, low, high = (columns[name] for name in ("time", "wind", "low", "high"))
     figure = Figure(figsize=(9.5, 3.2), layout="constrained")
     axes = figure.subplots()
-    wind = _during(recording)
+    wind = _wind_of_film(recording)
     axes.plot(np.arange(len(wind)) / AIR_RATE, wind, color="0.75", linewidth=0.8, label="true wind at the flag")
     axes.errorbar(
         time_,
@@ -338,7 +338,7 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def _judged(text: str, true: float) -> Judgement:
+def _judgement(text: str, true: float) -> Judgement:
     """Judges the first interval or bound of a text by a true value; a text without one is a refusal."""
     ends = re.search(r"\[([\d.]+), ([\d.]+)\]|at least ([\d.]+)|at most ([\d.]+)", text)
     if ends is None:

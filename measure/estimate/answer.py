@@ -159,7 +159,7 @@ def quantities(
         ends = float(assumed[k, 0]), float(assumed[k, 1])
         stated_value, limits = stated_values.get(name), limits_of(name)
         if stated_value is not None and stated_value.exact:
-            answers.append(_given(name, stated_value.low, level=level))
+            answers.append(_exact(name, stated_value.low, level=level))
             continue
         if stated_value is not None and not stated_value.sigma:
             limits = stated_value.low, stated_value.high
@@ -179,7 +179,7 @@ def quantities(
     return tuple(answers)
 
 
-def _given(name: str, value: float, *, level: float) -> Quantity:
+def _exact(name: str, value: float, *, level: float) -> Quantity:
     """Returns a quantity whose value the user stated."""
     exact = Span(low=value, high=value, level=level, bound=None, estimated=True)
     return Quantity(

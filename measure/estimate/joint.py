@@ -129,7 +129,7 @@ class Joint:
     def by_weight(
         self, looks: Sequence[Look], dependence: Dependence, quantities: Sequence[Quantity], draws: FloatArray
     ) -> Finding | None:
-        """How the wind would change with the weight of the cloth, where that is open and matters: the answers for a
+        """Reports how the wind would change with the area weight, where that is open and matters: the answers for a
         light and a heavy cloth of those that the answer leaves possible; None where it does not.
 
         Args:
@@ -167,7 +167,7 @@ class Joint:
         )
 
     def joint(self, looks: Sequence[Look], dependence: Dependence) -> tuple[FloatArray, FloatArray]:
-        """(n, target) draws of all windows together, the wind their mean, and (m, target) places of the windows' own in
+        """Combines all windows: draws (n, target), the wind their mean, and (m, target) places of the windows' own in
         the network's range."""
         wind_columns = [column for column, name in enumerate(self.names) if name in OWN]
         cloth_columns = [column for column, name in enumerate(self.names) if name not in OWN]
@@ -211,8 +211,8 @@ class Joint:
         )
 
     def _rows(self, log_factor: FloatArray, *names: str) -> NDArray[np.intp]:
-        """Which of the draws, those of all sizes in a row, make the answer: each as often as the Bayes factor (i, n) of
-        what is known makes its size probable, by systematic resampling.
+        """Selects the draws, those of all sizes in a row, that make the answer: each as often as the Bayes factor (i,
+        n) of what is known makes its size probable, by systematic resampling.
 
         A size s is as probable before as the prior of sizes has it, and a statement about the cloth says nothing of it.
         With the film x_s, which the network looks at as that of a flag of this size, and with p(x_s) alike for all

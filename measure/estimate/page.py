@@ -59,7 +59,7 @@ class Context:
 def page(
     measured: Measurement, series: Beside, context: Context, *, anyway: bool, sections: Sequence[Section] = ()
 ) -> str:
-    """The page.
+    """Renders the page.
 
     Args:
         anyway: whether estimates are shown although the gate refused the film; they are marked then. Where there is
@@ -101,9 +101,9 @@ def page(
     return render("measure.estimate", "page.html.j2", values)
 
 
-def _row(quantity: Quantity, known: Mapping[str, float]) -> dict[str, str | bool]:
+def _row(quantity: Quantity, truths: Mapping[str, float]) -> dict[str, str | bool]:
     digits = 3 if quantity.name == "density" else 2
-    truth = known.get(quantity.name)
+    truth = truths.get(quantity.name)
     bound_level = "" if quantity.span.bound is None else f" ({quantity.span.level * 100:.3g} %)"
     return {
         "name": SHORT[quantity.name],
@@ -117,24 +117,24 @@ def _row(quantity: Quantity, known: Mapping[str, float]) -> dict[str, str | bool
     }
 
 
-def _neighbour(one: Neighbour, rate: float) -> dict[str, str]:
-    known = [
-        f"{SHORT[name]} {one.known[name]:.{digits}f} {unit}"
+def _neighbour(neighbour: Neighbour, rate: float) -> dict[str, str]:
+    figures = [
+        f"{SHORT[name]} {neighbour.known[name]:.{digits}f} {unit}"
         for name, digits, unit in (("wind_speed", 1, "m/s"), ("density", 3, "kg/m²"))
-        if name in one.known
+        if name in neighbour.known
     ]
     return {
-        "name": one.name,
-        "image": moving(one.frames, rate=rate, side=_SIDE),
-        "known": ", ".join(known),
-        "distance": f"{one.distance:.1f}",
+        "name": neighbour.name,
+        "image": moving(neighbour.frames, rate=rate, side=_SIDE),
+        "known": ", ".join(figures),
+        "distance": f"{neighbour.distance:.1f}",
     }
 
 
-def _agreement(title: str, found: Agreement | None) -> dict[str, str]:
-    if found is None:
+def _agreement(title: str, agreement: Agreement | None) -> dict[str, str]:
+    if agreement is None:
         return {"title": title, "text": "the anemometer was silent"}
-    return {"title": title, "text": found.sentence}
+    return {"title": title, "text": agreement.sentence}
 
 
 def _delay(series: Beside) -> str | None:

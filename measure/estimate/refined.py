@@ -75,18 +75,18 @@ def scaled(refinement: Refinement, s: float) -> Refinement:
         return refinement
     return replace(
         refinement,
-        intervals=_all(refinement.intervals, s),
-        amortised=_all(refinement.amortised, s),
+        intervals=_all_scaled(refinement.intervals, s),
+        amortised=_all_scaled(refinement.amortised, s),
         bending=refinement.bending * s**4,
-        rounds=tuple(replace(round_, intervals=_all(round_.intervals, s)) for round_ in refinement.rounds),
+        rounds=tuple(replace(round_, intervals=_all_scaled(round_.intervals, s)) for round_ in refinement.rounds),
     )
 
 
-def _all(intervals: tuple[Interval, ...], s: float) -> tuple[Interval, ...]:
-    return tuple(_one(interval, s) for interval in intervals)
+def _all_scaled(intervals: tuple[Interval, ...], s: float) -> tuple[Interval, ...]:
+    return tuple(_scaled(interval, s) for interval in intervals)
 
 
-def _one(interval: Interval, s: float) -> Interval:
+def _scaled(interval: Interval, s: float) -> Interval:
     name = interval.name.partition(".")[0]
     factor = s ** POWERS.get(name, 0.0)
     shift = LOGARITHMS.get(name, 0.0) * math.log10(s)

@@ -35,7 +35,7 @@ class Distortion:
     apply: Distort
 
 
-def _still(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+def _at_rest(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
     """Holds the picture at rest, with noise: nothing moves."""
     picture = np.median(film, axis=0)
     return _noisy(np.repeat(picture[None], count, axis=0), rng.uniform(0.5, 4), rng)
@@ -88,7 +88,7 @@ def _repeated(film: Film, second: Film, rng: np.random.Generator, count: int) ->
     return _noisy(film[index], rng.uniform(0, 1.5) * rng.choice([0, 1]), rng)
 
 
-def _held(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+def _low_rate(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
     """Lowers the frame rate, each frame shown until the next."""
     step = rng.uniform(1.7, 5)
     index = (np.floor(np.arange(count) / step) * step).astype(int)
@@ -185,11 +185,11 @@ def _squared(clip: Film) -> Film:
 
 
 DISTORTIONS: dict[str, Distortion] = {
-    "still": Distortion(reason="no-motion", apply=_still),
+    "still": Distortion(reason="no-motion", apply=_at_rest),
     "cut": Distortion(reason="cut-off", apply=_cut),
     "camera": Distortion(reason="moving-camera", apply=_camera),
     "repeated": Distortion(reason="repeated-frames", apply=_repeated),
-    "held": Distortion(reason="low-frame-rate", apply=_held),
+    "held": Distortion(reason="low-frame-rate", apply=_low_rate),
     "dark": Distortion(reason="too-dark", apply=_dark),
     "pair": Distortion(reason="several-flags", apply=_pair),
     "small": Distortion(reason="scale", apply=_small),

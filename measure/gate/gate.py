@@ -23,8 +23,8 @@ from measure.gate.tail_probability import ExponentialTails
 from models.outliers import conformal_p, shrunk_covariance, whitening
 
 _SIDED = tuple(
-    (name, place, sign, kind)
-    for place, (name, check) in enumerate(CHECKS.items())
+    (name, column, sign, kind)
+    for column, (name, check) in enumerate(CHECKS.items())
     for sign, kind in ((1.0, check.high), (-1.0, check.low))
     if kind is not None
 )
@@ -59,11 +59,11 @@ SCORES: tuple[Score, ...] = (
     *(
         Score(
             name=f"like-{name}",
-            reason=one.reason,
+            reason=distortion.reason,
             sign=1.0,
             what=f"log-likelihood ratio of a clip made {name!r} to a plain one",
         )
-        for name, one in DISTORTIONS.items()
+        for name, distortion in DISTORTIONS.items()
     ),
 )
 """All scores in their order."""

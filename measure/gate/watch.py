@@ -133,8 +133,8 @@ class FilmWatch:
         return instants
 
     def twins(self, box: tuple[float, float, float, float] | None = None) -> float:
-        """Share of the frames that look like another one four frames away or more, 0 to 1: a loop, or frames that are
-        shown again.
+        """Computes the share of frames that look like another one four frames away or more, 0 to 1: a loop, or repeated
+        frames.
 
         Args:
             box: left, top, right and bottom of what moves, in shares of the picture; None for all of it.
@@ -157,8 +157,8 @@ class FilmWatch:
         return float((nearest < _TWIN * usual).mean()) if usual > 0 else 1.0
 
     def grain(self, mask: BoolArray) -> float:
-        """Share of the change that is left when pixels are averaged over a fortieth of the picture's longer side: of
-        cloth more than a half, of leaves less than a third.
+        """Computes the share of the change that is left when pixels are averaged over a fortieth of the picture's
+        longer side: of cloth more than a half, of leaves less than a third.
 
         Args:
             mask: (height, width) where, in any scale.

@@ -16,8 +16,8 @@ _NARROWEST = 0.12
 
 
 def chord(window: Window) -> FloatArray:
-    """(n, 2) from the middle of the hoist to the middle of the free edge: away from the hoist, and up [m]. Frames
-    that show no cloth are left out.
+    """Finds where the middle of the free edge is, (n, 2) from the middle of the hoist: away from the hoist, and up [m].
+    Frames that show no cloth are left out.
 
     Raises:
         UnseenError: the flag is seen edge-on, or is hardly seen.

@@ -16,9 +16,9 @@ _ROWS = 0.5
 
 
 def hoist_bulge(window: Window) -> float:
-    """Mean over the frames and over the rows between the hoist's ends of how far the first cloth is from the line that
-    joins them, away from the pole [flag lengths]. What is on the line's other side counts as on it, since a film's
-    masks end there.
+    """Computes how far the cloth next to the pole is from the line that joins the hoist's ends, away from the pole: the
+    mean over frames and rows between the ends [flag lengths]. Cloth on the line's other side counts as on it, since a
+    film's masks end there.
 
     Raises:
         UnseenError: as `chord`, or hardly any row between the ends shows cloth.

@@ -74,8 +74,9 @@ class Silhouettes:
         return np.stack([(inside * self.columns).sum(axis=1), (inside * up).sum(axis=1)], axis=1) / (high - low)
 
     def free_edge(self) -> FloatArray:
-        """(n, 2) middle of the free edge as far as an outline shows it [m]: midway between the middle quarter of the
-        free outline and the centroid of the `_TAIL` of the area that is farthest along the chord; NaN without cloth.
+        """Finds the middle of the free edge as far as an outline shows it, (n, 2) [m]: midway between the middle
+        quarter of the free outline and the centroid of the `_TAIL` of the area that is farthest along the chord; NaN
+        without cloth.
 
         Against the mean of the edge's points, the first is too high where the flag droops, the second too low.
         """

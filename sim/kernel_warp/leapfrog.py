@@ -179,7 +179,7 @@ def chosen(each: wp.vec3, index: int):
 
 @functools.cache
 def kernel(vertices: int, faces: int, hinges: int) -> Any:
-    """The kernel for meshes of these numbers; tiles have sizes that are known when it is compiled.
+    """Compiles the kernel for meshes of these numbers; tiles have sizes that are known when it is compiled.
 
     Launched by `wp.launch_tiled` with a block a member, of `THREADS` threads, on (sheet, members, motion, position,
     velocity, step, steps), with position and velocity (vertex, 3, batch), which it overwrites. On a processor that is

@@ -77,9 +77,9 @@ class Crew:
         spec = self.recipe.scene
         if spec.arcsim is not None:
             return spec.arcsim.scene.handles
-        return Handles(vertices=self._held(spec), stiffness=spec.stiffness)
+        return Handles(vertices=self._anchor_vertices(spec), stiffness=spec.stiffness)
 
-    def _held(self, spec: SceneSpec) -> tuple[int, ...]:
+    def _anchor_vertices(self, spec: SceneSpec) -> tuple[int, ...]:
         if spec.given is not None:
             return spec.given.held
         if spec.shape is Shape.HANGING_CLOTH:

@@ -257,7 +257,7 @@ def _scene(content: Mapping[str, Any], folder: Path, *, where: str) -> SceneSpec
         file = read_scene(folder / local_path(arcsim.file), root=root, accept=arcsim.accept)
         return _arcsim(file, noise=arcsim.start_noise, evaluation=arcsim.evaluation)
     if shape is Shape.MESH:
-        return _given(read(_Mesh, content, where=where), where=where)
+        return _given_mesh(read(_Mesh, content, where=where), where=where)
     sheet, square = read(_Sheet, content, where=where), shape is Shape.HANGING_CLOTH
     width = sheet.width or (1.0 if square else 1.5)
     if square and sheet.attachment is Attachment.HOIST:
@@ -282,7 +282,7 @@ def _stiffness(scene: _HandledScene, *, where: str) -> float:
     return math.inf if scene.rigid else scene.stiffness or ARCSIM_STIFFNESS
 
 
-def _given(mesh: _Mesh, *, where: str) -> SceneSpec:
+def _given_mesh(mesh: _Mesh, *, where: str) -> SceneSpec:
     cloth = GivenCloth(rest=mesh.rest, faces=mesh.faces, held=mesh.held, anchors=mesh.anchors)
     used = [vertex for face in cloth.faces for vertex in face]
     if not cloth.rest or not cloth.faces or not cloth.held or len(cloth.held) != len(cloth.anchors):

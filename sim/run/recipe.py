@@ -292,7 +292,7 @@ class Recipe:
                 "gravity": scene.gravity,
                 "content": scene.content,
                 "left_out": list(scene.arcsim.left_out) if scene.arcsim else [],
-                **_held(scene),
+                **_stiffness_entry(scene),
             },
             "material": {
                 "bases": [_base(base) for base in material.bases],
@@ -301,7 +301,7 @@ class Recipe:
                 "bending_factor": plain(material.bending),
                 "bending_factors": plain(material.bending_each),
                 "damping": plain(material.damping),
-                **_weighed(material),
+                **_density_factor_entry(material),
             },
             "wind": {
                 "speed": plain(wind.speed),
@@ -316,7 +316,7 @@ class Recipe:
                 "name": self.integrator.name,
                 "step": self.integrator.step,
                 "air_shape": self.integrator.air_shape.value,
-                **_chosen(self.integrator.backend),
+                **_backend_entry(self.integrator.backend),
             },
             "time": vars(self.time).copy(),
             "effects": {
@@ -329,19 +329,19 @@ class Recipe:
         }
 
 
-def _chosen(backend: Backend) -> dict[str, Any]:
+def _backend_entry(backend: Backend) -> dict[str, Any]:
     """Describes the backend where it is not the default: its results differ from the others' by rounding."""
     return {} if backend is Backend.AUTO else {"backend": backend.value}
 
 
-def _held(scene: SceneSpec) -> dict[str, Any]:
+def _stiffness_entry(scene: SceneSpec) -> dict[str, Any]:
     """Describes the handles' stiffness where it is not the usual one."""
     if scene.stiffness == ARCSIM_STIFFNESS:
         return {}
     return {"stiffness": "rigid" if math.isinf(scene.stiffness) else scene.stiffness}
 
 
-def _weighed(material: MaterialSpec) -> dict[str, Any]:
+def _density_factor_entry(material: MaterialSpec) -> dict[str, Any]:
     """Describes the factor on the density, where there is one."""
     return {} if material.density_factor == 1.0 else {"density_factor": plain(material.density_factor)}
 

@@ -117,7 +117,7 @@ def test_the_loop_is_closed_with_the_scales_weight_and_its_finding_is_judged_by_
     ],
 )
 def test_a_finding_is_right_if_its_interval_contains_the_truth(found: str, true: float, judgement: Judgement) -> None:
-    assert story._judged(found, true) is judgement
+    assert story._judgement(found, true) is judgement
 
 
 def test_a_cloth_that_cannot_be_weighed_is_no_failure_of_the_demonstration(
