@@ -91,10 +91,13 @@ def calibrate(chosen: CalibrateCommand) -> None:
             where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
         )
+    from flagdata.outputs import check_file, write_file
+
+    if chosen.report is not None:
+        check_file(chosen.report, command="calibrate")
     if chosen.lake is None:
         check_without_lake(*chosen.recordings)
     from flagdata.lake.results import placed
-    from flagdata.outputs import check_file, write_file
     from measure.cloth.arrays import folder_of, options_of, sources_of
     from measure.cloth.artifact import artifact, keep
     from measure.cloth.calibration import calibrate as calibrated
@@ -104,8 +107,6 @@ def calibrate(chosen: CalibrateCommand) -> None:
     from measure.film.similarity import FlagSize
     from measure.film.source import Reading
 
-    if chosen.report is not None:
-        check_file(chosen.report, command="calibrate")
     lake = chosen.opened()
     size = FlagSize.of(chosen.flag_size)
     reading = Reading.of(chosen, size)

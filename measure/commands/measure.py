@@ -88,17 +88,18 @@ def measure(chosen: MeasureCommand) -> None:
         raise UsageError("more than one form of output", fix="choose one of --json and --csv")
     if chosen.cache is not None and chosen.refine is None:
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
-    if chosen.source is not None and chosen.lake is None:
-        check_without_lake(chosen.source)
     from flagdata.outputs import check_file, check_folder
-    from measure.anemometer.networks import network
-    from measure.commands.measuring import Request
-    from measure.film.source import subjects
 
     if chosen.report is not None:
         check_file(chosen.report, command="measure")
     if chosen.zarr is not None:
         check_folder(chosen.zarr)
+    if chosen.source is not None and chosen.lake is None:
+        check_without_lake(chosen.source)
+    from measure.anemometer.networks import network
+    from measure.commands.measuring import Request
+    from measure.film.source import subjects
+
     lake, at = chosen.opened(), chosen.version
     request = Request.of(chosen, lake=lake, at=at, refine=chosen.refine)
     weight = request.options.area_weight

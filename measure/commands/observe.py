@@ -51,12 +51,7 @@ def observe(chosen: ObserveCommand) -> None:
       flagdata observe clip.mp4 --flag-size 1.5x1.0 --parquet clip.parquet --picture clip.png
       flagdata observe recording-7 --lake lake --flag-size 1.5x1.0 --json
     """
-    if chosen.lake is None:
-        check_without_lake(str(chosen.source))
     from flagdata.outputs import check_file, check_folder, fresh_folder, write_file
-    from flagdata.pages.pictures import png
-    from measure.observables.artifact import keep
-    from measure.observables.picture import picture
 
     if chosen.parquet is not None:
         check_file(chosen.parquet)
@@ -64,6 +59,12 @@ def observe(chosen: ObserveCommand) -> None:
         check_file(chosen.picture, command="observe")
     if chosen.zarr is not None:
         check_folder(chosen.zarr)
+    if chosen.lake is None:
+        check_without_lake(str(chosen.source))
+    from flagdata.pages.pictures import png
+    from measure.observables.artifact import keep
+    from measure.observables.picture import picture
+
     lake = chosen.opened()
     table, subject, reading = _table(chosen, lake, at=chosen.version)
     for sentence in subject.film.sentences:
