@@ -160,7 +160,8 @@ class LagEstimate:
 def estimate_offset(
     motion: MotionSeries, wind: WindAverage, *, search: LagSearch, generator: np.random.Generator
 ) -> LagEstimate:
-    """Offset of the camera's clock from the wind's by the lag of the flag's motion (see the module's text).
+    """Estimates the offset of the camera's clock from the wind's by the lag of the flag's motion (see the module's
+    text).
 
     Args:
         motion: energy on the camera's clock; several values a wind bin.
@@ -183,10 +184,10 @@ def estimate_offset(
     rival, mass, spread = _lobe(bins.offsets, score, best)
     statistical = max(peak.sigma, spread)
     reach = max(STEPS, round(2 * min(statistical, search.window) / bins.period * STEPS))
-    seen, _, _ = model.whitest.search(overlap=search.overlap)
-    near = seen[max(best - reach, 0) : best + reach + 1]
+    evidence, _, _ = model.whitest.search(overlap=search.overlap)
+    evidence_near_peak = evidence[max(best - reach, 0) : best + reach + 1]
     accidents = _Accidents.of(model.whitest, search, generator)
-    chance = accidents.chance(float(np.nanmax(near)))
+    chance = accidents.chance(float(np.nanmax(evidence_near_peak)))
     sigma = math.sqrt(statistical**2 + search.response_sigma**2 + search.stamp_sigma**2)
     offset = peak.offset + search.response
     estimate = LagEstimate(
@@ -203,7 +204,7 @@ def estimate_offset(
         curve=LagCurve(
             offset=bins.offsets + search.response,
             score=score,
-            evidence=seen,
+            evidence=evidence,
             overlap=counts * bins.period,
             chance_score=accidents.score(search.chance),
         ),
@@ -234,16 +235,17 @@ class _Accidents:
         return cls(location=float(np.mean(greatest)) - _EULER * scale, scale=scale)
 
     def chance(self, score: float) -> float:
-        """Probability of a greatest score above `score`."""
+        """Computes the probability of a greatest score above `score`."""
         return -math.expm1(-math.exp(-(score - self.location) / self.scale))
 
     def score(self, chance: float) -> float:
-        """The score that is exceeded with probability `chance`."""
+        """Computes the score that is exceeded with probability `chance`."""
         return self.location - self.scale * math.log(-math.log1p(-chance))
 
 
 def _lobe(offsets: Series, score: Series, best: int) -> tuple[int | None, float, float]:
-    """The greatest score outside the peak's lobe, and the share and standard deviation [s] of exp(z²/2) inside it.
+    """Finds the greatest score outside the peak's lobe, and the share and standard deviation [s] of exp(z²/2) inside
+    it.
 
     The lobe reaches to where the score first falls below half of its greatest, and two bins at least.
     """
@@ -267,7 +269,7 @@ def _lobe(offsets: Series, score: Series, best: int) -> tuple[int | None, float,
 
 
 def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | None) -> list[Finding]:
-    """What speaks against an estimate, and what the user should know of it."""
+    """Lists what speaks against an estimate, and what the user should know of it."""
     curve = estimate.curve
     score = curve.score
     findings: list[Finding] = []
@@ -319,7 +321,7 @@ def _no_gusts(bins: LagBins, search: LagSearch) -> Finding:
 
 
 def _unfit(bins: LagBins, search: LagSearch) -> Finding:
-    """Why no model fits at any offset."""
+    """Explains why no model fits at any offset."""
     longest, least = longest_compared(bins), max(search.overlap, FEWEST_BINS * bins.period)
     if longest < least:
         return _short_overlap(longest, least)
@@ -336,12 +338,12 @@ def _short_overlap(longest: float, least: float) -> Finding:
     )
 
 
-def _error(kind: str, what: str, value: float | None) -> Finding:
-    return Finding(kind=kind, severity=Severity.ERROR, what=what, value=value)
+def _error(kind: str, text: str, value: float | None) -> Finding:
+    return Finding(kind=kind, severity=Severity.ERROR, what=text, value=value)
 
 
 def _nothing(bins: LagBins, search: LagSearch, findings: tuple[Finding, ...]) -> LagEstimate:
-    """A refusal before there is a peak."""
+    """Refuses before there is a peak."""
     empty = np.full(len(bins.offsets), np.nan)
     return LagEstimate(
         offset=math.nan,

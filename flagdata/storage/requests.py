@@ -51,8 +51,8 @@ class Answer:
     @property
     def code(self) -> str | None:
         """The store's word for an error."""
-        found = _CODE.search(self.body)
-        return found[1].decode() if found and self.status >= 300 else None
+        match = _CODE.search(self.body)
+        return match[1].decode() if match and self.status >= 300 else None
 
     @property
     def date(self) -> datetime | None:
@@ -89,7 +89,7 @@ class _Staying(urllib.request.HTTPRedirectHandler):
 def asked(
     bucket: str, query: Mapping[str, str], *, method: str = "GET", key: str = "", waits: Sequence[float] = _WAITS
 ) -> Answer | Unreachable:
-    """The store's answer to a request for a bucket, or for a key of it.
+    """Sends a request for a bucket, or for a key of it, and returns the store's answer.
 
     Args:
         waits: before a request that failed in the store, or whose answer broke off, is sent again [s].
@@ -121,7 +121,7 @@ def _once(bucket: str, query: Mapping[str, str], method: str, key: str) -> Answe
 def signed(
     method: str, url: str, query: str, options: Mapping[str, str], *, when: datetime, service: str = "s3"
 ) -> dict[str, str]:
-    """The headers of a request without a body; without access keys those of one that nobody has signed.
+    """Signs the headers of a request without a body; without access keys those of one that nobody has signed.
 
     Args:
         query: as it is sent, its names in order.
@@ -151,7 +151,7 @@ def signed(
 
 
 def _address(bucket: str, key: str) -> str:
-    """The URL of a key as the client writes it: behind the bucket's name, or at a host of the bucket's own."""
+    """Builds the URL of a key as the client writes it: behind the bucket's name, or at a host of the bucket's own."""
     options = settings()
     virtual = os.environ.get(_VIRTUAL, "").lower() in ("1", "true", "yes", "on")
     endpoint = options.get("aws_endpoint")
@@ -168,7 +168,7 @@ def _answer(status: int, headers: Any, body: bytes) -> Answer:
 
 
 def _unreachable(reason: Any, url: str) -> Unreachable:
-    """What keeps a request from the store."""
+    """Explains what keeps a request from the store."""
     parts = urlsplit(url)
     host = parts.hostname or ""
     proxy = urllib.request.getproxies().get(parts.scheme)
