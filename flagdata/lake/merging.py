@@ -171,7 +171,7 @@ def _check_parents(
                 raise ConflictError(
                     f"{message}, which was withdrawn from {into!r}",
                     where=f"branch {branch}",
-                    fix=_ways_to_agree(parent, gone=into, there=branch),
+                    fix=_ways_to_agree(parent, gone=into, branch=branch),
                 )
     for row in made_from(mine, withdrawn).to_pylist():
         for parent in row["parents"]:
@@ -180,7 +180,7 @@ def _check_parents(
                     f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}, which was withdrawn"
                     f" from {branch!r}",
                     where=f"branch {into}",
-                    fix=_ways_to_agree(parent, gone=branch, there=into),
+                    fix=_ways_to_agree(parent, gone=branch, branch=into),
                 )
 
 
