@@ -19,7 +19,7 @@ PART = 600.0  # s
 FEWEST_PARTS = 3
 _AROUND = 10.0  # s either side of the whole recording's offset, at least
 _FASTEST = 3e-4  # s/s, beyond which no clock in a camera parts from another
-_PART_SIGMA = 2.0  # s; a part known worse than this says nothing
+_PART_SIGMA = 2.0  # s; a part known worse than this says nothing; lowered, fewer parts are left for a drift
 _DISAGREEMENT = 5.0  # σ of a part from the line
 
 

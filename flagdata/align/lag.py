@@ -52,18 +52,22 @@ class LagSearch:
 
     Attributes:
         centre: offset around which to search [s]: what the stamps say, 0 if they are believed.
-        window: the search goes from centre − window to centre + window [s].
+        window: the search goes from centre − window to centre + window [s]. Raise it where the clocks may be further
+            apart; a wider search takes longer and meets more accidents, so that peaks must be higher.
         response: time by which the flag's motion follows the wind that the bins report [s]: about L/U for a flag of
             length L, and d/U where the sensor stands d upwind of it. The sensor's own lag is not part of it: see
             `flagdata.align.windbins`.
         response_sigma: its standard uncertainty [s]. It bounds from below what this method can know.
         stamp_sigma: standard uncertainty of the wind's stamps as a whole [s]; 0.29 for stamps cut to whole seconds.
-        overlap: least time both must cover [s]; and never fewer than 30 bins.
+        overlap: least time both must cover [s]; and never fewer than 30 bins. Lowered, it allows offsets at which
+            little is compared, where high correlations are common.
         gustiness: least standard deviation over mean of the binned wind. Below it the wind says nothing about time.
-        chance: greatest probability of such a peak by accident.
-        rival: a second peak at this share of the greatest score makes the estimate ambiguous.
+        chance: greatest probability of such a peak by accident. Raised, it accepts more wrong offsets; lowered, it
+            refuses more right ones.
+        rival: a second peak at this share of the greatest score makes the estimate ambiguous. Raised, it accepts an
+            offset though another one agrees nearly as well.
         sigma: greatest standard uncertainty that is still an answer [s].
-        surrogates: how many winds of random phase measure chance.
+        surrogates: how many winds of random phase measure chance. More make the chance less noisy, and take longer.
     """
 
     centre: float = 0.0
@@ -171,9 +175,11 @@ def estimate_offset(
     Raises:
         InputError: no wind bins, bins off their grid, or fewer than two motion values a bin.
     """
+    # Steps 1 and 2: bins and normal scores.
     bins = LagBins.of(motion, wind, centre=search.centre - search.response, window=search.window)
     if bins.gustiness < search.gustiness:
         return _nothing(bins, search, (*motion.findings, _no_gusts(bins, search)))
+    # Steps 3 and 4: the filter, and the offset of the greatest score.
     model = fit(bins, overlap=search.overlap)
     if model is None:
         return _nothing(bins, search, (*motion.findings, _unfit(bins, search)))
@@ -181,9 +187,11 @@ def estimate_offset(
     score, counts, best = pair.search(overlap=search.overlap)
     peak = pair.peak(score, best)
 
+    # Step 5: the uncertainty, and a second peak that agrees nearly as well.
     rival, mass, spread = _lobe(bins.offsets, score, best)
     statistical = max(peak.sigma, spread)
     reach = max(STEPS, round(2 * min(statistical, search.window) / bins.period * STEPS))
+    # Step 6: the probability of such a score by accident.
     evidence, _, _ = model.whitest.search(overlap=search.overlap)
     evidence_near_peak = evidence[max(best - reach, 0) : best + reach + 1]
     accidents = _Accidents.of(model.whitest, search, generator)

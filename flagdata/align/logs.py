@@ -41,7 +41,7 @@ _REACH = 30.0  # s searched either side of the first offset, at least
 _FASTEST = 3e-4  # s/s, beyond which no logger's clock parts from another
 _PART_SIGMA = 1.0  # s; a part known worse than this says nothing
 _PART_SURROGATES = 50  # the first offset is known by then; those of a part keep out what agrees by accident
-_TRIES = 3  # hours looked at before the logs are taken for unrelated
+_TRIES = 3  # hours looked at before the logs are taken for unrelated; more take longer and refuse fewer pairs
 
 Progress = Callable[[int], object]
 

@@ -13,9 +13,9 @@ from flagdata.align.bins import STEPS, LagBins
 from flagdata.arrays import FloatArray
 from flagdata.signals import Series
 
-_ORDER = 4
+_ORDER = 4  # of the autoregression; lower leaves noise correlated, higher follows it less certainly
 _WIDTHS = (1.0, 2.0, 4.0, 8.0)  # bins
-_ROUNDS = 3
+_ROUNDS = 3  # of fitting filter and response in turn
 FEWEST_BINS = 30
 """Fewer wind bins in common are not compared, however long they are."""
 _TRIALS_AT_ONCE = 256

@@ -23,7 +23,8 @@ from flagdata.timebase import NANOSECONDS, iso
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed", "wind_speed_estimate")
 """Channels that cannot be negative."""
 _FASTEST = 150.0
-"""Largest speed, or component, of air near the ground [m/s]."""
+"""Largest speed, or component, of air near the ground [m/s]. Lowered, it cuts real gusts; raised, codes for no value
+pass as wind."""
 _TURNS = (-math.pi - 1e-6, 2 * math.pi + 1e-6)
 """Directions as instruments write them, signed or not, with room for conversion from degrees [rad]; beyond, the cell is
 a code or another quantity."""
@@ -40,7 +41,8 @@ highest summit, 108 kPa at the lowest shore), with room for wind tunnels, sensor
 overshoot. A recipe's `range` narrows them."""
 _STALE_CHANCE, _STALE_SHORTEST, _STALE_SECONDS = 1e-3, 5, 1.0
 """Probability of flagging one run of repeats in a log without any, see `stale`; rows and seconds below which a run is
-never stale: fast loggers read a smoothed signal several times over."""
+never stale: fast loggers read a smoothed signal several times over. Lowered chances or raised lengths let short
+freezes of a sensor pass."""
 _COARSE_STEP, _LEAST_OFF = 0.2, 0.1
 """Step between speeds [m/s] from which on an instrument is coarse, and how far its least speed may be from that."""
 _VANE_ROWS, _VANE_SPEEDS = 20, 3
@@ -51,7 +53,7 @@ _SIGNED_SHARE, _SIGNED_KINDS, _SIGNED_LEVEL = 0.05, 3, -0.5
 """Share of the rows, different values, and their median [m/s], from which negative speeds are those of a component."""
 _INTENSITY, _STEADY_ROWS, _STEADY_SPAN, _SLOWEST = 0.02, 20, 600.0, 1.0
 """Turbulence intensity (standard deviation by the mean) that no wind outdoors stays below; readings, seconds and mean
-speed [m/s] from which on a speed is judged."""
+speed [m/s] from which on a speed is judged. A raised intensity reports calm nights as wind tunnels."""
 _OUT = "out-of-range"
 _OUT_FIX = "check the recipe's columns and units; a code for no value belongs into its [file] missing"
 

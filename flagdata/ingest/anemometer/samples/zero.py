@@ -17,11 +17,13 @@ from flagdata.timebase import NANOSECONDS
 _WINDOW = 2.0
 """Length of a stretch that is looked at whole [s]."""
 _SHORTEST = 10.0
-"""Idle time it takes to believe an offset [s]: free air does not hold its speed within `_BAND` for so long."""
+"""Idle time it takes to believe an offset [s]: free air does not hold its speed within `_BAND` for so long.
+Lowered, a lull passes for idling; raised, short calms no longer show the offset."""
 _BAND = 0.05
-"""Widest spread of an idle reading within a stretch [m/s], or four steps of its resolution if that is more."""
+"""Widest spread of an idle reading within a stretch [m/s], or four steps of its resolution if that is more.
+Raised, light steady wind passes for idling."""
 _LARGEST = 1.0
-"""An idle reading beyond this is no zero offset but steady wind [m/s]."""
+"""An idle reading beyond this is no zero offset but steady wind [m/s]. Raised, steady wind may be subtracted."""
 _BELOW = 0.1
 """Readings below an idle one, over those that are idle, beyond which it is no calm air's."""
 _LEAST_JUMP = 0.1
