@@ -64,7 +64,7 @@ def _refused(value: object, name: str, noun: str, fix: str) -> Iterator[None]:
             raise TypeError
         yield
     except (TypeError, RuntimeError, ValueError):
-        message = f"{name} is {_shown(value)}, which is no {noun}"
+        message = f"{name} is {_excerpt(value)}, which is no {noun}"
         raise UsageError(message, fix=fix) from None
 
 
@@ -155,7 +155,7 @@ def _several(
     except TypeError:
         items = ()
     if len(items) != count:
-        message = f"{name} is {_shown(values)}, not {count} numbers"
+        message = f"{name} is {_excerpt(values)}, not {count} numbers"
         raise UsageError(message, fix=f"give {count} in parentheses, separated by commas")
     return tuple(convert_number(value, name) for value in items)
 
@@ -165,20 +165,20 @@ def _text(value: object, name: str) -> str:
         return str(value)
     if isinstance(value, os.PathLike):
         return os.fsdecode(value)
-    raise UsageError(f"{name} is {_shown(value)}, which is no text", fix="give it in quotes")
+    raise UsageError(f"{name} is {_excerpt(value)}, which is no text", fix="give it in quotes")
 
 
 def _table(value: object, name: str) -> Any:
     """Reads a table, or a text that stands for one."""
     if isinstance(value, str | Mapping):
         return plain(value)
-    message = f"{name} is {_shown(value)}, which is no table of names and values"
+    message = f"{name} is {_excerpt(value)}, which is no table of names and values"
     raise UsageError(message, fix='give one such as {"name": value}')
 
 
 def _texts(values: Any, name: str) -> list[str]:
     if isinstance(values, str | bytes) or not hasattr(values, "__iter__"):
-        message = f"{name} is {_shown(values)}, not a list of texts"
+        message = f"{name} is {_excerpt(values)}, not a list of texts"
         raise UsageError(message, fix=f"give a list, such as [{str(values)!r}]")
     return [_text(value, name) for value in values]
 
@@ -192,6 +192,6 @@ def _path(value: Any, name: str) -> Any:
     return value
 
 
-def _shown(value: object) -> str:
+def _excerpt(value: object) -> str:
     text = " ".join(repr(value).split())
     return text if len(text) <= 60 else f"{text[:57]}..."

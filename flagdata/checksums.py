@@ -71,7 +71,7 @@ def content_hash(path: Path) -> str:
 
 def sums_of(folder: Path) -> str:
     """Writes the lines of a folder whose SHA-256 is its `content_hash`."""
-    return _lines({name: file_hash(file) for name, file in _named(folder).items()})
+    return _lines({name: file_hash(file) for name, file in _files_by_path(folder).items()})
 
 
 def read_sums(text: str) -> dict[str, str]:
@@ -92,7 +92,7 @@ def write_sums(folder: Path) -> None:
     Raises:
         OSError: what the disk refuses.
     """
-    sums = {name: file_hash(file) for name, file in _named(folder).items() if name != SUMS}
+    sums = {name: file_hash(file) for name, file in _files_by_path(folder).items() if name != SUMS}
     (folder / SUMS).write_text(_lines(sums), encoding="utf-8")
 
 
@@ -114,7 +114,7 @@ def check_sums(folder: Path, *, fix: str) -> None:
         CorruptError: it does not; the message names the first file.
     """
     sums = _sums_in(folder, fix=fix)
-    present = {name: file for name, file in _named(folder).items() if name != SUMS}
+    present = {name: file for name, file in _files_by_path(folder).items() if name != SUMS}
     for name in sorted(sums.keys() | present.keys()):
         if name not in present:
             raise CorruptError("a file is missing", where=str(folder / name), fix=fix)
@@ -139,7 +139,7 @@ def is_sealed(path: Path) -> bool:
     return len(content) > _DIGEST and hashlib.sha256(memoryview(content)[:-_DIGEST]).digest() == content[-_DIGEST:]
 
 
-def _named(folder: Path) -> dict[str, Path]:
+def _files_by_path(folder: Path) -> dict[str, Path]:
     return {file.relative_to(folder).as_posix(): file for file in files_of(folder)}
 
 

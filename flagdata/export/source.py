@@ -99,7 +99,7 @@ class Entry:
         if not self.count:
             return -(2**63), 2**63 - 1
         times = self.frame_times
-        recipe = self._stated("recipe") if self.row.get("recipe") else {}
+        recipe = self._from_column("recipe") if self.row.get("recipe") else {}
         window = recipe.get("window", recipe.get("truth", {}).get("window", TRUTH_WINDOW))
         return int(times[0]) - round(window * NANOSECONDS), int(times[-1])
 
@@ -120,9 +120,9 @@ class Entry:
     @property
     def parameters(self) -> Any:
         """What it was made with, as strict JSON; unknown numbers are null."""
-        return _strict(self._stated("parameters")) if self.row["parameters"] else None
+        return _strict(self._from_column("parameters")) if self.row["parameters"] else None
 
-    def _stated(self, column: str) -> Any:
+    def _from_column(self, column: str) -> Any:
         return column_json(self.row[column], column, artifact=self.row["artifact"])
 
     def label(self) -> dict[str, Any]:

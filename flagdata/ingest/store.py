@@ -423,7 +423,7 @@ def find(lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], labe
     Raises:
         ConflictError: it is there, under another name or session than the one asked for.
     """
-    return _found(lake, lake.rows(at=branch).filter(_same(kind, source, recipe)).to_pylist(), labels)
+    return _presence(lake, lake.rows(at=branch).filter(_same(kind, source, recipe)).to_pylist(), labels)
 
 
 def _same(kind: Kind, source: Source, recipe: Mapping[str, Any]) -> pc.Expression:
@@ -441,7 +441,7 @@ def find_same(lake: Lake, artifact: str, labels: Labels, *, branch: str) -> Pres
     Raises:
         ConflictError: it is there, under another name or session than the one asked for.
     """
-    return _found(lake, lake.rows({"artifact": artifact}, at=branch).to_pylist(), labels)
+    return _presence(lake, lake.rows({"artifact": artifact}, at=branch).to_pylist(), labels)
 
 
 def kept(artifact: Artifact) -> IngestResult:
@@ -449,7 +449,7 @@ def kept(artifact: Artifact) -> IngestResult:
     return IngestResult(artifact=artifact, created=False, report=json.loads(artifact.report or "{}"))
 
 
-def _found(lake: Lake, rows: Sequence[Mapping[str, Any]], labels: Labels) -> Present:
+def _presence(lake: Lake, rows: Sequence[Mapping[str, Any]], labels: Labels) -> Present:
     if not rows:
         return ABSENT
     artifact = Artifact.from_row(rows[0])

@@ -245,7 +245,7 @@ class Transaction:
             self._seen = head
         return head, self._known
 
-    def _there(self, version: int, identities: Collection[str]) -> dict[str, Artifact]:
+    def _artifacts_at(self, version: int, identities: Collection[str]) -> dict[str, Artifact]:
         """Artifacts that the branch shows at a version, by id."""
         if not identities:
             return {}
@@ -270,7 +270,7 @@ class Transaction:
                     fix="do it again",
                 )
             moved = {i: replace(row, created=created) for i, (_, row) in self._moved.items()}
-            artifacts = self._there(version, existing) | fresh | moved
+            artifacts = self._artifacts_at(version, existing) | fresh | moved
             if not fresh and not moved:
                 return CommitResult(version=version, commit=None, added=(), existing=existing, artifacts=artifacts)
             self._check_parents(fresh.values(), identities)

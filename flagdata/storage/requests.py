@@ -173,7 +173,7 @@ def _unreachable(reason: Any, url: str) -> Unreachable:
     host = parts.hostname or ""
     proxy = urllib.request.getproxies().get(parts.scheme)
     if proxy is not None and not urllib.request.proxy_bypass(host):
-        message = f"there was no answer of {host} through the proxy {redacted(proxy)}: {_said(reason)}"
+        message = f"there was no answer of {host} through the proxy {redacted(proxy)}: {_one_line(reason)}"
         variable = f"{parts.scheme.upper()}_PROXY"
         return Unreachable(
             what=message, fix=f"check {variable}, or name {host} in NO_PROXY to reach it without a proxy"
@@ -190,16 +190,18 @@ def _unreachable(reason: Any, url: str) -> Unreachable:
             " (AWS_ENDPOINT_URL) and this machine's clock",
         )
     if isinstance(reason, ssl.SSLError):
-        return Unreachable(what=f"{host} does not speak TLS: {_said(reason)}", fix=f"{end_point}: http:// or https://")
+        return Unreachable(
+            what=f"{host} does not speak TLS: {_one_line(reason)}", fix=f"{end_point}: http:// or https://"
+        )
     if isinstance(reason, ConnectionRefusedError):
         message = f"{host} refuses connections to port {parts.port or (443 if parts.scheme == 'https' else 80)}"
         return Unreachable(what=message, fix=f"{end_point}, and that the store runs")
     if isinstance(reason, TimeoutError):
         return Unreachable(what=f"{host} did not answer in time", fix=f"{end_point}, the network and its firewall")
-    message = f"there was no answer of {host}: {_said(reason)}"
+    message = f"there was no answer of {host}: {_one_line(reason)}"
     broken = isinstance(reason, HTTPException | ConnectionError)
     return Unreachable(what=message, fix=f"{end_point} and the network", broken=broken)
 
 
-def _said(reason: object) -> str:
+def _one_line(reason: object) -> str:
     return redacted(" ".join(str(reason).split()))[:200]

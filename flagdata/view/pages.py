@@ -181,7 +181,7 @@ def artifact(site: Site, identity: str) -> str:
         NotFoundError: no such version, or it does not show the artifact.
     """
     rows, row = site.rows(), site.row(identity)
-    report = _stated(row, "report") or {}
+    report = _from_column(row, "report") or {}
     lost = site.media.is_lost(row)
     clips, count = _clips(site, rows, row)
     labels = labels_of(rows).get(identity, {})
@@ -189,7 +189,7 @@ def artifact(site: Site, identity: str) -> str:
     facts += [(PREFIX + name, printable(str(value))) for name, value in labels.items()]
     facts += [(f"version {number}", text) for number, text in _versions(site, row)]
     drawn = picture(ancestry(rows, identity), link=lambda relative: site.link(f"artifact/{relative}"))
-    documents = {name: _stated(row, name) for name in ("recipe", "parameters", "clock_model")}
+    documents = {name: _from_column(row, name) for name in ("recipe", "parameters", "clock_model")}
     return _page(
         site,
         "artifact.html.j2",
@@ -259,7 +259,7 @@ def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
     size = None if row["kind"] == Kind.CLIP else size_text(row["object_bytes"])
     wind = row["wind"]
     if row["kind"] == Kind.WIND:
-        wind = (_stated(row, "report") or {}).get("mean_speed")
+        wind = (_from_column(row, "report") or {}).get("mean_speed")
     sigma = "" if row["wind_sigma"] is None else f" ± {row['wind_sigma']:.2f}"
     return {
         "artifact": row["artifact"],
@@ -326,7 +326,7 @@ def _findings(report: Mapping[str, Any]) -> list[dict[str, str]]:
     ]
 
 
-def _stated(row: Mapping[str, Any], column: str) -> Any:
+def _from_column(row: Mapping[str, Any], column: str) -> Any:
     return column_json(row[column], column, artifact=row["artifact"]) if row[column] else None
 
 

@@ -149,8 +149,8 @@ class _Reader:
 
     def _field(self, field: _Field, depth: int) -> Any:
         if field.count is None:
-            return self._one(field.type, depth)
-        count = self._one("uint32", depth) if field.count < 0 else field.count
+            return self._value(field.type, depth)
+        count = self._value("uint32", depth) if field.count < 0 else field.count
         if field.type in _BYTES:
             return bytes(self._take(count))
         if field.type in _NUMBERS:
@@ -160,15 +160,15 @@ class _Reader:
             return np.frombuffer(self._take(count * kind.itemsize), kind).tolist()
         if count > len(self._data):
             raise self._cut_off()
-        return [self._one(field.type, depth) for _ in range(count)]
+        return [self._value(field.type, depth) for _ in range(count)]
 
-    def _one(self, kind: str, depth: int) -> Any:
+    def _value(self, kind: str, depth: int) -> Any:
         if kind in _NUMBERS:
             code = struct.Struct(self._order + _NUMBERS[kind])
             self._align(code.size)
             return code.unpack(self._take(code.size))[0]
         if kind == "string":
-            text = bytes(self._take(self._one("uint32", depth)))
+            text = bytes(self._take(self._value("uint32", depth)))
             return text.rstrip(b"\0").decode(errors="replace")
         return self.whole(kind, depth + 1)
 
