@@ -26,18 +26,18 @@ _ELSEWHERE = "another machine or service", "copy or mount it, and give the local
 
 
 def local_path(text: Path | str) -> Path:
-    """`text` as a path of a file or folder of this machine; nothing is looked up.
+    """Reads `text` as a path of a file or folder of this machine; nothing is looked up.
 
     Raises:
         UsageError: an address: a scheme or machine, a colon and a slash. A local path that looks like one can be given
             from the root on.
     """
-    found = _ADDRESS.fullmatch(str(text))
-    if found is None:
+    address = _ADDRESS.fullmatch(str(text))
+    if address is None:
         return Path(text)
-    scheme = found["scheme"].lower()
+    scheme = address["scheme"].lower()
     if scheme == "file":
-        message, fix = "a file: address, not a path", f"give the path: /{found['rest'].lstrip('/')}"
+        message, fix = "a file: address, not a path", f"give the path: /{address['rest'].lstrip('/')}"
     else:
         noun, fix = _KINDS.get(scheme, _ELSEWHERE)
         message = f"the address of {noun}, not a local path"
@@ -45,7 +45,7 @@ def local_path(text: Path | str) -> Path:
 
 
 def lake_place(text: Place | str) -> Place:
-    """Where a lake is: a folder of this machine, or `s3://bucket/prefix`.
+    """Reads where a lake is: a folder of this machine, or `s3://bucket/prefix`.
 
     Raises:
         UsageError: any other address.

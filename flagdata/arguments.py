@@ -31,7 +31,7 @@ _TUPLE = re.compile(r"tuple\[(?P<kind>int|float)(?P<more>(?:, (?P=kind))*)\]")
 
 
 def whole(value: object, name: str) -> int:
-    """A whole number of Python, Numpy, torch or pandas as Python's own.
+    """Converts a whole number of Python, Numpy, torch or pandas to Python's own.
 
     Args:
         name: of the argument, for the error message.
@@ -44,7 +44,7 @@ def whole(value: object, name: str) -> int:
 
 
 def real(value: object, name: str) -> float:
-    """A number of Python, Numpy, torch or pandas as Python's own; whole numbers stay whole.
+    """Converts a number of Python, Numpy, torch or pandas to Python's own; whole numbers stay whole.
 
     Raises:
         UsageError: a truth value, a text, a time, or several numbers.
@@ -64,17 +64,17 @@ def _refused(value: object, name: str, noun: str, fix: str) -> Iterator[None]:
             raise TypeError
         yield
     except (TypeError, RuntimeError, ValueError):
-        message = f"{name} is {_shown(value)}, which is no {noun}"
+        message = f"{name} is {_excerpt(value)}, which is no {noun}"
         raise UsageError(message, fix=fix) from None
 
 
 def plain(value: Any) -> Any:
-    """A value whose numbers, alone or within tables and lists, are Python's own; arrays stay what they are.
+    """Converts a value whose numbers, alone or within tables and lists, become Python's own; arrays stay what they are.
 
     A number of 32 bits or fewer is the one that it prints: `float32(0.2)` is 0.2, not 0.20000000298.
     """
     if isinstance(value, Mapping):
-        return {key: plain(one) for key, one in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if type(value) in (list, tuple):
         return type(value)(map(plain, value))
     if getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
@@ -84,7 +84,7 @@ def plain(value: Any) -> Any:
 
 
 def checked(call: Callable[P, R]) -> Callable[P, R]:
-    """A public call whose arguments are made plain, each by its annotation.
+    """Wraps a public call so that its arguments are made plain, each by its annotation.
 
     `int` and `float` take the numbers of other libraries, `tuple[int, int]` as many of them, `Path` whatever names a
     path, `str` texts alone, and tables keep no number of another library.
@@ -93,7 +93,7 @@ def checked(call: Callable[P, R]) -> Callable[P, R]:
         UsageError: when the call is made with a value that is none of its kind.
     """
     signature = inspect.signature(call)
-    kinds = {name: str(one.annotation) for name, one in signature.parameters.items()}
+    kinds = {name: str(parameter.annotation) for name, parameter in signature.parameters.items()}
     converts = {name: convert for name, kind in kinds.items() if (convert := converter(kind)) is not None}
 
     @functools.wraps(call)
@@ -110,27 +110,29 @@ def checked(call: Callable[P, R]) -> Callable[P, R]:
 def converter(annotation: str) -> Convert | None:
     """Returns what makes values of an annotation plain; `None` where they stay as they are."""
     kinds = [kind for kind in annotation.split(" | ") if kind != "None"]
-    found: Convert | None = None
+    convert: Convert | None = None
     if kinds == ["int"]:
-        found = whole
+        convert = whole
     elif kinds and set(kinds) <= {"int", "float"}:
-        found = real
+        convert = real
     elif kinds and set(kinds[1:]) <= {"str"} and (numbers := _TUPLE.fullmatch(kinds[0])):
-        each = whole if numbers["kind"] == "int" else real
-        found = functools.partial(_several, each=each, count=1 + numbers["more"].count(","), text="str" in kinds)
+        convert_number = whole if numbers["kind"] == "int" else real
+        convert = functools.partial(
+            _several, convert_number=convert_number, count=1 + numbers["more"].count(","), text="str" in kinds
+        )
     elif kinds == ["str"]:
-        found = _text
+        convert = _text
     elif kinds == ["Sequence[str]"]:
-        found = _texts
+        convert = _texts
     elif {"Path", "Place", "AnyLake"} & set(kinds):
-        found = _path
+        convert = _path
     elif kinds and all(kind == "str" or kind.startswith("Mapping[") for kind in kinds):
-        found = _table
+        convert = _table
     elif kinds and ("Mapping" in annotation or "float" in kinds):
-        found = _plain
-    if found is None or "None" not in annotation.split(" | "):
-        return found
-    return functools.partial(_or_none, convert=found)
+        convert = _plain
+    if convert is None or "None" not in annotation.split(" | "):
+        return convert
+    return functools.partial(_or_none, convert=convert)
 
 
 def _or_none(value: object, name: str, *, convert: Convert) -> Any:
@@ -141,19 +143,21 @@ def _plain(value: object, name: str) -> Any:
     return plain(value)
 
 
-def _several(values: object, name: str, *, each: Callable[[object, str], Any], count: int, text: bool = False) -> Any:
+def _several(
+    values: object, name: str, *, convert_number: Callable[[object, str], Any], count: int, text: bool = False
+) -> Any:
     if text and isinstance(values, str):
         return str(values)
     try:
         if isinstance(values, str | bytes):
             raise TypeError
-        found = tuple(values)  # type: ignore[call-overload]
+        items = tuple(values)  # type: ignore[call-overload]
     except TypeError:
-        found = ()
-    if len(found) != count:
-        message = f"{name} is {_shown(values)}, not {count} numbers"
+        items = ()
+    if len(items) != count:
+        message = f"{name} is {_excerpt(values)}, not {count} numbers"
         raise UsageError(message, fix=f"give {count} in parentheses, separated by commas")
-    return tuple(each(value, name) for value in found)
+    return tuple(convert_number(value, name) for value in items)
 
 
 def _text(value: object, name: str) -> str:
@@ -161,26 +165,26 @@ def _text(value: object, name: str) -> str:
         return str(value)
     if isinstance(value, os.PathLike):
         return os.fsdecode(value)
-    raise UsageError(f"{name} is {_shown(value)}, which is no text", fix="give it in quotes")
+    raise UsageError(f"{name} is {_excerpt(value)}, which is no text", fix="give it in quotes")
 
 
 def _table(value: object, name: str) -> Any:
-    """A table, or a text that stands for one."""
+    """Reads a table, or a text that stands for one."""
     if isinstance(value, str | Mapping):
         return plain(value)
-    message = f"{name} is {_shown(value)}, which is no table of names and values"
+    message = f"{name} is {_excerpt(value)}, which is no table of names and values"
     raise UsageError(message, fix='give one such as {"name": value}')
 
 
 def _texts(values: Any, name: str) -> list[str]:
     if isinstance(values, str | bytes) or not hasattr(values, "__iter__"):
-        message = f"{name} is {_shown(values)}, not a list of texts"
+        message = f"{name} is {_excerpt(values)}, not a list of texts"
         raise UsageError(message, fix=f"give a list, such as [{str(values)!r}]")
     return [_text(value, name) for value in values]
 
 
 def _path(value: Any, name: str) -> Any:
-    """A path as a text or as it is; what else a call takes stays."""
+    """Reads a path as a text or as it is; what else a call takes stays."""
     if isinstance(value, bytes) or (isinstance(value, os.PathLike) and not isinstance(value, Path)):
         return os.fsdecode(value)
     if isinstance(value, int | float):
@@ -188,6 +192,6 @@ def _path(value: Any, name: str) -> Any:
     return value
 
 
-def _shown(value: object) -> str:
+def _excerpt(value: object) -> str:
     text = " ".join(repr(value).split())
     return text if len(text) <= 60 else f"{text[:57]}..."

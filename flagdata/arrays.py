@@ -25,7 +25,7 @@ EXPANSION = 20
 
 
 def read_arrays(path: Path, *, what: str, fix: str) -> dict[str, AnyArray]:
-    """All arrays of an archive, by name.
+    """Reads all arrays of an archive, by name.
 
     Args:
         what: that it is, at the beginning of a sentence.

@@ -37,7 +37,7 @@ _DIRECTION_OF = {
 
 
 def average(series: WindSeries, period: float = 1.0, *, channel: str = "wind_speed") -> WindAverage:
-    """Mean of `channel` over bins of `period` [s] that end at whole multiples of it since 1970.
+    """Averages `channel` over bins of `period` [s] that end at whole multiples of it since 1970.
 
     A sample stamped at a bin's end belongs to that bin: (end - period, end]. Bins without a usable sample are absent.
 
@@ -89,13 +89,13 @@ def average(series: WindSeries, period: float = 1.0, *, channel: str = "wind_spe
 
 
 def instrument_sigma(sensor: Sensor, speed: FloatArray) -> FloatArray:
-    """Standard uncertainty of a reading by the instrument alone: accuracy and resolution [m/s]."""
+    """Computes the standard uncertainty of a reading by the instrument alone: accuracy and resolution [m/s]."""
     accuracy = np.maximum(sensor.accuracy or 0.0, (sensor.accuracy_relative or 0.0) * np.abs(speed))
     return np.hypot(accuracy, (sensor.resolution or 0.0) / math.sqrt(12))
 
 
 def correlation(speed: FloatArray, starts: IntArray, count: IntArray) -> float:
-    """Correlation ρ of neighbouring samples within bins, 0 to 1, see the module's text."""
+    """Estimates the correlation ρ of neighbouring samples within bins, 0 to 1, see the module's text."""
     if len(speed) == 0 or int(count.max()) < 2:
         return 0.0
     mean = np.repeat(np.add.reduceat(speed, starts) / count, count)
@@ -110,7 +110,7 @@ def correlation(speed: FloatArray, starts: IntArray, count: IntArray) -> float:
 
 
 def _scatter(speed: FloatArray, starts: IntArray, count: IntArray, mean: FloatArray) -> FloatArray:
-    """Standard deviation of each bin's mean from the scatter within it [m/s]; 0 for bins of one sample."""
+    """Computes the standard deviation of each bin's mean from the scatter within it [m/s]; 0 for bins of one sample."""
     square = np.add.reduceat((speed - np.repeat(mean, count)) ** 2, starts)
     variance = square / np.maximum(count - 1, 1)
     rho = correlation(speed, starts, count)
@@ -119,10 +119,11 @@ def _scatter(speed: FloatArray, starts: IntArray, count: IntArray, mean: FloatAr
 
 
 def _vector_mean(speed: FloatArray, direction: FloatArray, starts: IntArray) -> FloatArray:
-    """Direction of the mean wind vector of each bin [rad, 0 to 2π]; NaN where nothing blows or nothing is known."""
-    known = np.isfinite(direction)
-    east = np.add.reduceat(np.where(known, speed * np.sin(direction), 0.0), starts)
-    north = np.add.reduceat(np.where(known, speed * np.cos(direction), 0.0), starts)
-    total = np.add.reduceat(np.where(known, np.abs(speed), 0.0), starts)
+    """Computes the direction of the mean wind vector of each bin [rad, 0 to 2π]; NaN where nothing blows or nothing is
+    known."""
+    finite = np.isfinite(direction)
+    east = np.add.reduceat(np.where(finite, speed * np.sin(direction), 0.0), starts)
+    north = np.add.reduceat(np.where(finite, speed * np.cos(direction), 0.0), starts)
+    total = np.add.reduceat(np.where(finite, np.abs(speed), 0.0), starts)
     angle = np.mod(np.arctan2(east, north), 2 * np.pi)
     return np.where(np.hypot(east, north) > 1e-9 * np.maximum(total, 1e-12), angle, np.nan)

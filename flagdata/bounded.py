@@ -72,7 +72,7 @@ class Child:
         return self._end.alive and self._owner == os.getpid()
 
     def ask(self, message: object, *, seconds: float) -> Any:
-        """The answer to a message.
+        """Sends a message and returns the answer.
 
         Raises:
             EndedError: it has none after so many seconds, or ended.
@@ -139,7 +139,7 @@ def _end(process: subprocess.Popen[bytes], pipes: tuple[IO[bytes], IO[bytes]], o
 
 
 def run(serve: str, memory: int) -> None:
-    """Answer messages from standard input until it ends: what the child does."""
+    """Answers messages from standard input until it ends: what the child does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's business
     threading.Thread(target=_leave_with, args=[os.getppid()], daemon=True).start()
     answers = os.fdopen(os.dup(1), "wb")
@@ -160,7 +160,9 @@ def run(serve: str, memory: int) -> None:
         except FlagdataError as error:
             data = pickle.dumps((False, error), protocol=5)
         except Exception as error:  # noqa: BLE001  the parent reports it
-            data = pickle.dumps((False, RuntimeError(f"{type(error).__name__}: {error}")), protocol=5)
+            data = pickle.dumps(
+                (False, RuntimeError(f"its process raised {type(error).__name__}: {error}")), protocol=5
+            )
         answers.write(data)
         answers.flush()
 
@@ -172,7 +174,7 @@ def _leave_with(parent: int) -> None:
 
 
 def _limit(memory: int) -> None:
-    """Limit the memory that this process may write to: what it has, and so much more."""
+    """Limits the memory that this process may write to: what it has, and so much more."""
     (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmData:"))
     most = int(line.split()[1]) * 1024 + memory
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)

@@ -12,7 +12,7 @@ import pyarrow as pa
 
 
 def owned(data: bytes) -> pa.Buffer:
-    """The bytes in memory of Arrow's own, which its threads let go without the interpreter."""
+    """Copies the bytes to memory of Arrow's own, which its threads let go without the interpreter."""
     content = pa.allocate_buffer(len(data))
     if data:
         pa.FixedSizeBufferWriter(content).write(data)

@@ -10,16 +10,17 @@ from flagdata.storage import Place
 
 
 def user_cache() -> Path:
-    """FLAGDATA_CACHE, or `flagdata` in the user's cache folder."""
+    """Returns FLAGDATA_CACHE, or `flagdata` in the user's cache folder."""
     if chosen := os.environ.get("FLAGDATA_CACHE"):
         return Path(chosen)
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flagdata"
 
 
 def beside(lake: Place, suffix: str) -> Path:
-    """A folder for what was made of a lake: beside its folder, or in the user's cache where it is in a bucket."""
+    """Returns a folder for what was made of a lake: beside its folder, or in the user's cache where it is in a
+    bucket."""
     if isinstance(lake, Path):
-        whole = lake.absolute()
-        return whole.with_name(whole.name + suffix)
+        absolute = lake.absolute()
+        return absolute.with_name(absolute.name + suffix)
     address = hashlib.sha256(str(lake).encode()).hexdigest()[:12]  # "a/b-c" and "a/b/c" would have one name without
     return user_cache() / f"{lake.bucket}-{lake.key.replace('/', '-')}-{address}{suffix}"

@@ -76,15 +76,18 @@ class Calibrated:
         Raises:
             RefusedError: it is withheld, not determined, or only bounded.
         """
-        found = next(iter(self.quantities.values())).value
-        if found is None:
+        median = next(iter(self.quantities.values())).value
+        if median is None:
             fix = "look at `findings`; add recordings in other winds"
             raise RefusedError(self.sentence, where="area weight", fix=fix)
-        return found
+        return median
 
     def __repr__(self) -> str:
         return f"Calibrated({self.sentence})"
 
     def _repr_html_(self) -> str:
-        rows = {name.replace("_", " "): one.text for name, one in self.quantities.items()}
-        return table(self.sentence, rows | {f"{one.severity.value} {one.kind}": one.what for one in self.findings})
+        rows = {name.replace("_", " "): quantity.text for name, quantity in self.quantities.items()}
+        return table(
+            self.sentence,
+            rows | {f"{finding.severity.value} {finding.kind}": finding.what for finding in self.findings},
+        )

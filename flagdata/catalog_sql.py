@@ -113,7 +113,7 @@ class Answers:
         ).total()
 
     def __call__(self, message: tuple[Any, ...]) -> Any:
-        """The answer to (verb, number of the question, what else it takes).
+        """Answers (verb, number of the question, what else it takes).
 
         Returns:
             also a UsageError, where the SQL could not be run on these rows: they may be to blame.
@@ -127,8 +127,8 @@ class Answers:
         try:
             if verb == "open":
                 (question, closed) = rest
-                for one in closed:
-                    self._open.pop(one, None)
+                for identity in closed:
+                    self._open.pop(identity, None)
                 where = question.shown
                 self._open[number] = _Answer(self._duckdb, question)
                 return None
@@ -182,7 +182,7 @@ class _Answer:
         return relation.project(", ".join(f'"{name}"' for name in self.question.columns))
 
     def total(self) -> int:
-        """How many rows there are without the limit."""
+        """Counts the rows without the limit."""
         ((count,),) = self._relation.aggregate("count(*)").fetchall()
         return int(count)
 
@@ -194,7 +194,7 @@ class _Answer:
         return raw.schema
 
     def part(self) -> pa.Buffer | None:
-        """The next rows as an Arrow stream; `None` after the last."""
+        """Returns the next rows as an Arrow stream; `None` after the last."""
         batch = next(self._parts, None)
         if batch is None:
             return None
@@ -205,20 +205,20 @@ class _Answer:
 
     def _cut(self, raw: pa.RecordBatchReader, size: int) -> Iterator[pa.RecordBatch]:
         """Rows by the number and bytes that are handed on at once."""
-        held: list[pa.RecordBatch] = []
+        blocks: list[pa.RecordBatch] = []
         rows = held_bytes = 0
         for block in raw:
             block.validate(full=True)  # a scan may give text that is not UTF-8
-            if held and (rows + block.num_rows > size or held_bytes + block.nbytes > PART):
-                yield _joined(held)
-                held, rows, held_bytes = [], 0, 0
+            if blocks and (rows + block.num_rows > size or held_bytes + block.nbytes > PART):
+                yield _joined(blocks)
+                blocks, rows, held_bytes = [], 0, 0
             if block.num_rows > size or block.nbytes > PART:
                 yield from self._halved(block, size)
                 continue
-            held.append(block)
+            blocks.append(block)
             rows, held_bytes = rows + block.num_rows, held_bytes + block.nbytes
-        if held:
-            yield _joined(held)
+        if blocks:
+            yield _joined(blocks)
 
     def _halved(self, block: pa.RecordBatch, size: int) -> Iterator[pa.RecordBatch]:
         if block.num_rows > 1 and (block.num_rows > size or block.nbytes > PART):
@@ -256,7 +256,7 @@ def _joined(batches: Sequence[pa.RecordBatch]) -> pa.RecordBatch:
 
 
 def _leaves(values: pa.Array) -> int:
-    """How many values an array holds, those within lists and structures counted singly."""
+    """Counts the values of an array, those within lists and structures singly."""
     kind = values.type
     if pa.types.is_struct(kind):
         return sum(_leaves(values.field(number)) for number in range(kind.num_fields))
@@ -268,7 +268,7 @@ def _leaves(values: pa.Array) -> int:
 
 
 def _view_columns(labels: Sequence[str]) -> str:
-    """The catalog as SQL sees it. A NaN is an unknown value, but DuckDB sorts NaN above every number, so that
+    """Writes the catalog as SQL sees it. A NaN is an unknown value, but DuckDB sorts NaN above every number, so that
     "wind > 3" would hold for it: it becomes NULL."""
     stored = [
         f'CASE WHEN isnan("{name}") THEN NULL ELSE "{name}" END AS "{name}"'
@@ -276,12 +276,12 @@ def _view_columns(labels: Sequence[str]) -> str:
         else f'"{name}"'
         for name, field in CATALOG.items()
     ]
-    own = [f'"{name}"' for name in labels]
-    return ", ".join([*stored, *own, *(f'{sql} AS "{name}"' for name, (_, sql) in DERIVED.items())])
+    label_columns = [f'"{name}"' for name in labels]
+    return ", ".join([*stored, *label_columns, *(f'{sql} AS "{name}"' for name, (_, sql) in DERIVED.items())])
 
 
 def explain(error: Exception, *, where: str | None) -> UsageError:
-    """The usage error for what DuckDB says about a user's SQL.
+    """Turns what DuckDB says about a user's SQL into a usage error.
 
     Args:
         error: DuckDB's.

@@ -13,7 +13,7 @@ from flagdata.timebase import iso
 
 
 def said(column: str, value: object) -> str:
-    """A value for people: instants as times, numbers with their unit, mappings and lists as JSON."""
+    """Writes a value for people: instants as times, numbers with their unit, mappings and lists as JSON."""
     unit = CATALOG[column].unit
     if unit == "ns" and isinstance(value, int):
         return iso(value)
@@ -23,7 +23,7 @@ def said(column: str, value: object) -> str:
 
 
 def plain(value: Any) -> Any:
-    """A cell as what JSON and CSV can hold; times as ISO 8601.
+    """Converts a cell to what JSON and CSV can hold; times as ISO 8601.
 
     Raises:
         UsageError: a type with no such form (bytes, intervals).

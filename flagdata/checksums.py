@@ -22,8 +22,8 @@ _DIGEST = 32  # B
 
 
 def files_of(path: Path) -> list[Path]:
-    """The regular files of a folder, sorted by relative path, without what `files.is_beside`; the file itself if it is
-    one.
+    """Lists the regular files of a folder, sorted by relative path, without what `files.is_beside`; the file itself if
+    it is one.
 
     Raises:
         InputError: a symbolic link or special file, whose content the hash would not cover.
@@ -34,15 +34,15 @@ def files_of(path: Path) -> list[Path]:
         )
     if path.is_file():
         return [path]
-    found = []
+    files = []
     for entry in sorted(path.rglob("*"), key=lambda p: p.relative_to(path).as_posix()):
         if entry.is_symlink() or not (entry.is_dir() or entry.is_file()):
             raise InputError(
                 "an object contains a link or special file", where=str(entry), fix="store plain files only"
             )
         if entry.is_file() and not any(map(is_beside, entry.relative_to(path).parts)):
-            found.append(entry)
-    return found
+            files.append(entry)
+    return files
 
 
 def size_of(path: Path) -> int:
@@ -55,7 +55,8 @@ def size_of(path: Path) -> int:
 
 
 def content_hash(path: Path) -> str:
-    """SHA-256 of a file; of a folder, SHA-256 over the lines "<file sha256>  <relative path>\\n" sorted by path.
+    """Computes the SHA-256 of a file; of a folder, SHA-256 over the lines "<file sha256>  <relative path>\n" sorted by
+    path.
 
     The folder's form is what `sha256sum` prints, so that it can be checked without this package. Empty folders and
     file modes do not count.
@@ -69,20 +70,20 @@ def content_hash(path: Path) -> str:
 
 
 def sums_of(folder: Path) -> str:
-    """The lines of a folder whose SHA-256 is its `content_hash`."""
-    return _lines({name: file_hash(file) for name, file in _named(folder).items()})
+    """Writes the lines of a folder whose SHA-256 is its `content_hash`."""
+    return _lines({name: file_hash(file) for name, file in _files_by_path(folder).items()})
 
 
 def read_sums(text: str) -> dict[str, str]:
-    """Relative path → SHA-256, as `sums_of` wrote them.
+    """Reads relative path → SHA-256, as `sums_of` wrote them.
 
     Raises:
         ValueError: a line that is none.
     """
-    found = [_LINE.fullmatch(line) for line in text.splitlines()]
-    if not all(found):
+    matches = [_LINE.fullmatch(line) for line in text.splitlines()]
+    if not all(matches):
         raise ValueError("a line is not what sha256sum prints")
-    return {match[2]: match[1] for match in found if match is not None}
+    return {match[2]: match[1] for match in matches if match is not None}
 
 
 def write_sums(folder: Path) -> None:
@@ -91,19 +92,19 @@ def write_sums(folder: Path) -> None:
     Raises:
         OSError: what the disk refuses.
     """
-    sums = {name: file_hash(file) for name, file in _named(folder).items() if name != SUMS}
+    sums = {name: file_hash(file) for name, file in _files_by_path(folder).items() if name != SUMS}
     (folder / SUMS).write_text(_lines(sums), encoding="utf-8")
 
 
 def renewed_sums(folder: Path, name: str, content: bytes) -> str:
-    """The text of a folder's `SHA256SUMS` once a file of it, or a new one, has that content. What is stated of the
-    others stays, so that damage to them is still found.
+    """Writes the text of a folder's `SHA256SUMS` once a file of it, or a new one, has that content. What is stated of
+    the others stays, so that damage to them is still found.
 
     Raises:
         CorruptError: `SHA256SUMS` cannot be read.
     """
-    stated = _stated(folder, fix="restore the folder from a copy")
-    return _lines({**stated, name: hashlib.sha256(content).hexdigest()})
+    sums = _sums_in(folder, fix="restore the folder from a copy")
+    return _lines({**sums, name: hashlib.sha256(content).hexdigest()})
 
 
 def check_sums(folder: Path, *, fix: str) -> None:
@@ -112,24 +113,24 @@ def check_sums(folder: Path, *, fix: str) -> None:
     Raises:
         CorruptError: it does not; the message names the first file.
     """
-    stated = _stated(folder, fix=fix)
-    present = {name: file for name, file in _named(folder).items() if name != SUMS}
-    for name in sorted(stated.keys() | present.keys()):
+    sums = _sums_in(folder, fix=fix)
+    present = {name: file for name, file in _files_by_path(folder).items() if name != SUMS}
+    for name in sorted(sums.keys() | present.keys()):
         if name not in present:
             raise CorruptError("a file is missing", where=str(folder / name), fix=fix)
-        if name not in stated:
+        if name not in sums:
             raise CorruptError(f"{SUMS} does not state this file", where=str(folder / name), fix=fix)
-        if file_hash(present[name]) != stated[name]:
+        if file_hash(present[name]) != sums[name]:
             raise CorruptError("its bytes have changed since it was written", where=str(folder / name), fix=fix)
 
 
 def sealed(data: bytes) -> bytes:
-    """The bytes of a file with their SHA-256 behind them."""
+    """Appends to the bytes of a file their SHA-256."""
     return data + hashlib.sha256(data).digest()
 
 
 def is_sealed(path: Path) -> bool:
-    """Whether a file ends with the SHA-256 of all bytes before; a damaged, cut or foreign file does not.
+    """Checks whether a file ends with the SHA-256 of all bytes before; a damaged, cut or foreign file does not.
 
     Raises:
         OSError: it cannot be read.
@@ -138,7 +139,7 @@ def is_sealed(path: Path) -> bool:
     return len(content) > _DIGEST and hashlib.sha256(memoryview(content)[:-_DIGEST]).digest() == content[-_DIGEST:]
 
 
-def _named(folder: Path) -> dict[str, Path]:
+def _files_by_path(folder: Path) -> dict[str, Path]:
     return {file.relative_to(folder).as_posix(): file for file in files_of(folder)}
 
 
@@ -146,7 +147,7 @@ def _lines(sums: dict[str, str]) -> str:
     return "".join(f"{value}  {name}\n" for name, value in sorted(sums.items()))
 
 
-def _stated(folder: Path, *, fix: str) -> dict[str, str]:
+def _sums_in(folder: Path, *, fix: str) -> dict[str, str]:
     path = folder / SUMS
     try:
         return read_sums(path.read_text(encoding="utf-8"))

@@ -213,26 +213,26 @@ def show_traceback() -> None:
 
 def main(arguments: list[str] | None = None, *, command: click.Group = root, name: str = "flagdata") -> None:
     """Run a command line and exit: 0 done, 1 failed, 2 usage, 3 refused: the data fail a quality check."""
-    given = sys.argv[1:] if arguments is None else arguments
+    words = sys.argv[1:] if arguments is None else arguments
     log = logging.getLogger("flagdata")
     if not any(isinstance(handler, Aside) for handler in log.handlers):
         log.addHandler(Aside())
     try:
-        outcome = command.main(args=given, prog_name=name, standalone_mode=False)
+        outcome = command.main(args=words, prog_name=name, standalone_mode=False)
     except click.ClickException as error:
-        if "--json" in given:
+        if "--json" in words:
             document("error", {"kind": UsageError.kind, "what": error.format_message(), "where": None, "fix": _HELP})
-        shown = io.StringIO()
-        error.show(shown)
-        echo_lines(shown.getvalue(), aside=True)
+        usage = io.StringIO()
+        error.show(usage)
+        echo_lines(usage.getvalue(), aside=True)
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt) as error:
         if isinstance(error.__cause__, EOFError):  # of a file, which click takes for the end of the user's input
-            sys.exit(fail(foreseen(error.__cause__), as_json="--json" in given))
+            sys.exit(fail(foreseen(error.__cause__), as_json="--json" in words))
         say("flagdata: interrupted")
         sys.exit(1)
     except Exception as error:  # noqa: BLE001  all errors are reported in one form
-        sys.exit(fail(foreseen(error), as_json="--json" in given))
+        sys.exit(fail(foreseen(error), as_json="--json" in words))
     sys.exit(outcome if isinstance(outcome, int) else 0)  # an int is what a command gave to Context.exit
 
 

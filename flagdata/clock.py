@@ -90,7 +90,7 @@ class ClockModel:
         return device + offset + np.round((device - origin) * drift).astype(np.int64)
 
     def sigma(self, time: ArrayLike) -> FloatArray:
-        """Standard uncertainty [s] of `to_common` at instants of the device's clock."""
+        """Computes the standard uncertainty [s] of `to_common` at instants of the device's clock."""
         device = np.asarray(time, dtype=np.int64)
         index = self._segment(device)
         origin = np.array([s.origin for s in self.segments], dtype=np.int64)[index]
@@ -118,6 +118,6 @@ class ClockModel:
 
     @classmethod
     def identity(cls, device: str, reference: str, *, start: int, end: int, sigma: float) -> ClockModel:
-        """Both clocks declared the same, by their time stamps, to within `sigma` [s]."""
+        """Declares both clocks the same, by their time stamps, to within `sigma` [s]."""
         segment = Segment(start=start, end=end, origin=(start + end) // 2, offset=0.0, sigma_offset=sigma)
         return cls(device=device, reference=reference, method="stamps", confidence=1.0, segments=(segment,))

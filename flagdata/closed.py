@@ -69,8 +69,10 @@ class Closed:
         return self.words
 
     def _repr_html_(self) -> str:
-        found = {
-            name: f"{one.parameter} {one.value:.3g} [{one.low:.3g}, {one.high:.3g}] {one.unit}, {one.level:.0%}"
-            for name, one in self.strengths.items()
+        effects = {
+            name: f"{fit.parameter} {fit.value:.3g} [{fit.low:.3g}, {fit.high:.3g}] {fit.unit}, {fit.level:.0%}"
+            for name, fit in self.strengths.items()
         }
-        return html.table(self.sentence, {"p of the base model": f"{self.p_value:.3g}", **found, "verdict": self.words})
+        return html.table(
+            self.sentence, {"p of the base model": f"{self.p_value:.3g}", **effects, "verdict": self.words}
+        )

@@ -38,59 +38,61 @@ _JOINED = {
 
 
 def _spelled(words: Sequence[str]) -> dict[str, float]:
-    """Every point in the words for north, east, south and west, joined by nothing, a blank or a hyphen."""
+    """Spells every point in the words for north, east, south and west, joined by nothing, a blank or a hyphen."""
     of = dict(zip("NESW", words, strict=True))
-    found: dict[str, float] = {}
+    points: dict[str, float] = {}
     for point, degrees in _DEGREES.items():
         for sign in ("", " ", "-"):
-            found[sign.join(of[letter] for letter in point)] = degrees
+            points[sign.join(of[letter] for letter in point)] = degrees
             if len(point) == 3:
-                found[f"{of[point[0]]}{sign}{of[point[1]]}{of[point[2]]}"] = degrees
-    return found
+                points[f"{of[point[0]]}{sign}{of[point[1]]}{of[point[2]]}"] = degrees
+    return points
 
 
 def _iberian() -> dict[str, float]:
-    """NORESTE, SUROESTE, NORDESTE, ESTENORESTE and the like."""
+    """Spells NORESTE, SUROESTE, NORDESTE, ESTENORESTE and the like."""
     ends = {"E": "ESTE", "W": "OESTE"}
     between = {start + ends[east]: side + east for start, side in _JOINED.items() if side in "NS" for east in ends}
-    found = {name: _DEGREES[point] for name, point in between.items()}
+    points = {name: _DEGREES[point] for name, point in between.items()}
     for name, point in between.items():
         for start, side in _JOINED.items():
-            whole = side + point
-            if whole in _DEGREES:
-                found |= {f"{start}{sign}{name}": _DEGREES[whole] for sign in ("", " ", "-")}
-    return found
+            joined = side + point
+            if joined in _DEGREES:
+                points |= {f"{start}{sign}{name}": _DEGREES[joined] for sign in ("", " ", "-")}
+    return points
 
 
 def _russian() -> dict[str, float]:
-    """СЕВЕРО-ВОСТОК, of the wind СЕВЕРО-ВОСТОКА, as the weather pages rp5 say "Ветер, дующий с северо-востока"."""
+    """Spells СЕВЕРО-ВОСТОК, of the wind СЕВЕРО-ВОСТОКА, as the weather pages rp5 say "Ветер, дующий с
+    северо-востока"."""
     of = {"N": "СЕВЕР", "E": "ВОСТОК", "S": "ЮГ", "W": "ЗАПАД"}
-    found: dict[str, float] = {}
+    points: dict[str, float] = {}
     for point, degrees in _DEGREES.items():
         name = "".join(f"{of[letter]}О-" for letter in point[:-1]) + of[point[-1]]
-        found |= dict.fromkeys((name, f"{name}А", f"ВЕТЕР, ДУЮЩИЙ С {name}А"), degrees)
-    return found
+        points |= dict.fromkeys((name, f"{name}А", f"ВЕТЕР, ДУЮЩИЙ С {name}А"), degrees)
+    return points
 
 
 def _blowing() -> dict[str, float]:
-    """WIND BLOWING FROM THE SOUTH-SOUTHWEST or NORTH-EAST, as the weather pages rp5 say in English."""
+    """Spells WIND BLOWING FROM THE SOUTH-SOUTHWEST or NORTH-EAST, as the weather pages rp5 say in English."""
     of = dict(zip("NESW", _WORDS["en"], strict=True))
-    found: dict[str, float] = {}
+    points: dict[str, float] = {}
     for point, degrees in _DEGREES.items():
         first, last = ([of[letter] for letter in part] for part in (point[:-2], point[-2:]))
         for name in ("-".join([*first, "".join(last)]), "-".join([*first, *last])):
-            found[f"WIND BLOWING FROM THE {name}"] = degrees
-    return found
+            points[f"WIND BLOWING FROM THE {name}"] = degrees
+    return points
 
 
 def _polish() -> dict[str, float]:
-    """PN., PN.-ZACH. and ZACH.PN.-ZACH., as Polish shortens północ, południe, wschód and zachód; the dots may lack."""
+    """Spells PN., PN.-ZACH. and ZACH.PN.-ZACH., as Polish shortens północ, południe, wschód and zachód; the dots may
+    lack."""
     of = {"N": "PN.", "E": "WSCH.", "S": "PD.", "W": "ZACH."}
-    found: dict[str, float] = {}
+    points: dict[str, float] = {}
     for point, degrees in _DEGREES.items():
         name = "".join(of[letter] for letter in point[:-2]) + "-".join(of[letter] for letter in point[-2:])
-        found |= dict.fromkeys((name, name.replace(".", "")), degrees)
-    return found
+        points |= dict.fromkeys((name, name.replace(".", "")), degrees)
+    return points
 
 
 def _letters(north: str, east: str, south: str, west: str) -> dict[str, float]:
@@ -184,7 +186,7 @@ CALM = STILL | {
 
 
 def table_of(cells: Sequence[str], *, heading: str, share: float) -> str | None:
-    """The unit of a column of points of the compass; `None` where it holds something else, or two may be meant.
+    """Names the unit of a column of points of the compass; `None` where it holds something else, or two may be meant.
 
     Args:
         cells: trimmed, without those that are missing.
@@ -194,11 +196,13 @@ def table_of(cells: Sequence[str], *, heading: str, share: float) -> str | None:
     filled = [cell.upper() for cell in cells if cell.lower() not in CALM]
     if not filled:
         return None
-    known = [unit for unit, points in BY_UNIT.items() if sum(cell in points for cell in filled) >= share * len(filled)]
-    if not known:
+    fitting = [
+        unit for unit, points in BY_UNIT.items() if sum(cell in points for cell in filled) >= share * len(filled)
+    ]
+    if not fitting:
         return None
-    kinds = {cell for cell in filled if any(cell in BY_UNIT[unit] for unit in known)}
-    if "points" in known or all(len({BY_UNIT[unit].get(cell) for unit in known}) == 1 for cell in kinds):
-        return known[0]
-    found = [unit for unit in known if any(word in heading.lower() for word in _HEADINGS.get(unit, ()))]
-    return found[0] if found else None
+    kinds = {cell for cell in filled if any(cell in BY_UNIT[unit] for unit in fitting)}
+    if "points" in fitting or all(len({BY_UNIT[unit].get(cell) for unit in fitting}) == 1 for cell in kinds):
+        return fitting[0]
+    named_by_heading = [unit for unit in fitting if any(word in heading.lower() for word in _HEADINGS.get(unit, ()))]
+    return named_by_heading[0] if named_by_heading else None

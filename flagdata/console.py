@@ -91,12 +91,12 @@ def document(tag: str, content: Mapping[str, Any]) -> None:
 
 
 def echo(text: object = "") -> None:
-    """One line of a result, on stdout."""
+    """Writes one line of a result to stdout."""
     click.echo(printable(str(text)))
 
 
 def echo_lines(text: str, *, aside: bool = False) -> None:
-    """A result of several lines; nothing where there is none.
+    """Writes a result of several lines; nothing where there is none.
 
     Args:
         aside: on stderr.
@@ -105,7 +105,7 @@ def echo_lines(text: str, *, aside: bool = False) -> None:
 
 
 def csv_rows(rows: Iterable[Sequence[object]]) -> None:
-    """A result as CSV: to a file or another program as it is, to a terminal as other text."""
+    """Writes a result as CSV: to a file or another program as it is, to a terminal as other text."""
     writer = csv.writer(sys.stdout, lineterminator="\n")
     if sys.stdout.isatty():
         rows = ([printable(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
@@ -113,7 +113,7 @@ def csv_rows(rows: Iterable[Sequence[object]]) -> None:
 
 
 def ask(question: str) -> str:
-    """What somebody at the terminal types, without blanks around it."""
+    """Asks at the terminal, and returns what is typed, without blanks around it."""
     return str(click.prompt(printable(question), err=True, prompt_suffix="> ")).strip()
 
 
@@ -121,26 +121,26 @@ _COLOURS = {"warning": "yellow", "error": "red", "flagdata": "red"}
 
 
 def say(text: str, *, mark: str | None = None) -> None:
-    """A text for people, on stderr; further lines of it are indented, so that none is taken for a message of its own.
+    """Writes a text for people to stderr, further lines indented, so that none is taken for a message of its own.
 
     Args:
         mark: "note", "warning" or "error" before it, or "flagdata" before the error that ends a command: in colour on a
             terminal, unless the environment variable NO_COLOR is set.
     """
-    shown = _indented(text)
+    message = _indented(text)
     if mark is not None:
         coloured = mark in _COLOURS and not os.environ.get("NO_COLOR")
-        shown = f"{click.style(f'{mark}:', fg=_COLOURS[mark], bold=True) if coloured else f'{mark}:'} {shown}"
-    click.echo(shown, err=True)  # which takes the colour out where stderr is no terminal
+        message = f"{click.style(f'{mark}:', fg=_COLOURS[mark], bold=True) if coloured else f'{mark}:'} {message}"
+    click.echo(message, err=True)  # which takes the colour out where stderr is no terminal
 
 
 def say_finding(finding: Finding) -> None:
-    """A finding for people, on stderr: what was found, and what to do about it."""
+    """Writes a finding for people to stderr: what was found, and what to do about it."""
     say(finding.what + (f"; {finding.fix}" if finding.fix else ""), mark=finding.severity.value)
 
 
 def say_beside_bars(text: str) -> None:
-    """A text for people while a bar of `progress` is shown."""
+    """Writes a text for people while a bar of `progress` is shown."""
     from tqdm import tqdm  # loads slowly
 
     tqdm.write(_indented(text), file=sys.stderr)
@@ -158,7 +158,7 @@ class Aside(logging.Handler):
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Aligned columns on stdout; numbers to the right."""
+    """Writes aligned columns to stdout; numbers to the right."""
     body = [["" if cell is None else printable(str(cell)) for cell in row] for row in rows]
     header = list(map(printable, header))
     widths = [max(len(r[i]) for r in [header, *body]) for i in range(len(header))]
@@ -178,7 +178,7 @@ def _is_number(text: str) -> bool:
 
 @contextmanager
 def progress(total: int | None, label: str, unit: str) -> Iterator[Callable[[int], None]]:
-    """A bar on stderr for anything that takes longer than two seconds; yields a function that advances it."""
+    """Shows a bar on stderr for anything that takes longer than two seconds; yields a function that advances it."""
     from tqdm import tqdm
 
     interval = 0.2 if sys.stderr.isatty() else 10.0  # a log file gets a line now and then, not an animation
@@ -193,7 +193,7 @@ def progress(total: int | None, label: str, unit: str) -> Iterator[Callable[[int
 
 
 def foreseen(error: Exception) -> FlagdataError:
-    """The report of any exception that reached the command line."""
+    """Turns any exception that reached the command line into its report."""
     if isinstance(error, FlagdataError):
         return error
     if isinstance(error, ImportError) and (lacking := missing(error)) is not None:
@@ -210,10 +210,10 @@ def foreseen(error: Exception) -> FlagdataError:
     if isinstance(error, MemoryError):
         return LimitError("there is not enough memory for this", fix="ask for less at a time, or use a larger machine")
     frames = traceback.extract_tb(error.__traceback__)
-    places = [place for frame in frames if (place := _own_place(frame)) is not None]
+    places = [location for frame in frames if (location := _own_place(frame)) is not None]
     message = " ".join(f"{type(error).__name__}: {error}".split())
     return UnforeseenError(
-        f"unforeseen error: {message[:300]}",
+        f"an unforeseen error occurred: {message[:300]}",
         where=places[-1] if places else None,
         fix="this is a defect of flagdata: please report it, with what --debug before the command's name says",
     )
@@ -223,7 +223,7 @@ _HOUSE = Path(__file__).resolve().parents[1]
 
 
 def _own_place(frame: traceback.FrameSummary) -> str | None:
-    """File and line within the packages of this project; `None` elsewhere."""
+    """Returns file and line within the packages of this project; `None` elsewhere."""
     path = Path(frame.filename)
     if not path.is_relative_to(_HOUSE) or "site-packages" in path.relative_to(_HOUSE).parts:
         return None
@@ -232,7 +232,8 @@ def _own_place(frame: traceback.FrameSummary) -> str | None:
 
 @contextmanager
 def following(published: str, doing: str) -> Iterator[None]:
-    """Work that follows the publication of `published`: an error in it becomes a warning, since that stays published.
+    """Runs work that follows the publication of `published`: an error in it becomes a warning, since that stays
+    published.
 
     Args:
         published: what was published, e.g. "the data set in lake".
@@ -241,13 +242,13 @@ def following(published: str, doing: str) -> Iterator[None]:
     try:
         yield
     except Exception as error:  # noqa: BLE001  whatever it is, the command has done what cannot be undone
-        known = foreseen(error)
-        _report(f"{published} is published, but {doing} failed: {known.what}", known, mark="warning")
+        reported = foreseen(error)
+        _report(f"{published} is published, but {doing} failed: {reported.what}", reported, mark="warning")
 
 
 @contextmanager
 def in_steps(published: Callable[[], str]) -> Iterator[None]:
-    """Work that publishes one part after the other: an error in it says which parts are published and stay.
+    """Runs work that publishes one part after the other: an error in it says which parts are published and stay.
 
     Args:
         published: what is published by now, e.g. "2 recordings on branch main"; "" if nothing is.
@@ -255,15 +256,15 @@ def in_steps(published: Callable[[], str]) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        known = foreseen(error)
+        reported = foreseen(error)
         try:
             done = published()
         except (OSError, FlagdataError):
             done = "what was finished before (flagdata log lists it)"
         if not done:
             raise
-        fix = f"{known.fix}. Published, and kept: {done}; give the same command again for the rest"
-        raise type(known)(known.what, where=known.where, fix=fix) from error
+        fix = f"{reported.fix}. Published, and kept: {done}; give the same command again for the rest"
+        raise type(reported)(reported.what, where=reported.where, fix=fix) from error
 
 
 def fail(error: FlagdataError, *, as_json: bool) -> int:
@@ -274,16 +275,16 @@ def fail(error: FlagdataError, *, as_json: bool) -> int:
     return error.exit_code
 
 
-def _report(what: str, error: FlagdataError, *, mark: str = "flagdata") -> None:
-    say(what, mark=mark)
+def _report(text: str, error: FlagdataError, *, mark: str = "flagdata") -> None:
+    say(text, mark=mark)
     if error.where:
         say(f"  where: {error.where}")
     say(f"  fix:   {error.fix}")
 
 
-def print_help(shown: click.Context, *, as_json: bool) -> None:
-    """The help of a command on stdout."""
+def print_help(context: click.Context, *, as_json: bool) -> None:
+    """Writes the help of a command to stdout."""
     if as_json:
-        document("help", {"command": shown.command_path, "help": shown.get_help()})
+        document("help", {"command": context.command_path, "help": context.get_help()})
     else:
-        echo_lines(shown.get_help())
+        echo_lines(context.get_help())

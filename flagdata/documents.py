@@ -26,7 +26,7 @@ class LimitsError(ValueError):
 
 
 def from_toml(text: str) -> dict[str, Any]:
-    """The tables of a TOML text.
+    """Parses the tables of a TOML text.
 
     Raises:
         LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
@@ -46,7 +46,7 @@ def from_toml(text: str) -> dict[str, Any]:
 
 
 def to_toml(content: Mapping[str, Any], *, inside: str = "") -> str:
-    """A TOML text of these tables: texts, numbers, truth values, lists of them, tables, and lists of tables.
+    """Writes a TOML text of these tables: texts, numbers, truth values, lists of them, tables, and lists of tables.
 
     Args:
         inside: the table's own name, with a dot behind it.
@@ -58,16 +58,16 @@ def to_toml(content: Mapping[str, Any], *, inside: str = "") -> str:
     parts = ["".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in plain.items())]
     parts += [f"\n[{inside}{key}]\n{to_toml(value, inside=f'{inside}{key}.')}" for key, value in tables.items()]
     for key, value in lists.items():
-        parts += [f"\n[[{inside}{key}]]\n{to_toml(one, inside=f'{inside}{key}.')}" for one in value]
+        parts += [f"\n[[{inside}{key}]]\n{to_toml(inner_table, inside=f'{inside}{key}.')}" for inner_table in value]
     return "".join(parts)
 
 
 def _are_tables(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)
+    return isinstance(value, list) and bool(value) and all(isinstance(item, Mapping) for item in value)
 
 
 def from_json(text: str | bytes) -> Any:
-    """The value of a JSON text.
+    """Parses the value of a JSON text.
 
     Raises:
         LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
@@ -79,7 +79,7 @@ def from_json(text: str | bytes) -> Any:
 
 
 def from_stored_json(text: str) -> Any:
-    """The value of a JSON text that a lake holds; older versions stored numbers that are not finite.
+    """Parses the value of a JSON text that a lake holds; older versions stored numbers that are not finite.
 
     Raises:
         LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
@@ -92,7 +92,7 @@ def from_stored_json(text: str) -> Any:
 
 
 def column_json(text: str, column: str, *, artifact: str) -> Any:
-    """The value of a JSON column of a catalog's row.
+    """Parses the value of a JSON column of a catalog's row.
 
     Raises:
         CorruptError: as the errors of `from_stored_json`; it names the artifact.
@@ -105,7 +105,7 @@ def column_json(text: str, column: str, *, artifact: str) -> Any:
 
 
 def read_json(path: Path, *, noun: str, fix: str = "restore it from a copy") -> dict[str, Any]:
-    """The object in a JSON file that flagdata wrote.
+    """Reads the object in a JSON file that flagdata wrote.
 
     Args:
         noun: what the file is called in the error message.
@@ -146,7 +146,7 @@ def _check(content: Any) -> None:
 
 
 def _levels(content: Any) -> Iterator[list[Any]]:
-    """The values of each level of nesting below the whole.
+    """Yields the values of each level of nesting below the whole.
 
     Raises:
         LimitsError: there are more than `NESTING_LIMIT` levels.

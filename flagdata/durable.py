@@ -25,7 +25,7 @@ _LOG = logging.getLogger("flagdata")
 
 
 def flush_file(path: Path) -> None:
-    """Force a file's bytes to the disk."""
+    """Forces a file's bytes to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -34,7 +34,7 @@ def flush_file(path: Path) -> None:
 
 
 def flush_folder(path: Path) -> None:
-    """Force a folder's entries (names that were added, renamed, removed) to the disk."""
+    """Forces a folder's entries (names that were added, renamed, removed) to the disk."""
     flush_file(path)
 
 
@@ -46,13 +46,13 @@ def write_durably(path: Place, data: bytes) -> None:
         flush_folder(path.parent)
 
 
-def put_if_absent(path: Place, data: bytes, *, what: str | None = None) -> bool:
+def put_if_absent(path: Place, data: bytes, *, noun: str | None = None) -> bool:
     """Create `path` with all of `data`, or leave what is there; False when the name was taken.
 
     The bytes are written and flushed beside it under another name, then linked: the name appears whole or not at all.
 
     Args:
-        what: is published by it, for a warning; the file by its name if `None`.
+        noun: is published by it, for a warning; the file by its name if `None`.
 
     Raises:
         OSError: what the disk refused; the name was not taken.
@@ -71,26 +71,26 @@ def put_if_absent(path: Place, data: bytes, *, what: str | None = None) -> bool:
         with suppress(OSError):  # what is left is a collection's
             scratch.unlink(missing_ok=True)
         raise
-    what = what or f"the file {path.name}"
-    with confirming(what, path):
+    noun = noun or f"the file {path.name}"
+    with confirming(noun, path):
         flush_folder(path.parent)
-    with confirming(what, path):
+    with confirming(noun, path):
         scratch.unlink(missing_ok=True)
     return True
 
 
 @contextmanager
-def confirming(what: str, where: Place) -> Iterator[None]:
-    """Work on `what` after it was published: what the disk refuses is a warning, since it stays published."""
+def confirming(noun: str, where: Place) -> Iterator[None]:
+    """Works on `noun` after it was published: what the disk refuses is a warning, since it stays published."""
     try:
         yield
     except (OSError, FlagdataError) as error:
         refused = isinstance(error, OSError)
-        said = (error.strerror or str(error)) if refused else error.what
+        refusal = (error.strerror or str(error)) if refused else error.what
         _LOG.warning(
             "flagdata: warning: %s is published, but the disk did not confirm it (%s)\n  where: %s\n  fix:   %s",
-            what,
-            " ".join(said.split()),
+            noun,
+            " ".join(refusal.split()),
             (error.filename if refused else error.where) or where,
             "check the disk, then run flagdata doctor: until it confirms, a power cut may lose it",
         )
@@ -107,24 +107,26 @@ def disk_errors(doing: str, where: Place) -> Iterator[None]:
         yield
     except OSError as error:
         text = " ".join(COLOUR.sub("", error.strerror or str(error)).split())
-        number = error.errno or (int(found[1] or found[2]) if (found := _NUMBER.search(text)) else 0)
+        number = error.errno or (
+            int(number_in_text[1] or number_in_text[2]) if (number_in_text := _NUMBER.search(text)) else 0
+        )
         fix = error.fix if isinstance(error, StoreError) else _FIXES.get(number, "check the disk")
         raise FlagdataError(
             f"{doing} failed: {text}", where=str(error.filename or where), fix=f"{fix}, then do it again"
         ) from error
 
 
-def unreadable(what: str, where: Place, error: OSError) -> FlagdataError:
-    """The error for a file of the lake that cannot be read: damaged or closed to this user on a disk; in a bucket, what
-    the store says and its remedy, since the file itself may be whole.
+def unreadable(noun: str, where: Place, error: OSError) -> FlagdataError:
+    """Returns the error for a file of the lake that cannot be read: damaged or closed to this user on a disk; in a
+    bucket, what the store says and its remedy, since the file itself may be whole.
 
     Args:
-        what: is read.
+        noun: is read.
     """
-    said = f"{what} cannot be read: {error.strerror}"
+    message = f"{noun} cannot be read: {error.strerror}"
     if isinstance(error, StoreError):
-        return FlagdataError(said, where=str(where), fix=error.fix)
-    return CorruptError(said, where=str(where), fix="give yourself read permission on it, or restore it from a copy")
+        return FlagdataError(message, where=str(where), fix=error.fix)
+    return CorruptError(message, where=str(where), fix="give yourself read permission on it, or restore it from a copy")
 
 
 _NUMBER = re.compile(r"\(os error (\d+)\)|\bOs \{ code: (\d+)")  # as the Delta library writes it

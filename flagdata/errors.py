@@ -154,9 +154,9 @@ class UnknownNameError(UsageError):
     kind = ErrorKind.UNKNOWN_NAME
 
     @classmethod
-    def of(cls, noun: str, name: str, known: Iterable[str], *, where: str | None = None) -> UnknownNameError:
-        """Build the error for `name`, suggesting the closest of `known`."""
-        names = sorted(known)
+    def of(cls, noun: str, name: str, choices: Iterable[str], *, where: str | None = None) -> UnknownNameError:
+        """Build the error for `name`, suggesting the closest of `choices`."""
+        names = sorted(choices)
         close = difflib.get_close_matches(name, names, n=1)
         fix = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(names) or 'none'}"
         return cls(f"unknown {noun} {name!r}", where=where, fix=fix)

@@ -24,7 +24,7 @@ _CPU = "without an NVIDIA card first: pip install torch --index-url https://down
 
 
 def missing(error: ImportError) -> MissingExtraError | None:
-    """The error for the user of a module that is not installed; None where no extra brings it."""
+    """Returns the error for the user of a module that is not installed; None where no extra brings it."""
     module = (error.name or "").partition(".")[0]
     if not isinstance(error, ModuleNotFoundError) or module not in EXTRAS:
         return None
@@ -37,7 +37,7 @@ def missing(error: ImportError) -> MissingExtraError | None:
 
 @contextmanager
 def explained() -> Iterator[None]:
-    """Within it a module that an extra brings and that is missing is an error that names the extra.
+    """Turns the missing of a module that an extra brings into an error that names the extra.
 
     Raises:
         MissingExtraError: so it is.
@@ -45,7 +45,7 @@ def explained() -> Iterator[None]:
     try:
         yield
     except ImportError as error:
-        found = missing(error)
-        if found is None:
+        extra_error = missing(error)
+        if extra_error is None:
             raise
-        raise found from error
+        raise extra_error from error

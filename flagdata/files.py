@@ -20,7 +20,7 @@ _OF_WINDOWS = frozenset({"thumbs.db", "ehthumbs.db", "desktop.ini"})
 
 
 def is_beside(name: str) -> bool:
-    """Whether a name is of a file that an operating system puts beside what a user keeps in a folder.
+    """Checks whether a name is of a file that an operating system puts beside what a user keeps in a folder.
 
     Hidden files are, among them macOS's `.DS_Store` and `._NAME`, and Windows's Thumbs.db and desktop.ini.
     """
@@ -28,7 +28,7 @@ def is_beside(name: str) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether there is a folder at a path; false for what is no path at all, as a name that is too long."""
+    """Checks whether there is a folder at a path; false for what is no path at all, as a name that is too long."""
     try:
         return path.is_dir()
     except OSError:
@@ -36,7 +36,7 @@ def is_folder(path: Path) -> bool:
 
 
 def is_mcap(path: Path) -> bool:
-    """Whether there is a file at a path that begins as MCAP files do."""
+    """Checks whether there is a file at a path that begins as MCAP files do."""
     try:
         with open_regular(path) as stream:
             return stream.read(len(MCAP)) == MCAP
@@ -45,7 +45,7 @@ def is_mcap(path: Path) -> bool:
 
 
 def is_lerobot(path: Path) -> bool:
-    """Whether there is a folder at a path that has LeRobot's description of a data set."""
+    """Checks whether there is a folder at a path that has LeRobot's description of a data set."""
     return is_folder(path) and (path / LEROBOT_INFO).is_file()
 
 
@@ -64,24 +64,24 @@ def check_input(path: Path, *, noun: str = "file", limit: int | None = None) -> 
         InputError: a folder, a pipe or a device; or an empty file.
         LimitError: more bytes than `limit`.
     """
-    shown = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}…"
+    short_path = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}…"
     try:
         status = path.stat()
     except (OSError, ValueError) as error:  # a path with a null byte is a ValueError
         why = "" if isinstance(error, FileNotFoundError) else f" ({getattr(error, 'strerror', None) or error})"
-        raise NotFoundError(f"there is no such {noun}{why}", where=shown, fix="check the path") from None
+        raise NotFoundError(f"there is no such {noun}{why}", where=short_path, fix="check the path") from None
     if not stat.S_ISREG(status.st_mode):
         message = "a folder" if stat.S_ISDIR(status.st_mode) else "a pipe or device"
         fix = f"give a {noun}" if stat.S_ISDIR(status.st_mode) else "write what it gives to a file first"
-        raise InputError(f"{message}, not a {noun}", where=shown, fix=fix)
+        raise InputError(f"this is {message}, not a {noun}", where=short_path, fix=fix)
     if not status.st_size:
-        raise InputError(f"the {noun} is empty", where=shown, fix="copy or export it again")
+        raise InputError(f"the {noun} is empty", where=short_path, fix="copy or export it again")
     if limit is not None and status.st_size > limit:
-        raise LimitError(f"a {noun} of {status.st_size} bytes", where=shown, fix=f"at most {limit} are read")
+        raise LimitError(f"the {noun} has {status.st_size} bytes", where=short_path, fix=f"at most {limit} are read")
 
 
 def open_regular(path: Place) -> BufferedIOBase:
-    """A regular file, opened to read its bytes; of a bucket, an object's bytes.
+    """Opens a regular file to read its bytes; of a bucket, an object's bytes.
 
     Raises:
         OSError: what the system refused; or a folder, pipe or device, from which one may read without an end.

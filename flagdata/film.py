@@ -49,11 +49,11 @@ class Film(Protocol):
         ...
 
     def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
-        """(time since the first frame [s], (height, width) gray) from `first` to `last` [s], in order."""
+        """Yields (time since the first frame [s], (height, width) gray) from `first` to `last` [s], in order."""
         ...
 
     def findings(self) -> tuple[Finding, ...]:
-        """What was noticed; complete when its frames were read."""
+        """Returns what was noticed; complete when its frames were read."""
         ...
 
 
@@ -109,7 +109,7 @@ class CameraFilm:
                     if time >= first:
                         yield time, stream.unpadded(frame.image)
             finally:
-                self._findings = tuple(found for found in stream.findings if found.kind not in _OF_PADDING)
+                self._findings = tuple(finding for finding in stream.findings if finding.kind not in _OF_PADDING)
 
     def findings(self) -> tuple[Finding, ...]:
         return self._findings
@@ -161,9 +161,9 @@ class RecordFilm:
         low = int(np.searchsorted(self._seconds, first, side="left"))
         high = int(np.searchsorted(self._seconds, last, side="right"))
         for begin in range(low, high, _AT_ONCE):
-            some = min(_AT_ONCE, high - begin)
-            pictures = self.record.frames(self._first + begin, some)
-            yield from zip(self._seconds[begin : begin + some].tolist(), pictures, strict=True)
+            count = min(_AT_ONCE, high - begin)
+            pictures = self.record.frames(self._first + begin, count)
+            yield from zip(self._seconds[begin : begin + count].tolist(), pictures, strict=True)
 
     def findings(self) -> tuple[Finding, ...]:
         return ()

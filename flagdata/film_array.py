@@ -79,13 +79,13 @@ class Frames:
         return self.images.shape[1]
 
     def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
-        """(time since the first frame [s], (height, width) gray) from `first` to `last` [s], in order."""
+        """Yields (time since the first frame [s], (height, width) gray) from `first` to `last` [s], in order."""
         seconds = self.time - self.time[0]
-        for place in np.flatnonzero((seconds >= first) & (seconds <= last)).tolist():
-            yield float(seconds[place]), gray(self.images[place])
+        for index in np.flatnonzero((seconds >= first) & (seconds <= last)).tolist():
+            yield float(seconds[index]), gray(self.images[index])
 
     def findings(self) -> tuple[Finding, ...]:
-        """Nothing: the frames are as they were given."""
+        """Returns no findings: the frames are as they were given."""
         return ()
 
     def __repr__(self) -> str:
@@ -98,20 +98,20 @@ class Frames:
     def _repr_html_(self) -> str:
         from flagdata.pages.pictures import moving
 
-        every = math.ceil(len(self) / _SHOWN)
-        shown = moving(self.images[::every], rate=self.rate / every, side=_SIDE)
-        return html.table(repr(self), {}) + html.image(shown)
+        stride = math.ceil(len(self) / _SHOWN)
+        picture = moving(self.images[::stride], rate=self.rate / stride, side=_SIDE)
+        return html.table(repr(self), {}) + html.image(picture)
 
 
 def gray(picture: UInt8Array) -> UInt8Array:
-    """(height, width) luma by Rec. 601, as everywhere in `flagdata.ingest`, of a gray or sRGB picture."""
+    """Computes (height, width) luma by Rec. 601, as everywhere in `flagdata.ingest`, of a gray or sRGB picture."""
     if picture.ndim == 2:
         return picture
     return (picture @ np.array([0.299, 0.587, 0.114]) + 0.5).astype(np.uint8)
 
 
 def collected(film: Film, *, first: float, last: float | None) -> Frames:
-    """The frames of a film from `first` to `last` [s] as an array.
+    """Collects the frames of a film from `first` to `last` [s] in an array.
 
     Raises:
         LimitError: more than `LARGEST` bytes.

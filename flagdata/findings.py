@@ -110,5 +110,5 @@ SEVERITIES = {kind: severity for severity, kinds in _KINDS.items() for kind in k
 
 
 def quality_flags(findings: tuple[Finding, ...]) -> list[str]:
-    """The catalog's quality flags: kinds of all warnings and errors, sorted, each once."""
+    """Lists the catalog's quality flags: kinds of all warnings and errors, sorted, each once."""
     return sorted({f.kind for f in findings if f.severity is not Severity.NOTE})

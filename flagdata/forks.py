@@ -15,22 +15,22 @@ class OneProcess:
         fix: what to do instead of forking.
     """
 
-    def __init__(self, what: str, *, fix: str) -> None:
-        self._what, self._fix = what, fix
+    def __init__(self, text: str, *, fix: str) -> None:
+        self._what, self._fix = text, fix
         self._user: int | None = None
 
     def check(self) -> None:
-        """Note the process that uses it.
+        """Notes the process that uses it.
 
         Raises:
             FlagdataError: it was used before this process was forked.
         """
-        own = os.getpid()
+        process = os.getpid()
         if self._user is None:
-            self._user = own
-        elif self._user != own:
+            self._user = process
+        elif self._user != process:
             raise FlagdataError(
                 f"{self._what} was used before this process was forked, and cannot be used in the child",
-                where=f"process {own}",
+                where=f"process {process}",
                 fix=self._fix,
             )

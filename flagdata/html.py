@@ -7,7 +7,7 @@ from html import escape
 
 
 def table(title: str, rows: Mapping[str, str]) -> str:
-    """A title above rows of a name and a value, all of them text."""
+    """Writes a title above rows of a name and a value, all of them text."""
     cells = "".join(
         f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(value)}</td></tr>'
         for name, value in rows.items()
@@ -16,12 +16,12 @@ def table(title: str, rows: Mapping[str, str]) -> str:
 
 
 def grid(title: str, names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A title above a table with a heading, all cells text."""
+    """Writes a title above a table with a heading, all cells text."""
     head = "".join(f"<th>{escape(name)}</th>" for name in names)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<div><b>{escape(title)}</b><table><tr>{head}</tr>{body}</table></div>"
 
 
 def image(address: str) -> str:
-    """A picture at an address, which may hold the picture."""
+    """Writes a picture at an address, which may hold the picture."""
     return f'<img src="{escape(address)}">'

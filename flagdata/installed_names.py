@@ -76,9 +76,9 @@ class _Finder:
             spec = ModuleSpec(name, None, is_package=True)
             spec.submodule_search_locations = []
             return spec
-        place = _ROOT.joinpath(*parts[1:]) if parts[0] == FOLDER else _HERE.joinpath(*parts)
-        package = place / "__init__.py"
-        file, folders = (package, [str(place)]) if package.is_file() else (place.with_suffix(".py"), None)
+        location = _ROOT.joinpath(*parts[1:]) if parts[0] == FOLDER else _HERE.joinpath(*parts)
+        package = location / "__init__.py"
+        file, folders = (package, [str(location)]) if package.is_file() else (location.with_suffix(".py"), None)
         if not file.is_file():
             return None
         loader = _Loader(name, str(file))
@@ -102,7 +102,7 @@ class _Loader(SourceFileLoader):
 
 
 def renamed(source: str, root: Path) -> str:
-    """Python source with the packages' names as they are in an installation.
+    """Renames the packages in Python source as they are in an installation.
 
     Args:
         root: folder in which the packages lie: a text is a name where there is such a module.
@@ -115,25 +115,25 @@ def renamed(source: str, root: Path) -> str:
 
 
 def _places(tree: ast.Module, root: Path) -> Iterator[tuple[int, int]]:
-    """(line, column [B]) where a name of the packages begins."""
+    """Yields (line, column [B]) where a name of the packages begins."""
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.level == 0 and (node.module or "").partition(".")[0] in BESIDE:
             yield node.lineno, node.col_offset + len("from ")
         elif isinstance(node, ast.Import):
-            if any(one.name.partition(".")[0] in BESIDE for one in node.names):
+            if any(alias.name.partition(".")[0] in BESIDE for alias in node.names):
                 raise ValueError(f"line {node.lineno}: write `from package import module`, which can be renamed")
         elif isinstance(node, ast.Constant) and isinstance(node.value, str) and _is_name(node.value, root):
             yield node.lineno, node.col_offset + 1
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "files":
-            yield from ((one.lineno, one.col_offset + 1) for one in node.args if _is_package(one))
+            yield from ((argument.lineno, argument.col_offset + 1) for argument in node.args if _is_package(argument))
 
 
 def _is_name(text: str, root: Path) -> bool:
-    """Whether a text names a module within a package, perhaps with an attribute of it."""
-    found = _NAME.fullmatch(text)
-    if found is None or "." not in found["module"]:
+    """Checks whether a text names a module within a package, perhaps with an attribute of it."""
+    match = _NAME.fullmatch(text)
+    if match is None or "." not in match["module"]:
         return False
-    path = root.joinpath(*found["module"].split("."))
+    path = root.joinpath(*match["module"].split("."))
     return path.is_dir() or path.with_suffix(".py").is_file()
 
 
@@ -159,7 +159,7 @@ class BuildPackages(BuildPy):
             shutil.move(root / name, inside / name)
 
     def get_outputs(self, include_bytecode: bool = True) -> list[str]:
-        """The files that are there after the move."""
+        """Lists the files that are there after the move."""
         if self.editable_mode:
             return super().get_outputs(include_bytecode)
         return [str(path) for path in sorted(Path(self.build_lib).rglob("*")) if path.is_file()]

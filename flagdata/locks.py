@@ -13,7 +13,7 @@ LOCK = "lock"
 
 @contextmanager
 def alone_in(folder: Path, *, occupied: Callable[[], object]) -> Iterator[None]:
-    """Work in a folder, made if it is missing, that no other process or thread works in by this function.
+    """Allows work in a folder, made if it is missing, that no other process or thread works in by this function.
 
     Where one does, `occupied` is called, which raises, or says that its end is waited for. The lock (flock on the file
     `lock` in the folder) ends with the process, however that ends.

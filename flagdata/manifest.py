@@ -40,8 +40,8 @@ def unlisted(folder: Path, *, schema: str) -> list[str]:
     and the manifest itself where it cannot be read or is of another schema. Missing files and empty folders do not
     count."""
     listed = _listed(folder / MANIFEST, schema)
-    found = [path for path in sorted(_entries(folder)) if path != MANIFEST or not listed]
-    return [path for path in found if not _same(folder / path, listed.get(path))]
+    paths = [path for path in sorted(_entries(folder)) if path != MANIFEST or not listed]
+    return [path for path in paths if not _same(folder / path, listed.get(path))]
 
 
 def remove_listed(folder: Path, *, schema: str) -> None:
@@ -64,7 +64,7 @@ def remove_listed(folder: Path, *, schema: str) -> None:
 
 
 def _listed(manifest: Path, schema: str) -> dict[str, Mapping[str, Any]]:
-    """The entries of a manifest by path; none where it is absent, cannot be read or is of another schema."""
+    """Reads the entries of a manifest by path; none where it is absent, cannot be read or is of another schema."""
     try:
         content = json.loads(manifest.read_text(encoding="utf-8"))
         if manifest.is_symlink() or content["schema"] != schema:
@@ -76,11 +76,11 @@ def _listed(manifest: Path, schema: str) -> dict[str, Mapping[str, Any]]:
 
 def _entries(folder: Path) -> list[str]:
     """Paths of all that is no folder, and of links to folders."""
-    found: list[str] = []
+    paths: list[str] = []
     for inner, folders, files in os.walk(folder):
         links = [name for name in folders if (Path(inner) / name).is_symlink()]
-        found += [(Path(inner) / name).relative_to(folder).as_posix() for name in (*files, *links)]
-    return found
+        paths += [(Path(inner) / name).relative_to(folder).as_posix() for name in (*files, *links)]
+    return paths
 
 
 def _same(path: Path, entry: Mapping[str, Any] | None) -> bool:

@@ -8,7 +8,7 @@ _ESCAPED = str.maketrans({sign: f"&#{ord(sign)};" for sign in "|`*\\"} | {"&": "
 
 
 def plain(text: str) -> str:
-    """The text on one line, with whatever Markdown would read as more than text written as an HTML entity.
+    """Puts a text on one line, with whatever Markdown would read as more than text written as an HTML entity.
 
     Entities, unlike backslashes, are text in every dialect, inside a table and outside.
     """
@@ -16,7 +16,7 @@ def plain(text: str) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str | Sequence[str]]]) -> str:
-    """A table, its cells as text; a cell of several lines is a sequence of them."""
+    """Writes a table, its cells as text; a cell of several lines is a sequence of them."""
 
     def cell(content: str | Sequence[str]) -> str:
         return plain(content) if isinstance(content, str) else "<br>".join(map(plain, content))

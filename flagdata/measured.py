@@ -161,7 +161,9 @@ class Measured:
         rows = (
             {}
             if self.given is None
-            else {name.replace("_", " "): one.text for name, one in self.given.quantities.items()}
+            else {name.replace("_", " "): quantity.text for name, quantity in self.given.quantities.items()}
         )
         rows |= {"film": f"{self.duration:.2f} s at {self.rate:.4g} Hz", "gate": self.verdict}
-        return table(repr(self), rows | {f"{one.severity.value} {one.kind}": one.what for one in self.findings})
+        return table(
+            repr(self), rows | {f"{finding.severity.value} {finding.kind}": finding.what for finding in self.findings}
+        )

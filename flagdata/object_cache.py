@@ -35,8 +35,8 @@ _CRC = 4  # B
 
 
 def copy_of(name: str, suffix: str) -> Path | None:
-    """The local copy of the object called `name` ("mcap/<sha256>"), if there is one; it counts as used now."""
-    path = _place(name, suffix)
+    """Finds the local copy of the object called `name` ("mcap/<sha256>"), if there is one; it counts as used now."""
+    path = _cached_path(name, suffix)
     try:
         os.utime(path)
     except FileNotFoundError:
@@ -45,7 +45,7 @@ def copy_of(name: str, suffix: str) -> Path | None:
 
 
 def fetched(name: str, suffix: str, *, size: int, fetch: Callable[[Path], None], where: str) -> Path:
-    """A local copy of an object, fetched anew.
+    """Fetches a local copy of an object anew.
 
     Args:
         suffix: of its file or folder.
@@ -57,7 +57,7 @@ def fetched(name: str, suffix: str, *, size: int, fetch: Callable[[Path], None],
         CorruptError: what was fetched does not hash to its name.
         UsageError: FLAGDATA_CACHE_LIMIT is no number of bytes.
     """
-    path = _place(name, suffix)
+    path = _cached_path(name, suffix)
     folder = path.parent
     _take_room(folder, size)
     part = folder / f"{_PART}{uuid.uuid4().hex}{suffix}"
@@ -81,7 +81,7 @@ def fetched(name: str, suffix: str, *, size: int, fetch: Callable[[Path], None],
 
 def kept(name: str, suffix: str, finished: Path) -> None:
     """Make the local copy of an object out of the file or folder that was stored, which is moved."""
-    path = _place(name, suffix)
+    path = _cached_path(name, suffix)
     _take_room(path.parent, size_of(finished))
     os.utime(finished)  # it was used last now
     try:
@@ -91,15 +91,15 @@ def kept(name: str, suffix: str, finished: Path) -> None:
 
 
 def block_of(name: str, block: str) -> bytes | None:
-    """A block of an object as it was kept, if it was; it counts as used now."""
-    path = _place(name, _BLOCKS) / block
+    """Reads a block of an object as it was kept, if it was; it counts as used now."""
+    path = _cached_path(name, _BLOCKS) / block
     try:
         content = path.read_bytes()
         os.utime(path)
     except FileNotFoundError:
         return None
-    data, stated = content[:-_CRC], content[-_CRC:]
-    return data if stated == _crc(data) else None  # the machine stopped before its disk had it
+    data, checksum = content[:-_CRC], content[-_CRC:]
+    return data if checksum == _crc(data) else None  # the machine stopped before its disk had it
 
 
 def keep_blocks(name: str, blocks: Mapping[str, bytes]) -> None:
@@ -108,7 +108,7 @@ def keep_blocks(name: str, blocks: Mapping[str, bytes]) -> None:
     Raises:
         UsageError: FLAGDATA_CACHE_LIMIT is no number of bytes.
     """
-    folder = _place(name, _BLOCKS)
+    folder = _cached_path(name, _BLOCKS)
     _take_room(folder.parent, sum(map(len, blocks.values())) + _CRC * len(blocks))
     folder.mkdir(exist_ok=True)
     for block, data in blocks.items():
@@ -122,15 +122,15 @@ def keep_blocks(name: str, blocks: Mapping[str, bytes]) -> None:
 
 def forget(name: str, suffix: str) -> None:
     """Delete what there is of an object on this machine."""
-    _remove(_place(name, suffix))
-    _remove(_place(name, _BLOCKS))
+    _remove(_cached_path(name, suffix))
+    _remove(_cached_path(name, _BLOCKS))
 
 
 def _crc(data: bytes) -> bytes:
     return zlib.crc32(data).to_bytes(_CRC, "little")
 
 
-def _place(name: str, suffix: str) -> Path:
+def _cached_path(name: str, suffix: str) -> Path:
     return user_cache() / "objects" / f"{name.replace('/', '-')}{suffix}"
 
 
@@ -164,13 +164,13 @@ def _swept(folder: Path, size: int, limit: int) -> int:
             for entry in path.iterdir() if path.suffix == _BLOCKS else (path,):
                 with suppress(FileNotFoundError, InputError):  # another process has just renamed its part
                     entries.append((entry.lstat().st_mtime, entry, size_of(entry)))
-    total = sum(held for _, _, held in entries) + size
-    kept = limit if total <= limit else limit * _FILLED
-    for used, path, held in sorted(entries):
+    total = sum(bytes_held for _, _, bytes_held in entries) + size
+    room = limit if total <= limit else limit * _FILLED
+    for used, path, bytes_held in sorted(entries):
         block = path.parent != folder  # is read as a whole before anything else happens
-        if (used < old or block) and (total > kept or path.name.startswith(_PART)):
+        if (used < old or block) and (total > room or path.name.startswith(_PART)):
             _remove(path)
-            total -= held
+            total -= bytes_held
     return total
 
 

@@ -36,18 +36,18 @@ class ObjectRanges:
         StoreError: the store did not answer.
     """
 
-    def __init__(self, place: RemotePath) -> None:
-        self._place = place
-        status = place.stat()
+    def __init__(self, remote: RemotePath) -> None:
+        self._place = remote
+        status = remote.stat()
         self.size = status.st_size
-        self._name = f"{place.parent.name}/{place.stem}"
+        self._name = f"{remote.parent.name}/{remote.stem}"
         self._version = f"{zlib.crc32((status.e_tag or '').encode()):08x}"  # a damaged object may be put anew
         self._prepared: dict[int, bytes] = {}
         self._fetched = -1  # the last block of the last request
         self._guard = threading.Lock()
 
     def read(self, length: int, offset: int) -> bytes:
-        """At most `length` bytes at `offset`, fewer at the end of the object.
+        """Reads at most `length` bytes at `offset`, fewer at the end of the object.
 
         Raises:
             StoreError: the store did not answer.
@@ -58,15 +58,15 @@ class ObjectRanges:
         first = offset // BLOCK
         wanted = range(first, -(-end // BLOCK))
         with self._guard:
-            held = self._prepared
-            if any(number not in held for number in wanted):
-                held = self._blocks(wanted, ahead=0 <= first - self._fetched <= _GAP)
-                self._prepared = held
-        whole = b"".join([held[number] for number in wanted])
-        return whole[offset - first * BLOCK : end - first * BLOCK]
+            blocks = self._prepared
+            if any(number not in blocks for number in wanted):
+                blocks = self._blocks(wanted, ahead=0 <= first - self._fetched <= _GAP)
+                self._prepared = blocks
+        data = b"".join([blocks[number] for number in wanted])
+        return data[offset - first * BLOCK : end - first * BLOCK]
 
     def prepare(self, spans: Sequence[tuple[int, int]]) -> None:
-        """Fetch spans, first byte and end each, that will be read next; those before them are kept on disk only."""
+        """Fetches spans, first byte and end each, that will be read next; those before them are kept on disk only."""
         wanted = {
             number for start, end in spans for number in range(max(start, 0) // BLOCK, -(-min(end, self.size) // BLOCK))
         }
@@ -74,25 +74,25 @@ class ObjectRanges:
             self._prepared = self._blocks(sorted(wanted), ahead=False)
 
     def close(self) -> None:
-        """Forget what is in memory."""
+        """Forgets what is in memory."""
         self._prepared = {}
 
     def _blocks(self, wanted: Iterable[int], *, ahead: bool) -> dict[int, bytes]:
-        """Number → content of blocks; those that are not on this machine are fetched together.
+        """Maps the number of each block to its content; those that are not on this machine are fetched together.
 
         Args:
             ahead: the object is read in its order, so that what follows is fetched, too.
         """
-        held: dict[int, bytes] = {}
+        blocks: dict[int, bytes] = {}
         missing: list[int] = []
         for number in wanted:
-            kept = object_cache.block_of(self._name, f"{self._version}-{number}")
-            if kept is None:
+            stored = object_cache.block_of(self._name, f"{self._version}-{number}")
+            if stored is None:
                 missing.append(number)
             else:
-                held[number] = kept
+                blocks[number] = stored
         if not missing:
-            return held
+            return blocks
         if ahead:
             missing += range(missing[-1] + 1, min(missing[-1] + _AHEAD, -(-self.size // BLOCK)))
         runs = [[missing[0], missing[0]]]
@@ -107,4 +107,4 @@ class ObjectRanges:
             new |= {first + at // BLOCK: data[at : at + BLOCK] for at in range(0, len(data), BLOCK)}
         self._fetched = max(new)
         object_cache.keep_blocks(self._name, {f"{self._version}-{number}": data for number, data in new.items()})
-        return held | new
+        return blocks | new

@@ -49,7 +49,7 @@ _PNG, _PNG_END = b"\x89PNG\r\n\x1a\n", 12  # signature; bytes of the last chunk
 
 
 def signed(data: bytes, *, name: str, command: str) -> bytes:
-    """The bytes of a file `name` with the statement that `flagdata COMMAND` wrote them.
+    """Adds to the bytes of a file `name` the statement that `flagdata COMMAND` wrote them.
 
     A format that has no place for it leaves them as they are."""
     block, end = _block(data, name, command, hashlib.sha256(data).hexdigest())
@@ -58,7 +58,7 @@ def signed(data: bytes, *, name: str, command: str) -> bytes:
 
 
 def is_signed(path: Path, *, command: str) -> bool:
-    """Whether `flagdata COMMAND` wrote the file and nobody has changed it since.
+    """Checks whether `flagdata COMMAND` wrote the file and nobody has changed it since.
 
     Raises:
         OSError: it cannot be read.
@@ -75,7 +75,7 @@ def is_signed(path: Path, *, command: str) -> bool:
 
 
 def _block(data: bytes, name: str, command: str, digest: str) -> tuple[bytes, int]:
-    """The statement as bytes, and how many bytes of `data` stand behind it."""
+    """Builds the statement as bytes, and says how many bytes of `data` stand behind it."""
     words = f"{_WORDS} {command}; SHA-256 of the rest {digest}"
     suffix = Path(name).suffix.lower()
     if suffix in _COMMENTS:
@@ -128,11 +128,11 @@ def check_folder(path: Path, *, schema: str | None = None) -> None:
             return
         if schema is None:
             raise _taken(path)
-        if others := unlisted(path, schema=schema):
-            more = f" and {len(others) - _NAMED:,} more" if len(others) > _NAMED else ""
+        if foreign := unlisted(path, schema=schema):
+            further = f" and {len(foreign) - _NAMED:,} more" if len(foreign) > _NAMED else ""
             raise ConflictError(
                 f"the folder holds what this command did not write there, or what was changed since: "
-                f"{', '.join(others[:_NAMED])}{more}",
+                f"{', '.join(foreign[:_NAMED])}{further}",
                 where=str(path),
                 fix="move away what you want to keep and remove the folder, or name another one",
             )
@@ -205,9 +205,9 @@ def write_files(folder: Path, contents: Mapping[str, str | bytes | None], *, com
 
 
 def rewrite(path: Path, content: str | bytes) -> None:
-    """Replace a file of the program's own by its next state, such as a log with one more entry;
-    a reader sees the old one or the new one. The folder is made where it is missing. That it is the program's own, the
-    caller has made sure of.
+    """Replaces a file of the program's own by its next state, such as a log with one more entry; a reader sees the old
+    one or the new one. The folder is made where it is missing. That it is the program's own, the caller has made sure
+    of.
 
     Raises:
         ConflictError, InputError: as `check_rewrite`.
@@ -224,7 +224,7 @@ def rewrite(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def fresh_file(path: Path, *, command: str | None = None) -> Iterator[Path]:
-    """A scratch path beside `path`, nothing at it yet; what the block writes there becomes `path` when it ends.
+    """Makes a scratch path beside `path`, nothing at it yet; what the block writes there becomes `path` when it ends.
 
     Raises:
         ConflictError: `path` is taken, before or after the block.
@@ -240,7 +240,7 @@ def fresh_file(path: Path, *, command: str | None = None) -> Iterator[Path]:
 
 @contextmanager
 def fresh_folder(path: Path, *, schema: str | None = None) -> Iterator[Path]:
-    """A scratch folder beside `path` that becomes `path` when the block ends.
+    """Makes a scratch folder beside `path` that becomes `path` when the block ends.
 
     Args:
         schema: the folder gets a manifest of this schema at the end, and replaces an earlier one of the same schema.
@@ -295,7 +295,7 @@ def _check_writable(folder: Path) -> None:
 
 
 def _nearest(folder: Path) -> Path:
-    """The folder, or the nearest above it that is there."""
+    """Finds the folder, or the nearest above it that is there."""
     return next(above for above in (folder, *folder.parents) if above.exists() or above.is_symlink())
 
 
@@ -305,7 +305,7 @@ def _scratch(folder: Path) -> Path:
 
 @contextmanager
 def _removed() -> Iterator[dict[str, Path]]:
-    """Scratch paths by the name that each is for; what is left of them is removed at the end."""
+    """Collects scratch paths by the name that each is for; what is left of them is removed at the end."""
     scratch: dict[str, Path] = {}
     try:
         yield scratch

@@ -34,18 +34,18 @@ def check_stated(file: pq.FileMetaData, size: int, *, where: str, fix: str) -> N
         LimitError: its cells, or what they unpack to, take more than `HELD` and `EXPANSION` allow.
     """
     unpacked = sum(file.row_group(number).total_byte_size for number in range(file.num_row_groups))
-    stated = max(unpacked, file.num_rows * file.num_columns * _CELL)
+    stated_size = max(unpacked, file.num_rows * file.num_columns * _CELL)
     most = max(HELD, EXPANSION * size)
-    if stated > most:
+    if stated_size > most:
         raise LimitError(
-            f"a Parquet file of {size} bytes states {file.num_rows} rows, which take {stated} bytes",
+            f"a Parquet file of {size} bytes states {file.num_rows} rows, which take {stated_size} bytes",
             where=where,
             fix=f"at most {most} are read: {fix}",
         )
 
 
 def read_parquet(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
-    """Columns of a table; all if `None`.
+    """Reads columns of a table; all if `None`.
 
     Raises:
         LimitError: it takes more than `HELD` and `EXPANSION` allow.
@@ -60,10 +60,10 @@ def read_parquet(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
         if lacking := [name for name in names if name not in file.schema_arrow.names]:
             raise pa.ArrowInvalid(f"no column {', '.join(lacking)}")
         batches: list[pa.RecordBatch] = []
-        held = 0
+        size_read = 0
         for batch in file.iter_batches(_BATCH, columns=names):
-            held += batch.nbytes
-            if held > most:
+            size_read += batch.nbytes
+            if size_read > most:
                 raise LimitError(f"its rows take more than {most} bytes", where=where, fix="split it")
             batches.append(batch)
         return pa.Table.from_batches(batches) if batches else file.schema_arrow.empty_table().select(names)

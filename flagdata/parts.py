@@ -8,23 +8,23 @@ from typing import Any
 from flagdata.extras import explained
 
 
-def attribute(place: str) -> Any:
+def attribute(reference: str) -> Any:
     """Returns what "module:attribute" names.
 
     Raises:
         MissingExtraError: it needs a package that is not installed.
     """
-    module, _, name = place.partition(":")
+    module, _, name = reference.partition(":")
     with explained():
         return getattr(import_module(module), name)
 
 
-def call(place: str, *arguments: Any, **options: Any) -> Any:
-    """What "module:attribute" names, called.
+def call(reference: str, *arguments: Any, **options: Any) -> Any:
+    """Calls what "module:attribute" names.
 
     Raises:
         MissingExtraError: it needs a package that is not installed.
     """
-    module, _, name = place.partition(":")
+    module, _, name = reference.partition(":")
     with explained():
         return getattr(import_module(module), name)(*arguments, **options)

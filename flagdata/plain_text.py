@@ -17,12 +17,12 @@ _MARKS = (
 
 
 def encoding_of(head: bytes) -> str:
-    """The codec that the first bytes of a text state, UTF-8 where they state none."""
+    """Finds the codec that the first bytes of a text state, UTF-8 where they state none."""
     return next((codec for mark, codec in _MARKS if head.startswith(mark)), "utf-8")
 
 
 def plain_text(data: bytes, *, noun: str, where: str) -> str:
-    """The text of a file, UTF-8 or what its byte-order mark says; where lines end in CR alone they end in LF.
+    """Decodes the text of a file, UTF-8 or what its byte-order mark says; where lines end in CR alone they end in LF.
 
     Args:
         noun: what the file is called in the error message.

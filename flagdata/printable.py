@@ -7,19 +7,19 @@ SHORT = 12
 
 
 def printable(text: str) -> str:
-    """The text in one line; control characters, marks of direction and bytes that are not UTF-8 are escaped."""
+    """Puts a text in one line; control characters, marks of direction and bytes that are not UTF-8 are escaped."""
     if text.isprintable():
         return text
-    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
+    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
 
 
 def printable_lines(text: str) -> str:
-    """The same of a text of several lines, which stay."""
+    """Escapes a text of several lines likewise, which stay."""
     return "\n".join(map(printable, text.split("\n")))
 
 
 def counted(count: int, noun: str) -> str:
-    """ "1 object", "2 objects": for nouns that take an s."""
+    """Writes "1 object", "2 objects": for nouns that take an s."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 

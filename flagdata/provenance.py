@@ -21,7 +21,7 @@ _CHUNK = 1 << 20
 
 
 def canonical(value: Mapping[str, Any]) -> str:
-    """JSON with sorted keys and no blanks; NaN is refused (ValueError), since it has no JSON form."""
+    """Writes JSON with sorted keys and no blanks; NaN is refused (ValueError), since it has no JSON form."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
 
 
@@ -30,12 +30,12 @@ def digest(text: str) -> str:
 
 
 def recipe_hash(recipe: Mapping[str, Any]) -> str:
-    """SHA-256 of the canonical JSON of all options that shape a result."""
+    """Computes the SHA-256 of the canonical JSON of all options that shape a result."""
     return digest(canonical(recipe))
 
 
 def array_hash(content: Mapping[str, Any], arrays: Iterable[AnyArray]) -> str:
-    """SHA-256 of plain values and of arrays with their types and shapes, hex."""
+    """Computes the SHA-256 of plain values and of arrays with their types and shapes, hex."""
     total = hashlib.sha256()
     total.update(canonical(content).encode())
     for values in arrays:
@@ -46,7 +46,7 @@ def array_hash(content: Mapping[str, Any], arrays: Iterable[AnyArray]) -> str:
 
 
 def file_hash(path: Place) -> str:
-    """SHA-256 of a file's bytes, hex.
+    """Computes the SHA-256 of a file's bytes, hex.
 
     Raises:
         OSError: as `open_regular`.
@@ -57,14 +57,15 @@ def file_hash(path: Place) -> str:
 
 @functools.cache
 def code_version() -> str:
-    """Package version, and the commit when run from a checkout: "0.1.0+3f2a9c1". With uncommitted changes it is
+    """Returns package version, and the commit when run from a checkout: "0.1.0+3f2a9c1". With uncommitted changes it is
     "0.1.0+3f2a9c1-dirty.5d41e0b", whose last part is a hash of them, files that git does not track aside."""
     release, commit = version("flagdata"), commit_of(Path(__file__).resolve().parent.parent)
     return release if commit is None else f"{release}+{commit}"
 
 
 def commit_of(root: Path) -> str | None:
-    """The commit of a checkout with a hash of what was changed since, as in `code_version`; `None` where it is none."""
+    """Returns the commit of a checkout with a hash of what was changed since, as in `code_version`; `None` where it is
+    none."""
     if not (root / ".git").exists():
         return None
     described = _git(root, "describe", "--always", "--dirty", "--abbrev=7", "--exclude=*")

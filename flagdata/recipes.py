@@ -73,7 +73,7 @@ class Shelf:
         return Registry(self.noun, dict.fromkeys(names, ""), group=self.group, accepts=_is_recipe_path)
 
     def place(self) -> Traversable:
-        """The folder in which the files of the catalog are."""
+        """Returns the folder in which the files of the catalog are."""
         return files("catalogs") / self.folder
 
     def names(self) -> tuple[str, ...]:
@@ -103,7 +103,7 @@ class Shelf:
         return Found(name=name, data=data, folder=Path(), where=f"{self.noun} {name!r}")
 
     def find(self, source: str) -> Found:
-        """The recipe of that name in the catalog, or the file of that path, which ends in .toml.
+        """Finds the recipe of that name in the catalog, or the file of that path, which ends in .toml.
 
         Raises:
             UnknownNameError: no such name; the nearest is suggested.
@@ -125,7 +125,7 @@ class Shelf:
 
 
 def read_recipe(path: Path) -> Found:
-    """The recipe in a file.
+    """Reads the recipe in a file.
 
     Raises:
         NotFoundError: no such file.
@@ -146,12 +146,12 @@ def _is_recipe_path(entry: object) -> bool:
 
 
 def is_name(value: object) -> bool:
-    """Whether a recipe, and what is made by it, can be called so: text of printable characters, not too long."""
+    """Checks whether a recipe, and what is made by it, can be called so: text of printable characters, not too long."""
     return isinstance(value, str) and bool(value.strip()) and value.isprintable() and len(value) <= NAME_LIMIT
 
 
 def parsed(text: str, *, where: str) -> dict[str, Any]:
-    """The tables of a recipe's text.
+    """Parses the tables of a recipe's text.
 
     Raises:
         InputError: it is not TOML, or holds a number that is not finite or of thousands of digits.

@@ -48,7 +48,7 @@ class Registry(Mapping[str, Any]):
         self._found: dict[str, list[EntryPoint]] | None = None
 
     def _added(self) -> dict[str, list[EntryPoint]]:
-        """The entry points of each name."""
+        """Lists the entry points of each name."""
         if self._found is None:
             self._found = {}
             for entry in entry_points(group=self._group) if self._group else ():
@@ -72,25 +72,29 @@ class Registry(Mapping[str, Any]):
 
     def _loaded(self, entry: EntryPoint) -> Any:
         try:
-            found = _imported(entry.value)
-            why = None if self._accepts(found) else f"it is no {self._noun}, but {type(found).__name__} {found!r:.60}"
+            entry_value = _imported(entry.value)
+            why = (
+                None
+                if self._accepts(entry_value)
+                else f"it is no {self._noun}, but {type(entry_value).__name__} {entry_value!r:.60}"
+            )
         except (Exception, SystemExit) as error:  # noqa: BLE001  whatever code of others raises
-            found, why = None, f"{type(error).__name__}: {error}"
+            entry_value, why = None, f"{type(error).__name__}: {error}"
         if why is not None:
             raise PlugInError(
                 f"the {self._noun} {entry.name!r} of {_package(entry)} cannot be used: {why}",
                 where=entry.value,
                 fix="repair the package, or uninstall it",
             )
-        return found
+        return entry_value
 
     def package(self, name: str) -> str | None:
-        """The installed package that adds a name; `None` for those of the table."""
+        """Names the installed package that adds a name; `None` for those of the table."""
         added = self._added().get(name)
         return _package(added[-1]) if added else None
 
     def usable(self, names: Iterable[str] | None = None) -> Iterator[tuple[str, Any]]:
-        """The entries that can be used, of some names or of all; a warning is logged of each that cannot."""
+        """Yields the entries that can be used, of some names or of all; a warning is logged of each that cannot."""
         for name in self if names is None else names:
             try:
                 yield name, self[name]

@@ -36,7 +36,7 @@ class Rows:
         return iter(self.table.to_pylist())
 
     def __getitem__(self, column: str) -> np.ndarray:
-        """(n,) array of a column; numbers with gaps are float64 with NaN, texts with gaps hold None.
+        """Returns the (n,) array of a column; numbers with gaps are float64 with NaN, texts with gaps hold None.
 
         Raises:
             KeyError: no such column.
@@ -44,11 +44,11 @@ class Rows:
         return self.table.column(column).to_numpy(zero_copy_only=False)
 
     def to_pandas(self) -> Any:
-        """The rows as a data frame, where pandas is installed."""
+        """Returns the rows as a data frame, where pandas is installed."""
         return self.table.to_pandas()
 
     def __repr__(self) -> str:
-        names, cells = self._shown()
+        names, cells = self._excerpt()
         widths = [max(map(len, column)) for column in zip(names, *cells, strict=True)]
         lines = [
             "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
@@ -57,10 +57,10 @@ class Rows:
         return "\n".join([f"Rows({len(self)} of {len(self.columns)} columns)", *lines])
 
     def _repr_html_(self) -> str:
-        names, cells = self._shown()
+        names, cells = self._excerpt()
         return grid(f"{len(self)} rows", names, cells)
 
-    def _shown(self) -> tuple[list[str], list[list[str]]]:
+    def _excerpt(self) -> tuple[list[str], list[list[str]]]:
         """Columns that hold something, and their first cells as text."""
         head = self.table.slice(0, _SHOWN)
         names = [name for name in self.columns if head.column(name).null_count < head.num_rows]

@@ -198,7 +198,7 @@ CATALOG: dict[str, Field] = {
 
 
 def catalog_schema() -> pa.Schema:
-    """The Arrow schema of the catalog, with units and descriptions as field metadata."""
+    """Builds the Arrow schema of the catalog, with units and descriptions as field metadata."""
     fields = [
         pa.field(name, f.type, nullable=f.nullable, metadata={"unit": f.unit, "about": f.about})
         for name, f in CATALOG.items()

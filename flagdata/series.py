@@ -42,14 +42,14 @@ class Wind:
         return len(self.time)
 
     def _rows(self) -> dict[str, str]:
-        known = self.speed[np.isfinite(self.speed)]
-        course = f"{known.mean():.2f} m/s, {known.min():.2f} to {known.max():.2f} m/s" if len(known) else "none"
+        finite = self.speed[np.isfinite(self.speed)]
+        course = f"{finite.mean():.2f} m/s, {finite.min():.2f} to {finite.max():.2f} m/s" if len(finite) else "none"
         last = self.time[-1] if len(self) else 0.0
         return {
             "samples": f"{len(self)} in {last:.1f} s from {iso(self.start)}",
             "speed": course,
             "sensor": self.sensor.name,
-            **{f"{one.severity.value} {one.kind}": one.what for one in self.findings},
+            **{f"{finding.severity.value} {finding.kind}": finding.what for finding in self.findings},
         }
 
     def __repr__(self) -> str:
@@ -83,12 +83,12 @@ class Motion:
         return len(self.time)
 
     def _rows(self) -> dict[str, str]:
-        known = self.energy[np.isfinite(self.energy)]
-        course = f"{known.mean():.2f}, {known.min():.2f} to {known.max():.2f}" if len(known) else "none"
+        finite = self.energy[np.isfinite(self.energy)]
+        course = f"{finite.mean():.2f}, {finite.min():.2f} to {finite.max():.2f}" if len(finite) else "none"
         return {
             "pairs of frames": f"{len(self)}, to {self.time[-1] if len(self) else 0.0:.2f} s",
             "energy [gray levels/s]": course,
-            **{f"{one.severity.value} {one.kind}": one.what for one in self.findings},
+            **{f"{finding.severity.value} {finding.kind}": finding.what for finding in self.findings},
         }
 
     def __repr__(self) -> str:

@@ -44,7 +44,7 @@ class Simulated:
     @property
     def positions(self) -> Float32Array:
         """(member, frame, vertex, 3) [m], z up."""
-        return np.stack([one.positions for one in self.members])
+        return np.stack([member.positions for member in self.members])
 
     @property
     def time(self) -> FloatArray:

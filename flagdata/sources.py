@@ -19,7 +19,7 @@ FILMED = (Kind.RECORDING, Kind.CLIP, Kind.CAMERA)
 def film_at(
     source: Path | str, *, lake: Lake | None, at: str | None, true_fps: float | None, sequence_fps: float | None
 ) -> tuple[CameraFilm, Path] | tuple[RecordFilm, Artifact]:
-    """The film that a source names, with its path or its artifact.
+    """Opens the film that a source names, with its path or its artifact.
 
     Args:
         source: a path, `example:NAME`, or the name, id or beginning of the id of an artifact.
@@ -44,7 +44,7 @@ def film_at(
 
 
 def frames_have_instants() -> UsageError:
-    """The error of options of files that are given for films of a lake."""
+    """Returns the error of options of files that are given for films of a lake."""
     return UsageError(
         "the frames of a lake have their instants",
         where="--true-fps, --sequence-fps",
@@ -55,7 +55,8 @@ def frames_have_instants() -> UsageError:
 def named(
     lake: Lake, source: str, at: str | None, *, kinds: tuple[Kind, ...] = FILMED, noun: str = "file or film of the lake"
 ) -> Artifact:
-    """The artifact of a name or id; of a recording and what it was aligned from, which has its name, the recording.
+    """Finds the artifact of a name or id; of a recording and what it was aligned from, which has its name, the
+    recording.
 
     Args:
         kinds: that are meant; a clip by its id alone.
@@ -66,18 +67,18 @@ def named(
         UsageError: several.
     """
     rows = lake.rows({"kind": kinds}, at=at, columns=COLUMNS).to_pylist()
-    found = meant(rows, source)
-    if not found:
+    rows_meant = meant(rows, source)
+    if not rows_meant:
         raise UnknownNameError.of(noun, source, {row["name"] for row in rows})
-    if len(found) > 1:
-        several = ", ".join(f"{row['kind']} {row['artifact'][:SHORT]}" for row in found[:4])
-        message = f"{source!r} names {len(found)} of the lake: {several}"
+    if len(rows_meant) > 1:
+        several = ", ".join(f"{row['kind']} {row['artifact'][:SHORT]}" for row in rows_meant[:4])
+        message = f"{source!r} names {len(rows_meant)} of the lake: {several}"
         raise UsageError(message, where="SOURCE", fix="give the id of one")
-    return lake.artifact(found[0]["artifact"], at=at)
+    return lake.artifact(rows_meant[0]["artifact"], at=at)
 
 
 def stored_film(lake: Lake, artifact: Artifact) -> RecordFilm:
-    """The frames of an artifact.
+    """Opens the frames of an artifact.
 
     Raises:
         InputError: it has none of its own.

@@ -24,8 +24,8 @@ class SqlProcess(Child):
 
 
 def sql_process() -> SqlProcess:
-    """That of this thread: a new one where there is none, or it has ended."""
-    known: SqlProcess | None = getattr(_own, "process", None)
-    if known is None or not known.usable:
-        known = _own.process = SqlProcess()
-    return known
+    """Returns the process of this thread: a new one where there is none, or it has ended."""
+    process: SqlProcess | None = getattr(_own, "process", None)
+    if process is None or not process.usable:
+        process = _own.process = SqlProcess()
+    return process

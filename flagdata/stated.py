@@ -42,7 +42,7 @@ class Stated:
 
     @classmethod
     def of(cls, value: Stated | float | tuple[float, float] | str) -> Stated:
-        """A statement from a number, a range (low, high), or a text of one of the three forms."""
+        """Makes a statement from a number, a range (low, high), or a text of one of the three forms."""
         if isinstance(value, Stated):
             return value
         if isinstance(value, str):
@@ -63,18 +63,18 @@ class Stated:
         return f"{self.low:g}" if self.low == self.high else f"{self.low:g}:{self.high:g}"
 
     def within(self, deviations: float) -> tuple[float, float]:
-        """The range, or the value less and plus so many standard deviations."""
+        """Returns the range, or the value less and plus so many standard deviations."""
         return self.low - deviations * self.sigma, self.high + deviations * self.sigma
 
     def recipe(self) -> Any:
-        """JSON value: a number, a list of two of a range, or value and sigma."""
+        """Returns the JSON value: a number, a list of two of a range, or value and sigma."""
         if self.sigma:
             return {"value": self.low, "sigma": self.sigma}
         return self.low if self.low == self.high else [self.low, self.high]
 
 
 def parse(text: str) -> Stated:
-    """The statement that a text makes.
+    """Parses the statement that a text makes.
 
     Raises:
         UsageError: a text of none of the three forms.

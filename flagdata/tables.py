@@ -61,7 +61,7 @@ class Range:
             )
 
     def at(self, share: float) -> float:
-        """The value that a share (0 to 1) of the range lies below."""
+        """Computes the value that a share (0 to 1) of the range lies below."""
         if self.scale is Scale.LOG:
             return math.exp(math.log(self.low) + share * (math.log(self.high) - math.log(self.low)))
         return self.low + share * (self.high - self.low)
@@ -108,12 +108,12 @@ Spelled: TypeAlias = Annotated[tuple[str, ...], _Mark.SPELLED]
 
 
 def ends(quantity: Quantity) -> tuple[float, float]:
-    """The smallest and the largest value."""
+    """Returns the smallest and the largest value."""
     return (quantity.low, quantity.high) if isinstance(quantity, Range) else (quantity, quantity)
 
 
 def in_radians(quantity: Quantity) -> Quantity:
-    """A quantity that is given in degrees."""
+    """Converts a quantity that is given in degrees."""
     if isinstance(quantity, Range):
         return Range(low=math.radians(quantity.low), high=math.radians(quantity.high), scale=quantity.scale)
     return math.radians(quantity)
@@ -183,7 +183,7 @@ def entries(types: Mapping[str, Any], content: Any, *, where: str) -> dict[str, 
     return values
 
 
-def check_keys(content: Any, known: Collection[str], *, where: str) -> None:
+def check_keys(content: Any, allowed: Collection[str], *, where: str) -> None:
     """Makes sure that a value is a table of known keys.
 
     Raises:
@@ -193,11 +193,11 @@ def check_keys(content: Any, known: Collection[str], *, where: str) -> None:
     if not isinstance(content, Mapping):
         raise InputError(f"{_excerpt(content)} is not a table", where=where, fix="write it as [table] with keys")
     for key in content:
-        if key not in known:
-            raise UnknownNameError.of("key", key, known, where=where)
+        if key not in allowed:
+            raise UnknownNameError.of("key", key, allowed, where=where)
 
 
-def value(kind: Any, given: Any, *, key: str, where: str) -> Any:
+def value(kind: Any, content: Any, *, key: str, where: str) -> Any:
     """Reads the value of a key as a type: one of msgspec's, a dataclass, a quantity or a range, or tables or a list of
     them. Numbers are finite.
 
@@ -207,45 +207,47 @@ def value(kind: Any, given: Any, *, key: str, where: str) -> Any:
     bare, notes = _stripped(kind)
     origin, inner = get_origin(bare), get_args(bare)
     if bare is Any:
-        return given
+        return content
     if Range in (bare, *inner):
-        return _quantity(bare, notes, given, key=key, where=where)
+        return _quantity(bare, notes, content, key=key, where=where)
     if _is_table(bare):
-        return _table(bare, given, where=f"{where} [{key}]")
-    if _Mark.SPELLED in notes and isinstance(given, list | tuple):
-        return tuple(str(item).strip() for item in given)
-    if origin is tuple and inner[-1] is ... and isinstance(given, list | tuple):
+        return _table(bare, content, where=f"{where} [{key}]")
+    if _Mark.SPELLED in notes and isinstance(content, list | tuple):
+        return tuple(str(item).strip() for item in content)
+    if origin is tuple and inner[-1] is ... and isinstance(content, list | tuple):
         item, marks = _stripped(inner[0])
         if _is_table(item):
-            return tuple(_table(item, each, where=f"{where} [[{key}]] {n}") for n, each in enumerate(given, start=1))
+            return tuple(
+                _table(item, entry, where=f"{where} [[{key}]] {n}") for n, entry in enumerate(content, start=1)
+            )
         if isinstance(item, EnumMeta) or any(isinstance(mark, Named) for mark in marks):
-            return tuple(value(inner[0], each, key=key, where=where) for each in given)
-    return _converted(bare, notes, given, key=key, where=where)
+            return tuple(value(inner[0], item, key=key, where=where) for item in content)
+    return _converted(bare, notes, content, key=key, where=where)
 
 
 def _is_table(bare: Any) -> bool:
     return is_dataclass(bare) or get_origin(bare) is Mapping
 
 
-def _table(bare: Any, given: Any, *, where: str) -> Any:
+def _table(bare: Any, content: Any, *, where: str) -> Any:
     """Reads a dataclass, or a table whose keys are names of one type and whose values are of another."""
     if is_dataclass(bare):
-        return read(bare, given, where=where)  # pyright: ignore[reportArgumentType]
-    check_keys(given, given if isinstance(given, Mapping) else (), where=where)
+        return read(bare, content, where=where)  # pyright: ignore[reportArgumentType]
+    check_keys(content, content if isinstance(content, Mapping) else (), where=where)
     name, kind = get_args(bare)
-    names = {each: value(name, each, key="name", where=where) for each in given}
-    return {names[each]: value(kind, content, key=each, where=where) for each, content in given.items()}
+    names = {entry: value(name, entry, key="name", where=where) for entry in content}
+    return {names[entry]: value(kind, item, key=entry, where=where) for entry, item in content.items()}
 
 
-def _quantity(bare: Any, notes: list[Any], given: Any, *, key: str, where: str) -> Quantity:
-    if isinstance(given, Mapping):
-        made = read(Range, given, where=f"{where} {key}")
+def _quantity(bare: Any, notes: list[Any], content: Any, *, key: str, where: str) -> Quantity:
+    if isinstance(content, Mapping):
+        quantity = read(Range, content, where=f"{where} {key}")
     else:
-        number = _converted(float, notes, given, key=key, where=where)
-        made = Range(low=number, high=number) if bare is Range else number
-    for end in ends(made):
+        number = _converted(float, notes, content, key=key, where=where)
+        quantity = Range(low=number, high=number) if bare is Range else number
+    for end in ends(quantity):
         _converted(float, notes, end, key=key, where=where)
-    return made
+    return quantity
 
 
 def _in_degrees(kind: Any, content: Mapping[str, Any], *, key: str, where: str) -> Quantity:
@@ -260,7 +262,7 @@ def _in_degrees(kind: Any, content: Mapping[str, Any], *, key: str, where: str) 
     return angle
 
 
-def _converted(bare: Any, notes: list[Any], given: Any, *, key: str, where: str) -> Any:
+def _converted(bare: Any, notes: list[Any], content: Any, *, key: str, where: str) -> Any:
     """Converts a value to a type with bounds; raises as `read`."""
     bounds = [note for note in notes if isinstance(note, Meta)]
     if bare is int and not bounds:
@@ -269,28 +271,28 @@ def _converted(bare: Any, notes: list[Any], given: Any, *, key: str, where: str)
     for bound in bounds:
         kind = Annotated[kind, bound]
     try:
-        made = msgspec.convert(_exact(given), kind)
+        converted = msgspec.convert(_exact(content), kind)
     except msgspec.ValidationError:
-        raise _refusal(bare, bounds, given, key=key, where=where) from None
-    if _Mark.ANGLE in notes and abs(made) > _TURN:
+        raise _refusal(bare, bounds, content, key=key, where=where) from None
+    if _Mark.ANGLE in notes and abs(converted) > _TURN:
         raise InputError(
-            f"{key} is {made:.4g} rad, more than a whole turn",
+            f"{key} is {converted:.4g} rad, more than a whole turn",
             where=where,
-            fix=f"give radians, or degrees as {key}{DEGREES} = {made:.4g}",
+            fix=f"give radians, or degrees as {key}{DEGREES} = {converted:.4g}",
         )
     for note in notes:
-        if isinstance(note, Named) and made not in note.known:
-            raise UnknownNameError.of(note.noun, made, note.known, where=where)
-    return made
+        if isinstance(note, Named) and converted not in note.known:
+            raise UnknownNameError.of(note.noun, converted, note.known, where=where)
+    return converted
 
 
-def _refusal(bare: Any, bounds: list[Meta], given: Any, *, key: str, where: str) -> Exception:
+def _refusal(bare: Any, bounds: list[Meta], content: Any, *, key: str, where: str) -> Exception:
     if isinstance(bare, EnumMeta):
-        return UnknownNameError.of(key, str(given), [option.value for option in bare], where=where)  # pyright: ignore[reportAttributeAccessIssue]
+        return UnknownNameError.of(key, str(content), [option.value for option in bare], where=where)  # pyright: ignore[reportAttributeAccessIssue]
     most = min((bound.le for bound in bounds if bound.le is not None), default=math.inf)
-    if bare is int and isinstance(given, int) and given > most:
-        return LimitError(f"{key} is {_excerpt(given)}", where=where, fix=f"give at most {most}")
-    return InputError(f"{key} is {_excerpt(given)}", where=where, fix=f"give {_wanted(bare, bounds)}")
+    if bare is int and isinstance(content, int) and content > most:
+        return LimitError(f"{key} is {_excerpt(content)}", where=where, fix=f"give at most {most}")
+    return InputError(f"{key} is {_excerpt(content)}", where=where, fix=f"give {_wanted(bare, bounds)}")
 
 
 def _wanted(bare: Any, bounds: list[Meta]) -> str:
@@ -322,30 +324,30 @@ def _stripped(kind: Any) -> tuple[Any, list[Any]]:
     notes: list[Any] = []
     while True:
         if get_origin(kind) is Annotated:
-            kind, *more = get_args(kind)
-            notes += more
+            kind, *annotations = get_args(kind)
+            notes += annotations
         elif NoneType in get_args(kind):
-            kind = Union[tuple(each for each in get_args(kind) if each is not NoneType)]  # noqa: UP007
+            kind = Union[tuple(option for option in get_args(kind) if option is not NoneType)]  # noqa: UP007
         else:
             return kind, notes
 
 
-def _exact(given: Any) -> Any:
+def _exact(content: Any) -> Any:
     """Returns a value with floats for their subclasses, such as NumPy's, which msgspec refuses.
 
     Raises:
         msgspec.ValidationError: a number that is not finite.
     """
-    if isinstance(given, float) and not math.isfinite(given):
-        raise msgspec.ValidationError(given)
-    if isinstance(given, list | tuple):
-        return [_exact(item) for item in given]
-    return float(given) if isinstance(given, float) else given
+    if isinstance(content, float) and not math.isfinite(content):
+        raise msgspec.ValidationError(content)
+    if isinstance(content, list | tuple):
+        return [_exact(item) for item in content]
+    return float(content) if isinstance(content, float) else content
 
 
-def _excerpt(given: Any) -> str:
-    """The value as the recipe has it; of a long one, its beginning."""
-    text = repr(given)
+def _excerpt(content: Any) -> str:
+    """Quotes the value as the recipe has it; of a long one, its beginning."""
+    text = repr(content)
     return text if len(text) <= _EXCERPT else f"{text[:_EXCERPT]}…"
 
 

@@ -92,23 +92,24 @@ _ELSEWHERE: Mapping[str, Mapping[str, str]] = {
 
 
 def meanings(abbreviation: str) -> dict[str, str]:
-    """Offset from UTC ("+02:00") → a place whose clocks are called so at that offset; empty for no abbreviation."""
+    """Maps the offsets from UTC ("+02:00") that an abbreviation may mean to a place whose clocks are called so; empty
+    for no abbreviation."""
     name = abbreviation.strip().upper()
     return {**_called().get(name, {}), **_ELSEWHERE.get(name, {})}
 
 
 @cache
 def _called() -> dict[str, dict[str, str]]:
-    """What clocks of this year are called → their offset → the first place, by the tz database."""
-    found: dict[str, dict[str, str]] = {}
+    """Maps what clocks of this year are called to their offset and the first place, by the tz database."""
+    clocks: dict[str, dict[str, str]] = {}
     middle = datetime.now(UTC).replace(day=15)
-    for place in (*_PLACES, *sorted(name for name in available_timezones() if "/" in name)):
+    for zone_name in (*_PLACES, *sorted(name for name in available_timezones() if "/" in name)):
         for month in (1, 7):
-            clock = middle.replace(month=month).astimezone(ZoneInfo(place))
+            clock = middle.replace(month=month).astimezone(ZoneInfo(zone_name))
             name = (clock.tzname() or "").upper()
             if name.isalpha() and name not in ("UTC", "GMT"):
-                found.setdefault(name, {}).setdefault(_written(clock.utcoffset() or timedelta()), place)
-    return found
+                clocks.setdefault(name, {}).setdefault(_written(clock.utcoffset() or timedelta()), zone_name)
+    return clocks
 
 
 def _written(offset: timedelta) -> str:
@@ -127,7 +128,7 @@ WallStatus = Literal["unique", "ambiguous", "nonexistent"]
 
 
 def zone(name: str, *, where: str | None = None) -> tzinfo:
-    """The time zone called `name`: an IANA name ("Europe/Amsterdam"), "UTC", or a fixed offset ("+02:00").
+    """Returns the time zone called `name`: an IANA name ("Europe/Amsterdam"), "UTC", or a fixed offset ("+02:00").
 
     An abbreviation ("CET") is refused even where the tz database has a zone of that name: whether its clock is set in
     summer is what the abbreviation leaves open.
@@ -160,11 +161,11 @@ def zone(name: str, *, where: str | None = None) -> tzinfo:
 
 
 def _abbreviated(text: str, clocks: Mapping[str, str], where: str | None) -> UnknownNameError:
-    """The error for an abbreviation of these clocks, offset → place."""
-    shown = " or ".join(f"{offset} (as in {place})" for offset, place in clocks.items())
+    """Returns the error for an abbreviation of these clocks, offset → place."""
+    meanings_found = " or ".join(f"{offset} (as in {where_used})" for offset, where_used in clocks.items())
     offsets, places = (" or ".join(dict.fromkeys(names)) for names in (clocks, clocks.values()))
     return UnknownNameError(
-        f"{text!r} is an abbreviation, no name of a time zone: it may mean {shown}",
+        f"{text!r} is an abbreviation, no name of a time zone: it may mean {meanings_found}",
         where=where,
         fix=f"give the offset that the clock kept, {offsets}; if it was set in summer and winter, give the place whose "
         f"time it followed, {places}",
@@ -172,7 +173,7 @@ def _abbreviated(text: str, clocks: Mapping[str, str], where: str | None) -> Unk
 
 
 def from_datetime(moment: datetime, *, nanosecond: int = 0) -> int:
-    """UTC nanoseconds of an aware `moment` (exact to the microsecond) plus `nanosecond` below the microsecond.
+    """Converts an aware `moment` (exact to the microsecond) plus `nanosecond` below the microsecond to UTC nanoseconds.
 
     Raises:
         TimeError: when `moment` carries no zone.
@@ -183,18 +184,18 @@ def from_datetime(moment: datetime, *, nanosecond: int = 0) -> int:
     return (delta.days * 86_400 + delta.seconds) * NANOSECONDS + delta.microseconds * 1_000 + nanosecond
 
 
-def wall_status(wall: datetime, place: tzinfo) -> WallStatus:
-    """Whether a naive wall-clock time occurs once, twice or never in `place` (daylight-saving jumps)."""
-    early = wall.replace(tzinfo=place, fold=0)
-    late = wall.replace(tzinfo=place, fold=1)
+def wall_status(wall: datetime, local_zone: tzinfo) -> WallStatus:
+    """Checks whether a naive wall-clock time occurs once, twice or never in `local_zone` (daylight-saving jumps)."""
+    early = wall.replace(tzinfo=local_zone, fold=0)
+    late = wall.replace(tzinfo=local_zone, fold=1)
     if early.utcoffset() == late.utcoffset():
         return "unique"
-    back = early.astimezone(UTC).astimezone(place).replace(tzinfo=None)
+    back = early.astimezone(UTC).astimezone(local_zone).replace(tzinfo=None)
     return "ambiguous" if back == wall else "nonexistent"
 
 
-def from_wall(wall: datetime, place: tzinfo, *, fold: int | None = None, where: str | None = None) -> int:
-    """UTC nanoseconds of a naive wall-clock time in `place`.
+def from_wall(wall: datetime, local_zone: tzinfo, *, fold: int | None = None, where: str | None = None) -> int:
+    """Converts a naive wall-clock time in a zone to UTC nanoseconds.
 
     Args:
         fold: 0 or 1 chooses the first or second pass of an ambiguous hour; `None` refuses it.
@@ -202,24 +203,24 @@ def from_wall(wall: datetime, place: tzinfo, *, fold: int | None = None, where: 
     Raises:
         TimeError: the wall time never occurs there, or occurs twice and `fold` was not given.
     """
-    status = wall_status(wall, place)
+    status = wall_status(wall, local_zone)
     if status == "nonexistent":
         raise TimeError(
-            f"{wall.isoformat(sep=' ')} does not exist in {place}: the clocks were set forward over it",
+            f"{wall.isoformat(sep=' ')} does not exist in {local_zone}: the clocks were set forward over it",
             where=where,
             fix="give the zone the instrument's clock really ran on (many loggers stay on winter time, e.g. +01:00)",
         )
     if status == "ambiguous" and fold is None:
         raise TimeError(
-            f"{wall.isoformat(sep=' ')} occurs twice in {place}: the clocks were set back over it",
+            f"{wall.isoformat(sep=' ')} occurs twice in {local_zone}: the clocks were set back over it",
             where=where,
             fix="give a fixed offset such as +02:00 (before the change) or +01:00 (after it)",
         )
-    return from_datetime(wall.replace(tzinfo=place, fold=fold or 0))
+    return from_datetime(wall.replace(tzinfo=local_zone, fold=fold or 0))
 
 
 def parse(text: str, *, default: tzinfo | None = None, where: str | None = None) -> int:
-    """UTC nanoseconds of an ISO 8601 time such as "2026-05-01T12:00:00.25+02:00", to the nanosecond.
+    """Parses an ISO 8601 time such as "2026-05-01T12:00:00.25+02:00" to UTC nanoseconds, to the nanosecond.
 
     Args:
         default: the zone of a time that names none; with `None` such a time is refused.
@@ -238,22 +239,22 @@ def parse(text: str, *, default: tzinfo | None = None, where: str | None = None)
         message = f"{text!r} is no day or time of the calendar"
         raise TimeError(message, where=where, fix="correct the date") from None
     nanosecond = int((fraction or "").ljust(9, "0"))
-    place = zone(offset, where=where) if offset else default
-    if place is None:
+    local_zone = zone(offset, where=where) if offset else default
+    if local_zone is None:
         raise TimeError(
             f"the time {text!r} has no zone", where=where, fix="append one, e.g. +02:00 or Z, or name it by --zone"
         )
-    return from_wall(wall, place, where=where) + nanosecond
+    return from_wall(wall, local_zone, where=where) + nanosecond
 
 
 def names_zone(text: str) -> bool:
-    """Whether an ISO 8601 time names its own zone; false for what is no such time."""
+    """Checks whether an ISO 8601 time names its own zone; false for what is no such time."""
     match = _ISO.match(text.strip())
     return match is not None and match[8] is not None
 
 
 def iso(instant: int) -> str:
-    """ISO 8601 text of UTC nanoseconds, with as many decimals (0, 3, 6 or 9) as it takes to be exact."""
+    """Writes UTC nanoseconds as ISO 8601, with as many decimals (0, 3, 6 or 9) as it takes to be exact."""
     seconds, nanosecond = divmod(int(instant), NANOSECONDS)
     text = (_EPOCH + timedelta(seconds=seconds)).strftime("%Y-%m-%dT%H:%M:%S")
     if nanosecond:

@@ -318,7 +318,7 @@ SPELLINGS |= {
 
 
 def unit(text: str, *, where: str | None = None) -> Unit:
-    """The unit that a file spells as `text`.
+    """Returns the unit that a file spells as `text`.
 
     Raises:
         UnknownNameError: with the nearest known spelling.
@@ -327,7 +327,7 @@ def unit(text: str, *, where: str | None = None) -> Unit:
 
 
 def canonical(text: str, *, where: str | None = None) -> str:
-    """The table's own name of the unit that a file spells as `text`.
+    """Returns the table's own name of the unit that a file spells as `text`.
 
     Raises:
         UnknownNameError: with the nearest known spelling.
@@ -339,21 +339,22 @@ def canonical(text: str, *, where: str | None = None) -> str:
 
 
 def spelled(text: str) -> str | None:
-    """The table's own name of the unit that a file spells as `text`; `None` where it spells none."""
+    """Returns the table's own name of the unit that a file spells as `text`; `None` where it spells none."""
     stripped = text.strip()
     if stripped in UNITS:
         return stripped
     key = _key(stripped)
-    known = key if key in UNITS else SPELLINGS.get(key)
-    if known is not None:
-        return known
+    unit_name = key if key in UNITS else SPELLINGS.get(key)
+    if unit_name is not None:
+        return unit_name
     name = _factored(stripped)
-    known = name is not None and name.partition(" ")[0] in _TENTHS and UNITS[name].si in ("m/s", "rad")
-    return name if known else None
+    unit_name = name is not None and name.partition(" ")[0] in _TENTHS and UNITS[name].si in ("m/s", "rad")
+    return name if unit_name else None
 
 
 def _factored(text: str) -> str | None:
-    """The name of a unit with a factor before it, as "0.765 m/s" of what one turn of a cup is; `None` for no such."""
+    """Returns the name of a unit with a factor before it, as "0.765 m/s" of what one turn of a cup is; `None` for no
+    such."""
     match = _FACTOR.fullmatch(text.strip().replace(",", "."))
     name = None if match is None else spelled(match["unit"])
     if match is None or name is None or UNITS[name].offset or " " in name or float(match["factor"]) == 0:
@@ -362,12 +363,12 @@ def _factored(text: str) -> str | None:
 
 
 def plain_powers(text: str) -> str:
-    """A unit's spelling with powers as digits and a point for products: W/m² and W/m**2 as W/m2, m·s⁻¹ as m.s-1."""
+    """Writes a unit with powers as digits and a point for products: W/m² and W/m**2 as W/m2, m·s⁻¹ as m.s-1."""
     return re.sub(r"(?<=\w)\s*\*\s*(?=\w)", ".", re.sub(r"\*\*|\^", "", text.translate(_POWERS)))
 
 
 def _key(text: str) -> str:
-    """A spelling in lower case, without blanks, and with one way to write degrees, powers, products and "per"."""
+    """Writes a unit in lower case, without blanks, and with one way to write degrees, powers, products and "per"."""
     key = plain_powers(text.lower().replace("º", "°")).replace("-per-", "/").replace("(-1)", "-1")
     for per in (" per ", " pro ", " por ", " par ", " al "):
         key = key.replace(per, "/")

@@ -45,7 +45,7 @@ class Sheet:
 
 
 def reader() -> Callable[[tuple[str, int]], Sheet | None]:
-    """What reads (path of a workbook, most rows of a sheet).
+    """Returns what reads (path of a workbook, most rows of a sheet).
 
     Raises:
         ModuleNotFoundError: python-calamine is missing.
@@ -55,7 +55,7 @@ def reader() -> Callable[[tuple[str, int]], Sheet | None]:
 
 
 def _read(calamine: Any, where: str, rows: int) -> Sheet | None:
-    """The first sheet that holds two rows; `None` where none does.
+    """Reads the first sheet that holds two rows; `None` where none does.
 
     Raises:
         InputError: the workbook is damaged.
@@ -69,8 +69,8 @@ def _read(calamine: Any, where: str, rows: int) -> Sheet | None:
         if damaged is None:
             tables = _tables(calamine, where, rows)
             title, text = next(tables, ("", ""))
-            others = tuple(name for name, _ in tables)
-            return Sheet(title=title, text=text, others=others, of_1904=of_1904) if text else None
+            other_titles = tuple(name for name, _ in tables)
+            return Sheet(title=title, text=text, others=other_titles, of_1904=of_1904) if text else None
     except (calamine.CalamineError, zipfile.BadZipFile, zlib.error, OSError, ValueError, RuntimeError) as error:
         damaged = type(error).__name__
     fix = "copy it again, or open it in Excel and save the sheet as CSV"
@@ -78,13 +78,13 @@ def _read(calamine: Any, where: str, rows: int) -> Sheet | None:
 
 
 def _tables(calamine: Any, where: str, rows: int) -> Iterator[tuple[str, str]]:
-    """Title and text of each sheet that holds two rows."""
+    """Yields title and text of each sheet that holds two rows."""
     book = calamine.CalamineWorkbook.from_path(where)
-    for one in book.sheets_metadata:
-        if one.typ == calamine.SheetTypeEnum.WorkSheet:
-            text = _text(book.get_sheet_by_name(one.name), rows, where)
+    for sheet in book.sheets_metadata:
+        if sheet.typ == calamine.SheetTypeEnum.WorkSheet:
+            text = _text(book.get_sheet_by_name(sheet.name), rows, where)
             if sum(bool(line.strip(",\n")) for line in io.StringIO(text)) > 1:
-                yield one.name, text
+                yield sheet.name, text
 
 
 def _text(sheet: Any, rows: int, where: str) -> str:
@@ -95,13 +95,13 @@ def _text(sheet: Any, rows: int, where: str) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     if sheet.start is not None:  # there is a cell; rows come from the sheet's first, columns from that of the cells
-        left = [""] * sheet.start[1]
-        writer.writerows([*left, *map(_cell, row)] for row in sheet.iter_rows())
+        empty_cells = [""] * sheet.start[1]
+        writer.writerows([*empty_cells, *map(_cell, row)] for row in sheet.iter_rows())
     return out.getvalue()
 
 
 def _cell(value: object) -> str:
-    """A cell as text on one line."""
+    """Writes a cell as text on one line."""
     if isinstance(value, dt.datetime):
         return value.isoformat(sep=" ")
     if isinstance(value, float):

@@ -6,7 +6,7 @@ _SHORT = 90.0  # s
 
 
 def announced(what: str, seconds: float, *, workers: int = 1, kept: str | None = None) -> str:
-    """What is to be done, and for about how long.
+    """Announces what is to be done, and for about how long.
 
     Args:
         what: as the subject of a sentence in the singular, as in "simulating 40 flags".

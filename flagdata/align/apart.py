@@ -13,7 +13,7 @@ _NEAR = 120.0  # s about a whole quarter
 
 
 def by_spans(film: tuple[int, int], log: tuple[int, int], *, names: tuple[str, str]) -> Finding | None:
-    """A warning where film and log (or two logs), as stamped, lie `HOURS_APART` or more from each other; else `None`.
+    """Warns where film and log (or two logs), as stamped, lie `HOURS_APART` or more from each other; else `None`.
 
     Args:
         film, log: first and last instant of each, on its own clock [UTC ns].
@@ -35,7 +35,7 @@ def by_spans(film: tuple[int, int], log: tuple[int, int], *, names: tuple[str, s
 
 
 def by_offset(offset: float, *, names: tuple[str, str]) -> Finding | None:
-    """A warning where a clock model shifts the film's clock by `HOURS_APART` or more; else `None`.
+    """Warns where a clock model shifts the film's clock by `HOURS_APART` or more; else `None`.
 
     Args:
         offset: added to the film's clock [s].

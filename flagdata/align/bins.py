@@ -46,7 +46,7 @@ class LagBins:
 
     @classmethod
     def of(cls, motion: MotionSeries, wind: WindAverage, *, centre: float, window: float) -> LagBins:
-        """Bin `motion` like `wind`, for offsets from centre − window to centre + window [s].
+        """Bins `motion` like `wind`, for offsets from centre − window to centre + window [s].
 
         Raises:
             InputError: nothing to bin, wind bins that are not on one grid, or fewer than two motion values a bin.
@@ -64,13 +64,15 @@ class LagBins:
         lowest = round((centre - window) * NANOSECONDS / step)
         count = 2 * math.ceil(window * NANOSECONDS / step) + 1
         highest = lowest + count - 1
-        near = (wind.time >= motion.time[0] + lowest * step) & (wind.time <= motion.time[-1] + highest * step + period)
-        if not np.any(near):
+        in_reach = (wind.time >= motion.time[0] + lowest * step) & (
+            wind.time <= motion.time[-1] + highest * step + period
+        )
+        if not np.any(in_reach):
             raise InputError(
                 "the wind log and the film do not overlap at any offset searched",
                 fix="check start times and zones, or give --centre and a wider --search",
             )
-        time, speed = wind.time[near], wind.speed[near]
+        time, speed = wind.time[in_reach], wind.speed[in_reach]
         index = np.rint((time - time[0]) / period).astype(np.int64)
         if np.any(np.abs(time - time[0] - index * period) > _OFF_GRID * period):
             raise InputError("the wind bins are not on one regular grid", fix="average the wind series anew")
@@ -92,37 +94,38 @@ class LagBins:
         )
 
     def index(self, trial: int) -> slice:
-        """The motion samples that belong to the wind bins at trial offset number `trial`."""
+        """Selects the motion samples that belong to the wind bins at trial offset number `trial`."""
         start = len(self.offsets) - 1 - trial
         return slice(start, start + STEPS * (len(self.wind) - 1) + 1, STEPS)
 
     def middle(self, trial: int) -> int:
-        """The middle of what both cover at a trial offset, on the camera's clock [UTC ns]."""
-        both = np.flatnonzero(np.isfinite(self.wind) & np.isfinite(self.motion[self.index(trial)]))
-        centre = float(both[0] + both[-1]) / 2 if len(both) else (len(self.wind) - 1) / 2
+        """Computes the middle of what both cover at a trial offset, on the camera's clock [UTC ns]."""
+        compared = np.flatnonzero(np.isfinite(self.wind) & np.isfinite(self.motion[self.index(trial)]))
+        centre = float(compared[0] + compared[-1]) / 2 if len(compared) else (len(self.wind) - 1) / 2
         step = self.period * NANOSECONDS / STEPS
         return self.first + round((self.index(trial).start + STEPS * centre - STEPS / 2) * step)
 
     def windows(self, samples: FloatArray, trials: slice) -> FloatArray:
-        """(trials, n) view of `samples` (as long as `motion`): the row of each trial offset."""
+        """Views `samples` (as long as `motion`) as (trials, n): the row of each trial offset."""
         rows = np.lib.stride_tricks.sliding_window_view(samples, STEPS * (len(self.wind) - 1) + 1)[:, ::STEPS]
         return rows[::-1][trials]
 
 
 def normal_scores(values: Series) -> Series:
-    """Φ⁻¹((rank − ½) / n) of the finite values, ties sharing their mean rank; NaN stays NaN (van der Waerden, 1952)."""
+    """Computes Φ⁻¹((rank − ½) / n) of the finite values, ties sharing their mean rank; NaN stays NaN (van der Waerden,
+    1952)."""
     scores = np.full(values.shape, np.nan)
     finite = np.isfinite(values)
     count = int(np.count_nonzero(finite))
     if count:
-        _, place, ties = np.unique(values[finite], return_inverse=True, return_counts=True)
+        _, rank_index, ties = np.unique(values[finite], return_inverse=True, return_counts=True)
         rank = np.cumsum(ties) - (ties - 1) / 2
-        scores[finite] = ndtri((rank[place] - 0.5) / count)
+        scores[finite] = ndtri((rank[rank_index] - 0.5) / count)
     return scores
 
 
 def _means(motion: MotionSeries, ends: Instants, period: int, expected: float) -> Series:
-    """Mean energy over a triangle of width 2 bins about the middle of the bin that ends at each instant.
+    """Computes the mean energy over a triangle of width 2 bins about the middle of the bin that ends at each instant.
 
     NaN where under half of the frames expected in the bin itself are. The triangle, a box drawn over a box, keeps what
     moves faster than the bins from folding down into them: it would ripple the score with the period of a bin.
@@ -135,9 +138,9 @@ def _means(motion: MotionSeries, ends: Instants, period: int, expected: float) -
     enough = count >= max(1.0, _COVERED * expected)
     boxes = np.where(enough, (total[high] - total[low]) / np.maximum(count, 1), np.nan)
     # The box over the box: from half a bin before to half a bin after.
-    there = enough.astype(np.float64)
+    is_present = enough.astype(np.float64)
     kernel = np.ones(STEPS + 1)
     kernel[[0, -1]] = 0.5
-    weight = np.convolve(there, kernel, mode="same")
+    weight = np.convolve(is_present, kernel, mode="same")
     sums = np.convolve(np.where(enough, boxes, 0.0), kernel, mode="same")
     return np.where(enough, sums / np.maximum(weight, 0.5), np.nan)

@@ -53,18 +53,18 @@ class ClothFilm:
     @property
     def parameters(self) -> dict[str, float | str]:
         """What the catalog keeps, by the names that simulated recordings have."""
-        found: dict[str, float | str] = {"fabric": self.fabric, "density": self.density}
+        values: dict[str, float | str] = {"fabric": self.fabric, "density": self.density}
         if self.bending_stiffness is not None:
-            found["bending_stiffness"] = self.bending_stiffness
+            values["bending_stiffness"] = self.bending_stiffness
         if self.wind_level:
-            found["wind_level"] = self.wind_level
-        return found
+            values["wind_level"] = self.wind_level
+        return values
 
 
 def cloth_recording(
     lake: Lake, camera: Artifact, cloth: ClothFilm, *, branch: str = "main", progress: Progress | None = None
 ) -> RecordingResult:
-    """The recording of a film of a measured cloth and its clips; what is there where it is there.
+    """Makes the recording of a film of a measured cloth and its clips; returns what is there where it is there.
 
     Args:
         camera: the film, ingested.
@@ -81,27 +81,27 @@ def cloth_recording(
             where=camera.id,
             fix="name a camera artifact; see flagdata ls",
         )
-    stated = Finding.of(
+    declaration = Finding.of(
         "cloth-declared",
         f"the cloth is {cloth.fabric}, of {cloth.density:g} kg/m²: measured by itself, as the table says",
         value=cloth.density,
     )
     if cloth.wind is None:
-        return _without_wind(lake, camera, cloth, stated, branch=branch, progress=progress)
+        return _without_wind(lake, camera, cloth, declaration, branch=branch, progress=progress)
     wind = ConstantWind(speed=cloth.wind[0], sigma=cloth.wind[1])
-    _, made = declared_recording(
+    _, result = declared_recording(
         lake,
         camera,
         wind,
         recipe=_recipe(cloth),
-        findings=(stated,),
+        findings=(declaration,),
         parameters=cloth.parameters,
         name=camera.name,
         session=cloth.fabric,
         branch=branch,
         progress=progress,
     )
-    return made
+    return result
 
 
 def _recipe(cloth: ClothFilm) -> dict[str, Any]:
@@ -109,19 +109,19 @@ def _recipe(cloth: ClothFilm) -> dict[str, Any]:
 
 
 def _without_wind(
-    lake: Lake, camera: Artifact, cloth: ClothFilm, stated: Finding, *, branch: str, progress: Progress | None
+    lake: Lake, camera: Artifact, cloth: ClothFilm, declaration: Finding, *, branch: str, progress: Progress | None
 ) -> RecordingResult:
     recipe, parents = _recipe(cloth), {"camera": camera}
-    there = find_made(
-        lake, Kind.RECORDING, parents, recipe, what="recording", name=camera.name, session=cloth.fabric, branch=branch
+    present = find_made(
+        lake, Kind.RECORDING, parents, recipe, noun="recording", name=camera.name, session=cloth.fabric, branch=branch
     )
-    if there.whole is not None:
-        rows = lake.rows({"kind": Kind.CLIP, "recording": there.whole.id}, at=branch, columns=["artifact"])
-        return RecordingResult(recording=there.whole, clips=tuple(rows["artifact"].to_pylist()), created=False)
+    if present.whole is not None:
+        rows = lake.rows({"kind": Kind.CLIP, "recording": present.whole.id}, at=branch, columns=["artifact"])
+        return RecordingResult(recording=present.whole, clips=tuple(rows["artifact"].to_pylist()), created=False)
     source = open_parent(lake, str(camera.object))
     times = source.device_frame_times
     start, end = int(times[0]), int(times[-1])
-    metadata = {PROVENANCE: provenance(parents, recipe, code=there.code)}
+    metadata = {PROVENANCE: provenance(parents, recipe, code=present.code)}
     if CAMERA in source.metadata:
         metadata[CAMERA] = dict(source.metadata[CAMERA])
     report = {
@@ -130,7 +130,7 @@ def _without_wind(
         "frames": len(times),
         "start": iso(start),
         "end": iso(end),
-        "findings": [stated.as_dict()],
+        "findings": [declaration.as_dict()],
     }
     with lake.transaction(f"declare the cloth of {camera.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
@@ -149,7 +149,7 @@ def _without_wind(
             frame_count=len(times),
             rate=(len(times) - 1) * NANOSECONDS / (end - start) if end > start else None,
             parameters=canonical(cloth.parameters),
-            quality=sorted({*camera.quality, *quality_flags((stated,))}),
+            quality=sorted({*camera.quality, *quality_flags((declaration,))}),
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
         )
         transaction.add(recording)

@@ -70,7 +70,7 @@ class ConstantWind:
             )
 
     def recipe(self) -> dict[str, Any]:
-        """What the artifact's identity depends on, beside the film."""
+        """Returns what the artifact's identity depends on, beside the film."""
         return {"declare": {"wind": self.speed, "sigma": self.sigma}}
 
     def series(self, start: int, end: int) -> WindSeries:
@@ -97,7 +97,8 @@ def declared_recording(
     branch: str = "main",
     progress: Progress | None = None,
 ) -> tuple[Artifact, RecordingResult]:
-    """The wind artifact and the recording of a film in a declared wind, in one commit; what is there where it is there.
+    """Makes the wind artifact and the recording of a film in a declared wind, in one commit; returns what is there
+    where it is there.
 
     Args:
         recipe: what else the recording's identity depends on.
@@ -128,27 +129,29 @@ def declared_recording(
             details={"method": clock.method, "offset": 0.0, "sigma": SAME_CLOCK, "confidence": 1.0},
         )
 
-    there = find_made(
-        lake, Kind.WIND, {"camera": camera}, wind.recipe(), what="declared wind", name=None, session=None, branch=branch
+    present = find_made(
+        lake, Kind.WIND, {"camera": camera}, wind.recipe(), noun="declared wind", name=None, session=None, branch=branch
     )
-    if there.whole is not None:
-        pair = Pair.opened(lake, camera, there.whole)
-        made = make_recording(lake, pair, alignment(pair), name=name, session=session, branch=branch, progress=progress)
-        return there.whole, made
+    if present.whole is not None:
+        pair = Pair.opened(lake, camera, present.whole)
+        result = make_recording(
+            lake, pair, alignment(pair), name=name, session=session, branch=branch, progress=progress
+        )
+        return present.whole, result
     with lake.transaction(f"declare the wind of {camera.name}", branch=branch) as transaction:
-        stated = _add_wind(transaction, camera, wind, session=session or camera.session, code=there.code)
-        pair = Pair.opened(lake, camera, stated)
+        wind_artifact = _add_wind(transaction, camera, wind, session=session or camera.session, code=present.code)
+        pair = Pair.opened(lake, camera, wind_artifact)
         recording = add_recording(
             lake,
             transaction,
             pair,
             alignment(pair),
             name=name,
-            session=session_of(pair, named=session),
-            code=there.code,
+            session=session_of(pair, session_given=session),
+            code=present.code,
             progress=progress,
         )
-    return transaction.result.artifacts[stated.id], recorded(transaction, recording)
+    return transaction.result.artifacts[wind_artifact.id], recorded(transaction, recording)
 
 
 def _add_wind(
@@ -158,7 +161,7 @@ def _add_wind(
     recipe = wind.recipe()
     before, after = round(MARGIN_BEFORE * NANOSECONDS), round(MARGIN_AFTER * NANOSECONDS)
     series = wind.series(cast(int, camera.start) - before, cast(int, camera.end) + after)
-    stated = Finding(
+    finding = Finding(
         kind=DECLARED,
         severity=Severity.WARNING,
         value=wind.speed,
@@ -172,7 +175,7 @@ def _add_wind(
         "sigma": wind.sigma,
         "start": iso(start),
         "end": iso(end),
-        "findings": [stated.as_dict()],
+        "findings": [finding.as_dict()],
     }
     staged = transaction.staging(".mcap")
     with RecordWriter(staged, metadata={PROVENANCE: provenance({"camera": camera}, recipe, code=code)}) as record:
@@ -188,7 +191,7 @@ def _add_wind(
         start=start,
         end=end,
         rate=1.0,
-        quality=quality_flags((stated,)),
+        quality=quality_flags((finding,)),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
     )
     transaction.add(artifact)

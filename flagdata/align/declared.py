@@ -21,7 +21,7 @@ _STEPS = (3600.0, 60.0, 10.0, 1.0, 0.1, 0.01, 0.001)  # s, that loggers cut thei
 
 
 def by_stamps(device: str, reference: str, *, start: int, end: int, sigma: float) -> ClockModel:
-    """Both clocks taken as one, as their stamps say, to within `sigma` [s].
+    """Takes both clocks as one, as their stamps say, to within `sigma` [s].
 
     Args:
         start, end: of what the device recorded, on its own clock [UTC ns].
@@ -34,7 +34,7 @@ def by_stamps(device: str, reference: str, *, start: int, end: int, sigma: float
 
 
 def given(device: str, reference: str, *, start: int, end: int, offset: float, sigma: float) -> ClockModel:
-    """The device's clock plus `offset` [s], known to `sigma` [s], is the reference's.
+    """Declares that the device's clock plus `offset` [s], known to `sigma` [s], is the reference's.
 
     Raises:
         UsageError: an offset that is not finite, or a σ that is not positive and finite.
@@ -62,7 +62,7 @@ def _declared(
 
 
 def stamp_step(time: Instants) -> float:
-    """The step that stamps are cut or rounded to [s]: the coarsest of 1 h, 1 min, 10 s, … 1 ms that divides all.
+    """Finds the step that stamps are cut or rounded to [s]: the coarsest of 1 h, 1 min, 10 s, … 1 ms that divides all.
 
     0 where none does. A logger that writes exactly once a second looks like one that truncates to whole seconds.
 
@@ -78,5 +78,6 @@ def stamp_step(time: Instants) -> float:
 
 
 def stamp_sigma(time: Instants) -> float:
-    """Standard uncertainty of stamps from their step alone [s]: step / √12, rectangular (JCGM 100:2008, 4.3.7)."""
+    """Computes the standard uncertainty of stamps from their step alone [s]: step / √12, rectangular (JCGM 100:2008,
+    4.3.7)."""
     return stamp_step(time) / math.sqrt(12)

@@ -19,7 +19,7 @@ PART = 600.0  # s
 FEWEST_PARTS = 3
 _AROUND = 10.0  # s either side of the whole recording's offset, at least
 _FASTEST = 3e-4  # s/s, beyond which no clock in a camera parts from another
-_PART_SIGMA = 2.0  # s; a part known worse than this says nothing
+_PART_SIGMA = 2.0  # s; a part known worse than this says nothing; lowered, fewer parts are left for a drift
 _DISAGREEMENT = 5.0  # σ of a part from the line
 
 
@@ -47,12 +47,12 @@ class ClockLine:
 def clock_line(
     motion: MotionSeries,
     wind: WindAverage,
-    whole: LagEstimate,
+    overall: LagEstimate,
     *,
     search: LagSearch,
     generator: np.random.Generator,
 ) -> ClockLine:
-    """Drift about an accepted offset, from parts of ten minutes where there are three or more.
+    """Fits a drift about an accepted offset, from parts of ten minutes where there are three or more.
 
     The parts' offsets are fitted by a line, weighted by their statistical σ; a scatter beyond those widens the result
     (Birge, 1932: √(χ²/ν) where it exceeds 1). What is common to all parts, the flag's response and the stamps, goes
@@ -62,25 +62,27 @@ def clock_line(
     error, and the line is not to be used.
 
     Raises:
-        InputError: `whole` was refused.
+        InputError: `overall` was refused.
     """
-    if not whole.accepted:
+    if not overall.accepted:
         raise InputError("no drift about an offset that was refused", fix="check accepted first")
-    alone = ClockLine(origin=whole.at, offset=whole.offset, drift=0.0, sigma_offset=whole.sigma, sigma_drift=QUARTZ)
+    alone = ClockLine(
+        origin=overall.at, offset=overall.offset, drift=0.0, sigma_offset=overall.sigma, sigma_drift=QUARTZ
+    )
     duration = float(motion.time[-1] - motion.time[0]) / NANOSECONDS
     count = int(duration / PART)
     if count < FEWEST_PARTS:
         return alone
-    reach = max(_AROUND, 4 * whole.sigma + _FASTEST * duration)
-    near = replace(search, centre=whole.offset, window=reach, sigma=_PART_SIGMA)
+    reach = max(_AROUND, 4 * overall.sigma + _FASTEST * duration)
+    search_nearby = replace(search, centre=overall.offset, window=reach, sigma=_PART_SIGMA)
     parts = tuple(
         part
         for chunk in _chunks(motion, count)
-        if (part := estimate_offset(chunk, wind, search=near, generator=generator)).accepted
+        if (part := estimate_offset(chunk, wind, search=search_nearby, generator=generator)).accepted
     )
     if len(parts) < FEWEST_PARTS:
         return alone
-    return line_through(parts, whole)
+    return line_through(parts, overall)
 
 
 def _chunks(motion: MotionSeries, count: int) -> list[MotionSeries]:
@@ -94,9 +96,10 @@ def _chunks(motion: MotionSeries, count: int) -> list[MotionSeries]:
     return chunks
 
 
-def line_through(parts: tuple[LagEstimate, ...], whole: LagEstimate) -> ClockLine:
-    """The weighted line of `clock_line` through the offsets of three parts or more; `whole` lends its common σ."""
-    at = np.array([(part.at - whole.at) / NANOSECONDS for part in parts])
+def line_through(parts: tuple[LagEstimate, ...], overall: LagEstimate) -> ClockLine:
+    """Fits the weighted line of `clock_line` through the offsets of three parts or more; `overall` lends its common
+    σ."""
+    at = np.array([(part.at - overall.at) / NANOSECONDS for part in parts])
     offset = np.array([part.offset for part in parts])
     sigma = np.array([part.sigma_statistical for part in parts])
     mean, drift, origin, weight, information = _weighted(at, offset, sigma)
@@ -105,7 +108,7 @@ def line_through(parts: tuple[LagEstimate, ...], whole: LagEstimate) -> ClockLin
     scatter = math.sqrt(float(residual @ residual) / (len(parts) - 2))
     if scatter > 1:
         mean, drift, origin, weight, information = _weighted(at, offset, sigma * scatter)
-    common = math.sqrt(max(whole.sigma**2 - whole.sigma_statistical**2, 0.0))
+    common = math.sqrt(max(overall.sigma**2 - overall.sigma_statistical**2, 0.0))
     findings: tuple[Finding, ...] = ()
     if abs(residual[worst]) > _DISAGREEMENT:
         findings = (
@@ -118,7 +121,7 @@ def line_through(parts: tuple[LagEstimate, ...], whole: LagEstimate) -> ClockLin
             ),
         )
     return ClockLine(
-        origin=whole.at + round(origin * NANOSECONDS),
+        origin=overall.at + round(origin * NANOSECONDS),
         offset=mean,
         drift=drift,
         sigma_offset=math.hypot(1 / math.sqrt(weight), common),
@@ -129,7 +132,8 @@ def line_through(parts: tuple[LagEstimate, ...], whole: LagEstimate) -> ClockLin
 
 
 def _weighted(at: Series, offset: Series, sigma: Series) -> tuple[float, float, float, float, float]:
-    """Offset at the weighted mean time, drift, that time, and the information (1/σ²) of offset and drift."""
+    """Computes the offset at the weighted mean time, drift, that time, and the information (1/σ²) of offset and
+    drift."""
     weight = sigma**-2
     total = float(weight.sum())
     origin, mean = float(weight @ at) / total, float(weight @ offset) / total

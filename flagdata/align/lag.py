@@ -52,18 +52,22 @@ class LagSearch:
 
     Attributes:
         centre: offset around which to search [s]: what the stamps say, 0 if they are believed.
-        window: the search goes from centre − window to centre + window [s].
+        window: the search goes from centre − window to centre + window [s]. Raise it where the clocks may be further
+            apart; a wider search takes longer and meets more accidents, so that peaks must be higher.
         response: time by which the flag's motion follows the wind that the bins report [s]: about L/U for a flag of
             length L, and d/U where the sensor stands d upwind of it. The sensor's own lag is not part of it: see
             `flagdata.align.windbins`.
         response_sigma: its standard uncertainty [s]. It bounds from below what this method can know.
         stamp_sigma: standard uncertainty of the wind's stamps as a whole [s]; 0.29 for stamps cut to whole seconds.
-        overlap: least time both must cover [s]; and never fewer than 30 bins.
+        overlap: least time both must cover [s]; and never fewer than 30 bins. Lowered, it allows offsets at which
+            little is compared, where high correlations are common.
         gustiness: least standard deviation over mean of the binned wind. Below it the wind says nothing about time.
-        chance: greatest probability of such a peak by accident.
-        rival: a second peak at this share of the greatest score makes the estimate ambiguous.
+        chance: greatest probability of such a peak by accident. Raised, it accepts more wrong offsets; lowered, it
+            refuses more right ones.
+        rival: a second peak at this share of the greatest score makes the estimate ambiguous. Raised, it accepts an
+            offset though another one agrees nearly as well.
         sigma: greatest standard uncertainty that is still an answer [s].
-        surrogates: how many winds of random phase measure chance.
+        surrogates: how many winds of random phase measure chance. More make the chance less noisy, and take longer.
     """
 
     centre: float = 0.0
@@ -160,7 +164,8 @@ class LagEstimate:
 def estimate_offset(
     motion: MotionSeries, wind: WindAverage, *, search: LagSearch, generator: np.random.Generator
 ) -> LagEstimate:
-    """Offset of the camera's clock from the wind's by the lag of the flag's motion (see the module's text).
+    """Estimates the offset of the camera's clock from the wind's by the lag of the flag's motion (see the module's
+    text).
 
     Args:
         motion: energy on the camera's clock; several values a wind bin.
@@ -170,9 +175,11 @@ def estimate_offset(
     Raises:
         InputError: no wind bins, bins off their grid, or fewer than two motion values a bin.
     """
+    # Steps 1 and 2: bins and normal scores.
     bins = LagBins.of(motion, wind, centre=search.centre - search.response, window=search.window)
     if bins.gustiness < search.gustiness:
         return _nothing(bins, search, (*motion.findings, _no_gusts(bins, search)))
+    # Steps 3 and 4: the filter, and the offset of the greatest score.
     model = fit(bins, overlap=search.overlap)
     if model is None:
         return _nothing(bins, search, (*motion.findings, _unfit(bins, search)))
@@ -180,13 +187,15 @@ def estimate_offset(
     score, counts, best = pair.search(overlap=search.overlap)
     peak = pair.peak(score, best)
 
+    # Step 5: the uncertainty, and a second peak that agrees nearly as well.
     rival, mass, spread = _lobe(bins.offsets, score, best)
     statistical = max(peak.sigma, spread)
     reach = max(STEPS, round(2 * min(statistical, search.window) / bins.period * STEPS))
-    seen, _, _ = model.whitest.search(overlap=search.overlap)
-    near = seen[max(best - reach, 0) : best + reach + 1]
+    # Step 6: the probability of such a score by accident.
+    evidence, _, _ = model.whitest.search(overlap=search.overlap)
+    evidence_near_peak = evidence[max(best - reach, 0) : best + reach + 1]
     accidents = _Accidents.of(model.whitest, search, generator)
-    chance = accidents.chance(float(np.nanmax(near)))
+    chance = accidents.chance(float(np.nanmax(evidence_near_peak)))
     sigma = math.sqrt(statistical**2 + search.response_sigma**2 + search.stamp_sigma**2)
     offset = peak.offset + search.response
     estimate = LagEstimate(
@@ -203,7 +212,7 @@ def estimate_offset(
         curve=LagCurve(
             offset=bins.offsets + search.response,
             score=score,
-            evidence=seen,
+            evidence=evidence,
             overlap=counts * bins.period,
             chance_score=accidents.score(search.chance),
         ),
@@ -234,16 +243,17 @@ class _Accidents:
         return cls(location=float(np.mean(greatest)) - _EULER * scale, scale=scale)
 
     def chance(self, score: float) -> float:
-        """Probability of a greatest score above `score`."""
+        """Computes the probability of a greatest score above `score`."""
         return -math.expm1(-math.exp(-(score - self.location) / self.scale))
 
     def score(self, chance: float) -> float:
-        """The score that is exceeded with probability `chance`."""
+        """Computes the score that is exceeded with probability `chance`."""
         return self.location - self.scale * math.log(-math.log1p(-chance))
 
 
 def _lobe(offsets: Series, score: Series, best: int) -> tuple[int | None, float, float]:
-    """The greatest score outside the peak's lobe, and the share and standard deviation [s] of exp(z²/2) inside it.
+    """Finds the greatest score outside the peak's lobe, and the share and standard deviation [s] of exp(z²/2) inside
+    it.
 
     The lobe reaches to where the score first falls below half of its greatest, and two bins at least.
     """
@@ -267,7 +277,7 @@ def _lobe(offsets: Series, score: Series, best: int) -> tuple[int | None, float,
 
 
 def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | None) -> list[Finding]:
-    """What speaks against an estimate, and what the user should know of it."""
+    """Lists what speaks against an estimate, and what the user should know of it."""
     curve = estimate.curve
     score = curve.score
     findings: list[Finding] = []
@@ -319,7 +329,7 @@ def _no_gusts(bins: LagBins, search: LagSearch) -> Finding:
 
 
 def _unfit(bins: LagBins, search: LagSearch) -> Finding:
-    """Why no model fits at any offset."""
+    """Explains why no model fits at any offset."""
     longest, least = longest_compared(bins), max(search.overlap, FEWEST_BINS * bins.period)
     if longest < least:
         return _short_overlap(longest, least)
@@ -336,12 +346,12 @@ def _short_overlap(longest: float, least: float) -> Finding:
     )
 
 
-def _error(kind: str, what: str, value: float | None) -> Finding:
-    return Finding(kind=kind, severity=Severity.ERROR, what=what, value=value)
+def _error(kind: str, text: str, value: float | None) -> Finding:
+    return Finding(kind=kind, severity=Severity.ERROR, what=text, value=value)
 
 
 def _nothing(bins: LagBins, search: LagSearch, findings: tuple[Finding, ...]) -> LagEstimate:
-    """A refusal before there is a peak."""
+    """Refuses before there is a peak."""
     empty = np.full(len(bins.offsets), np.nan)
     return LagEstimate(
         offset=math.nan,

@@ -41,7 +41,7 @@ _REACH = 30.0  # s searched either side of the first offset, at least
 _FASTEST = 3e-4  # s/s, beyond which no logger's clock parts from another
 _PART_SIGMA = 1.0  # s; a part known worse than this says nothing
 _PART_SURROGATES = 50  # the first offset is known by then; those of a part keep out what agrees by accident
-_TRIES = 3  # hours looked at before the logs are taken for unrelated
+_TRIES = 3  # hours looked at before the logs are taken for unrelated; more take longer and refuse fewer pairs
 
 Progress = Callable[[int], object]
 
@@ -89,7 +89,7 @@ def log_clock(
     generator: np.random.Generator,
     progress: Progress | None = None,
 ) -> LogClock:
-    """Offset, drift and gain of `sensor` against `reference`.
+    """Estimates offset, drift and gain of `sensor` against `reference`.
 
     Args:
         names: of the reference and the sensor, for the model and messages.
@@ -101,10 +101,10 @@ def log_clock(
         InputError: a log without wind speed or with too few samples.
         RefusedError: the logs are not of one wind, or no offset can be estimated, with the reason.
     """
-    model, line, whole = clock_between(
+    model, line, overall = clock_between(
         reference, sensor, names=names, search=search, generator=generator, progress=progress
     )
-    return LogClock(model=model, line=line, whole=whole, gain=gain_of(reference, sensor, model))
+    return LogClock(model=model, line=line, whole=overall, gain=gain_of(reference, sensor, model))
 
 
 def clock_between(
@@ -116,33 +116,33 @@ def clock_between(
     generator: np.random.Generator,
     progress: Progress | None = None,
 ) -> tuple[ClockModel, ClockLine, LagEstimate]:
-    """Offset and drift of `sensor` against `reference`, with the line and the first hour that they are from; parameters
-    and refusals as for `log_clock`. The sensor may be anything that follows the wind.
+    """Estimates offset and drift of `sensor` against `reference`, with the line and the first hour that they are from;
+    parameters and refusals as for `log_clock`. The sensor may be anything that follows the wind.
     """
     slow_is_sensor = _spacing(sensor) >= _spacing(reference)
     slow, fast = (sensor, reference) if slow_is_sensor else (reference, sensor)
-    slow, fast = _alike(slow, fast)
+    slow, fast = _with_equal_lag(slow, fast)
     sign = -1.0 if slow_is_sensor else 1.0
     bins = wind_bins(slow, shortest=max(SHORTEST, 2 * _spacing(fast)))
     motion, motion_sigma = _as_motion(fast)
     stamps = math.hypot(bins.sigma, motion_sigma, stamp_sigma(slow.time), stamp_sigma(fast.time))
-    looked = replace(
+    search_used = replace(
         search,
         centre=sign * search.centre,
         response=0.0,
         response_sigma=0.0,
         stamp_sigma=math.hypot(search.stamp_sigma, stamps),
     )
-    whole = _whole(motion, bins.average, search=looked, generator=generator, names=names)
-    line = _line(motion, bins.average, whole, search=looked, generator=generator, progress=progress)
+    overall = _overall(motion, bins.average, search=search_used, generator=generator, names=names)
+    line = _line(motion, bins.average, overall, search=search_used, generator=generator, progress=progress)
     crooked = [finding.what for finding in line.findings]
     if crooked:
         raise _refused(names, crooked)
-    return _model(line, sensor, names=names, confidence=whole.confidence, turned=slow_is_sensor), line, whole
+    return _model(line, sensor, names=names, confidence=overall.confidence, turned=slow_is_sensor), line, overall
 
 
 def gain_of(reference: WindSeries, sensor: WindSeries, model: ClockModel) -> Gain:
-    """The sensor's minute means against the reference's, the sensor's stamps taken to the reference's clock.
+    """Compares the sensor's minute means with the reference's, the sensor's stamps taken to the reference's clock.
 
     Raises:
         InputError: fewer than ten minutes that both cover, or a reference that does not vary.
@@ -169,7 +169,7 @@ def gain_of(reference: WindSeries, sensor: WindSeries, model: ClockModel) -> Gai
 
 
 def half_full(means: WindAverage) -> np.ndarray:
-    """(n,) whether a bin holds half as many samples as the usual one."""
+    """Checks (n,) whether a bin holds half as many samples as the usual one."""
     return means.count >= max(1.0, float(np.median(means.count)) / 2)
 
 
@@ -188,14 +188,14 @@ def _usable(series: WindSeries) -> tuple[Instants, Series]:
 
 
 def _spacing(series: WindSeries) -> float:
-    """Median time between usable samples [s]."""
+    """Computes the median time between usable samples [s]."""
     time, _ = _usable(series)
     return float(np.median(np.diff(time))) / NANOSECONDS
 
 
-def _alike(slow: WindSeries, fast: WindSeries) -> tuple[WindSeries, WindSeries]:
-    """Both logs late by the slower one's lag, where it is stated and the faster has none, so that none is left to allow
-    for; else as they are."""
+def _with_equal_lag(slow: WindSeries, fast: WindSeries) -> tuple[WindSeries, WindSeries]:
+    """Delays both logs by the slower one's lag, where it is stated and the faster has none, so that none is left to
+    allow for; else as they are."""
     lags = [series.sensor.distance_constant for series in (slow, fast)]
     if any(lag is None for lag in lags) or _spacing(fast) > SHORTEST / 2:
         return slow, fast
@@ -207,7 +207,7 @@ def _alike(slow: WindSeries, fast: WindSeries) -> tuple[WindSeries, WindSeries]:
 
 
 def _lagged(series: WindSeries, distance: float) -> WindSeries:
-    """The log as a rotor of distance constant `distance` [m] would have given it: dy/dt = (u − y) u / ℓ.
+    """Filters a log as a rotor of distance constant `distance` [m] would have given it: dy/dt = (u − y) u / ℓ.
 
     After a gap of ten of its lags the rotor is taken to have followed.
     """
@@ -225,7 +225,7 @@ def _lagged(series: WindSeries, distance: float) -> WindSeries:
 
 
 def _as_motion(series: WindSeries) -> tuple[MotionSeries, float]:
-    """The faster log at the instants of its air, and the standard uncertainty of those [s].
+    """Returns the faster log at the instants of its air, and the standard uncertainty of those [s].
 
     Each sample stands twice, a quarter of its spacing before and after: one that falls on the edge of a bin then counts
     by half on either side, where as a whole it would shift the bin by half a spacing.
@@ -246,7 +246,7 @@ def _cut(motion: MotionSeries, low: int, high: int) -> MotionSeries | None:
     return MotionSeries(time=motion.time[first:last], energy=motion.energy[first:last])
 
 
-def _near(wind: WindAverage, low: int, high: int) -> WindAverage | None:
+def _between(wind: WindAverage, low: int, high: int) -> WindAverage | None:
     rows = slice(*np.searchsorted(wind.time, [low, high]).tolist())
     if len(wind.time[rows]) < 2:
         return None
@@ -263,17 +263,18 @@ def _near(wind: WindAverage, low: int, high: int) -> WindAverage | None:
 def _part(
     motion: MotionSeries, wind: WindAverage, low: int, high: int, *, search: LagSearch, generator: np.random.Generator
 ) -> LagEstimate | None:
-    """The offset of the faster log from `low` to `high` on its own clock [ns]; `None` where one of them is silent."""
+    """Estimates the offset of the faster log from `low` to `high` on its own clock [ns]; `None` where one of them is
+    silent."""
     chunk = _cut(motion, low, high)
     margin = round(search.window * NANOSECONDS)
     centre = round(search.centre * NANOSECONDS)
-    bins = _near(wind, low + centre - margin, high + centre + margin)
+    bins = _between(wind, low + centre - margin, high + centre + margin)
     if chunk is None or bins is None:
         return None
     return estimate_offset(chunk, bins, search=search, generator=generator)
 
 
-def _whole(
+def _overall(
     motion: MotionSeries,
     wind: WindAverage,
     *,
@@ -281,7 +282,7 @@ def _whole(
     generator: np.random.Generator,
     names: tuple[str, str],
 ) -> LagEstimate:
-    """The first accepted offset of the hours in which the wind varies most.
+    """Finds the first accepted offset of the hours in which the wind varies most.
 
     Raises:
         RefusedError: none is, with the reasons of the best one.
@@ -295,51 +296,58 @@ def _whole(
     edges = np.linspace(low, high + 1, count + 1).astype(np.int64)
     spread = []
     for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        near = _near(wind, first + centre, last + centre)
-        spread.append(0.0 if near is None else float(np.std(near.speed)) * math.sqrt(len(near.time)))
+        wind_in_hour = _between(wind, first + centre, last + centre)
+        spread.append(
+            0.0 if wind_in_hour is None else float(np.std(wind_in_hour.speed)) * math.sqrt(len(wind_in_hour.time))
+        )
     reasons: list[str] = []
     for hour in np.argsort(spread)[::-1][:_TRIES].tolist():
-        found = _part(motion, wind, int(edges[hour]), int(edges[hour + 1]), search=search, generator=generator)
-        if found is not None and found.accepted:
-            return found
-        if found is not None and not reasons:
-            reasons = list(found.reasons)
+        estimate = _part(motion, wind, int(edges[hour]), int(edges[hour + 1]), search=search, generator=generator)
+        if estimate is not None and estimate.accepted:
+            return estimate
+        if estimate is not None and not reasons:
+            reasons = list(estimate.reasons)
     raise _refused(names, reasons or ["the logs have no hour in common"])
 
 
 def _line(
     motion: MotionSeries,
     wind: WindAverage,
-    whole: LagEstimate,
+    overall: LagEstimate,
     *,
     search: LagSearch,
     generator: np.random.Generator,
     progress: Progress | None,
 ) -> ClockLine:
-    """The line through the offsets of the parts; without three of them the first offset and a prior drift."""
+    """Fits the line through the offsets of the parts; without three of them the first offset and a prior drift."""
     duration = float(motion.time[-1] - motion.time[0]) / NANOSECONDS
-    reach = max(_REACH, 4 * whole.sigma + _FASTEST * duration)
-    near = replace(search, centre=whole.offset, window=min(reach, search.window), sigma=_PART_SIGMA)
-    near = replace(near, sigma=math.hypot(_PART_SIGMA, near.stamp_sigma), surrogates=_PART_SURROGATES)
+    reach = max(_REACH, 4 * overall.sigma + _FASTEST * duration)
+    search_nearby = replace(search, centre=overall.offset, window=min(reach, search.window), sigma=_PART_SIGMA)
+    search_nearby = replace(
+        search_nearby, sigma=math.hypot(_PART_SIGMA, search_nearby.stamp_sigma), surrogates=_PART_SURROGATES
+    )
     count = int(duration / PART)
     edges = np.linspace(float(motion.time[0]), float(motion.time[-1]) + 1, count + 1).astype(np.int64)
     chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_PARTS)).round().astype(np.int64)) if count else []
     parts: list[LagEstimate] = []
     for index in chosen:
-        part = _part(motion, wind, int(edges[index]), int(edges[index + 1]), search=near, generator=generator)
+        part = _part(motion, wind, int(edges[index]), int(edges[index + 1]), search=search_nearby, generator=generator)
         if part is not None and part.accepted:
             parts.append(part)
         if progress:
             progress(1)
     if len(parts) < FEWEST_PARTS:
-        return ClockLine(origin=whole.at, offset=whole.offset, drift=0.0, sigma_offset=whole.sigma, sigma_drift=QUARTZ)
-    return line_through(tuple(parts), whole)
+        return ClockLine(
+            origin=overall.at, offset=overall.offset, drift=0.0, sigma_offset=overall.sigma, sigma_drift=QUARTZ
+        )
+    return line_through(tuple(parts), overall)
 
 
 def _model(
     line: ClockLine, sensor: WindSeries, *, names: tuple[str, str], confidence: float, turned: bool
 ) -> ClockModel:
-    """The sensor's clock on the reference's; `turned` where the line is of the reference's clock on the sensor's."""
+    """Builds the sensor's clock on the reference's; `turned` where the line is of the reference's clock on the
+    sensor's."""
     origin, offset, drift = line.origin, line.offset, line.drift
     if turned:
         origin, offset, drift = origin + round(offset * NANOSECONDS), -offset, -drift / (1 + drift)

@@ -76,8 +76,8 @@ class ClockOptions:
                 fix="give seconds > 0",
             )
         if (self.offset is not None) != (self.by is Method.GIVEN):
-            needs = "needs an offset" if self.by is Method.GIVEN else "takes no offset"
-            raise UsageError(f"alignment by {self.by} {needs}", where="--offset", fix=_GIVEN)
+            number = "an" if self.by is Method.GIVEN else "no"
+            raise UsageError(f"alignment by {self.by} needs {number} offset", where="--offset", fix=_GIVEN)
         if (self.offset_sigma is not None) == (self.by is Method.ESTIMATE):
             if self.by is Method.ESTIMATE:
                 raise UsageError(
@@ -89,13 +89,13 @@ class ClockOptions:
                 fix="state how well the clocks are known to agree, in seconds (one standard deviation)",
             )
         searching = (self.search, self.response, self.response_sigma)
-        if self.by is not Method.ESTIMATE and any(one is not None for one in searching):
+        if self.by is not Method.ESTIMATE and any(option is not None for option in searching):
             raise UsageError(
                 f"alignment by {self.by} searches nothing", where="--search", fix="leave the search's options out"
             )
 
     def recipe(self) -> dict[str, Any]:
-        """What the recording's identity depends on."""
+        """Returns what the recording's identity depends on."""
         if self.by is Method.ESTIMATE:
             search = {**vars(self.search or LagSearch()), "response": self.response}
             return {"align": {"by": self.by.value, "search": {**search, "response_sigma": self.response_sigma}}}
@@ -127,9 +127,10 @@ class Evidence:
         return (*self.estimate.reasons, *(f.what for f in crooked if f.severity is Severity.ERROR))
 
     def as_json(self) -> bytes:
-        """The search, for the record: offsets [s], scores, evidence, and the evidence that accidents seldom reach."""
+        """Writes the search for the record: offsets [s], scores, evidence, and the evidence that accidents seldom
+        reach."""
         curve = self.estimate.curve
-        score, seen = (
+        score, evidence = (
             [None if math.isnan(value) else round(value, 4) for value in values.tolist()]
             for values in (curve.score, curve.evidence)
         )
@@ -137,7 +138,7 @@ class Evidence:
             "schema": "flagdata.lag-curve/1",
             "offset": np.round(curve.offset, 3).tolist(),
             "score": score,
-            "evidence": seen,
+            "evidence": evidence,
             "chance_score": round(curve.chance_score, 4),
         }
         return json.dumps(content, allow_nan=False).encode()
@@ -152,7 +153,7 @@ class Outcome:
 
 
 def declared(pair: Pair, options: ClockOptions, *, recipe: Mapping[str, Any]) -> Outcome:
-    """A clock model by stamps or by a given offset. The stamps' own resolution is added to a σ by stamps.
+    """Builds a clock model by stamps or by a given offset. The stamps' own resolution is added to a σ by stamps.
 
     Raises:
         UsageError: `options.by` is neither, or a σ that is no uncertainty.
@@ -174,7 +175,7 @@ def declared(pair: Pair, options: ClockOptions, *, recipe: Mapping[str, Any]) ->
 
 
 def responding(wind: float) -> tuple[float, float]:
-    """By how much a flag's motion follows a mean wind [m/s], and the standard uncertainty of that [s].
+    """Computes by how much a flag's motion follows a mean wind [m/s], and the standard uncertainty of that [s].
 
     A flag follows when the air has passed it twice, and one that hangs in light wind later still: motion of simulated
     flags of 1.5 m by 1 m lags by 1.0 to 1.6 s in winds of 3 m/s. From 10 m/s on it is 0.3 ± 0.15 s.
@@ -227,16 +228,16 @@ def _check_lengths(pair: Pair, wind: WindAverage, search: LagSearch) -> None:
         )
 
 
-def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outcome:
-    """The clock model of an estimate that may be used.
+def estimated(pair: Pair, evidence: Evidence, *, recipe: Mapping[str, Any]) -> Outcome:
+    """Builds the clock model of an estimate that may be used.
 
     Raises:
         RefusedError: it may not, with the reasons.
     """
-    estimate, line = found.estimate, found.line
-    if line is None or found.reasons:
+    estimate, line = evidence.estimate, evidence.line
+    if line is None or evidence.reasons:
         raise RefusedError(
-            f"no offset can be estimated: {'; '.join(found.reasons)}",
+            f"no offset can be estimated: {'; '.join(evidence.reasons)}",
             where=f"{pair.camera.name} and {pair.wind.name}",
             fix=f"look at it with --plot FILE.png; or state the offset: {_GIVEN}",
         )
@@ -262,13 +263,14 @@ def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outc
         recipe=recipe,
         findings=(*estimate.findings, *_too_good(pair, line.sigma_offset)),
         details={"method": "estimated", **summary(estimate, line)},
-        curve=found.as_json(),
+        curve=evidence.as_json(),
     )
-    return Outcome(alignment=alignment, evidence=found)
+    return Outcome(alignment=alignment, evidence=evidence)
 
 
 def summary(estimate: LagEstimate, line: ClockLine) -> dict[str, Any]:
-    """The numbers of a clock model that was estimated, for JSON; `drift_parts` is 0 where the drift is a prior's."""
+    """Returns the numbers of a clock model that was estimated, for JSON; `drift_parts` is 0 where the drift is a
+    prior's."""
     half = NINETY * line.sigma_offset
     return {
         "offset": line.offset,
@@ -286,7 +288,7 @@ def summary(estimate: LagEstimate, line: ClockLine) -> dict[str, Any]:
 
 
 def _too_good(pair: Pair, sigma: float) -> tuple[Finding, ...]:
-    """A warning where an offset is claimed to be known better than one frame."""
+    """Warns where an offset is claimed to be known better than one frame."""
     times = pair.camera_record.device_frame_times
     period = float(np.median(np.diff(times))) / NANOSECONDS if len(times) > 1 else 0.0
     if sigma >= period:
@@ -302,7 +304,7 @@ def _too_good(pair: Pair, sigma: float) -> tuple[Finding, ...]:
 
 
 def _start_sigma(pair: Pair) -> float:
-    """Standard uncertainty of reading the film's start off its file [s]; 0 where the user gave it."""
+    """Computes the standard uncertainty of reading the film's start off its file [s]; 0 where the user gave it."""
     text = pair.camera_record.metadata.get(CAMERA, {}).get("start_sigma")
     if text is None:
         return 0.0

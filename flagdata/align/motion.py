@@ -68,7 +68,7 @@ class MotionSeries:
 
 
 def motion_energy(frames: Iterable[tuple[int, UInt8Array]]) -> MotionSeries:
-    """Motion energy of a film, in one pass, holding two reduced frames at a time.
+    """Computes the motion energy of a film, in one pass, holding two reduced frames at a time.
 
     Args:
         frames: (instant [UTC ns on the camera's clock], (height, width) uint8 gray), in order of time; all of one size.
@@ -119,12 +119,13 @@ def motion_energy(frames: Iterable[tuple[int, UInt8Array]]) -> MotionSeries:
 def _reduce(image: UInt8Array, block: int) -> Float32Array:
     """Means over `block` × `block` pixels; rows and columns that do not fill a block are left out."""
     height, width = image.shape[0] // block, image.shape[1] // block
-    whole = image[: height * block, : width * block]
-    return whole.reshape(height, block, width, block).mean(axis=(1, 3), dtype=np.float32)
+    blocks = image[: height * block, : width * block]
+    return blocks.reshape(height, block, width, block).mean(axis=(1, 3), dtype=np.float32)
 
 
 def _change(before: Float32Array, after: Float32Array, block: int) -> tuple[float, float, float]:
-    """Mean change above noise [gray levels], the gain, and the shift [blocks] between two reduced frames."""
+    """Computes the mean change above noise [gray levels], the gain, and the shift [blocks] between two reduced
+    frames."""
     grad_y, grad_x = np.gradient(before) if min(before.shape) > 1 else (np.zeros_like(before), np.zeros_like(before))
     centre = float(before.mean())
     columns = np.stack(
@@ -144,7 +145,7 @@ def _change(before: Float32Array, after: Float32Array, block: int) -> tuple[floa
 def _fitted(
     columns: FloatArray, target: FloatArray, keep: BoolArray, least: float
 ) -> tuple[FloatArray, float, FloatArray]:
-    """|residual| and its σ after least squares on the blocks to keep, twice; and the four parameters.
+    """Computes |residual| and its σ after least squares on the blocks to keep, twice; and the four parameters.
 
     Two starts are compared, since either can go astray: all blocks, where the flag fills little of the picture, and
     those that hardly changed, where the camera stands still.
@@ -154,18 +155,18 @@ def _fitted(
     for _ in range(2):
         if np.count_nonzero(keep) < max(8, _FEWEST_STILL * len(target)):
             break
-        kept = columns[keep]
+        columns_used = columns[keep]
         # As by the pseudo-inverse, which leaves alone what a flat picture does not determine (gain, shift).
-        values, vectors = np.linalg.eigh(kept.T @ kept)
+        values, vectors = np.linalg.eigh(columns_used.T @ columns_used)
         inverse = np.divide(1.0, values, out=np.zeros(4), where=values > 1e-9 * values[-1])
-        parameters = vectors @ (inverse * (vectors.T @ (kept.T @ target[keep])))
+        parameters = vectors @ (inverse * (vectors.T @ (columns_used.T @ target[keep])))
         residual = np.abs(target - columns @ parameters)
         keep, sigma = _quiet(residual, least)
     return residual, sigma, parameters
 
 
 def _quiet(residual: FloatArray, least: float) -> tuple[BoolArray, float]:
-    """Which blocks are within 3 σ, σ being that of a normal distribution with the residual's lowest fifth."""
+    """Finds which blocks are within 3 σ, σ being that of a normal distribution with the residual's lowest fifth."""
     # np.quantile, which takes ten times as long on so few numbers.
     below, share = divmod(_LOW_QUANTILE * (len(residual) - 1), 1)
     places = (int(below), min(int(below) + 1, len(residual) - 1))

@@ -60,7 +60,7 @@ def pair_clocks(
     least_delay: float = 0.0,
     least_delay_sigma: float | None = None,
 ) -> PairedClocks:
-    """Model `device_time` on the clock of `host_time`.
+    """Models `device_time` on the clock of `host_time`.
 
     Args:
         device_time: (n,) the device's stamps, strictly increasing [UTC ns].
@@ -146,7 +146,7 @@ class _Line:
 
 
 def _blocks(time: Series) -> IntArray:
-    """First indices of the blocks."""
+    """Finds the first indices of the blocks."""
     count = len(time)
     span = max(float(time[-1] - time[0]), 1e-9)
     length = max(_BLOCK, span * _SAMPLES / count, span / _MOST_BLOCKS)
@@ -155,7 +155,7 @@ def _blocks(time: Series) -> IntArray:
 
 
 def _least(time: Series, late: Series) -> tuple[Series, Series, IntArray]:
-    """Time and value of the least of each block, and the blocks' first indices."""
+    """Finds time and value of the least of each block, and the blocks' first indices."""
     starts = _blocks(time)
     ends = np.append(starts[1:], len(time))
     index = np.array([low + int(np.argmin(late[low:high])) for low, high in zip(starts, ends, strict=True)])
@@ -163,7 +163,7 @@ def _least(time: Series, late: Series) -> tuple[Series, Series, IntArray]:
 
 
 def _line(time: Series, late: Series, quantum: float) -> _Line:
-    """The lower envelope of one segment; `quantum` is the σ that the resolution of the stamps leaves them [s]."""
+    """Fits the lower envelope of one segment; `quantum` is the σ that the resolution of the stamps leaves them [s]."""
     when, least, _ = _least(time, late)
     origin = float(np.mean(when))
     drift, sigma_drift = 0.0, PRIOR_DRIFT
@@ -185,7 +185,7 @@ def _line(time: Series, late: Series, quantum: float) -> _Line:
 def _jumps(time: Series, late: Series) -> list[int]:
     """Indices of the first samples after steps of the lower envelope."""
     _, least, starts = _least(time, late)
-    found: list[int] = []
+    jumps: list[int] = []
     pending = [(0, len(least))]
     while pending:
         low, high = pending.pop()
@@ -207,13 +207,13 @@ def _jumps(time: Series, late: Series) -> list[int]:
         after = float(np.median(part[split : split + side]))
         if abs(after - before) <= limit:
             continue
-        found.append(_first_after(late, starts, low + split, before, after))
+        jumps.append(_first_after(late, starts, low + split, before, after))
         pending += [(low, low + split), (low + split, high)]
-    return sorted(set(found))
+    return sorted(set(jumps))
 
 
 def _first_after(late: Series, starts: IntArray, block: int, before: float, after: float) -> int:
-    """The first sample after a step that lies in block `block` or the one before it."""
+    """Finds the first sample after a step that lies in block `block` or the one before it."""
     low = int(starts[block - 1])
     high = int(starts[block + 1]) if block + 1 < len(starts) else len(late)
     below = late[low:high] < (before + after) / 2
@@ -250,7 +250,7 @@ def _findings(model: ClockModel, delay: float, worst: float) -> tuple[Finding, .
 
 
 def host_clock(series: WindSeries) -> PairedClocks | None:
-    """A logged device's clock on the computer's; `None` where the log has one kind of stamp only, or one sample.
+    """Puts a logged device's clock on the computer's; `None` where the log has one kind of stamp only, or one sample.
 
     Raises:
         InputError: see `pair_clocks`.

@@ -83,8 +83,8 @@ def _draw_series(axes: Axes, evidence: Evidence) -> None:
     shift = offset - evidence.response if math.isfinite(offset) else 0.0
     middles, energy = _binned((motion.time - origin) / NANOSECONDS + shift, motion.energy, wind.period)
     if len(middles):
-        near = (wind_time >= middles[0] - _MARGIN) & (wind_time <= middles[-1] + _MARGIN)
-        x, y = _broken(wind_time[near], normal_scores(wind.speed[near]), wind.period)
+        in_view = (wind_time >= middles[0] - _MARGIN) & (wind_time <= middles[-1] + _MARGIN)
+        x, y = _broken(wind_time[in_view], normal_scores(wind.speed[in_view]), wind.period)
         axes.plot(x, y, color=_WIND, lw=1.1, label="wind speed")
         axes.plot(middles, normal_scores(energy), color=_MOTION, lw=1.1, label="motion of the flag")
         axes.legend(loc="lower right", bbox_to_anchor=(1, 1), frameon=False, ncols=2)
@@ -140,11 +140,11 @@ def _binned(time: Series, values: Series, period: float) -> tuple[Series, Series
     first = int(index.min()) if len(index) else 0
     count = np.bincount(index - first)
     total = np.bincount(index - first, weights=values[finite])
-    there = np.flatnonzero(count)
-    return np.asarray((there + first + 0.5) * period, dtype=np.float64), total[there] / count[there]
+    filled = np.flatnonzero(count)
+    return np.asarray((filled + first + 0.5) * period, dtype=np.float64), total[filled] / count[filled]
 
 
 def _broken(time: Series, values: Series, period: float) -> tuple[Series, Series]:
-    """The same line with NaN where bins are missing, so that gaps show."""
+    """Returns the same line with NaN where bins are missing, so that gaps show."""
     gaps = np.flatnonzero(np.diff(time) > 1.5 * period) + 1
     return np.insert(time, gaps, np.nan), np.insert(values, gaps, np.nan)

@@ -18,16 +18,16 @@ def find_made(
     parents: Mapping[str, Artifact],
     recipe: Mapping[str, Any],
     *,
-    what: str,
+    noun: str,
     name: str | None,
     session: str | None,
     branch: str,
 ) -> Present:
-    """What the branch has of the artifact that these parents and this recipe make.
+    """Finds what the branch has of the artifact that these parents and this recipe make.
 
     Args:
         parents: in their order, by what each is.
-        what: the artifact is, for messages.
+        noun: the artifact is, for messages.
         name, session: asked for; `None` takes any.
 
     Raises:
@@ -39,10 +39,10 @@ def find_made(
         if list(row["parents"]) != wanted:
             continue
         artifact = Artifact.from_row(row)
-        for label, asked, kept in (("name", name, artifact.name), ("session", session, artifact.session)):
-            if asked is not None and asked != kept:
+        for label, asked, value in (("name", name, artifact.name), ("session", session, artifact.session)):
+            if asked is not None and asked != value:
                 raise ConflictError(
-                    f"the {what} is there already with the {label} {kept!r}",
+                    f"the {noun} is there already with the {label} {value!r}",
                     where=artifact.id,
                     fix=f"leave out --{label}, or take the old one off with flagdata withdraw first",
                 )
@@ -51,7 +51,7 @@ def find_made(
 
 
 def provenance(parents: Mapping[str, Artifact], recipe: Mapping[str, Any], *, code: str) -> dict[str, str]:
-    """What a record says of where it comes from.
+    """Returns what a record says of where it comes from.
 
     Args:
         code: version of the code that made it.

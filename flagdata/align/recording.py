@@ -97,7 +97,7 @@ class Pair:
 
     @classmethod
     def opened(cls, lake: Lake, camera: Artifact, wind: Artifact) -> Pair:
-        """A camera and a wind whose objects are in the lake, whether or not they are committed."""
+        """Opens a camera and a wind whose objects are in the lake, whether or not they are committed."""
         records = [open_parent(lake, str(artifact.object)) for artifact in (camera, wind)]
         return cls(camera=camera, wind=wind, camera_record=records[0], wind_record=records[1])
 
@@ -113,7 +113,7 @@ class Pair:
         return int(times[0]), int(times[-1]) + 1
 
     def series(self) -> WindSeries:
-        """All samples of the anemometer, on its own clock.
+        """Reads all samples of the anemometer, on its own clock.
 
         Raises:
             InputError: the record has none.
@@ -124,7 +124,7 @@ class Pair:
         return series
 
     def motion(self, *, progress: Progress | None = None) -> MotionSeries:
-        """Motion energy of the film on the camera's clock.
+        """Computes the motion energy of the film on the camera's clock.
 
         Args:
             progress: called with the number of frames read, now and then.
@@ -173,7 +173,7 @@ class RecordingResult:
 
 
 def truth_recipe(window: float) -> dict[str, Any]:
-    """What the window of the ground truth [s] adds to a recording's recipe: nothing where it is the usual one.
+    """Returns what the window of the ground truth [s] adds to a recording's recipe: nothing where it is the usual one.
 
     Raises:
         UsageError: no length of time, or one beyond a day.
@@ -188,18 +188,19 @@ def truth_recipe(window: float) -> dict[str, Any]:
 
 
 def truth_window(recipe: Mapping[str, Any]) -> float:
-    """The window of the ground truth [s] of a recording's clips, by its recipe."""
+    """Returns the window of the ground truth [s] of a recording's clips, by its recipe."""
     return float(recipe.get("truth", {}).get("window", TRUTH_WINDOW))
 
 
-def session_of(pair: Pair, *, named: str | None) -> str | None:
-    """The session of a recording: the one named, else the one its parents agree on; `None` where neither names one.
+def session_of(pair: Pair, *, session_given: str | None) -> str | None:
+    """Returns the session of a recording: the one given, else the one its parents agree on; `None` where neither has
+    one.
 
     Raises:
         UsageError: the parents name different ones.
     """
-    if named is not None:
-        return named
+    if session_given is not None:
+        return session_given
     sessions = {artifact.session for artifact in (pair.camera, pair.wind) if artifact.session}
     if len(sessions) > 1:
         raise UsageError(
@@ -213,7 +214,7 @@ def session_of(pair: Pair, *, named: str | None) -> str | None:
 def find_recording(
     lake: Lake, pair: Pair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
 ) -> RecordingResult | None:
-    """The recording that these parents and options make, if it is on the branch and its object is sound.
+    """Finds the recording that these parents and options make, if it is on the branch and its object is sound.
 
     Raises:
         ConflictError: it is, under another name or session than the one asked for.
@@ -228,7 +229,7 @@ def _present(
     lake: Lake, pair: Pair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
 ) -> Present:
     return find_made(
-        lake, Kind.RECORDING, pair.parents, recipe, what="recording", name=name, session=session, branch=branch
+        lake, Kind.RECORDING, pair.parents, recipe, noun="recording", name=name, session=session, branch=branch
     )
 
 
@@ -264,7 +265,7 @@ def make_recording(
             pair,
             alignment,
             name=name,
-            session=session_of(pair, named=session),
+            session=session_of(pair, session_given=session),
             code=_present(lake, pair, alignment.recipe, name=name, session=session, branch=branch).code,
             progress=progress,
         )
@@ -291,7 +292,7 @@ def add_recording(
     frames = clock.to_common(pair.camera_record.device_frame_times)
     window = truth_window(alignment.recipe)
     before = max(MARGIN_BEFORE, window)
-    wind = _near(pair.series(), int(frames[0]), int(frames[-1]), before=before, where=pair.wind.id)
+    wind = _around_film(pair.series(), int(frames[0]), int(frames[-1]), before=before, where=pair.wind.id)
     staged = transaction.staging(".mcap")
     _write(staged, pair, alignment, wind, first=int(frames[0]), code=code, progress=progress)
     recording = _artifact(pair, alignment, frames, stored=transaction.put(staged), name=name, session=session)
@@ -302,21 +303,21 @@ def add_recording(
 
 
 def recorded(transaction: Transaction, recording: Artifact) -> RecordingResult:
-    """What a transaction did that has ended and made `recording` and its clips."""
+    """Returns what a transaction did that has ended and made `recording` and its clips."""
     result = transaction.result
     return RecordingResult(
         recording=result.artifacts[recording.id],
         created=recording.id in result.added,
         healed=result.healed.get(recording.id),
-        clips=tuple(made.id for made in result.artifacts.values() if made.recording == recording.id),
+        clips=tuple(artifact.id for artifact in result.artifacts.values() if artifact.recording == recording.id),
     )
 
 
-def _near(series: WindSeries, start: int, end: int, *, before: float, where: str) -> WindSeries:
-    """The samples from `before` [s] before the film to `MARGIN_AFTER` after it."""
+def _around_film(series: WindSeries, start: int, end: int, *, before: float, where: str) -> WindSeries:
+    """Selects the samples from `before` [s] before the film to `MARGIN_AFTER` after it."""
     low, high = start - round(before * NANOSECONDS), end + round(MARGIN_AFTER * NANOSECONDS)
-    near = (series.time >= low) & (series.time <= high)
-    if not np.any(near):
+    is_near = (series.time >= low) & (series.time <= high)
+    if not np.any(is_near):
         raise InputError(
             f"no wind sample from {iso(low)} to {iso(high)}, when the film was taken by this clock model:"
             f" the log runs from {iso(int(series.time[0]))} to {iso(int(series.time[-1]))}",
@@ -324,11 +325,11 @@ def _near(series: WindSeries, start: int, end: int, *, before: float, where: str
             fix="check the start times and zones of both, or the offset",
         )
     return WindSeries(
-        time=series.time[near],
-        channels={channel: values[near] for channel, values in series.channels.items()},
-        flags=series.flags[near],
+        time=series.time[is_near],
+        channels={channel: values[is_near] for channel, values in series.channels.items()},
+        flags=series.flags[is_near],
         sensor=series.sensor,
-        host_time=None if series.host_time is None else series.host_time[near],
+        host_time=None if series.host_time is None else series.host_time[is_near],
     )
 
 
@@ -393,9 +394,11 @@ def _artifact(
     device = pair.camera_record.device_frame_times
     middle = int(device[0] + (device[-1] - device[0]) // 2)
     start, end = int(frames[0]), int(frames[-1])
-    apart = by_offset(float(clock.to_common(middle) - middle) / NANOSECONDS, names=(pair.camera.name, pair.wind.name))
-    findings = (*alignment.findings, *((apart,) if apart is not None else ()))
-    own = quality_flags(findings)
+    hours_warning = by_offset(
+        float(clock.to_common(middle) - middle) / NANOSECONDS, names=(pair.camera.name, pair.wind.name)
+    )
+    findings = (*alignment.findings, *((hours_warning,) if hours_warning is not None else ()))
+    new_flags = quality_flags(findings)
     report = {
         "schema": REPORT_SCHEMA,
         "kind": Kind.RECORDING.value,
@@ -423,7 +426,7 @@ def _artifact(
         clock_sigma=float(clock.sigma(middle)),
         clock_model=clock.to_json(),
         parameters=canonical(dict(alignment.parameters)) if alignment.parameters else None,
-        quality=sorted({*pair.camera.quality, *pair.wind.quality, *own}),
+        quality=sorted({*pair.camera.quality, *pair.wind.quality, *new_flags}),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
     )
 
@@ -434,7 +437,7 @@ def _clips_of(lake: Lake, recording: Artifact, branch: str) -> tuple[str, ...]:
 
 
 def parents_of(lake: Lake, recording: str, *, at: str | None = None) -> tuple[Artifact, Sequence[str]]:
-    """A recording by id or name, and its camera's and wind's ids.
+    """Finds a recording by id or name, and its camera's and wind's ids.
 
     Raises:
         UsageError: it is no recording of a camera and an anemometer.

@@ -13,9 +13,9 @@ from flagdata.align.bins import STEPS, LagBins
 from flagdata.arrays import FloatArray
 from flagdata.signals import Series
 
-_ORDER = 4
+_ORDER = 4  # of the autoregression; lower leaves noise correlated, higher follows it less certainly
 _WIDTHS = (1.0, 2.0, 4.0, 8.0)  # bins
-_ROUNDS = 3
+_ROUNDS = 3  # of fitting filter and response in turn
 FEWEST_BINS = 30
 """Fewer wind bins in common are not compared, however long they are."""
 _TRIALS_AT_ONCE = 256
@@ -42,13 +42,15 @@ class Whitened:
         return cls(bins=bins, wind=_filter(wind, filters, 1), motion=_filter(bins.motion, filters, STEPS))
 
     def search(self, *, overlap: float) -> tuple[Series, Series, int]:
-        """This pair's scores z (m,), the bins compared (m,), and the trial where z is greatest; −1 where none is."""
+        """Computes this pair's scores z (m,), the bins compared (m,), and the trial where z is greatest; −1 where none
+        is."""
         scores, counts = self.scores(self.wind[:, None], overlap=overlap)
         score = scores[:, 0]
         return score, counts, int(np.nanargmax(score)) if np.any(np.isfinite(score)) else -1
 
     def scores(self, winds: FloatArray, *, overlap: float) -> tuple[FloatArray, Series]:
-        """Scores z = atanh(r) √(n − 3), (m, s), of winds (n, s), and how many bins each trial offset compares, (m,).
+        """Computes scores z = atanh(r) √(n − 3), (m, s), of winds (n, s), and how many bins each trial offset compares,
+        (m,).
 
         All winds count as missing where the filtered wind is. Trials that cover less than `overlap` [s] get NaN.
         """
@@ -56,15 +58,15 @@ class Whitened:
         weight = present.astype(np.float64)
         filled = np.where(present[:, None], winds, 0.0)
         squares = filled * filled
-        there = np.isfinite(self.motion)
-        motion = np.where(there, self.motion, 0.0)
+        is_finite = np.isfinite(self.motion)
+        motion = np.where(is_finite, self.motion, 0.0)
         trials = len(self.bins.offsets)
         scores = np.empty((trials, winds.shape[1]))
         counts = np.empty(trials)
         enough = max(FEWEST_BINS, overlap / self.bins.period)
         for start in range(0, trials, _TRIALS_AT_ONCE):
             part = slice(start, start + _TRIALS_AT_ONCE)
-            mask = self.bins.windows(there, part).astype(np.float64)
+            mask = self.bins.windows(is_finite, part).astype(np.float64)
             y = np.ascontiguousarray(self.bins.windows(motion, part))
             n = mask @ weight
             safe = np.maximum(n, 1.0)[:, None]
@@ -80,7 +82,7 @@ class Whitened:
         return scores, counts
 
     def peak(self, score: Series, best: int) -> Peak:
-        """The peak at trial `best` of this pair's own scores, refined, with its uncertainty (see `lag`)."""
+        """Refines the peak at trial `best` of this pair's own scores, with its uncertainty (see `lag`)."""
         x, y, dx = self.wind, self.motion[self.bins.index(best)], _slope(self.wind) / self.bins.period
         valid = np.isfinite(x) & np.isfinite(y) & np.isfinite(dx)
         n = int(np.count_nonzero(valid))
@@ -95,15 +97,15 @@ class Whitened:
         return Peak(offset=self._vertex(score, best), sigma=sigma, correlation=correlation, bins=n)
 
     def _vertex(self, score: Series, best: int) -> float:
-        """Where a parabola through half a bin either side of the peak is greatest [s]."""
+        """Finds where a parabola through half a bin either side of the peak is greatest [s]."""
         half = STEPS // 2
-        near = np.arange(max(best - half, 0), min(best + half + 1, len(score)))
-        near = near[np.isfinite(score[near])]
+        around_peak = np.arange(max(best - half, 0), min(best + half + 1, len(score)))
+        around_peak = around_peak[np.isfinite(score[around_peak])]
         centre = float(self.bins.offsets[best])
-        if len(near) < half:
+        if len(around_peak) < half:
             return centre
-        away = self.bins.offsets[near] - centre
-        square, line, _ = np.polyfit(away, score[near], 2)
+        away = self.bins.offsets[around_peak] - centre
+        square, line, _ = np.polyfit(away, score[around_peak], 2)
         return centre + float(np.clip(-line / (2 * square), away[0], away[-1])) if square < 0 else centre
 
 
@@ -132,7 +134,7 @@ class Fit:
 
 
 def fit(bins: LagBins, *, overlap: float) -> Fit | None:
-    """The filter φ(B) and the smooth, symmetric response to the wind that suit a pair best, found in turn.
+    """Fits the filter φ(B) and the smooth, symmetric response to the wind that suit a pair best, found in turn.
 
     The response is a sum of Gaussians of several widths with coefficients ≥ 0, by non-negative least squares on the
     filtered series at the best offset: the wind's quick changes, which the flag elsewhere does not see and which the
@@ -143,7 +145,7 @@ def fit(bins: LagBins, *, overlap: float) -> Fit | None:
         `None` where no trial offset covers `overlap` [s], or the motion rises with the wind at none.
     """
     smooth = np.stack([_smoothed(bins.wind, width) for width in _WIDTHS], axis=1)  # (n, widths)
-    own = filters = autoregression(bins.motion, stride=STEPS)
+    motion_filter = filters = autoregression(bins.motion, stride=STEPS)
     best, highest = -1, -math.inf
     for column in smooth.T:
         score, _, trial = Whitened.by(filters, column, bins).search(overlap=overlap)
@@ -151,7 +153,7 @@ def fit(bins: LagBins, *, overlap: float) -> Fit | None:
             best, highest = trial, float(score[trial])
     if best < 0:
         return None
-    pair = Whitened.by(own, smooth[:, 0], bins)
+    pair = Whitened.by(motion_filter, smooth[:, 0], bins)
     wind = smooth[:, 0]
     for _ in range(_ROUNDS):
         motion = bins.motion[bins.index(best)]
@@ -164,39 +166,39 @@ def fit(bins: LagBins, *, overlap: float) -> Fit | None:
         score, _, best = pair.search(overlap=overlap)
         if best < 0 or score[best] <= 0:
             return None
-    return Fit(best=pair, whitest=Whitened.by(own, wind, bins))
+    return Fit(best=pair, whitest=Whitened.by(motion_filter, wind, bins))
 
 
 def longest_compared(bins: LagBins) -> float:
-    """Longest time that a pair can be compared over at any trial offset [s]: the filter takes some bins at the start
-    and after each gap."""
+    """Computes the longest time that a pair can be compared over at any trial offset [s]: the filter takes some bins at
+    the start and after each gap."""
     pair = Whitened.by(autoregression(bins.motion, stride=STEPS), bins.wind, bins)
     _, counts, _ = pair.search(overlap=0.0)
     return bins.period * float(counts.max())
 
 
 def _response(smooth: FloatArray, motion: Series, filters: Series) -> Series:
-    """a_w ≥ 0, (widths,), of Σ a_w smooth_w fitted to the motion (n,) behind the filter."""
+    """Fits a_w ≥ 0, (widths,), of Σ a_w smooth_w to the motion (n,) behind the filter."""
     columns = np.stack([_filter(column, filters, 1) for column in smooth.T], axis=1)
     target = _filter(motion, filters, 1)
-    both = np.isfinite(target) & np.all(np.isfinite(columns), axis=1)
-    centred = columns[both] - columns[both].mean(axis=0)
-    weights, _ = nnls(centred, target[both] - target[both].mean())
+    finite = np.isfinite(target) & np.all(np.isfinite(columns), axis=1)
+    centred = columns[finite] - columns[finite].mean(axis=0)
+    weights, _ = nnls(centred, target[finite] - target[finite].mean())
     return weights
 
 
 def _smoothed(samples: Series, width: float) -> Series:
-    """Mean over a Gaussian of standard deviation `width` [bins] of what is there; NaN stays NaN."""
+    """Averages what is there over a Gaussian of standard deviation `width` [bins]; NaN stays NaN."""
     reach = math.ceil(3 * width)
     kernel = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / width))
-    there = np.isfinite(samples)
-    total = np.convolve(np.where(there, samples, 0.0), kernel, mode="full")[reach : reach + len(samples)]
-    weight = np.convolve(there.astype(np.float64), kernel, mode="full")[reach : reach + len(samples)]
-    return np.where(there, total / np.maximum(weight, 1e-300), np.nan)
+    is_finite = np.isfinite(samples)
+    total = np.convolve(np.where(is_finite, samples, 0.0), kernel, mode="full")[reach : reach + len(samples)]
+    weight = np.convolve(is_finite.astype(np.float64), kernel, mode="full")[reach : reach + len(samples)]
+    return np.where(is_finite, total / np.maximum(weight, 1e-300), np.nan)
 
 
 def autoregression(samples: Series, *, stride: int) -> Series:
-    """(4,) coefficients φ of samples a `stride` apart, by Yule and Walker; missing samples count as the mean.
+    """Fits (4,) coefficients φ of samples a `stride` apart, by Yule and Walker; missing samples count as the mean.
 
     Autocovariances are biased (divided by the number of samples, not of pairs), which keeps the filter stable.
     """
@@ -223,7 +225,7 @@ def _filter(samples: Series, filters: Series, stride: int) -> Series:
 
 
 def _slope(samples: Series) -> Series:
-    """Derivative per sample by the central difference of fourth order; NaN at the ends and beside gaps."""
+    """Computes the derivative per sample by the central difference of fourth order; NaN at the ends and beside gaps."""
     out = np.full(samples.shape, np.nan)
     if len(samples) > 4:
         out[2:-2] = (8 * (samples[3:-1] - samples[1:-3]) - (samples[4:] - samples[:-4])) / 12
@@ -231,7 +233,8 @@ def _slope(samples: Series) -> Series:
 
 
 def long_run_variance(psi: Series, count: int) -> float:
-    """Newey and West (1987): Σ over lags of the autocovariances of `count` samples with Bartlett's weights."""
+    """Computes the long-run variance of Newey and West (1987): Σ over lags of the autocovariances of `count` samples
+    with Bartlett's weights."""
     reach = math.ceil(count ** (1 / 3))
     total = float(psi @ psi)
     for lag in range(1, reach + 1):

@@ -87,7 +87,7 @@ def wind_bins(series: WindSeries, *, shortest: float = SHORTEST) -> WindBins:
 
 
 def lead(sensor: Sensor, spacing: float, speed: float) -> tuple[float, float]:
-    """By how much a sample's air precedes its stamp, and its standard uncertainty [s]."""
+    """Computes by how much a sample's air precedes its stamp, and its standard uncertainty [s]."""
     rectangle = 1 / math.sqrt(12)
     if sensor.averaging is not None:
         averaging, averaging_sigma = sensor.averaging / 2, 0.0
@@ -103,7 +103,8 @@ def lead(sensor: Sensor, spacing: float, speed: float) -> tuple[float, float]:
 
 
 def _mid_bin_shift(time: np.ndarray, length: int) -> int:
-    """Time to take off slow samples so that they fall mid-bin, where jitter cannot move them across [ns]."""
+    """Computes the time to take off slow samples so that they fall mid-bin, where jitter cannot move them across
+    [ns]."""
     angle = 2 * np.pi * ((time % length) / length)
     phase = float(np.angle(np.mean(np.exp(1j * angle)))) / (2 * np.pi) * length
     return round(phase - length / 2)

@@ -44,25 +44,25 @@ class WindPair:
             UsageError: artifacts of other kinds, or one artifact twice.
             InputError: one holds no samples.
         """
-        found = [lake.artifact(identity, at=at, kinds=(Kind.WIND,)) for identity in (reference, sensor)]
-        for artifact in found:
+        artifacts = [lake.artifact(identity, at=at, kinds=(Kind.WIND,)) for identity in (reference, sensor)]
+        for artifact in artifacts:
             if artifact.kind is not Kind.WIND or artifact.object is None:
                 raise UsageError(
                     f"{artifact.name!r} is a {artifact.kind}, not a wind",
                     where=artifact.id,
                     fix="flagdata align REFERENCE SENSOR takes two wind artifacts; see flagdata ls",
                 )
-        if found[0].id == found[1].id:
+        if artifacts[0].id == artifacts[1].id:
             raise UsageError(
-                "both names are of the same wind artifact", where=found[0].id, fix="name two wind artifacts"
+                "both names are of the same wind artifact", where=artifacts[0].id, fix="name two wind artifacts"
             )
         series = []
-        for artifact in found:
+        for artifact in artifacts:
             samples = Record.open(lake.record_place(str(artifact.object))).wind()
             if samples is None or not len(samples):
                 raise InputError("the wind artifact holds no samples", where=artifact.id, fix="ingest the log anew")
             series.append(samples)
-        return cls(reference=found[0], sensor=found[1], reference_series=series[0], sensor_series=series[1])
+        return cls(reference=artifacts[0], sensor=artifacts[1], reference_series=series[0], sensor_series=series[1])
 
     @property
     def parents(self) -> dict[str, Artifact]:
@@ -77,20 +77,20 @@ class WindPair:
 def find_aligned(
     lake: Lake, pair: WindPair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
 ) -> Present:
-    """What the branch has of the artifact that these parents and options make.
+    """Finds what the branch has of the artifact that these parents and options make.
 
     Raises:
         ConflictError: it is, under another name or session than the one asked for.
     """
     return find_made(
-        lake, Kind.WIND, pair.parents, recipe, what="aligned log", name=name, session=session, branch=branch
+        lake, Kind.WIND, pair.parents, recipe, noun="aligned log", name=name, session=session, branch=branch
     )
 
 
 def make_aligned(
     lake: Lake,
     pair: WindPair,
-    found: LogClock,
+    log_clock: LogClock,
     *,
     recipe: Mapping[str, Any],
     name: str | None,
@@ -108,22 +108,22 @@ def make_aligned(
     Returns:
         its row, and what was done where its object was damaged or missing.
     """
-    clock, own = found.model, pair.sensor_series.time
+    clock, sensor_time = log_clock.model, pair.sensor_series.time
     metadata = {PROVENANCE: provenance(pair.parents, recipe, code=code)}
     with lake.transaction(f"align {pair.sensor.name} with {pair.reference.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata=metadata) as record:
             record.wind(pair.sensor_series, clock=clock)
-        common = clock.to_common(own)
-        middle = int(own[0] + (own[-1] - own[0]) // 2)
+        common = clock.to_common(sensor_time)
+        middle = int(sensor_time[0] + (sensor_time[-1] - sensor_time[0]) // 2)
         start, end = int(common[0]), int(common[-1])
         report = {
             "schema": REPORT_SCHEMA,
             "kind": Kind.WIND.value,
-            "samples": len(own),
+            "samples": len(sensor_time),
             "start": iso(start),
             "end": iso(end),
-            **summary(found),
+            **summary(log_clock),
         }
         artifact = Artifact(
             kind=Kind.WIND,
@@ -148,23 +148,23 @@ def make_aligned(
     return transaction.result.artifacts[artifact.id], transaction.result.healed.get(artifact.id)
 
 
-def summary(found: LogClock) -> dict[str, Any]:
-    """The numbers for JSON: of the sensor's clock on the reference's, and of its gain; `drift_parts` is 0 where the
-    drift is a prior's."""
-    (segment,) = found.model.segments
+def summary(log_clock: LogClock) -> dict[str, Any]:
+    """Returns the numbers for JSON: of the sensor's clock on the reference's, and of its gain; `drift_parts` is 0 where
+    the drift is a prior's."""
+    (segment,) = log_clock.model.segments
     half = NINETY * segment.sigma_offset
-    gain = found.gain
+    gain = log_clock.gain
     return {
-        "method": found.model.method,
+        "method": log_clock.model.method,
         "offset": segment.offset,
         "at": iso(segment.origin),
         "sigma": segment.sigma_offset,
         "interval": [segment.offset - half, segment.offset + half],
         "level": 0.9,
-        "confidence": found.model.confidence,
+        "confidence": log_clock.model.confidence,
         "drift": segment.drift,
         "drift_sigma": segment.sigma_drift,
-        "drift_parts": len(found.line.parts),
+        "drift_parts": len(log_clock.line.parts),
         "gain": gain.gain,
         "gain_sigma": gain.sigma,
         "zero": gain.zero,

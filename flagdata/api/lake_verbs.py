@@ -82,11 +82,11 @@ class Naming(AtVersion, OnLake):
     def __post_init__(self) -> None:
         allowed = () if self.name is None else ("discard", "message") if self.delete else ("at",)
         if self.name is None and self.delete:
-            raise UsageError("--delete without a NAME", fix="give the NAME of what is to be deleted")
+            raise UsageError("--delete needs a NAME", fix="give the NAME of what is to be deleted")
         for key in ("at", "discard", "message"):
             if getattr(self, key) and key not in allowed:
                 what = "without a NAME" if self.name is None else "with --delete" if self.delete else "without --delete"
-                raise UsageError(f"--{key} {what}", fix="leave it out, or see --help")
+                raise UsageError(f"--{key} cannot be given {what}", fix="leave it out, or see --help")
 
 
 @called(Naming)
@@ -143,7 +143,7 @@ class Exporting(AtVersion, OnLake):
 
     def __post_init__(self) -> None:
         if self.salt and self.split is None:
-            raise UsageError("--salt without --split", fix="name the side by --split, or leave out --salt")
+            raise UsageError("--salt needs --split", fix="name the side by --split, or leave out --salt")
 
 
 @called(Exporting)

@@ -276,5 +276,5 @@ def close_loop(chosen: Closing) -> Closed:
         UsageError: winds that do not fit the recordings, or nulls that cannot test the level.
     """
     if (chosen.rest is None) != (chosen.rate is None):
-        raise UsageError("rest= without rate=, or the other way round", where="recordings", fix="give both")
+        raise UsageError("rest= and rate= must be given together", where="recordings", fix="give both")
     return call("measure.closing.arrays:closed", chosen)

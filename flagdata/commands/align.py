@@ -261,7 +261,7 @@ def _of_film(
     """Makes the recording of a film and a wind, unless it is there."""
     from flagdata.align.recording import find_recording, make_recording, session_of
 
-    session_of(pair, named=session)  # refused before the long part
+    session_of(pair, session_given=session)  # refused before the long part
     _warn_of_clocks(pair, clock)
     names = {"name": name, "session": session, "branch": chosen.branch}
     present = None if chosen.dry_run or plot else find_recording(lake, pair, recipe, **names)

@@ -132,7 +132,8 @@ def _expected(question: Open, text: str) -> tuple[str, object]:
     if text.replace(",", ".").lstrip("+-").replace(".", "", 1).isdigit():
         return "missing", text.replace(",", ".")
     raise RefusedError(
-        f"{question.question} {text}", fix="describe the file by a recipe, and name it by --sensor FILE.toml"
+        f"{text!r} is no answer to: {question.question}",
+        fix="describe the file by a recipe, and name it by --sensor FILE.toml",
     )
 
 

@@ -124,7 +124,7 @@ def _check_picture(chosen: FromCamera) -> None:
     if chosen.crop_picture is None:
         return
     if chosen.crop.strip().lower() != "auto":
-        raise UsageError("--crop-picture without --crop auto", where=str(chosen.crop_picture), fix="add --crop auto")
+        raise UsageError("--crop-picture needs --crop auto", where=str(chosen.crop_picture), fix="add --crop auto")
     check_file(Path(chosen.crop_picture), command="ingest")
 
 

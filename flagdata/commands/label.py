@@ -31,7 +31,7 @@ def label(words: tuple[str, ...], message: str | None, branch_name: str, as_json
     values = dict(given(word) for word in words if "=" in word)
     named = [lake.identity(word, at=branch_name) for word in words if "=" not in word]
     if not values or not named:
-        raise UsageError("no artifact or no label", fix="flagdata label ARTIFACT NAME=VALUE")
+        raise UsageError("the artifact or the label is missing", fix="flagdata label ARTIFACT NAME=VALUE")
     what = message or f"label {', '.join(values)}"
     version, labelled = lake.label(named, values, what, branch=branch_name)
     if as_json:

@@ -200,7 +200,9 @@ def withdraw(
     lake = Lake.open(lake_path)
     if everywhere:
         if context.get_parameter_source("branch_name") is ParameterSource.COMMANDLINE:
-            raise UsageError("--everywhere with --branch", fix="leave out --branch: every branch is meant")
+            raise UsageError(
+                "--everywhere cannot be combined with --branch", fix="leave out --branch: every branch is meant"
+            )
         _erase(lake, artifacts, message, with_descendants=with_descendants, as_json=as_json)
         return
     named = {lake.identity(artifact, at=branch_name) for artifact in artifacts}

@@ -94,7 +94,7 @@ def query(chosen: QueryCommand) -> None:
       flagdata query --sql "select session, count(*) n, avg(wind) wind from catalog group by session" --json
     """
     if sum((chosen.as_json, chosen.as_csv, chosen.arrow is not None)) > 1:
-        raise UsageError("more than one form of output", fix="choose one of --json, --csv and --arrow")
+        raise UsageError("more than one form of output is given", fix="choose one of --json, --csv and --arrow")
     if chosen.describe:
         _describe(as_json=chosen.as_json)
         return

@@ -86,7 +86,7 @@ def doctor(source: Path | None, deep: bool, grace: timedelta, as_json: bool, lak
     """
     if source is not None:
         if deep:
-            raise UsageError("--deep with a SOURCE", fix="leave it out: stamps are all that is read")
+            raise UsageError("--deep cannot be combined with a SOURCE", fix="leave it out: stamps are all that is read")
         _examine(source, as_json=as_json)
         return
     from flagdata.ingest.before import unconfirmed

@@ -73,10 +73,10 @@ class DecodedCache:
                     fix="choose a folder outside it: it is disposable",
                 )
         self.path.mkdir(parents=True, exist_ok=True)
-        with os.scandir(self.path) as found:
-            for entry in found:
-                own = _NAME.fullmatch(entry.name) or entry.name in (_TALLY, _WRITING)
-                if not own and not is_beside(entry.name):
+        with os.scandir(self.path) as entries:
+            for entry in entries:
+                is_of_cache = _NAME.fullmatch(entry.name) or entry.name in (_TALLY, _WRITING)
+                if not is_of_cache and not is_beside(entry.name):
                     raise UsageError(
                         "a cache among other files", where=entry.path, fix="give it a new or empty folder of its own"
                     )
@@ -167,8 +167,8 @@ class DecodedCache:
 
     def _entries(self) -> list[_Entry]:
         entries: list[_Entry] = []
-        with os.scandir(self.path) as found:
-            for entry in found:
+        with os.scandir(self.path) as scan:
+            for entry in scan:
                 if _NAME.fullmatch(entry.name):
                     with contextlib.suppress(FileNotFoundError):
                         status = entry.stat()
@@ -177,7 +177,8 @@ class DecodedCache:
 
     @contextlib.contextmanager
     def _locked(self) -> Iterator[BinaryIO]:
-        """One writer at a time, across processes; the lock dies with its holder. Yields the tally, at its start."""
+        """Lets one writer work at a time, across processes; the lock dies with its holder. Yields the tally, at its
+        start."""
         with (self.path / _TALLY).open("a+b") as tally:
             fcntl.flock(tally, fcntl.LOCK_EX)
             tally.seek(0)

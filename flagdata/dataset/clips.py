@@ -26,7 +26,7 @@ TRUTH_SPEED = "wind_speed"  # the truth parameter of a simulated record that is 
 
 
 def runs(times: Instants, frames: int) -> Iterator[int]:
-    """First indices of the non-overlapping clips of `frames` consecutive frames.
+    """Yields the first indices of the non-overlapping clips of `frames` consecutive frames.
 
     Args:
         times: (n,) instants of the frames [UTC ns], increasing.
@@ -53,7 +53,7 @@ def runs(times: Instants, frames: int) -> Iterator[int]:
 def clip_rows(
     record: Record, recording: Artifact, *, frames: int = CLIP_FRAMES, window: float = TRUTH_WINDOW
 ) -> list[Artifact]:
-    """The clips of a recording, in order, with the mean wind over the window before each one's end.
+    """Cuts a recording into clips, in order, with the mean wind over the window before each one's end.
 
     A clip whose window is thin, stale or empty is kept as a row: its numbers say so, and `pairs` refuses it by its
     tolerance. A simulated record states its wind as the truth parameter "wind_speed" [m/s]; that is then exact.
@@ -69,8 +69,8 @@ def clip_rows(
     times = record.frame_times
     series = truth_series(record)
     clock = ClockModel.from_json(recording.clock_model) if recording.clock_model else None
-    known = record.truth or {}
-    parameters = recording.parameters or (provenance.canonical(known) if known else None)
+    truth_values = record.truth or {}
+    parameters = recording.parameters or (provenance.canonical(truth_values) if truth_values else None)
     rows: list[Artifact] = []
     for first in runs(times, frames):
         last = first + frames - 1
@@ -78,7 +78,7 @@ def clip_rows(
         sigma = float(clock.sigma(record.device_frame_times[last])) if clock else recording.clock_sigma
         if sigma is None and recording.seed is not None:
             sigma = 0.0  # a simulation has one clock
-        truth = clip_truth(series, end, known=known.get(TRUTH_SPEED), clock_sigma=sigma, window=window)
+        truth = clip_truth(series, end, stated_speed=truth_values.get(TRUTH_SPEED), clock_sigma=sigma, window=window)
         start = int(times[first])
         rows.append(
             _row(
@@ -97,21 +97,22 @@ def clip_rows(
 
 
 def truth_series(record: Record) -> TruthSeries | None:
-    """The record's wind over ground; `None` where it has none, such as the log of a moving platform."""
+    """Reads the record's wind over ground; `None` where it has none, such as the log of a moving platform."""
     series = record.wind()
     return TruthSeries.of(series) if series is not None and over_ground(series) is not None else None
 
 
 def clip_truth(
-    series: TruthSeries | None, end: int, *, known: float | None, clock_sigma: float | None, window: float
+    series: TruthSeries | None, end: int, *, stated_speed: float | None, clock_sigma: float | None, window: float
 ) -> WindTruth:
-    """Ground truth at a clip's end: `known` exactly where a simulation states it, else the mean of the series.
+    """Computes the ground truth at a clip's end: `stated_speed` exactly where a simulation states it, else the mean of
+    the series.
 
     Args:
         clock_sigma: [s]; `None` where nobody knows, and the ground truth's σ is then unknown too.
     """
-    if known is not None:
-        return WindTruth.exact(known)
+    if stated_speed is not None:
+        return WindTruth.exact(stated_speed)
     if series is None:
         return WindTruth.missing(staleness=math.inf)
     if clock_sigma is None:
@@ -152,10 +153,10 @@ def _row(
         frame_first=first,
         frame_count=frames,
         rate=recording.rate,
-        wind=_known(truth.wind),
-        wind_sigma=_known(truth.sigma),
+        wind=_finite_or_none(truth.wind),
+        wind_sigma=_finite_or_none(truth.sigma),
         wind_coverage=truth.coverage,
-        wind_staleness=_known(truth.staleness),
+        wind_staleness=_finite_or_none(truth.staleness),
         clock_method=recording.clock_method,
         clock_offset=recording.clock_offset,
         clock_drift=recording.clock_drift,
@@ -166,6 +167,6 @@ def _row(
     )
 
 
-def _known(value: float) -> float | None:
-    """The catalog writes what nobody knows as null, not as NaN or infinity."""
+def _finite_or_none(value: float) -> float | None:
+    """Returns a value as the catalog writes it: null for what nobody knows, not NaN or infinity."""
     return value if math.isfinite(value) else None

@@ -18,42 +18,42 @@ _TIES = ["artifact", "kind", "source_hash", "object", "session"]
 
 
 def origins_of(catalog: pa.Table, clips: pa.Table) -> list[Origin]:
-    """One origin a recording, with the days of `clips` only."""
+    """Finds one origin a recording, with the days of `clips` only."""
     parents = dict(zip(catalog["artifact"].to_pylist(), catalog["parents"].to_pylist(), strict=True))
     ties = {row["artifact"]: _ties(row) for row in matching(catalog, {"kind": _TIED}).select(_TIES).to_pylist()}
     days: dict[str, set[str]] = defaultdict(set)
-    known: dict[str, Origin] = {}
+    origins: dict[str, Origin] = {}
     for row in clips.group_by(["recording", "session", "seed", "day"]).aggregate([]).to_pylist():
         recording = row["recording"]
         if row["day"]:
             days[recording].add(row["day"])
-        if recording not in known:
+        if recording not in origins:
             lineage = {recording, *_ancestors(recording, parents)}
-            known[recording] = Origin(
+            origins[recording] = Origin(
                 recording=recording,
                 session=row["session"],
                 seed=row["seed"],
                 sources=tuple(sorted({tie for artifact in lineage for tie in ties.get(artifact, ())})),
             )
-    return [replace(known[recording], days=tuple(sorted(days[recording]))) for recording in sorted(known)]
+    return [replace(origins[recording], days=tuple(sorted(days[recording]))) for recording in sorted(origins)]
 
 
 def _ties(row: Mapping[str, str | None]) -> list[str]:
-    """What must not be on two sides because of one artifact of a recording's lineage, in words."""
+    """Lists in words what must not be on two sides because of one artifact of a recording's lineage."""
     ties = [] if row["kind"] == Kind.RECORDING else [f"{row['kind']} {row['source_hash'] or row['artifact']}"]
     ties += [f"{column} {row[column]}" for column in ("object", "session") if row[column]]
     return ties
 
 
 def _ancestors(artifact: str, parents: Mapping[str, list[str]]) -> set[str]:
-    found: set[str] = set()
+    ancestors: set[str] = set()
     open_ = [artifact]
     while open_:
         for parent in parents.get(open_.pop(), ()):
-            if parent not in found:
-                found.add(parent)
+            if parent not in ancestors:
+                ancestors.add(parent)
                 open_.append(parent)
-    return found
+    return ancestors
 
 
 def superseded(catalog: pa.Table, recordings: set[str]) -> dict[str, str]:

@@ -47,7 +47,7 @@ class Batchable(Dataset[Sample], ABC):
 
     @abstractmethod
     def __len__(self) -> int:
-        """How many samples there are."""
+        """Counts the samples."""
 
 
 class PairLoader:
@@ -98,14 +98,14 @@ class PairLoader:
             raise UsageError(
                 f"there is no share {share[0]} of {share[1]}", fix="give (index, count) with 0 <= index < count"
             )
-        for option, value, known in (
+        for option, value, choices in (
             ("order", order, ("shuffled", "stored")),
             ("last", last, ("keep", "drop")),
             ("memory", memory, ("pageable", "pinned")),
             ("run_in", run_in, ("threads", "fork", "spawn", "forkserver")),
         ):
-            if value not in known:
-                raise UsageError(f"{option} cannot be {value!r}", fix=f"give {' or '.join(map(repr, known))}")
+            if value not in choices:
+                raise UsageError(f"{option} cannot be {value!r}", fix=f"give {' or '.join(map(repr, choices))}")
         if memory == "pinned" and not torch.accelerator.is_available():
             raise UsageError("pinned memory without an accelerator", fix="leave memory at 'pageable'")
         self.pairs = pairs
@@ -143,9 +143,9 @@ class PairLoader:
         return self._total() // self._share[1]
 
     def _total(self) -> int:
-        """Batches of all shares in a whole epoch."""
-        whole, rest = divmod(len(self.pairs), self._batch_size)
-        return whole + (rest > 0 and self._last == "keep")
+        """Counts batches of all shares in a whole epoch."""
+        full_batches, rest = divmod(len(self.pairs), self._batch_size)
+        return full_batches + (rest > 0 and self._last == "keep")
 
     @checked
     def batches(self, epoch: int) -> list[list[int]]:
@@ -167,14 +167,15 @@ class PairLoader:
 
     @checked
     def order_hash(self, epoch: int) -> str:
-        """SHA-256 of the samples and their order in an epoch, in hexadecimal: equal for any workers and shares."""
+        """Computes the SHA-256 of the samples and their order in an epoch, in hexadecimal: equal for any workers and
+        shares."""
         order = self._ordered(epoch).astype("<i8").tobytes()
         return hashlib.sha256(
             f"{self.pairs.fingerprint} {self._batch_size} {self._last}\n".encode() + order
         ).hexdigest()
 
     def __iter__(self) -> Iterator[Batch]:
-        """The batches of the epoch that are left.
+        """Yields the batches of the epoch that are left.
 
         Raises:
             UsageError: while stepping, when another iteration of this loader has begun since.
@@ -216,7 +217,7 @@ class PairLoader:
         return batch.pin_memory() if self._memory == "pinned" else batch
 
     def state_dict(self) -> State:
-        """Everything that determines the batches still to come; put it into the checkpoint beside the model."""
+        """Returns everything that determines the batches still to come; put it into the checkpoint beside the model."""
         return {
             "at": self.pairs.at,
             "fingerprint": self.pairs.fingerprint,
@@ -231,23 +232,23 @@ class PairLoader:
         }
 
     def load_state_dict(self, state: Mapping[str, str | int | None]) -> None:
-        """Go to where `state` was taken: the next iteration gives the same batches, bit for bit. Taken with another
+        """Goes to where `state` was taken: the next iteration gives the same batches, bit for bit. Taken with another
         number of shares, it is that of any of them after equally many batches.
 
         Raises:
             RefusedError: it was taken of other data, another seed, or other batches.
             UsageError: it is not a state of a loader.
         """
-        own = self.state_dict()
+        present_state = self.state_dict()
         state = {"before": 0, **state}  # which states of older versions lack
         share = _SHARE.fullmatch(str(state.get("share")))
-        if set(state) != set(own) or share is None:
+        if set(state) != set(present_state) or share is None:
             raise UsageError("this is not a state of a loader of pairs", fix="give what state_dict returned")
-        different = [name for name in own if name not in _MOVING and state[name] != own[name]]
+        different = [name for name in present_state if name not in _MOVING and state[name] != present_state[name]]
         if different:
-            named = "; ".join(f"{name} was {state[name]!r}, is {own[name]!r}" for name in different)
+            differences = "; ".join(f"{name} was {state[name]!r}, is {present_state[name]!r}" for name in different)
             raise RefusedError(
-                f"the saved state belongs to other batches: {named}",
+                f"the saved state belongs to other batches: {differences}",
                 where=f"data at {state['at'] or 'the head of main'}",
                 fix="resolve the query at the same tag, with the same options",
             )

@@ -72,7 +72,7 @@ class Pairs(Batchable):
 
     @checked
     def __getitem__(self, index: int) -> Sample:
-        """The pair at `index`, 0 ≤ index < len.
+        """Reads the pair at `index`, 0 ≤ index < len.
 
         Raises:
             IndexError: beyond the last pair.
@@ -100,7 +100,7 @@ class Pairs(Batchable):
 
     @checked
     def film(self, index: int) -> UInt8Array:
-        """All frames of the recording that the pair at `index` is of: (frames, height, width) gray.
+        """Reads all frames of the recording that the pair at `index` is of: (frames, height, width) gray.
 
         Raises:
             IndexError: beyond the last pair.
@@ -113,7 +113,7 @@ class Pairs(Batchable):
 
     @checked
     def film_times(self, index: int) -> FloatArray:
-        """(frames,) instants of the frames of `film`, from the first [s].
+        """Reads (frames,) instants of the frames of `film`, from the first [s].
 
         Raises:
             IndexError: beyond the last pair.
@@ -135,7 +135,9 @@ class Pairs(Batchable):
         return f"Pairs({len(self)} pairs at {at}, {len(self.refused)} refused, fingerprint {self.fingerprint[:12]})"
 
     def _repr_html_(self) -> str:
-        refused = {f"refused {one.artifact[:SHORT]}": "; ".join(one.reasons) for one in self.refused[:_SHOWN]}
+        refused = {
+            f"refused {refusal.artifact[:SHORT]}": "; ".join(refusal.reasons) for refusal in self.refused[:_SHOWN]
+        }
         wind = self.table.wind
         rows = {"version": self.at or "the head of main", "wind": f"{wind.min():.2f} to {wind.max():.2f} m/s"}
         return table(f"{len(self)} pairs, {len(self.refused)} refused", rows | refused)

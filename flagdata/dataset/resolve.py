@@ -58,10 +58,10 @@ def side_sizes(
     recording_of = dict(zip(chosen["artifact"].to_pylist(), chosen["recording"].to_pylist(), strict=True))
     sizes: dict[str, SideSize] = {}
     for side in split_by.sides:
-        held = clips_on_side(catalog, side, split_by) & recording_of.keys()
-        recordings = {recording_of[clip] for clip in held}
+        clips_of_side = clips_on_side(catalog, side, split_by) & recording_of.keys()
+        recordings = {recording_of[clip] for clip in clips_of_side}
         sizes[side] = SideSize(
-            clips=len(held),
+            clips=len(clips_of_side),
             recordings=len(recordings),
             groups=len({labels[recording] for recording in recordings}),
         )
@@ -101,19 +101,19 @@ def resolve(
     windows = _windows(clips, table)
     table = _with_window(lake, table, windows, _common(windows) if window is None else window)
     refused = judge(table, tolerance, superseded=superseded(_lineage(catalog), set(table.recording.tolist())))
-    kept = np.array([k not in refused for k in range(len(table))], dtype=np.bool_)
-    if not kept.any():
+    is_usable = np.array([k not in refused for k in range(len(table))], dtype=np.bool_)
+    if not is_usable.any():
         first = next(iter(refused.values()))
         raise RefusedError(
             f"all {len(table)} pairs are outside the tolerance; the first: {'; '.join(first.reasons)}",
             where=f"clip {first.artifact}",
             fix="give a wider Tolerance, or improve the recording's wind log or clock",
         )
-    return Resolved(table=table.take(kept), refused=tuple(refused.values()))
+    return Resolved(table=table.take(is_usable), refused=tuple(refused.values()))
 
 
 def _lineage(catalog: pa.Table | Scan) -> pa.Table:
-    """The columns that state where clips come from."""
+    """Selects the columns that state where clips come from."""
     return catalog.table(_LINEAGE) if isinstance(catalog, Scan) else catalog
 
 
@@ -146,7 +146,7 @@ def _hashed_side(catalog: pa.Table | Scan, split_by: HashedSplit, split: str) ->
 
 
 def explicit_sides(catalog: pa.Table | Scan, split_by: ExplicitSplit) -> dict[str, pa.Table]:
-    """Side → its clips: what `Origin` is made of. All sides are resolved and compared, whichever is wanted.
+    """Maps each side to its clips: what `Origin` is made of. All sides are resolved and compared, whichever is wanted.
 
     Raises:
         RefusedError: two of them share a recording, a film, a mesh sequence, a seed, a session or a day.
@@ -158,53 +158,54 @@ def explicit_sides(catalog: pa.Table | Scan, split_by: ExplicitSplit) -> dict[st
 
 
 def _windows(clips: pa.Table, table: PairTable) -> FloatArray:
-    """Window (n,) of the catalog's ground truth of each pair [s], NaN where its recipe has none."""
+    """Reads the window (n,) of the catalog's ground truth of each pair [s], NaN where its recipe has none."""
     recipe = clips["recipe"].combine_chunks().dictionary_encode()
     first = np.unique(recipe.indices.fill_null(-1).to_numpy(zero_copy_only=False), return_index=True)
     owner = {int(number): clips["artifact"][int(row)].as_py() for number, row in zip(*first, strict=True)}
-    stated = [
+    windows_of_recipes = [
         column_json(text, "recipe", artifact=owner[number]).get("window", math.nan) if text else math.nan
         for number, text in enumerate(recipe.dictionary.to_pylist())
     ]
-    windows = np.array([*stated, math.nan], dtype=np.float64)[recipe.indices.fill_null(-1).to_numpy()]
-    place = pc.index_in(pa.array(table.artifact), value_set=clips["artifact"])  # type: ignore[attr-defined]
-    return windows[place.to_numpy()]
+    windows = np.array([*windows_of_recipes, math.nan], dtype=np.float64)[recipe.indices.fill_null(-1).to_numpy()]
+    row_of_pair = pc.index_in(pa.array(table.artifact), value_set=clips["artifact"])  # type: ignore[attr-defined]
+    return windows[row_of_pair.to_numpy()]
 
 
 def _common(windows: FloatArray) -> float:
-    """The one window of all pairs [s]; the usual one where no recipe states any.
+    """Finds the one window of all pairs [s]; the usual one where no recipe states any.
 
     Raises:
         UsageError: several.
     """
-    found = np.unique(windows[np.isfinite(windows)])
-    if len(found) > 1:
+    distinct = np.unique(windows[np.isfinite(windows)])
+    if len(distinct) > 1:
         raise UsageError(
-            f"the clips have ground truths over {', '.join(f'{window:g}' for window in found)} s",
+            f"the clips have ground truths over {', '.join(f'{window:g}' for window in distinct)} s",
             where="window",
             fix="name one: window=SECONDS; the others are then computed anew from the records' wind",
         )
-    return float(found[0]) if len(found) else TRUTH_WINDOW
+    return float(distinct[0]) if len(distinct) else TRUTH_WINDOW
 
 
 def _with_window(lake: Lake, table: PairTable, windows: FloatArray, window: float) -> PairTable:
-    """The table with ground truths over `window`; those of another window are computed anew from the record's wind."""
-    other = np.nonzero(windows != window)[0]
-    if not len(other):
+    """Returns the table with ground truths over `window`; those of another window are computed anew from the record's
+    wind."""
+    to_compute = np.nonzero(windows != window)[0]
+    if not len(to_compute):
         return table
     wind, sigma, coverage, staleness = (
         values.copy() for values in (table.wind, table.wind_sigma, table.coverage, table.staleness)
     )
-    for number in np.unique(table.object[other]):
+    for number in np.unique(table.object[to_compute]):
         record = Record.open(lake.record_place(str(table.objects[number])))
-        known = (record.truth or {}).get(TRUTH_SPEED)
+        exact_speed = (record.truth or {}).get(TRUTH_SPEED)
         series = truth_series(record)
-        for k in other[table.object[other] == number]:
+        for k in to_compute[table.object[to_compute] == number]:
             clock = float(table.clock_sigma[k])
             truth = clip_truth(
                 series,
                 int(table.end[k]),
-                known=known,
+                stated_speed=exact_speed,
                 clock_sigma=None if math.isnan(clock) else clock,
                 window=window,
             )

@@ -101,11 +101,11 @@ class Batch:
         return len(self.artifact)
 
     def to(self, device: torch.device | str) -> Self:
-        """The batch with its tensors on `device`; copies from pinned memory overlap with computation."""
+        """Moves the batch's tensors to `device`; copies from pinned memory overlap with computation."""
         return self._mapped(lambda tensor: tensor.to(device, non_blocking=tensor.is_pinned()))
 
     def pin_memory(self) -> Self:
-        """The batch in page-locked memory; `DataLoader(pin_memory=True)` calls it."""
+        """Copies the batch to page-locked memory; `DataLoader(pin_memory=True)` calls it."""
         return self._mapped(torch.Tensor.pin_memory)
 
     def _mapped(self, function: _TensorMap) -> Self:
@@ -124,7 +124,7 @@ class Batch:
 
 
 def collate(samples: Sequence[Sample]) -> Batch:
-    """Stack samples in order.
+    """Stacks samples in order.
 
     Raises:
         InputError: no sample, or clips of different shapes.

@@ -34,7 +34,7 @@ class Source:
     @classmethod
     @checked
     def open(cls, path: Place | str) -> Source:
-        """The lake in the folder `path`, or at `s3://bucket/prefix`.
+        """Opens the lake in the folder `path`, or at `s3://bucket/prefix`.
 
         Raises:
             NotFoundError: no lake there.
@@ -118,7 +118,7 @@ class Source:
         at: str | None = None,
         split_by: HashedSplit | ExplicitSplit | None = None,
     ) -> dict[str, SideSize]:
-        """How many clips, recordings and independent groups each side of a split holds, before any tolerance.
+        """Counts the clips, recordings and independent groups of each side of a split, before any tolerance.
 
         Whole groups go to one side, so that with few of them the shares can be far from the fractions asked for: look
         here before training.
@@ -138,14 +138,14 @@ class Source:
         return side_sizes(self.lake, where=where, at=at, split_by=split_by or HashedSplit())
 
     def __repr__(self) -> str:
-        held = ", ".join(f"{count} {kind}" for kind, count in self._held().items()) or "empty"
-        return f"Lake({self.lake.path}: {held})"
+        contents = ", ".join(f"{count} {kind}" for kind, count in self._counts().items()) or "empty"
+        return f"Lake({self.lake.path}: {contents})"
 
     def _repr_html_(self) -> str:
-        return table(f"Lake {self.lake.path}", {kind: str(count) for kind, count in self._held().items()})
+        return table(f"Lake {self.lake.path}", {kind: str(count) for kind, count in self._counts().items()})
 
-    def _held(self) -> dict[str, int]:
-        """Kind → artifacts on main, by name of the kind."""
+    def _counts(self) -> dict[str, int]:
+        """Counts the artifacts on main by name of their kind."""
         return dict(sorted(Counter(self.lake.rows(columns=["kind"])["kind"].to_pylist()).items()))
 
 

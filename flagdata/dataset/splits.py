@@ -65,7 +65,7 @@ class Origin:
 
 
 def groups(origins: Sequence[Origin]) -> IntArray:
-    """Label (n,) of the connected group of each recording, from 0."""
+    """Labels (n,) the connected group of each recording, from 0."""
     if not origins:
         return np.empty(0, dtype=np.int64)
     index: dict[str, int] = {}
@@ -108,7 +108,7 @@ class HashedSplit:
         return tuple(self.fractions)
 
     def assign(self, origins: Sequence[Origin]) -> list[str]:
-        """The side of each recording."""
+        """Assigns each recording to a side."""
         labels = groups(origins).tolist()
         names: dict[int, tuple[int, str | int]] = {}
         for label, origin in zip(labels, origins, strict=True):
@@ -173,9 +173,9 @@ def refuse_leaks(sides: Mapping[str, Iterable[Origin]]) -> None:
             holders.setdefault(tie, []).append(side)
     leaks = sorted(tie for tie, names in holders.items() if len(names) > 1)
     if leaks:
-        named = "; ".join(f"{tie} is in {' and in '.join(holders[tie])}" for tie in leaks[:_LISTED])
-        more = f"; and {len(leaks) - _LISTED} more" if len(leaks) > _LISTED else ""
+        listed = "; ".join(f"{tie} is in {' and in '.join(holders[tie])}" for tie in leaks[:_LISTED])
+        further = f"; and {len(leaks) - _LISTED} more" if len(leaks) > _LISTED else ""
         raise RefusedError(
-            f"the split leaks: {named}{more}",
+            f"the split leaks: {listed}{further}",
             fix="split by whole sessions, days and seeds, or use the hashed split, which keeps them together",
         )

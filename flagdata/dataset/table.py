@@ -83,7 +83,7 @@ class PairTable:
 
     @classmethod
     def of(cls, rows: pa.Table, *, labels: Mapping[str, Mapping[str, Any]] | None = None) -> Self:
-        """The table of catalog rows (with at least `COLUMNS`), in the order of recording, frame and identity.
+        """Builds the table of catalog rows (with at least `COLUMNS`), in the order of recording, frame and identity.
 
         Args:
             labels: artifact → the user's own values; those that are numbers or truth values become the parameters
@@ -126,13 +126,13 @@ class PairTable:
         )
 
     def take(self, index: IntArray | BoolArray) -> Self:
-        """The pairs at `index`, in its order, with the objects and parameter names that they use."""
+        """Selects the pairs at `index`, in its order, with the objects and parameter names that they use."""
         shared = ("objects", "names")
         taken = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in shared}
         used, taken["object"] = np.unique(taken["object"], return_inverse=True)
-        known = ~np.all(np.isnan(taken["parameters"]), axis=0)
-        taken["parameters"] = taken["parameters"][:, known]
-        return replace(self, **taken, objects=self.objects[used], names=self.names[known])
+        has_values = ~np.all(np.isnan(taken["parameters"]), axis=0)
+        taken["parameters"] = taken["parameters"][:, has_values]
+        return replace(self, **taken, objects=self.objects[used], names=self.names[has_values])
 
     def parameter_columns(self, rows: IntArray | Sequence[int] | slice = slice(None)) -> dict[str, FloatArray]:
         """Name → (n,) values of some pairs, by default of all; NaN where a clip has no such parameter."""
@@ -140,13 +140,13 @@ class PairTable:
         return {str(name): chosen[:, k] for k, name in enumerate(self.names)}
 
     def parameters_of(self, index: int) -> dict[str, float]:
-        """The parameters that pair `index` has."""
+        """Returns the parameters that pair `index` has."""
         values = self.parameters[index]
         return {str(self.names[k]): float(values[k]) for k in np.nonzero(~np.isnan(values))[0]}
 
     def fingerprint(self) -> str:
-        """SHA-256 of every pair's identity, place and ground truth, in order: equal means the same data, by whatever
-        query it was found."""
+        """Computes the SHA-256 of every pair's identity, place and ground truth, in order: equal means the same data,
+        by whatever query it was found."""
         digest = hashlib.sha256()
         for field in fields(self):
             values: AnyArray = getattr(self, field.name)
@@ -161,7 +161,8 @@ def _text(rows: pa.Table, column: str) -> NDArray[np.str_]:
 
 
 def _coded(rows: pa.Table, column: str) -> tuple[NDArray[np.str_], IntArray]:
-    """The different texts of a column, sorted, and of each row which it has; as `np.unique`, without sorting all."""
+    """Encodes a column: its different texts, sorted, and of each row which it has; as `np.unique`, without sorting
+    all."""
     coded = rows[column].combine_chunks().dictionary_encode()
     texts, places = np.unique(np.array(coded.dictionary.to_pylist(), dtype=np.str_), return_inverse=True)
     return texts, places[coded.indices.to_numpy()].astype(np.int64)
@@ -187,18 +188,18 @@ def _parameters(texts: Sequence[str | None], artifacts: Sequence[str]) -> tuple[
 
 
 def _labelled(text: str | None, labels: Mapping[str, Any] | None, *, artifact: str) -> str | None:
-    """The parameters of a clip with its labels among them."""
+    """Adds a clip's labels to its parameters."""
     if not labels:
         return text
-    known = column_json(text, "parameters", artifact=artifact) if text else {}
-    return json.dumps({**known, "label": labels})
+    parameters = column_json(text, "parameters", artifact=artifact) if text else {}
+    return json.dumps({**parameters, "label": labels})
 
 
 def _numbers(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, float]]:
-    found: list[tuple[str, float]] = []
+    numbers: list[tuple[str, float]] = []
     for name, value in values.items():
         if isinstance(value, Mapping):
-            found.extend(_numbers(value, f"{prefix}{name}."))
+            numbers.extend(_numbers(value, f"{prefix}{name}."))
         elif isinstance(value, (int, float)):
-            found.append((prefix + name, float(value)))
-    return found
+            numbers.append((prefix + name, float(value)))
+    return numbers

@@ -61,7 +61,7 @@ class WindTruth:
 
     @classmethod
     def exact(cls, wind: float) -> WindTruth:
-        """A wind that a simulation states [m/s]."""
+        """Returns a wind that a simulation states [m/s]."""
         return cls(
             wind=wind,
             sigma=0.0,
@@ -75,7 +75,7 @@ class WindTruth:
 
     @classmethod
     def missing(cls, *, staleness: float) -> WindTruth:
-        """No usable sample in the window; the newest before its end is `staleness` old [s]."""
+        """Returns a truth without a usable sample in the window; the newest before its end is `staleness` old [s]."""
         nan = math.nan
         return cls(
             wind=nan,
@@ -91,7 +91,8 @@ class WindTruth:
 
 
 def over_ground(series: WindSeries) -> Series | None:
-    """Speed of the air over ground (n,) [m/s]: the channel itself, or from the horizontal components of a sonic.
+    """Computes the speed of the air over ground (n,) [m/s]: the channel itself, or from the horizontal components of a
+    sonic.
 
     `None` when the series has neither. The wind that a moving platform feels, or that its instrument computes as if the
     platform were at rest, is not the wind at a flag; nor are the components that apparent wind was made of.
@@ -126,7 +127,7 @@ class TruthSeries:
 
     @classmethod
     def of(cls, series: WindSeries) -> TruthSeries:
-        """Prepare `series`, whose times must be on the clock of the clips.
+        """Prepares `series`, whose times must be on the clock of the clips.
 
         Rows that hold other channels only (the sentences of one stream) are as if they were not there.
 
@@ -147,11 +148,11 @@ class TruthSeries:
         period = float(np.median(spacing)) if len(spacing) else BLOCK
         since = np.concatenate([[period], spacing])[: len(speed)]
         # Rows that arrive in bunches within a second are no gaps between the bunches.
-        held = np.where(since <= max(GAP * period, BLOCK), since, period)
+        hold_times = np.where(since <= max(GAP * period, BLOCK), since, period)
         return cls(
             time=time[usable],
             speed=speed[usable],
-            held=held[usable],
+            held=hold_times[usable],
             dead=((flags & int(SampleFlag.DEAD_ZONE)) != 0)[usable],
             period=period,
             sensor=series.sensor,
@@ -159,7 +160,7 @@ class TruthSeries:
 
     @checked
     def before(self, end: int, *, window: float = TRUTH_WINDOW, clock_sigma: float = 0.0) -> WindTruth:
-        """The mean over (end - window, end].
+        """Averages over (end - window, end].
 
         Args:
             end: the clip's last instant [UTC ns].
@@ -180,14 +181,14 @@ class TruthSeries:
         staleness = (end - int(self.time[last - 1])) / NANOSECONDS if last else math.inf
         if first == last:
             return WindTruth.missing(staleness=staleness)
-        speed, held = self.speed[first:last], self.held[first:last]
-        wind = float(np.average(speed, weights=held))
-        inside = np.minimum(held, (self.time[first:last] - begin) / NANOSECONDS)
+        speed, hold_times = self.speed[first:last], self.held[first:last]
+        wind = float(np.average(speed, weights=hold_times))
+        inside = np.minimum(hold_times, (self.time[first:last] - begin) / NANOSECONDS)
         past = int(np.searchsorted(self.time, end - round(max(HISTORY, window) * NANOSECONDS), side="right"))
         correlation = _correlation_time(self._blocks(past, last, begin))
         sigma_mean = _standard_error(self._blocks(first, last, begin), correlation)
-        dead = float(np.average(self.dead[first:last], weights=held))
-        sigma_sensor = _sensor_sigma(self._known(first, last, past), wind, dead)
+        dead = float(np.average(self.dead[first:last], weights=hold_times))
+        sigma_sensor = _sensor_sigma(self._completed_sensor(first, last, past), wind, dead)
         sigma_clock = clock_sigma * self._slope(first, last, begin, end, clock_sigma)
         coverage = min(1.0, float(inside.sum()) / window)
         flags = {
@@ -209,8 +210,8 @@ class TruthSeries:
             flags=tuple(sorted(name for name, holds in flags.items() if holds)),
         )
 
-    def _known(self, first: int, last: int, past: int) -> Sensor:
-        """The instrument, with the step of its readings as resolution where its errors are unknown.
+    def _completed_sensor(self, first: int, last: int, past: int) -> Sensor:
+        """Returns the instrument, with the step of its readings as resolution where its errors are unknown.
 
         The step is that of the window, or, where nothing changes in it, of the history from `past` on.
         """
@@ -226,11 +227,11 @@ class TruthSeries:
         # A stamp closes its block, as it closes the window.
         block = (self.time[first:last] - begin - 1) // width
         starts = np.concatenate([[0], np.nonzero(np.diff(block))[0] + 1])
-        held = self.held[first:last]
-        return np.add.reduceat(self.speed[first:last] * held, starts) / np.add.reduceat(held, starts)
+        hold_times = self.held[first:last]
+        return np.add.reduceat(self.speed[first:last] * hold_times, starts) / np.add.reduceat(hold_times, starts)
 
     def _slope(self, first: int, last: int, begin: int, end: int, clock_sigma: float) -> float:
-        """Size of the derivative of the window's mean with respect to its position [m/s²].
+        """Computes the size of the derivative of the window's mean with respect to its position [m/s²].
 
         Moving the window by δ gains δ · v(end) and loses δ · v(begin): the derivative is (v(end) - v(begin)) / window.
         Both speeds are means over ±σ (at least a block) about the edges. Where an edge has no samples the scatter
@@ -248,7 +249,8 @@ class TruthSeries:
 
 
 def _sensor_sigma(sensor: Sensor, wind: float, dead: float) -> float:
-    """Accuracy, a rectangular resolution step, and for the share `dead` a rectangular true speed in [0, threshold].
+    """Combines accuracy, a rectangular resolution step, and for the share `dead` a rectangular true speed in [0,
+    threshold].
 
     NaN where neither accuracy nor resolution is known.
     """
@@ -261,13 +263,14 @@ def _sensor_sigma(sensor: Sensor, wind: float, dead: float) -> float:
 
 
 def _smallest_step(speed: Series) -> float:
-    """Smallest difference between readings (n,) that occur [m/s], to a nanometre a second; 0 when all are equal."""
+    """Finds the smallest difference between readings (n,) that occur [m/s], to a nanometre a second; 0 when all are
+    equal."""
     levels = np.unique(np.round(speed, 9))
     return float(np.diff(levels).min()) if len(levels) > 1 else 0.0
 
 
 def _correlation_time(values: Series) -> float:
-    """Integrated autocorrelation time of a series (n,), in steps: 1 for uncorrelated values.
+    """Estimates the integrated autocorrelation time of a series (n,), in steps: 1 for uncorrelated values.
 
     Geyer's initial monotone sequence (Practical Markov chain Monte Carlo, Statist. Sci. 7, 1992, section 3.3), and at
     least 1: no credit for anti-correlation.
@@ -285,7 +288,7 @@ def _correlation_time(values: Series) -> float:
 
 
 def _standard_error(values: Series, correlation: float) -> float:
-    """Standard error of the mean of a series (n,) with a correlation time τ in steps; NaN for n < 2.
+    """Computes the standard error of the mean of a series (n,) with a correlation time τ in steps; NaN for n < 2.
 
     var(mean) = s² τ / (n - τ), with s² = mean((x - x̄)²): the divisor undoes the loss of variance that removing the
     sample's own mean causes. τ is held at n/2 at most, where the error is the scatter itself: the window then saw no

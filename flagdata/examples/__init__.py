@@ -74,7 +74,7 @@ def names() -> tuple[str, ...]:
 
 @checked
 def example(name: str = "flag") -> Example:
-    """An example that comes with the package: a film of a simulated flag, the log beside it, and the truth.
+    """Returns an example that comes with the package: a film of a simulated flag, the log beside it, and the truth.
 
     ```python
     flag = flagdata.example("flag")
@@ -105,7 +105,7 @@ def example(name: str = "flag") -> Example:
 
 
 def example_of(source: Path | str) -> Example | None:
-    """The example that a text `example:NAME` names; None of any other.
+    """Finds the example that a text `example:NAME` names; None of any other.
 
     Raises:
         UnknownNameError: no example of that name.

@@ -75,27 +75,27 @@ class LeRobot:
         with ExitStack() as stack:
             data = stack.enter_context(_Data(folder, self.frames))
             film = stack.enter_context(_Films(folder, rate)) if self.frames == "av1" else None
-            made = _Made(rate=rate)
+            data_set = _Made(rate=rate)
             for entry in source.entries():
                 if not entry.count:
                     raise InputError(
                         "a record without frames makes no episode", where=entry.key, fix="leave it out by --where"
                     )
-                made.add(entry, data, film)
+                data_set.add(entry, data, film)
                 advance(1)
-        made.write(folder, self.frames)
+        data_set.write(folder, self.frames)
         return {
-            "episodes": len(made.episodes),
-            "frames": made.total,
+            "episodes": len(data_set.episodes),
+            "frames": data_set.total,
             "fps": float(rate),
             "units": label_units(),
-            "worst_timing": made.worst,
+            "worst_timing": data_set.worst,
             "video": "AV1, lossy" if self.frames == "av1" else "PNG, exact",
         }
 
 
 def common_rate(rates: Sequence[float]) -> Fraction:
-    """The one frame rate of a data set [Hz]: the median, a whole number where it is near one.
+    """Finds the one frame rate of a data set [Hz]: the median, a whole number where it is near one.
 
     Raises:
         InputError: there is none.
@@ -103,9 +103,9 @@ def common_rate(rates: Sequence[float]) -> Fraction:
     if not rates:
         raise InputError("no film states a frame rate", where="--where", fix="select films of two frames and more")
     middle = float(np.median(rates))
-    whole = round(middle)
-    near = whole > 0 and abs(middle - whole) <= _NEAR_WHOLE * middle
-    return Fraction(whole) if near else Fraction(middle).limit_denominator(1001)
+    nearest = round(middle)
+    is_whole = nearest > 0 and abs(middle - nearest) <= _NEAR_WHOLE * middle
+    return Fraction(nearest) if is_whole else Fraction(middle).limit_denominator(1001)
 
 
 @dataclass(kw_only=True)
@@ -123,7 +123,7 @@ class _Made:
         """Write an episode."""
         times = entry.frame_times
         number, count = len(self.episodes), entry.count
-        self.worst = max(self.worst, self._apart(entry))
+        self.worst = max(self.worst, self._farthest_from_grid(entry))
         columns: dict[str, AnyArray] = {
             "timestamp": (np.arange(count) / float(self.rate)).astype(np.float32),
             "frame_index": np.arange(count),
@@ -134,10 +134,10 @@ class _Made:
             "flagdata.device_time": entry.device_frame_times,
             **_wind(entry),
         }
-        place: dict[str, Any] = {}
+        file_columns: dict[str, Any] = {}
         pictures = _Tally.empty()
         if film is not None:
-            place = film.episode(self._sized(entry, pictures))
+            file_columns = film.episode(self._sized(entry, pictures))
             where = data.episode(columns, None)
         else:
             where = data.episode(columns, [_png(image) for image in self._sized(entry, pictures)])
@@ -153,7 +153,7 @@ class _Made:
                 **where,
                 "dataset_from_index": self.total,
                 "dataset_to_index": self.total + count,
-                **place,
+                **file_columns,
                 "meta/episodes/chunk_index": 0,
                 "meta/episodes/file_index": 0,
                 "flagdata/artifact": entry.key,
@@ -166,25 +166,25 @@ class _Made:
         )
         self.total += count
 
-    def _apart(self, entry: Entry) -> float:
-        """Farthest that a frame's instant is from k / rate [s].
+    def _farthest_from_grid(self, entry: Entry) -> float:
+        """Computes how far a frame's instant is from k / rate at most [s].
 
         Raises:
             InputError: half a period, or more.
         """
         times = (entry.frame_times - entry.frame_times[0]) / NANOSECONDS
-        apart = float(np.abs(times - np.arange(len(times)) / float(self.rate)).max())
-        if apart >= 0.5 / float(self.rate):
+        farthest = float(np.abs(times - np.arange(len(times)) / float(self.rate)).max())
+        if farthest >= 0.5 / float(self.rate):
             raise InputError(
-                f"frames lie up to {apart:.3f} s from a steady {float(self.rate):g} Hz, which LeRobot takes them to "
+                f"frames lie up to {farthest:.3f} s from a steady {float(self.rate):g} Hz, which LeRobot takes them to "
                 "have",
                 where=entry.key,
                 fix="export films of one rate without gaps (clips have none), or to mcap, which keeps each instant",
             )
-        return apart
+        return farthest
 
     def _sized(self, entry: Entry, tally: _Tally) -> Iterator[UInt8Array]:
-        """The pictures of an entry one by one, (height, width) uint8, counted.
+        """Yields the pictures of an entry one by one, (height, width) uint8, counted.
 
         Raises:
             InputError: their size is not that of the first entry.
@@ -201,7 +201,7 @@ class _Made:
             yield from images
 
     def write(self, folder: Path, frames: str) -> None:
-        """The tables and documents of meta/."""
+        """Writes the tables and documents of meta/."""
         meta = folder / "meta"
         (meta / "episodes" / "chunk-000").mkdir(parents=True)
         table = pa.Table.from_pylist(self.episodes)
@@ -269,9 +269,9 @@ class _Tally:
 
     @classmethod
     def of(cls, values: AnyArray) -> _Tally:
-        made = cls.empty()
-        made.take(values[np.isfinite(values)].astype(np.float64))
-        return made
+        tally = cls.empty()
+        tally.take(values[np.isfinite(values)].astype(np.float64))
+        return tally
 
     @classmethod
     def joined(cls, parts: Sequence[_Tally]) -> _Tally:
@@ -322,7 +322,7 @@ class _Data:
         self._open.close()
 
     def episode(self, columns: Mapping[str, AnyArray], pictures: Sequence[bytes] | None) -> dict[str, int]:
-        """Append an episode, and say in which file it is."""
+        """Appends an episode, and says in which file it is."""
         if self._writer is None or self._written >= _DATA_BYTES:
             self._open.close()
             self._number += 1
@@ -332,7 +332,7 @@ class _Data:
         values: dict[str, Any] = {name: columns[name] for name in _NUMBERS}
         if pictures is not None:
             values[CAMERA] = [{"bytes": picture, "path": None} for picture in pictures]
-        table = pa.table([pa.array(values[one.name], one.type) for one in self._schema], schema=self._schema)
+        table = pa.table([pa.array(values[field.name], field.type) for field in self._schema], schema=self._schema)
         self._writer.write_table(table, row_group_size=table.num_rows)
         self._written += table.nbytes
         return {"data/chunk_index": self._number // _CHUNK, "data/file_index": self._number % _CHUNK}
@@ -359,7 +359,7 @@ class _Films:
         self._open.close()
 
     def episode(self, images: Iterator[UInt8Array]) -> dict[str, Any]:
-        """Append the pictures of an episode, and say where they are."""
+        """Appends the pictures of an episode, and says where they are."""
         begin = None
         for image in images:
             container, stream = self._writing = self._writing or self._next(image)
@@ -372,7 +372,7 @@ class _Films:
             container.mux(packets)
             self._frames += 1
         chunk, file = divmod(self._number, _CHUNK)
-        place = {
+        file_columns = {
             "chunk_index": chunk,
             "file_index": file,
             "from_timestamp": float((begin or 0) / self._rate),
@@ -380,10 +380,10 @@ class _Films:
         }
         if self._size >= _VIDEO_BYTES:
             self._finish()
-        return {f"videos/{CAMERA}/{name}": value for name, value in place.items()}
+        return {f"videos/{CAMERA}/{name}": value for name, value in file_columns.items()}
 
     def _next(self, image: UInt8Array) -> tuple[Any, Any]:
-        """Container and stream of a new file for pictures like this one."""
+        """Opens container and stream of a new file for pictures like this one."""
         height, width = image.shape
         if height % 2 or width % 2:
             raise InputError(
@@ -414,16 +414,16 @@ def _path(folder: Path, number: int, suffix: str) -> Path:
 
 
 def _wind(entry: Entry) -> dict[str, Float32Array]:
-    """The newest mean over 1 s at each frame: speed, σ and direction, and how old it is."""
+    """Returns the newest mean over 1 s at each frame: speed, σ and direction, and how old it is."""
     means, times = entry.record.wind_1hz(), entry.frame_times
     names = ("speed", "sigma", "direction")
     if means is None:
         return {f"observation.wind_{name}": np.full(len(times), np.nan, np.float32) for name in (*names, "age")}
     newest = np.searchsorted(means.time, times, side="right") - 1
-    there = newest >= 0
-    found = {name: np.where(there, getattr(means, name)[newest], np.nan) for name in names}
-    found["age"] = np.where(there, (times - means.time[newest]) / NANOSECONDS, np.nan)
-    return {f"observation.wind_{name}": values.astype(np.float32) for name, values in found.items()}
+    is_known = newest >= 0
+    columns = {name: np.where(is_known, getattr(means, name)[newest], np.nan) for name in names}
+    columns["age"] = np.where(is_known, (times - means.time[newest]) / NANOSECONDS, np.nan)
+    return {f"observation.wind_{name}": values.astype(np.float32) for name, values in columns.items()}
 
 
 def _png(image: UInt8Array) -> bytes:
@@ -433,7 +433,7 @@ def _png(image: UInt8Array) -> bytes:
 
 
 def _tasks() -> pa.Table:
-    """The table of tasks, whose index is the text of a task, as pandas stores it."""
+    """Builds the table of tasks, whose index is the text of a task, as pandas stores it."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": store, "metadata": None}
         for name, kind, store in (("task_index", "int64", "int64"), ("task", "unicode", "object"))

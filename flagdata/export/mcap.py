@@ -88,7 +88,7 @@ class _Original:
         self._file.close()
 
     def decodable_from(self, frame: int) -> int:
-        """Index of the last key frame up to `frame`, of a record in H.264.
+        """Finds the last key frame up to `frame`, of a record in H.264.
 
         Raises:
             CorruptError: there is none.
@@ -100,7 +100,7 @@ class _Original:
         raise CorruptError(f"there is no key frame up to frame {frame}", where=self._where, fix="run flagdata verify")
 
     def data(self, topic: str, index: int) -> bytes:
-        """The payload of one message.
+        """Reads the payload of one message.
 
         Raises:
             CorruptError: it has changed since it was written.
@@ -139,7 +139,7 @@ def _cut(entry: Entry, original: _Original, target: Path) -> None:
 
 
 def _order(entry: Entry, original: _Original, first_frame: int) -> Iterator[tuple[str, int]]:
-    """Topic and index of the messages of a clip: the parameters, then all others in order of log time."""
+    """Yields topic and index of the messages of a clip: the parameters, then all others in order of log time."""
     begin, end = entry.wind_span
     begin = min(begin, end - round(HISTORY * NANOSECONDS))
     topics, indices, times = [], [], []
@@ -162,11 +162,11 @@ def _order(entry: Entry, original: _Original, first_frame: int) -> Iterator[tupl
 def _register(writer: ChecksummedFile, original: _Original, topic: str) -> int:
     channel = original.summary.channels[topic]
     schema = original.summary.schemas.get(channel.schema_id)
-    known = (
+    schema_id = (
         0 if schema is None else writer.register_schema(name=schema.name, encoding=schema.encoding, data=schema.data)
     )
     return writer.register_channel(
-        topic=topic, message_encoding=channel.message_encoding, schema_id=known, metadata=channel.metadata
+        topic=topic, message_encoding=channel.message_encoding, schema_id=schema_id, metadata=channel.metadata
     )
 
 

@@ -122,7 +122,7 @@ def _configure(stream: VideoStream, shape: Sequence[int], crf: int, *, where: st
 
 
 def _luma_frame(image: UInt8Array) -> av.VideoFrame:
-    """A gray image (height, width) as the full-range luma of a picture without colour."""
+    """Converts a gray image (height, width) to the full-range luma of a picture without colour."""
     height, width = image.shape
     planar = np.full((height * 3 // 2, width), 128, dtype=np.uint8)
     planar[:height] = image
@@ -135,8 +135,8 @@ def _luma_frame(image: UInt8Array) -> av.VideoFrame:
 def _frame_rows(entry: Entry) -> Iterable[Sequence[object]]:
     times, device = entry.frame_times, entry.device_frame_times
     pts = presentation_times(times)
-    for index, (at, time, own) in enumerate(zip(pts.tolist(), times.tolist(), device.tolist(), strict=True)):
-        yield index, at, iso(time), iso(own)
+    for index, (at, time, device_time) in enumerate(zip(pts.tolist(), times.tolist(), device.tolist(), strict=True)):
+        yield index, at, iso(time), iso(device_time)
 
 
 def _wind_rows(entry: Entry) -> list[tuple[object, ...]] | None:

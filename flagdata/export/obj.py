@@ -41,9 +41,9 @@ class ObjFolders:
 
 def _scene(sequence: MeshSequence | RaggedMeshSequence, row: Mapping[str, Any]) -> dict[str, Any]:
     frame_time = 1 / (row["rate"] or FRAME_RATE)
-    own = sequence.attributes.get("scene")
-    if isinstance(own, Mapping):
-        return {**own, "frame_time": frame_time}
+    stored_scene = sequence.attributes.get("scene")
+    if isinstance(stored_scene, Mapping):
+        return {**stored_scene, "frame_time": frame_time}
     parameters: dict[str, Any] = column_json(row["parameters"] or "{}", "parameters", artifact=row["artifact"])
     scene: dict[str, Any] = {
         "frame_time": frame_time,

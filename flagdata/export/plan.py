@@ -34,8 +34,8 @@ from flagdata.schema import FORMAT_VERSION, Kind
 
 
 def on_side(catalog: pa.Table, rows: pa.Table, split: str, *, salt: str) -> pa.Table:
-    """The rows on one side: clips, and recordings by their clips. Sides are decided over all clips of the version, so
-    that two exports of one version never put a session, day, seed or camera file on two sides.
+    """Selects the rows on one side: clips, and recordings by their clips. Sides are decided over all clips of the
+    version, so that two exports of one version never put a session, day, seed or camera file on two sides.
 
     Raises:
         UnknownNameError: no such side.
@@ -48,15 +48,15 @@ def on_side(catalog: pa.Table, rows: pa.Table, split: str, *, salt: str) -> pa.T
 
 
 def current(catalog: pa.Table, rows: pa.Table) -> tuple[pa.Table, dict[str, str]]:
-    """The rows without recordings that another among them replaces, and without the clips of those: two alignments of
-    one camera and wind log would hold every picture twice. Also: recording left out → the later one."""
+    """Drops recordings that another among the rows replaces, and the clips of those: two alignments of one camera and
+    wind log would hold every picture twice. Also returns: recording left out → the later one."""
     recordings = rows.filter(pc.field("kind") == Kind.RECORDING.value)["artifact"].to_pylist()
     replaced = superseded(catalog, {*recordings, *rows["recording"].drop_null().to_pylist()})
     if not replaced:
         return rows, {}
     old = set(replaced)
-    kept = ~_is_one_of(old) & (pc.field("recording").is_null() | ~_is_one_of(old, column="recording"))
-    return rows.filter(kept), dict(sorted(replaced.items()))
+    stays = ~_is_one_of(old) & (pc.field("recording").is_null() | ~_is_one_of(old, column="recording"))
+    return rows.filter(stays), dict(sorted(replaced.items()))
 
 
 def _is_one_of(artifacts: set[str], *, column: str = "artifact") -> pc.Expression:
@@ -67,12 +67,12 @@ def check_kinds(rows: pa.Table, name: str, kinds: frozenset[Kind]) -> None:
     """Raises:
     UsageError: rows of a kind that is not among `kinds`.
     """
-    others = Counter(kind for kind in rows["kind"].to_pylist() if kind not in kinds)
-    if others:
-        found = ", ".join(f"{count} of kind {kind}" for kind, count in sorted(others.items()))
-        held = ", ".join(f"'{kind}'" for kind in sorted(kinds))
-        fix = f'choose what it holds: --where "kind in ({held})", with your filter'
-        raise UsageError(f"{name} cannot hold {found}", where="--where", fix=fix)
+    wrong_kinds = Counter(kind for kind in rows["kind"].to_pylist() if kind not in kinds)
+    if wrong_kinds:
+        listed = ", ".join(f"{count} of kind {kind}" for kind, count in sorted(wrong_kinds.items()))
+        allowed = ", ".join(f"'{kind}'" for kind in sorted(kinds))
+        fix = f'choose what it holds: --where "kind in ({allowed})", with your filter'
+        raise UsageError(f"{name} cannot hold {listed}", where="--where", fix=fix)
 
 
 FORMATS = Registry(
@@ -128,21 +128,21 @@ class Export:
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def exporter(self) -> Exporter:
-        """The format with its options.
+        """Builds the format with its options.
 
         Raises:
             UnknownNameError: no such format.
             UsageError: an option that this format does not take.
         """
-        made = FORMATS[self.format]
-        known = [f.name for f in dataclasses.fields(made)]
+        form = FORMATS[self.format]
+        names = [f.name for f in dataclasses.fields(form)]
         for name in self.options:
-            if name not in known:
-                takes = ", ".join(known) or "none"
+            if name not in names:
+                takes = ", ".join(names) or "none"
                 raise UsageError(
                     f"{self.format} takes no option {name!r}", where="export", fix=f"its options are: {takes}"
                 )
-        return made(**self.options)
+        return form(**self.options)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,7 +211,7 @@ class Prepared:
 
 
 def prepare(lake: Lake, request: Export) -> Prepared:
-    """Choose the rows of an export, at one version.
+    """Chooses the rows of an export, at one version.
 
     Raises:
         NotFoundError: no rows.
@@ -235,8 +235,8 @@ def prepare(lake: Lake, request: Export) -> Prepared:
     rows, replaced = current(catalog, rows)
     check_kinds(rows, request.format, exporter.kinds)
     if not rows.num_rows:
-        given = {"filter": request.where, "version": str(version)}
-        where = ", ".join(f"{name} {value}" for name, value in given.items() if value is not None)
+        chosen_by = {"filter": request.where, "version": str(version)}
+        where = ", ".join(f"{name} {value}" for name, value in chosen_by.items() if value is not None)
         raise NotFoundError("no rows match", where=where, fix="try the filter with flagdata query")
     labels = labels_of(catalog)
     for name, values in columns(with_labels(rows, labels)).items():

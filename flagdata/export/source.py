@@ -99,17 +99,18 @@ class Entry:
         if not self.count:
             return -(2**63), 2**63 - 1
         times = self.frame_times
-        recipe = self._stated("recipe") if self.row.get("recipe") else {}
+        recipe = self._from_column("recipe") if self.row.get("recipe") else {}
         window = recipe.get("window", recipe.get("truth", {}).get("window", TRUTH_WINDOW))
         return int(times[0]) - round(window * NANOSECONDS), int(times[-1])
 
     def images(self, size: int = 64) -> Iterator[UInt8Array]:
-        """The frames decoded, in order, as arrays (at most `size`, height, width) gray."""
+        """Yields the frames decoded, in order, as arrays (at most `size`, height, width) gray."""
         for begin in range(0, self.count, size):
             yield self.record.frames(self.first + begin, min(size, self.count - begin))
 
     def jpegs(self) -> Iterator[bytes]:
-        """The frames as JPEG, in order: the stored bytes, or decoded and encoded anew where the record is H.264."""
+        """Yields the frames as JPEG, in order: the stored bytes, or decoded and encoded anew where the record is
+        H.264."""
         if self.count and self.record.coding is Coding.H264:
             for images in self.images():
                 yield from map(encode_jpeg, images)
@@ -119,13 +120,13 @@ class Entry:
     @property
     def parameters(self) -> Any:
         """What it was made with, as strict JSON; unknown numbers are null."""
-        return _strict(self._stated("parameters")) if self.row["parameters"] else None
+        return _strict(self._from_column("parameters")) if self.row["parameters"] else None
 
-    def _stated(self, column: str) -> Any:
+    def _from_column(self, column: str) -> Any:
         return column_json(self.row[column], column, artifact=self.row["artifact"])
 
     def label(self) -> dict[str, Any]:
-        """Identity, ground truth with σ, times and parameters as strict JSON; unknown numbers are null."""
+        """Returns identity, ground truth with σ, times and parameters as strict JSON; unknown numbers are null."""
         row = self.row
         times = self.frame_times
         return {
@@ -143,8 +144,8 @@ class Entry:
 
 def label_units() -> dict[str, str]:
     """Units of the numbers in `Entry.label`, for the manifest."""
-    named = {name: CATALOG[name].unit for name in (*IDENTITY, *TRUTH, "start", "end") if CATALOG[name].unit}
-    return {**named, "frame_times": "ns"}
+    units = {name: CATALOG[name].unit for name in (*IDENTITY, *TRUTH, "start", "end") if CATALOG[name].unit}
+    return {**units, "frame_times": "ns"}
 
 
 def _strict(value: Any) -> Any:
@@ -173,7 +174,8 @@ class Source:
         return self.rows.num_rows
 
     def entries(self, order: np.ndarray | None = None) -> Iterator[Entry]:
-        """The rows with their records, in order or in the order of the indices given. One record is open at a time.
+        """Yields the rows with their records, in order or in the order of the indices given. One record is open at a
+        time.
 
         Each object is hashed before the first of its frames leaves the lake: what is exported is what was committed.
 
@@ -197,15 +199,15 @@ class Source:
 
 
 def entry_of(row: Mapping[str, Any], record: Record, *, labels: Mapping[str, Any] | None = None) -> Entry:
-    """A row of the catalog with the part of its record that it describes.
+    """Joins a row of the catalog with the part of its record that it describes.
 
     Raises:
         CorruptError: it reaches beyond its record.
     """
     present = record.frame_count
-    whole = row["frame_first"] is None
-    first = 0 if whole else row["frame_first"]
-    count = present if whole or row["frame_count"] is None else row["frame_count"]
+    is_whole = row["frame_first"] is None
+    first = 0 if is_whole else row["frame_first"]
+    count = present if is_whole or row["frame_count"] is None else row["frame_count"]
     if first + count > present:
         raise CorruptError(
             f"frames {first} to {first + count - 1} of a record that has {present}",

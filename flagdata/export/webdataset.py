@@ -95,7 +95,7 @@ class _Shards:
         self._open.close()
 
     def add(self, key: str, members: list[tuple[str, bytes]]) -> None:
-        """Append one sample, in a new shard if this one would grow beyond the limit.
+        """Appends one sample, in a new shard if this one would grow beyond the limit.
 
         Raises:
             LimitError: the sample alone is larger.
@@ -127,7 +127,7 @@ def shard_name(number: int) -> str:
 
 
 def _member(name: str, size: int) -> tarfile.TarInfo:
-    """A tar header that depends on name and size alone."""
+    """Builds a tar header that depends on name and size alone."""
     info = tarfile.TarInfo(name)
     info.size, info.mode, info.mtime = size, 0o644, 0
     return info
@@ -138,5 +138,5 @@ def _padded(size: int) -> int:
 
 
 def _file_size(members: int) -> int:
-    """Size of a tar file of `members` bytes: two zero blocks at the end, padded to a whole record."""
+    """Computes the size of a tar file of `members` bytes: two zero blocks at the end, padded to a whole record."""
     return -(-(members + 2 * _BLOCK) // _RECORD) * _RECORD

@@ -51,6 +51,8 @@ def _heading(channel: str) -> str:
 
 def _rows(entry: Entry, wind: WindSeries) -> Iterator[Sequence[object]]:
     columns = [values.tolist() for values in wind.channels.values()]
-    own = entry.record.device_wind_times.tolist()
-    for time, device, flags, *values in zip(wind.time.tolist(), own, wind.flags.tolist(), *columns, strict=True):
+    device_times = entry.record.device_wind_times.tolist()
+    for time, device, flags, *values in zip(
+        wind.time.tolist(), device_times, wind.flags.tolist(), *columns, strict=True
+    ):
         yield iso(time), iso(device), *map(cell, values), ";".join(str(flag.name) for flag in _NAMED if flags & flag)

@@ -54,7 +54,8 @@ class ZarrGroups:
 
 
 def _numbers(entry: Entry) -> xarray.Dataset:
-    """All but the pictures: samples along `time`, means over 1 s along `second`, instants along `frame_time`."""
+    """Collects all but the pictures: samples along `time`, means over 1 s along `second`, instants along
+    `frame_time`."""
     begin, end = entry.wind_span
     variables: dict[str, Any] = {}
     wind = entry.record.wind()
@@ -80,9 +81,9 @@ def _numbers(entry: Entry) -> xarray.Dataset:
         about_device = "instant of a frame, the camera's own clock, UTC"
         variables["device_time"] = _instants("frame_time", entry.device_frame_times, about_device)
     label = entry.label()
-    known = {name: label[name] for name in (*IDENTITY, *TRUTH) if isinstance(label[name], str | int | float)}
+    plain_values = {name: label[name] for name in (*IDENTITY, *TRUTH) if isinstance(label[name], str | int | float)}
     text = json.dumps(label, sort_keys=True, allow_nan=False, ensure_ascii=False)
-    return xarray.Dataset(variables, attrs={**known, "units": json.dumps(label_units()), "flagdata_label": text})
+    return xarray.Dataset(variables, attrs={**plain_values, "units": json.dumps(label_units()), "flagdata_label": text})
 
 
 def _frames(images: UInt8Array, attributes: Mapping[Any, Any]) -> xarray.Dataset:

@@ -25,17 +25,17 @@ _CHOOSES = ("wind", "talker", "session")
 """What makes another log of the same file and no other reading of it: one of several anemometers, a second session."""
 
 
-def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any]) -> tuple[Finding, ...]:
-    """A note for each of some artifacts that was read from the same bytes otherwise.
+def other_readings(artifacts: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any]) -> tuple[Finding, ...]:
+    """Notes each of some artifacts that was read from the same bytes otherwise.
 
     Args:
-        others: artifacts of the same kind that are in the lake.
+        artifacts: artifacts of the same kind that are in the lake.
         source_hash: of the file's bytes.
         recipe: all that shapes the result now.
     """
     now = _options(recipe)
     findings: list[Finding] = []
-    for artifact in others:
+    for artifact in artifacts:
         before = _options(artifact.recipe)
         if artifact.source_hash != source_hash or any(before.get(name) != now.get(name) for name in _CHOOSES):
             continue
@@ -45,8 +45,8 @@ def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping
             message = f"the same file is in the lake by other options as {artifact.id[:SHORT]} ({changed}); both stay"
         elif artifact.recipe.get("plan") != recipe.get("plan"):
             mean = json.loads(artifact.report or "{}").get("mean_speed")
-            said = "" if mean is None else f", mean speed {mean:.4g} m/s"
-            message = f"the same file was understood otherwise before, as {artifact.id[:SHORT]}{said}; both stay"
+            mean_speed = "" if mean is None else f", mean speed {mean:.4g} m/s"
+            message = f"the same file was understood otherwise before, as {artifact.id[:SHORT]}{mean_speed}; both stay"
         else:
             continue
         fix = f"if that one is wrong, take it off: flagdata withdraw {artifact.id[:SHORT]} -m 'read otherwise'"
@@ -55,18 +55,19 @@ def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping
 
 
 def earlier(
-    lake: Lake, others: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any], series: WindSeries
+    lake: Lake, artifacts: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any], series: WindSeries
 ) -> Artifact | None:
-    """The artifact that an older version made of the same bytes and options, and whose wind is the same to the bit.
+    """Finds the artifact that an older version made of the same bytes and options, and whose wind is the same to the
+    bit.
 
     Args:
         lake: that holds the artifacts.
-        others: artifacts of the same kind that are in the lake.
+        artifacts: artifacts of the same kind that are in the lake.
         source_hash: of the file's bytes.
         recipe: all that shapes the result now.
         series: as it is read now, by no draft.
     """
-    for artifact in others:
+    for artifact in artifacts:
         if artifact.source_hash == source_hash and _options(artifact.recipe) == _options(recipe):
             try:
                 before = Record.open(lake.record_place(str(artifact.object))).wind()
@@ -78,7 +79,7 @@ def earlier(
 
 
 def unconfirmed(artifacts: Iterable[Artifact]) -> tuple[Finding, ...]:
-    """A warning for each artifact of a log that an older version read by a draft of its own, which nobody confirmed."""
+    """Warns of each artifact of a log that an older version read by a draft of its own, which nobody confirmed."""
     return tuple(
         Finding.of(
             "draft-unconfirmed",
@@ -92,25 +93,26 @@ def unconfirmed(artifacts: Iterable[Artifact]) -> tuple[Finding, ...]:
 
 
 def _was_drafted(artifact: Artifact) -> bool:
-    """Whether a table was read by no recipe of the user's, before plans were a part of the identity."""
+    """Checks whether a table was read by no recipe of the user's, before plans were a part of the identity."""
     wind = artifact.recipe.get("wind")
     if artifact.kind is not Kind.WIND or not isinstance(wind, Mapping) or "plan" in artifact.recipe:
         return False
     return wind.get("recipe") is None and json.loads(artifact.report or "{}").get("format") == "delimited"
 
 
-def _same(one: WindSeries, other: WindSeries) -> bool:
-    names = one.channels.keys()
+def _same(first: WindSeries, second: WindSeries) -> bool:
+    names = first.channels.keys()
     return (
-        names == other.channels.keys()
-        and np.array_equal(one.time, other.time)
-        and np.array_equal(one.flags, other.flags)
-        and all(np.array_equal(one.channels[name], other.channels[name], equal_nan=True) for name in names)
+        names == second.channels.keys()
+        and np.array_equal(first.time, second.time)
+        and np.array_equal(first.flags, second.flags)
+        and all(np.array_equal(first.channels[name], second.channels[name], equal_nan=True) for name in names)
     )
 
 
 def _options(recipe: Mapping[str, Any]) -> dict[str, Any]:
-    """The options of a recipe, those of the anemometer's own among them; what was understood of the file is none."""
+    """Selects the options of a recipe, those of the anemometer's own among them; what was understood of the file is
+    none."""
     flat: dict[str, Any] = {}
     for name, value in recipe.items():
         if name != "plan":

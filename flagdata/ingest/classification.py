@@ -21,7 +21,7 @@ MARKERS = "markers"
 
 
 def guesses(path: Path, *, topic: str | None = None, encoding: str | None = None) -> tuple[Guess, ...]:
-    """What a source may be, the likeliest first; never empty. A file of no known signature is tried as a video.
+    """Lists what a source may be, the likeliest first; never empty. A file of no known signature is tried as a video.
 
     Args:
         topic: of an MCAP file, for which it is judged.
@@ -38,20 +38,20 @@ def guesses(path: Path, *, topic: str | None = None, encoding: str | None = None
         return (Guess(format="marker table", score=0.99, reasons=(reason,), kind="markers"),)
     if is_bag(path):
         return _of_mcap(path, topic)
-    other = other_bag(path)
-    if other is not None:
-        return (Guess(format="bag", score=0.99, reasons=(f"this is {other[0]}",), kind="other", fix=other[1]),)
+    bag = other_bag(path)
+    if bag is not None:
+        return (Guess(format="bag", score=0.99, reasons=(f"this is {bag[0]}",), kind="other", fix=bag[1]),)
     if is_lerobot(path):
         reason = f"it has LeRobot's {LEROBOT_INFO}"
         return (Guess(format="LeRobot", score=0.99, reasons=(reason,), kind="camera"),)
-    found = sniff(path, encoding=encoding)
-    if found[0].kind != "other":
-        return found
-    seen = _pictured(path) if path.is_file() else None
-    if seen is None:
-        return found
-    reason = f"FFmpeg reads it as {seen.container} with {seen.codec} video"
-    return (Guess(format="video", score=0.8, reasons=(reason,), kind="camera"), *found)
+    candidates = sniff(path, encoding=encoding)
+    if candidates[0].kind != "other":
+        return candidates
+    video = _pictured(path) if path.is_file() else None
+    if video is None:
+        return candidates
+    reason = f"FFmpeg reads it as {video.container} with {video.codec} video"
+    return (Guess(format="video", score=0.8, reasons=(reason,), kind="camera"), *candidates)
 
 
 def classify(
@@ -63,7 +63,8 @@ def classify(
     topic: str | None = None,
     encoding: str | None = None,
 ) -> Guess:
-    """What a source is to be ingested as: a guess of kind "camera", "anemometer", "meshes", "markers" or "record".
+    """Classifies what a source is to be ingested as: a guess of kind "camera", "anemometer", "meshes", "markers" or
+    "record".
 
     Args:
         format_name: what the user says it is: "camera", "meshes", "markers" or an anemometer format; goes before the
@@ -106,7 +107,8 @@ def classify(
 
 
 def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
-    """A record of flagdata's, or of another program's file the topic that was named: pictures before numbers."""
+    """Recognises a record of flagdata's, or of another program's file the topic that was named: pictures before
+    numbers."""
     from flagdata.ingest.anemometer.containers.mcap import of_numbers
     from flagdata.ingest.mcap.bags import parts_of
     from flagdata.ingest.mcap.pictures import of_pictures
@@ -114,25 +116,29 @@ def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
     from flagdata.ingest.records import is_ours
     from flagdata.record.writer import PROFILE
 
-    ours = topic is None and any(profile(one) == PROFILE and is_ours(one) for one in parts_of(path))
+    ours = topic is None and any(profile(part) == PROFILE and is_ours(part) for part in parts_of(path))
     if ours and path.is_file():
         return (Guess(format="record", score=1.0, reasons=("its header says that flagdata wrote it",), kind="record"),)
     if ours:  # each is a recording of its own
         reason, fix = "a folder of records that flagdata wrote", f"give the files in it: {path / '*.mcap'}"
         return (Guess(format="records", score=0.0, reasons=(reason,), kind="other", fix=fix),)
-    present = [one for one in topics(path) if topic in (None, one.name, one.plain)]
-    found = [
-        Guess(format="MCAP", score=0.9, reasons=(f"the topic {one} holds pictures",), kind="camera")
-        for one in of_pictures(present)
+    present = [
+        present_topic for present_topic in topics(path) if topic in (None, present_topic.name, present_topic.plain)
     ]
-    found += [
-        Guess(format="MCAP", score=0.8, reasons=(f"the topic {one} holds numbers",))
-        for one in of_numbers(path, present)
+    candidates = [
+        Guess(format="MCAP", score=0.9, reasons=(f"the topic {picture_topic} holds pictures",), kind="camera")
+        for picture_topic in of_pictures(present)
     ]
-    if found:
-        return tuple(found)
+    candidates += [
+        Guess(format="MCAP", score=0.8, reasons=(f"the topic {number_topic} holds numbers",))
+        for number_topic in of_numbers(path, present)
+    ]
+    if candidates:
+        return tuple(candidates)
     if topic is not None:
-        raise UnknownNameError.of("topic of pictures or numbers", topic, [one.name for one in topics(path)])
+        raise UnknownNameError.of(
+            "topic of pictures or numbers", topic, [present_topic.name for present_topic in topics(path)]
+        )
     reason = f"its topics hold neither pictures nor numbers: {', '.join(map(str, present)) or 'there are none'}"
     return (Guess(format="MCAP", score=0.0, reasons=(reason,), kind="other", fix="give a file that has such a topic"),)
 

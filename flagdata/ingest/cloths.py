@@ -33,7 +33,7 @@ _WEIGHTS = (0.005, 5.0)  # kg/m²; silk organza has 0.02, heavy canvas 1
 
 
 def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
-    """The films of a table, CSV (comma, semicolon or tab; a decimal comma beside the latter two), in its order.
+    """Reads the films of a table, CSV (comma, semicolon or tab; a decimal comma beside the latter two), in its order.
 
     Raises:
         NotFoundError: no such table, or a film that it names is not there.
@@ -50,7 +50,7 @@ def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
     check_columns(
         names, needed=COLUMNS, optional=OPTIONAL, where=str(path), fix=f"give {', '.join(COLUMNS)}, each once"
     )
-    found: list[ClothFilm] = []
+    films: list[ClothFilm] = []
     for line, cells in table.rows:
         where = f"{path}, line {line}"
         if len(cells) != len(names):
@@ -59,15 +59,15 @@ def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
             )
         cell = dict(zip(names, cells, strict=True))
         numbers = {name: table.number(cell[name]) for name in names if name in _NUMBERS}
-        found.append(_film(cell | numbers, path.parent, where))
-        _check_alike(found, where)
-    return tuple(found)
+        films.append(_film(cell | numbers, path.parent, where))
+        _check_alike(films, where)
+    return tuple(films)
 
 
 def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
     for name in COLUMNS:
         if not row[name]:
-            raise InputError(f"no {name}", where=where, fix="fill the cell, or leave the row out")
+            raise InputError(f"the cell of {name} is empty", where=where, fix="fill the cell, or leave the row out")
     film = folder / local_path(row["film"])
     if not is_folder(film):
         try:
@@ -78,7 +78,7 @@ def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
     density = _number(row, "area_weight", where, unit="kg/m²")
     if density is None or not _WEIGHTS[0] <= density <= _WEIGHTS[1]:
         raise InputError(
-            f"an area weight of {row['area_weight']} kg/m²",
+            f"the area weight is {row['area_weight']} kg/m²",
             where=where,
             fix=f"give kg/m², {_WEIGHTS[0]:g} to {_WEIGHTS[1]:g}; 1 oz/yd² is 0.0339 kg/m², 100 g/m² is 0.1",
         )
@@ -100,7 +100,7 @@ def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
 
 
 def _number(row: Mapping[str, str], name: str, where: str, *, unit: str) -> float | None:
-    """A number of 0 or more; None where the cell is empty or the column is not there."""
+    """Reads a number of 0 or more; None where the cell is empty or the column is not there."""
     text = row.get(name, "")
     if not text:
         return None
@@ -113,14 +113,14 @@ def _number(row: Mapping[str, str], name: str, where: str, *, unit: str) -> floa
     return value
 
 
-def _check_alike(found: list[ClothFilm], where: str) -> None:
+def _check_alike(films: list[ClothFilm], where: str) -> None:
     """Make sure that the newest row does not contradict those before it."""
-    newest = found[-1]
-    for other in found[:-1]:
-        if other.film == newest.film:
+    newest = films[-1]
+    for film in films[:-1]:
+        if film.film == newest.film:
             raise InputError(f"{newest.film.name} is named twice", where=where, fix="keep one of the rows")
-        same = (other.density, other.bending_stiffness) == (newest.density, newest.bending_stiffness)
-        if other.fabric == newest.fabric and not same:
+        same = (film.density, film.bending_stiffness) == (newest.density, newest.bending_stiffness)
+        if film.fabric == newest.fabric and not same:
             raise InputError(
                 f"{newest.fabric} has another area weight or stiffness than before",
                 where=where,

@@ -78,7 +78,7 @@ class Examination:
 
 
 def examine(path: Path) -> Examination:
-    """Examine an MCAP file or a LeRobot data set.
+    """Examines an MCAP file or a LeRobot data set.
 
     Raises:
         InputError: it is neither.
@@ -88,11 +88,11 @@ def examine(path: Path) -> Examination:
         return _mcap(path)
     if is_lerobot(path):
         return _lerobot(path)
-    message, fix = other_bag(path) or (
+    kind, fix = other_bag(path) or (
         "neither an MCAP file nor a LeRobot data set",
         "flagdata ingest --sniff looks at others",
     )
-    raise InputError(message, where=str(path), fix=fix)
+    raise InputError(kind, where=str(path), fix=fix)
 
 
 def _mcap(path: Path) -> Examination:
@@ -115,9 +115,9 @@ def _mcap(path: Path) -> Examination:
             continue
         stream = Stream.of(topic.name, holds, read.stamps)
         streams.append(stream)
-        findings += _judged(stream)
+        findings += _stream_findings(stream)
         findings += read.findings
-    findings += _lost_pictures([one for one in streams if one.holds == "pictures"])
+    findings += _lost_pictures([stream for stream in streams if stream.holds == "pictures"])
     rest = [topic.name for topic in present if topic not in (*pictures, *numbers)]
     if rest:
         findings.append(_lost("topics", f"topics that hold neither pictures nor numbers: {', '.join(rest)}"))
@@ -130,7 +130,7 @@ def _lerobot(folder: Path) -> Examination:
     info = described(folder)
     fps = float(info["fps"])
     timed = TIME in info["features"]
-    found = cameras(info)
+    pictures = cameras(info)
     streams: list[Stream] = []
     findings: list[Finding] = []
     for path in tables(folder / "data"):
@@ -141,7 +141,7 @@ def _lerobot(folder: Path) -> Examination:
             seconds = stamps_of(rows.select(["timestamp"]), str(path)) / NANOSECONDS
             stream = Stream.of(f"episode {episode}", "frames", stamps)
             streams.append(stream)
-            findings += [one for one in _judged(stream) if timed or one.kind != "not-a-date"]
+            findings += [finding for finding in _stream_findings(stream) if timed or finding.kind != "not-a-date"]
             steady = np.abs(seconds - rows["frame_index"].to_numpy() / fps).max()
             if steady > _STEADY:
                 findings.append(
@@ -153,14 +153,14 @@ def _lerobot(folder: Path) -> Examination:
                         fix="check it with LeRobot's own reader",
                     )
                 )
-    findings += _lost_pictures(streams if found else [])
+    findings += _lost_pictures(streams if pictures else [])
     if not timed:
         message = "no instants: LeRobot counts frame / fps, so gaps, jitter and the date of the camera are not in it"
         findings.append(_lost("instants", message))
-    own = {TIME, "timestamp", "frame_index", "episode_index", "index", "task_index", *found}
-    others = sorted(set(info["features"]) - own)
-    if others:
-        findings.append(_lost("features", f"features that are no pictures: {', '.join(others)}"))
+    own_features = {TIME, "timestamp", "frame_index", "episode_index", "index", "task_index", *pictures}
+    other_features = sorted(set(info["features"]) - own_features)
+    if other_features:
+        findings.append(_lost("features", f"features that are no pictures: {', '.join(other_features)}"))
     missing = [name for name in ("tasks.parquet", "stats.json") if not (folder / "meta" / name).is_file()]
     if missing:
         message = f"meta/ lacks {', '.join(missing)}"
@@ -171,7 +171,7 @@ def _lerobot(folder: Path) -> Examination:
     return Examination(format=f"LeRobot {info['codebase_version']}", streams=tuple(streams), findings=tuple(findings))
 
 
-def _judged(stream: Stream) -> Iterator[Finding]:
+def _stream_findings(stream: Stream) -> Iterator[Finding]:
     if stream.backward:
         yield Finding.of(
             "stamps-disordered",
@@ -201,14 +201,14 @@ def _judged(stream: Stream) -> Iterator[Finding]:
 def _lost_pictures(streams: Sequence[Stream]) -> Iterator[Finding]:
     if streams:
         yield _lost("colour", f"colour and size: films become gray squares of {FRAME_SIZE} px; --crop chooses the part")
-    fast = [one for one in streams if one.rate is not None and one.rate > FRAME_RATE * 1.01]
+    fast = [stream for stream in streams if stream.rate is not None and stream.rate > FRAME_RATE * 1.01]
     if fast:
-        names = ", ".join(f"{one.name} ({one.rate:.4g} Hz)" for one in fast[:5])
+        names = ", ".join(f"{stream.name} ({stream.rate:.4g} Hz)" for stream in fast[:5])
         yield _lost("frames", f"frames beyond {FRAME_RATE:g} Hz of {names}; --rate native keeps them")
 
 
-def _lost(what: str, text: str) -> Finding:
-    return Finding(kind=f"lost-{what}", severity=Severity.NOTE, what=f"not kept by ingest: {text}")
+def _lost(lost: str, text: str) -> Finding:
+    return Finding(kind=f"lost-{lost}", severity=Severity.NOTE, what=f"not kept by ingest: {text}")
 
 
 def _unread(name: str, error: FlagdataError) -> Finding:
@@ -216,10 +216,12 @@ def _unread(name: str, error: FlagdataError) -> Finding:
     return Finding(kind="topic-unread", severity=severity, where=name, what=error.what, fix=error.fix)
 
 
-def as_dict(found: Examination) -> dict[str, Any]:
-    """JSON values; instants as ISO 8601, rates in Hz."""
+def as_dict(examination: Examination) -> dict[str, Any]:
+    """Returns JSON values; instants as ISO 8601, rates in Hz."""
     return {
-        "format": found.format,
-        "streams": [{**vars(one), "start": iso(one.start), "end": iso(one.end)} for one in found.streams],
-        "findings": [finding.as_dict() for finding in found.findings],
+        "format": examination.format,
+        "streams": [
+            {**vars(stream), "start": iso(stream.start), "end": iso(stream.end)} for stream in examination.streams
+        ],
+        "findings": [finding.as_dict() for finding in examination.findings],
     }

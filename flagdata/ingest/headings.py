@@ -19,7 +19,7 @@ _HEAD = 1 << 16
 
 
 def delimiter_of(heading: str) -> str:
-    """The one of `DELIMITERS` that stands most often in a heading."""
+    """Finds the one of `DELIMITERS` that stands most often in a heading."""
     return max(DELIMITERS, key=heading.count)
 
 
@@ -51,7 +51,7 @@ class SmallTable:
 
 
 def small_table(text: str, *, where: str) -> SmallTable:
-    """The table in a text: CSV with commas, semicolons or tabs, which a first line "sep=;" may name.
+    """Reads the table in a text: CSV with commas, semicolons or tabs, which a first line "sep=;" may name.
 
     Raises:
         InputError: quotes that do not close, and the like.
@@ -60,14 +60,14 @@ def small_table(text: str, *, where: str) -> SmallTable:
 
 
 def _cut(lines: Sequence[str], where: str, *, strict: bool) -> SmallTable:
-    named = int(bool(lines) and len(lines[0]) == len(_SEP) + 1 and lines[0].lower().startswith(_SEP))
-    delimiter = lines[0][len(_SEP) :] if named else delimiter_of(lines[0] if lines else "")
-    reader = csv.reader(lines[named:], delimiter=delimiter, strict=strict)
+    names_delimiter = int(bool(lines) and len(lines[0]) == len(_SEP) + 1 and lines[0].lower().startswith(_SEP))
+    delimiter = lines[0][len(_SEP) :] if names_delimiter else delimiter_of(lines[0] if lines else "")
+    reader = csv.reader(lines[names_delimiter:], delimiter=delimiter, strict=strict)
     try:
-        rows = [(reader.line_num + named, tuple(cell.strip() for cell in row)) for row in reader]
+        rows = [(reader.line_num + names_delimiter, tuple(cell.strip() for cell in row)) for row in reader]
     except csv.Error as error:
-        line = f"{where}, line {reader.line_num + named}"
-        raise InputError(f"not a table: {error}", where=line, fix="export it anew") from None
+        line = f"{where}, line {reader.line_num + names_delimiter}"
+        raise InputError(f"this is not a table: {error}", where=line, fix="export it anew") from None
     (line, names), *rows = rows or [(1, ())]
     while names and not names[-1]:
         names = names[:-1]
@@ -76,7 +76,7 @@ def _cut(lines: Sequence[str], where: str, *, strict: bool) -> SmallTable:
 
 
 def small_table_head(path: Path) -> SmallTable:
-    """The heading and first rows of a table of any length, for a look at it: what is damaged is replaced.
+    """Reads the heading and first rows of a table of any length, for a look at it: what is damaged is replaced.
 
     Raises:
         InputError: it is no text.
@@ -84,8 +84,8 @@ def small_table_head(path: Path) -> SmallTable:
     with path.open("rb") as stream:
         head = stream.read(_HEAD)
     text = head.decode(encoding_of(head), errors="replace").replace("\r\n", "\n").replace("\r", "\n")
-    whole = text if len(head) < _HEAD else text[: text.rfind("\n") + 1]
-    return _cut(whole.splitlines(), str(path), strict=False)
+    whole_lines = text if len(head) < _HEAD else text[: text.rfind("\n") + 1]
+    return _cut(whole_lines.splitlines(), str(path), strict=False)
 
 
 def _without_blank_end(cells: tuple[str, ...], width: int) -> tuple[str, ...]:

@@ -54,7 +54,7 @@ _OF_A_SAMPLE = (
 
 
 def is_ours(path: Path) -> bool:
-    """Whether an MCAP file holds a record with its provenance.
+    """Checks whether an MCAP file holds a record with its provenance.
 
     Raises:
         CorruptError: it cannot be read.
@@ -63,7 +63,7 @@ def is_ours(path: Path) -> bool:
 
 
 def ingest_record(lake: Lake, path: Path, *, labels: Labels | None = None, branch: str = "main") -> IngestResult:
-    """Bring a record in that `flagdata export mcap` wrote, or that was copied out of a lake.
+    """Brings in a record that `flagdata export mcap` wrote, or that was copied out of a lake.
 
     Raises:
         CorruptError: the record, or the table of rows beside it, is damaged.
@@ -89,9 +89,9 @@ def ingest_record(lake: Lake, path: Path, *, labels: Labels | None = None, branc
     report = _report(artifact, record, findings)
     if artifact.report is None:
         artifact = replace(artifact, report=json.dumps(report, allow_nan=False, ensure_ascii=False))
-    there = find_same(lake, artifact.id, labels, branch=branch).whole
-    if there is not None:
-        return replace(kept(there), report=report)
+    artifact_in_lake = find_same(lake, artifact.id, labels, branch=branch).whole
+    if artifact_in_lake is not None:
+        return replace(kept(artifact_in_lake), report=report)
     with lake.transaction(f"ingest record {source.name}", branch=branch) as transaction:
         artifact = replace(artifact, object=transaction.put(path))
         source.check_unchanged()
@@ -112,7 +112,8 @@ def _check(record: Record) -> None:
 
 
 def _row_beside(path: Path, sha256: str) -> dict[str, Any] | None:
-    """The row of a record in the table beside it; `None` where there is no table, or it does not have this record."""
+    """Reads the row of a record in the table beside it; `None` where there is no table, or it does not have this
+    record."""
     rows = path.parent / ROWS
     if not rows.is_file():
         return None
@@ -121,23 +122,23 @@ def _row_beside(path: Path, sha256: str) -> dict[str, Any] | None:
         missing = [name for name in CATALOG if name not in table.column_names]
         for name in missing:
             table = table.append_column(name, pa.nulls(table.num_rows, CATALOG[name].type))
-        found = table.filter(pc.field("artifact") == path.stem).to_pylist()
+        rows_of_record = table.filter(pc.field("artifact") == path.stem).to_pylist()
     except (pa.ArrowException, OSError) as error:
         raise CorruptError(
             f"the table of rows beside the record cannot be read: {error}",
             where=str(rows),
             fix="export again, or move the record to a folder of its own to ingest it without its row",
         ) from None
-    whole = found and found[0]["frame_first"] is None
-    if not found or (whole and found[0]["object"] != f"mcap/{sha256}"):
+    is_whole = rows_of_record and rows_of_record[0]["frame_first"] is None
+    if not rows_of_record or (is_whole and rows_of_record[0]["object"] != f"mcap/{sha256}"):
         return None
-    return {name: found[0][name] for name in CATALOG}
+    return {name: rows_of_record[0][name] for name in CATALOG}
 
 
 def _artifact(
     record: Record, row: Mapping[str, Any] | None, source: Source, labels: Labels
 ) -> tuple[Artifact, tuple[Finding, ...]]:
-    """What a record was, with its former parents; of a clip's part the recording that it is now."""
+    """Builds what a record was, with its former parents; of a clip's part the recording that it is now."""
     if SAMPLE in record.metadata:
         return _of_sample(record, row, source), ()
     if row is not None:
@@ -149,7 +150,7 @@ def _of_sample(record: Record, row: Mapping[str, Any] | None, source: Source) ->
     where = str(record.path)
     try:
         label = from_json(record.metadata[SAMPLE]["label"])
-        known = {column: label[column] for column in _OF_A_SAMPLE}
+        labels = {column: label[column] for column in _OF_A_SAMPLE}
         original, recording = label["artifact"], label["recording"]
         parameters = None if label["parameters"] is None else json.dumps(label["parameters"], sort_keys=True)
     except (ValueError, KeyError, TypeError) as error:
@@ -167,23 +168,23 @@ def _of_sample(record: Record, row: Mapping[str, Any] | None, source: Source) ->
         end=int(times[-1]),
         frame_count=len(times),
         clock_model=_clock(record)[0],
-        **{**known, "session": known["session"] or f"recording {str(recording)[:SHORT]}"},
+        **{**labels, "session": labels["session"] or f"recording {str(recording)[:SHORT]}"},
     )
 
 
 def _of_metadata(record: Record, source: Source) -> Artifact:
-    """What a record says of itself; the name and the session are not in it."""
+    """Builds an artifact from what a record says of itself; the name and the session are not in it."""
     where = str(record.path)
-    stated = dict(record.metadata[PROVENANCE])
+    provenance = dict(record.metadata[PROVENANCE])
     try:
-        recipe = from_json(stated["recipe"])
+        recipe = from_json(provenance["recipe"])
     except (ValueError, KeyError):
         raise InputError("the record does not state its recipe", where=where, fix="export it again") from None
     filmed, windy = TOPIC_IMAGE in record.topics, TOPIC_WIND in record.topics
-    parents = [stated[role] for role in ("camera", "wind", "sequence") if role in stated]
-    of_a_device = "source_hash" in stated
+    parents = [provenance[role] for role in ("camera", "wind", "sequence") if role in provenance]
+    of_a_device = "source_hash" in provenance
     if not (filmed or windy) or (of_a_device and filmed and windy):
-        raise InputError("a record of neither a device nor a recording", where=where, fix="see flagdata doctor")
+        raise InputError("the record is of neither a device nor a recording", where=where, fix="see flagdata doctor")
     kind = Kind.RECORDING if not of_a_device else Kind.CAMERA if filmed else Kind.WIND
     series = record.wind()
     times = record.frame_times if filmed else series.time if series is not None else record.frame_times
@@ -192,11 +193,11 @@ def _of_metadata(record: Record, source: Source) -> Artifact:
     span = int(times[-1] - times[0])
     return Artifact(
         kind=kind,
-        name=Path(stated.get("source_name", source.name)).stem,
+        name=Path(provenance.get("source_name", source.name)).stem,
         recipe=recipe,
         parents=parents,
-        source_hash=stated.get("source_hash"),
-        source_name=stated.get("source_name"),
+        source_hash=provenance.get("source_hash"),
+        source_name=provenance.get("source_name"),
         start=int(times[0]),
         end=int(times[-1]),
         day=iso(int(times[0]))[:10],
@@ -211,7 +212,7 @@ def _of_metadata(record: Record, source: Source) -> Artifact:
 
 
 def _clock(record: Record) -> tuple[str | None, int]:
-    """The clock model of the camera in a record, as JSON, and the middle of the film on the camera's clock."""
+    """Reads the clock model of the camera in a record, as JSON, and the middle of the film on the camera's clock."""
     models = [values["model"] for name, values in record.metadata.items() if name.startswith(f"{CLOCK}/")]
     if len(models) != 1 or TOPIC_IMAGE not in record.topics:
         return None, 0
@@ -220,7 +221,8 @@ def _clock(record: Record) -> tuple[str | None, int]:
 
 
 def _alone(artifact: Artifact, source: Source) -> Artifact:
-    """A recording without its parents: its recipe names what it was, its session holds together what came of one."""
+    """Builds a recording without its parents: its recipe names what it was, its session holds together what came of
+    one."""
     recipe = {"ingest": "record", "artifact": artifact.id, **artifact.recipe}
     session = artifact.session or f"camera {artifact.parents[0][:SHORT]}"
     return replace(
@@ -231,7 +233,7 @@ def _alone(artifact: Artifact, source: Source) -> Artifact:
 def _without(absent: list[str]) -> Finding:
     return Finding.of(
         "parents-absent",
-        f"what it was made from is not on the branch ({', '.join(one[:SHORT] for one in absent)}): it came in as "
+        f"what it was made from is not on the branch ({', '.join(parent[:SHORT] for parent in absent)}): it came in as "
         "a recording without parents",
         count=len(absent),
         fix="to restore it whole, export and ingest the camera and the wind first, then withdraw this one",
@@ -239,7 +241,7 @@ def _without(absent: list[str]) -> Finding:
 
 
 def _unreported(labels: Labels) -> Finding:
-    unknown = [label for label, given in (("name", labels.name), ("session", labels.session)) if given is None]
+    unknown = [label for label, value in (("name", labels.name), ("session", labels.session)) if value is None]
     fix = "take it off (flagdata withdraw), then ingest the file in the folder that flagdata export wrote"
     return Finding.of(
         "report-absent",
@@ -250,7 +252,7 @@ def _unreported(labels: Labels) -> Finding:
 
 
 def _report(artifact: Artifact, record: Record, findings: tuple[Finding, ...]) -> dict[str, Any]:
-    """What came in, for people and for --json."""
+    """Reports what came in, for people and for --json."""
     start, end = artifact.start or 0, artifact.end or 0
     return {
         "schema": REPORT_SCHEMA,

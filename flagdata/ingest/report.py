@@ -47,7 +47,7 @@ def _span(start: int, end: int) -> dict[str, Any]:
 def camera_report(
     info: CameraInfo, times: FrameTimes, findings: Iterable[Finding], reasons: Sequence[str]
 ) -> dict[str, Any]:
-    """The report of a camera; times in UTC, durations in seconds, rates in Hz."""
+    """Reports a camera; times in UTC, durations in seconds, rates in Hz."""
     return {
         "schema": REPORT_SCHEMA,
         "kind": Kind.CAMERA.value,
@@ -62,8 +62,8 @@ def camera_report(
     }
 
 
-def wind_report(log: WindLog, findings: Iterable[Finding], *, named: str | None) -> dict[str, Any]:
-    """The report of a log; of a recipe file that was named, only its base name stays."""
+def wind_report(log: WindLog, findings: Iterable[Finding], *, recipe_file: str | None) -> dict[str, Any]:
+    """Reports a log; of a recipe file that was named, only its base name stays."""
     series = log.series
     time = series.time
     kinds = [time[rows] for _, rows in streams(series.channels)]
@@ -75,7 +75,7 @@ def wind_report(log: WindLog, findings: Iterable[Finding], *, named: str | None)
         "schema": REPORT_SCHEMA,
         "kind": Kind.WIND.value,
         "format": log.format,
-        "reasons": [r.replace(named, Path(named).name) if named else r for r in log.reasons],
+        "reasons": [r.replace(recipe_file, Path(recipe_file).name) if recipe_file else r for r in log.reasons],
         **_span(int(time[0]), int(time[-1])),
         "samples": len(series),
         "rate": float(NANOSECONDS / np.median(steps)) if len(steps) else None,

@@ -40,7 +40,7 @@ class Source:
 
     @classmethod
     def of(cls, path: Path, *, with_files: Sequence[Path] = ()) -> Source:
-        """The source as it is now.
+        """Returns the source as it is now.
 
         Args:
             with_files: that make one source with it, in order; they are hashed with it.
@@ -48,12 +48,12 @@ class Source:
         Raises:
             InputError: it cannot be read, or is empty, a pipe or a device; or two of several files are the same.
         """
-        for one in (path, *with_files):
-            if with_files or not is_folder(one):
-                check_input(one)
+        for file in (path, *with_files):
+            if with_files or not is_folder(file):
+                check_input(file)
         before = _state(path)
         if with_files:
-            parts = [file_hash(one) for one in (path, *with_files)]
+            parts = [file_hash(file) for file in (path, *with_files)]
             _check_distinct((path, *with_files), parts)
             return cls(path=path, hash=digest("\n".join(parts)), state=before, others=_states(with_files))
         if path.is_dir():
@@ -77,7 +77,7 @@ class Source:
                 )
 
     def provenance(self, recipe: Mapping[str, Any], *, code: str) -> dict[str, str]:
-        """For the metadata of a record.
+        """Returns the source's facts for the metadata of a record.
 
         Args:
             code: version of the code that made it.
@@ -93,12 +93,14 @@ class Source:
 
 def _check_distinct(paths: Sequence[Path], hashes: Sequence[str]) -> None:
     first: dict[str, Path] = {}
-    for path, own in zip(paths, hashes, strict=True):
-        if own in first:
+    for path, content_hash in zip(paths, hashes, strict=True):
+        if content_hash in first:
             raise InputError(
-                f"its bytes are those of {first[own].name}", where=str(path), fix="name each part of a recording once"
+                f"its bytes are those of {first[content_hash].name}",
+                where=str(path),
+                fix="name each part of a recording once",
             )
-        first[own] = path
+        first[content_hash] = path
 
 
 def _states(paths: Sequence[Path]) -> tuple[tuple[Path, tuple[tuple[str, int, int], ...]], ...]:
@@ -113,11 +115,11 @@ def _state(path: Path) -> tuple[tuple[str, int, int], ...]:
             status = path.stat()
             return ((path.name, status.st_size, status.st_mtime_ns),)
         if is_lerobot(path):
-            files = [one for one in path.rglob("*") if one.is_file() and not is_beside(one.name)]
-            found = [(str(one.relative_to(path)), one.stat()) for one in files]
+            files = [file for file in path.rglob("*") if file.is_file() and not is_beside(file.name)]
+            states = [(str(file.relative_to(path)), file.stat()) for file in files]
         else:
             with os.scandir(path) as entries:
-                found = [(e.name, e.stat()) for e in entries if e.is_file() and not is_beside(e.name)]
-        return tuple(sorted((name, status.st_size, status.st_mtime_ns) for name, status in found))
+                states = [(e.name, e.stat()) for e in entries if e.is_file() and not is_beside(e.name)]
+        return tuple(sorted((name, status.st_size, status.st_mtime_ns) for name, status in states))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None

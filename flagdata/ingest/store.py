@@ -78,7 +78,8 @@ class WindIngest:
     wind: WindOptions = field(default_factory=WindOptions)
 
     def recipe(self) -> dict[str, Any]:
-        """The options; a sensor recipe by its name and content, since its file may change or lie elsewhere tomorrow."""
+        """Returns the options; a sensor recipe by its name and content, since its file may change or lie elsewhere
+        tomorrow."""
         options = dict(self.wind.as_dict())
         if self.wind.recipe is not None:
             options["recipe"] = Path(self.wind.recipe).name
@@ -152,16 +153,16 @@ def ingest_camera(
     chapter = chapter_of(path) if options.camera.start is None else None
     if chapter is not None and chapter.before:
         recipe["chapter_before"] = chapter.before  # it comes from other files, and shapes the result
-    there = find(lake, Kind.CAMERA, source, recipe, labels, branch=branch)
-    if there.whole is not None:
+    present = find(lake, Kind.CAMERA, source, recipe, labels, branch=branch)
+    if present.whole is not None:
         if crop_picture is not None:
-            crop_picture(Record.open(lake.record_place(str(there.whole.object))).attachment(CROP_PICTURE))
-        return kept(there.whole)
+            crop_picture(Record.open(lake.record_place(str(present.whole.object))).attachment(CROP_PICTURE))
+        return kept(present.whole)
     with lake.transaction(f"ingest camera {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         times = FrameTimes()
         with open_camera(path, options.camera) as stream:
-            metadata = {CAMERA: camera_metadata(stream.info), PROVENANCE: source.provenance(recipe, code=there.code)}
+            metadata = {CAMERA: camera_metadata(stream.info), PROVENANCE: source.provenance(recipe, code=present.code)}
             with RecordWriter(staged, metadata=metadata, coding=options.coding, quality=JPEG_QUALITY) as record:
                 if stream.proposal is not None:
                     if crop_picture is not None:
@@ -216,8 +217,8 @@ def ingest_wind(
         UnconfirmedError: nobody confirmed what the program drafted; the lake is unchanged.
         ConflictError: the file changed while it was read, or is in the lake under other labels.
     """
-    each = [(options or WindIngest(), labels or Labels())]
-    (result,) = ingest_winds(lake, path, each, branch=branch, confirm=confirm)
+    readings = [(options or WindIngest(), labels or Labels())]
+    (result,) = ingest_winds(lake, path, readings, branch=branch, confirm=confirm)
     if isinstance(result, NothingMeasuredError):
         raise result
     return result
@@ -226,7 +227,7 @@ def ingest_wind(
 def ingest_winds(
     lake: Lake,
     path: Path,
-    each: Sequence[tuple[WindIngest, Labels]],
+    readings: Sequence[tuple[WindIngest, Labels]],
     *,
     branch: str = "main",
     confirm: Confirm = UNASKED,
@@ -234,7 +235,7 @@ def ingest_winds(
     """Ingest the anemometers of one log, in one transaction: all that can be used, or none where one cannot be read.
 
     Args:
-        each: the options that read one of them, and its labels.
+        readings: the options that read one of them, and its labels.
         confirm: asks once whether the drafted ones among them are right; without it drafts are refused.
 
     Returns:
@@ -244,21 +245,25 @@ def ingest_winds(
         FlagdataError, UnconfirmedError, ConflictError: as `ingest_wind`, of any of them; the lake is unchanged.
     """
     source = Source.of(path)
-    read = [_read(lake, path, source, options, labels, branch=branch) for options, labels in each]
-    new = [one for one in read if isinstance(one, _Read)]
+    read = [_read(lake, path, source, options, labels, branch=branch) for options, labels in readings]
+    new = [reading_of_log for reading_of_log in read if isinstance(reading_of_log, _Read)]
     if not new:
-        return tuple(one for one in read if not isinstance(one, _Read))
-    unseen = [(one.log, one.options.wind) for one in new if one.there.artifact is None]
+        return tuple(reading_of_log for reading_of_log in read if not isinstance(reading_of_log, _Read))
+    unseen = [
+        (reading_of_log.log, reading_of_log.options.wind)
+        for reading_of_log in new
+        if reading_of_log.there.artifact is None
+    ]
     how = confirmed(path, source.hash, unseen, confirm) if unseen else None
     with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
-        staged = [_staged(transaction, path, source, one, how) for one in new]
+        staged = [_staged(transaction, path, source, reading_of_log, how) for reading_of_log in new]
         for artifact, _ in staged:
             transaction.add(artifact)
     done = (
-        result_of(transaction, artifact, report, one.labels)
-        for one, (artifact, report) in zip(new, staged, strict=True)
+        result_of(transaction, artifact, report, reading_of_log.labels)
+        for reading_of_log, (artifact, report) in zip(new, staged, strict=True)
     )
-    return tuple(next(done) if isinstance(one, _Read) else one for one in read)
+    return tuple(next(done) if isinstance(reading_of_log, _Read) else reading_of_log for reading_of_log in read)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -286,7 +291,8 @@ class _Read:
 def _read(
     lake: Lake, path: Path, source: Source, options: WindIngest, labels: Labels, *, branch: str
 ) -> _Read | IngestResult | NothingMeasuredError:
-    """A log as it is to be written; what is in the lake already; or why none of its values can be used."""
+    """Reads a log as it is to be written; or returns what is in the lake already, or why none of its values can be
+    used."""
     try:
         log = read_log(path, options.wind)
     except NothingMeasuredError as error:
@@ -294,41 +300,47 @@ def _read(
     recipe = {**options.recipe(), "plan": dict(log.plan)}
     if _is_of_another_session(lake, source, recipe, labels, branch=branch):
         recipe["session"] = labels.session
-    there = find(lake, Kind.WIND, source, recipe, labels, branch=branch)
-    if there.whole is not None:
-        return kept(there.whole)
+    present = find(lake, Kind.WIND, source, recipe, labels, branch=branch)
+    if present.whole is not None:
+        return kept(present.whole)
     paired = host_clock(log.series)
     findings = (*log.findings, *(paired.findings if paired is not None else ()))
-    others = _present(lake, Kind.WIND, branch)
-    same = None if log.drafted or there.artifact is not None else earlier(lake, others, source.hash, recipe, log.series)
+    artifacts = _present(lake, Kind.WIND, branch)
+    same = (
+        None
+        if log.drafted or present.artifact is not None
+        else earlier(lake, artifacts, source.hash, recipe, log.series)
+    )
     if same is not None:
         _check_labels(same, labels)
         return kept(same)
-    findings = (*findings, *_beside(lake, log.series, labels.session, others))
-    findings = (*findings, *other_readings(others, source.hash, recipe))
-    return _Read(log=log, options=options, labels=labels, recipe=recipe, findings=findings, paired=paired, there=there)
+    findings = (*findings, *_shifted_logs(lake, log.series, labels.session, artifacts))
+    findings = (*findings, *other_readings(artifacts, source.hash, recipe))
+    return _Read(
+        log=log, options=options, labels=labels, recipe=recipe, findings=findings, paired=paired, there=present
+    )
 
 
 def _is_of_another_session(
     lake: Lake, source: Source, recipe: Mapping[str, Any], labels: Labels, *, branch: str
 ) -> bool:
-    """Whether the branch has this log for a session, and it is ingested for another one: the same constant wind, or
-    counts of seconds from 0, may have been logged beside another film. It is another artifact, whose recipe names its
-    session."""
+    """Checks whether the branch has this log for a session, and it is ingested for another one: the same constant wind,
+    or counts of seconds from 0, may have been logged beside another film. It is another artifact, whose recipe names
+    its session."""
     rows = lake.rows(at=branch).filter(_same(Kind.WIND, source, recipe)).to_pylist()
     return bool(rows) and None not in (labels.session, rows[0]["session"]) and rows[0]["session"] != labels.session
 
 
 def _present(lake: Lake, kind: Kind, branch: str) -> list[Artifact]:
-    """All artifacts of a kind that are on a branch."""
+    """Lists all artifacts of a kind that are on a branch."""
     rows = lake.rows(at=branch).filter(pc.field("kind") == kind.value).to_pylist()
     return [Artifact.from_row(row) for row in rows]
 
 
 def _staged(
-    transaction: Transaction, path: Path, source: Source, one: _Read, how: str | None
+    transaction: Transaction, path: Path, source: Source, reading_of_log: _Read, how: str | None
 ) -> tuple[Artifact, dict[str, Any]]:
-    """The artifact of a log, whose record is written for a transaction, and its report.
+    """Writes the record of a log for a transaction, and returns the artifact and its report.
 
     Args:
         how: the drafted readings of its file were confirmed; `None` where there are none.
@@ -336,10 +348,12 @@ def _staged(
     Raises:
         ConflictError: the file changed while it was read.
     """
-    log, findings, recipe = one.log, one.findings, one.recipe
+    log, findings, recipe = reading_of_log.log, reading_of_log.findings, reading_of_log.recipe
     time = log.series.time
     staged = transaction.staging(".mcap")
-    with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe, code=one.there.code)}) as record:
+    with RecordWriter(
+        staged, metadata={PROVENANCE: source.provenance(recipe, code=reading_of_log.there.code)}
+    ) as record:
         record.wind(log.series)
         if is_bag(path):
             findings = (*findings, _left_whole(path))
@@ -347,25 +361,25 @@ def _staged(
             record.attach_file(source.name, path, media_type="text/plain", log_time=int(time[0]))
         else:
             findings = (*findings, _not_attached(path))
-        if one.options.wind.recipe is not None:
-            found = SENSORS.find(one.options.wind.recipe)
-            name = f"{found.name}.recipe.toml"
-            record.attach(name, found.data, media_type="application/toml", log_time=int(time[0]))
+        if reading_of_log.options.wind.recipe is not None:
+            recipe_file = SENSORS.find(reading_of_log.options.wind.recipe)
+            name = f"{recipe_file.name}.recipe.toml"
+            record.attach(name, recipe_file.data, media_type="application/toml", log_time=int(time[0]))
         elif log.drafted:
             drafted = log.drafted.encode()
             record.attach("drafted.recipe.toml", drafted, media_type="application/toml", log_time=int(time[0]))
     source.check_unchanged()
-    report = wind_report(log, findings, named=one.options.wind.recipe)
-    before = {} if one.there.artifact is None else json.loads(one.there.artifact.report or "{}")
+    report = wind_report(log, findings, recipe_file=reading_of_log.options.wind.recipe)
+    before = {} if reading_of_log.there.artifact is None else json.loads(reading_of_log.there.artifact.report or "{}")
     if (confirmed_by := before.get("confirmed", how)) is not None:
         report["confirmed"] = confirmed_by
-    if one.paired is not None:
-        report["host_clock"] = json.loads(one.paired.model.to_json())
+    if reading_of_log.paired is not None:
+        report["host_clock"] = json.loads(reading_of_log.paired.model.to_json())
     artifact = _artifact(
         Kind.WIND,
         source,
         recipe,
-        one.labels,
+        reading_of_log.labels,
         findings=findings,
         report=report,
         start=int(time[0]),
@@ -377,41 +391,43 @@ def _staged(
     return artifact, report
 
 
-def _beside(lake: Lake, series: WindSeries, session: str | None, others: Sequence[Artifact]) -> tuple[Finding, ...]:
-    """Those of other logs, of the same session or of none, whose wind this one is, hours apart."""
+def _shifted_logs(
+    lake: Lake, series: WindSeries, session: str | None, artifacts: Sequence[Artifact]
+) -> tuple[Finding, ...]:
+    """Reports other logs, of the same session or of none, whose wind this one is, hours apart."""
     start, end = int(series.time[0]), int(series.time[-1])
-    near = [
+    closest = [
         artifact
-        for artifact in others
+        for artifact in artifacts
         if artifact.session == session
         and artifact.start is not None
         and artifact.end is not None
         and min(end, artifact.end) - max(start, artifact.start) > 0
     ]
-    near.sort(key=lambda artifact: max(start, artifact.start or 0) - min(end, artifact.end or 0))
+    closest.sort(key=lambda artifact: max(start, artifact.start or 0) - min(end, artifact.end or 0))
     findings: list[Finding] = []
-    for artifact in near[:NEIGHBOURS]:
+    for artifact in closest[:NEIGHBOURS]:
         try:
-            other = Record.open(lake.record_place(str(artifact.object))).wind()
+            neighbour = Record.open(lake.record_place(str(artifact.object))).wind()
         except FlagdataError:
             continue  # damage of another artifact is found by verify; it does not keep this log out
-        finding = hours_off(series, other, name=artifact.name) if other is not None else None
+        finding = hours_off(series, neighbour, name=artifact.name) if neighbour is not None else None
         if finding is not None:
             findings.append(finding)
     return tuple(findings)
 
 
 def find(lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], labels: Labels, *, branch: str) -> Present:
-    """What the branch has of the artifact that this ingest would make.
+    """Finds what the branch has of the artifact that this ingest would make.
 
     Raises:
         ConflictError: it is there, under another name or session than the one asked for.
     """
-    return _found(lake, lake.rows(at=branch).filter(_same(kind, source, recipe)).to_pylist(), labels)
+    return _presence(lake, lake.rows(at=branch).filter(_same(kind, source, recipe)).to_pylist(), labels)
 
 
 def _same(kind: Kind, source: Source, recipe: Mapping[str, Any]) -> pc.Expression:
-    """What the row of an artifact meets that this source and recipe make."""
+    """Builds the condition that the row of an artifact meets that this source and recipe make."""
     return (
         (pc.field("kind") == kind.value)
         & (pc.field("source_hash") == source.hash)
@@ -420,20 +436,20 @@ def _same(kind: Kind, source: Source, recipe: Mapping[str, Any]) -> pc.Expressio
 
 
 def find_same(lake: Lake, artifact: str, labels: Labels, *, branch: str) -> Present:
-    """What the branch has of the artifact of an identity.
+    """Finds what the branch has of the artifact of an identity.
 
     Raises:
         ConflictError: it is there, under another name or session than the one asked for.
     """
-    return _found(lake, lake.rows({"artifact": artifact}, at=branch).to_pylist(), labels)
+    return _presence(lake, lake.rows({"artifact": artifact}, at=branch).to_pylist(), labels)
 
 
 def kept(artifact: Artifact) -> IngestResult:
-    """The result of an ingest that found its artifact in the lake."""
+    """Returns the result of an ingest that found its artifact in the lake."""
     return IngestResult(artifact=artifact, created=False, report=json.loads(artifact.report or "{}"))
 
 
-def _found(lake: Lake, rows: Sequence[Mapping[str, Any]], labels: Labels) -> Present:
+def _presence(lake: Lake, rows: Sequence[Mapping[str, Any]], labels: Labels) -> Present:
     if not rows:
         return ABSENT
     artifact = Artifact.from_row(rows[0])
@@ -443,10 +459,10 @@ def _found(lake: Lake, rows: Sequence[Mapping[str, Any]], labels: Labels) -> Pre
 
 def _check_labels(artifact: Artifact, labels: Labels) -> None:
     """Refuse labels that the artifact, which is there already, does not have."""
-    for label, asked, kept in (("name", labels.name, artifact.name), ("session", labels.session, artifact.session)):
-        if asked is not None and asked != kept:
+    for label, asked, stored in (("name", labels.name, artifact.name), ("session", labels.session, artifact.session)):
+        if asked is not None and asked != stored:
             raise ConflictError(
-                f"{artifact.source_name} is in the lake with {f'the {label} {kept!r}' if kept else f'no {label}'}, "
+                f"{artifact.source_name} is in the lake with {f'the {label} {stored!r}' if stored else f'no {label}'}, "
                 f"not {asked!r}",
                 where=artifact.id,
                 fix=f"leave out --{label}, or take the old one off with flagdata withdraw and ingest again",
@@ -486,16 +502,16 @@ def _artifact(
 
 
 def result_of(transaction: Transaction, artifact: Artifact, report: Mapping[str, Any], labels: Labels) -> IngestResult:
-    """What an ingest did whose transaction has ended.
+    """Returns what an ingest did whose transaction has ended.
 
     Raises:
         ConflictError: another process published it meanwhile, under another name or session than the one asked for.
     """
-    there = transaction.result.artifacts[artifact.id]
+    artifact_in_lake = transaction.result.artifacts[artifact.id]
     if artifact.id in transaction.result.added:
-        return IngestResult(artifact=there, created=True, report=report)
-    _check_labels(there, labels)
-    return replace(kept(there), healed=transaction.result.healed.get(artifact.id))
+        return IngestResult(artifact=artifact_in_lake, created=True, report=report)
+    _check_labels(artifact_in_lake, labels)
+    return replace(kept(artifact_in_lake), healed=transaction.result.healed.get(artifact.id))
 
 
 def _left_whole(path: Path) -> Finding:

@@ -47,49 +47,52 @@ class Ancestry:
     edges: tuple[tuple[str, str], ...]
 
     def nearer(self, *, up: bool) -> dict[str, list[str]]:
-        """Id → the ids it was made from (`up`), or of what was made from it, in the order of the relatives."""
-        found: dict[str, list[str]] = {}
+        """Maps each id to the ids it was made from (`up`), or of what was made from it, in the order of the
+        relatives."""
+        ids: dict[str, list[str]] = {}
         for parent, child in self.edges:
-            found.setdefault(child if up else parent, []).append(parent if up else child)
-        return found
+            ids.setdefault(child if up else parent, []).append(parent if up else child)
+        return ids
 
 
-def ancestry(shown: pa.Table, artifact: str) -> Ancestry:
-    """The lineage of an artifact.
+def ancestry(rows_of_ref: pa.Table, artifact: str) -> Ancestry:
+    """Builds the lineage of an artifact.
 
     Args:
-        shown: rows of a ref, with the columns of the catalog.
+        rows_of_ref: rows of a ref, with the columns of the catalog.
         artifact: full id of one of them.
     """
-    rows = shown.select(_COLUMNS).combine_chunks()
+    rows = rows_of_ref.select(_COLUMNS).combine_chunks()
     children = pc.take(rows["artifact"], pc.list_parent_indices(rows["parents"]))  # type: ignore[attr-defined]
     pairs = pa.table({"child": children, "parent": pc.list_flatten(rows["parents"])})  # type: ignore[attr-defined]
     above = _reached(pairs, artifact, along=("child", "parent"))
     below = _reached(pairs, artifact, along=("parent", "child"))
-    generations = {one: -steps for one, steps in _steps(artifact, above).items()}
-    generations |= {one: steps for one, steps in _steps(artifact, below).items() if one not in generations}
-    known = {row["artifact"]: row for row in rows.filter(_among(rows["artifact"], generations)).to_pylist()}
+    generations = {relative: -steps for relative, steps in _steps(artifact, above).items()}
+    generations |= {
+        relative: steps for relative, steps in _steps(artifact, below).items() if relative not in generations
+    }
+    rows_by_id = {row["artifact"]: row for row in rows.filter(_among(rows["artifact"], generations)).to_pylist()}
     relatives = {
-        one: Relative(
-            artifact=one,
+        relative: Relative(
+            artifact=relative,
             generation=generation,
-            **{name: known[one][name] for name in _COLUMNS[1:-1]} if one in known else {},
+            **{name: rows_by_id[relative][name] for name in _COLUMNS[1:-1]} if relative in rows_by_id else {},
         )
-        for one, generation in sorted(generations.items(), key=lambda item: item[1])
+        for relative, generation in sorted(generations.items(), key=lambda item: item[1])
     }
     edges = dict.fromkeys([*((parent, child) for child, parent in above), *below])
     return Ancestry(artifact=artifact, relatives=relatives, edges=tuple(edges))
 
 
 def _reached(pairs: pa.Table, artifact: str, *, along: tuple[str, str]) -> list[tuple[str, str]]:
-    """(from, to) of all steps that lead away from an artifact, each once."""
-    seen, fresh, steps = {artifact}, {artifact}, []
+    """Lists (from, to) of all steps that lead away from an artifact, each once."""
+    reached, fresh, steps = {artifact}, {artifact}, []
     while fresh:
-        found = pairs.filter(_among(pairs[along[0]], fresh))
-        taken = list(zip(found[along[0]].to_pylist(), found[along[1]].to_pylist(), strict=True))
+        onward = pairs.filter(_among(pairs[along[0]], fresh))
+        taken = list(zip(onward[along[0]].to_pylist(), onward[along[1]].to_pylist(), strict=True))
         steps += taken
-        fresh = {to for _, to in taken} - seen
-        seen |= fresh
+        fresh = {to for _, to in taken} - reached
+        reached |= fresh
     return steps
 
 
@@ -98,7 +101,8 @@ def _among(column: pa.ChunkedArray, wanted: Collection[str]) -> pa.ChunkedArray:
 
 
 def _steps(artifact: str, steps: Sequence[tuple[str, str]]) -> dict[str, int]:
-    """Id → length of the longest way to it. Of ids in a circle, which only a damaged catalog has, some way's."""
+    """Computes id → length of the longest way to it. Of ids in a circle, which only a damaged catalog has, some
+    way's."""
     onwards: dict[str, list[str]] = {}
     awaited: dict[str, int] = {artifact: 0}
     for begin, end in dict.fromkeys(steps):
@@ -106,13 +110,13 @@ def _steps(artifact: str, steps: Sequence[tuple[str, str]]) -> dict[str, int]:
         awaited[end] = awaited.get(end, 0) + 1
     longest, ready = {artifact: 0}, deque([artifact])
     while ready:
-        one = ready.popleft()
-        for end in onwards.get(one, ()):
-            longest[end] = max(longest.get(end, 0), longest[one] + 1)
+        current = ready.popleft()
+        for end in onwards.get(current, ()):
+            longest[end] = max(longest.get(end, 0), longest[current] + 1)
             awaited[end] -= 1
             if awaited[end] == 0:
                 ready.append(end)
-    return {one: longest.get(one, 1) for one in awaited}
+    return {current: longest.get(current, 1) for current in awaited}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,23 +134,23 @@ class Line:
     repeated: bool = False
 
 
-def tree(found: Ancestry, *, up: bool, most: int | None) -> Iterator[Line]:
-    """The lines of what an artifact was made from (`up`), or of what was made from it.
+def tree(lineage: Ancestry, *, up: bool, most: int | None) -> Iterator[Line]:
+    """Yields the lines of what an artifact was made from (`up`), or of what was made from it.
 
     Args:
         most: more relatives of one kind at one place are counted on one line; `None` lists all.
     """
-    nearer = found.nearer(up=up)
+    nearer = lineage.nearer(up=up)
     above: set[str] = set()
     waiting: list[tuple[tuple[bool, ...], tuple[Relative, ...]]] = []
 
     def descend(artifacts: Sequence[str], ends: tuple[bool, ...]) -> None:
         next_ones = dict.fromkeys(one for artifact in artifacts for one in nearer.get(artifact, ()))
-        groups = grouped([found.relatives[one] for one in next_ones], most=most)
+        groups = grouped([lineage.relatives[one] for one in next_ones], most=most)
         last = len(groups) - 1
-        waiting.extend(((*ends, place == last), group) for place, group in reversed(list(enumerate(groups))))
+        waiting.extend(((*ends, position == last), group) for position, group in reversed(list(enumerate(groups))))
 
-    descend([found.artifact], ())
+    descend([lineage.artifact], ())
     while waiting:
         ends, group = waiting.pop()
         artifacts = [relative.artifact for relative in group]
@@ -158,12 +162,14 @@ def tree(found: Ancestry, *, up: bool, most: int | None) -> Iterator[Line]:
 
 
 def grouped(relatives: Sequence[Relative], *, most: int | None) -> list[tuple[Relative, ...]]:
-    """The relatives one by one, but those of a kind of which there are more than `most` together."""
+    """Groups relatives one by one, but those of a kind of which there are more than `most` together."""
     kinds: dict[str | None, list[Relative]] = {}
     for relative in relatives:
         kinds.setdefault(relative.kind, []).append(relative)
     return [
         group
         for members in kinds.values()
-        for group in ([tuple(members)] if most is not None and len(members) > most else [(one,) for one in members])
+        for group in (
+            [tuple(members)] if most is not None and len(members) > most else [(member,) for member in members]
+        )
     ]

@@ -178,7 +178,7 @@ class Artifact:
 
     @classmethod
     def from_row(cls, row: Mapping[str, Any]) -> Artifact:
-        """The artifact of a catalog row (the inverse of `row`).
+        """Builds the artifact of a catalog row (the inverse of `row`).
 
         Raises:
             InputError: a row whose values break the rules above.

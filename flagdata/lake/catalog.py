@@ -73,8 +73,7 @@ class Moved(Exception):  # noqa: N818 — an outcome to act on, never shown to a
 
 
 def _one_at_a_time(method: Callable[Concatenate[Catalog, P], T]) -> Callable[Concatenate[Catalog, P], T]:
-    """Keeps other threads out of the same catalog, and refuses the Delta library in a forked child of a process that
-    used it: it would hang or crash there."""
+    """Keeps other threads out of the catalog, and the Delta library out of forked children, where it would hang."""
 
     @wraps(method)
     def guarded(self: Catalog, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -157,7 +156,7 @@ class Catalog:
 
     @_one_at_a_time
     def head(self) -> int:
-        """The newest version.
+        """Finds the newest version.
 
         Raises:
             LogGapError: an entry of the log, or all of it, is missing.
@@ -166,7 +165,7 @@ class Catalog:
 
     @_one_at_a_time
     def rows(self, version: int) -> pa.Table:
-        """All rows of one version, of all branches, see `RowFiles.table`.
+        """Reads all rows of one version, of all branches, see `RowFiles.table`.
 
         Args:
             version: at most `head()`.
@@ -183,7 +182,7 @@ class Catalog:
 
     @_one_at_a_time
     def scan(self, version: int) -> Scan | None:
-        """The same rows, to be decoded as they are asked for, see `RowFiles.scan`.
+        """Opens the same rows, to be decoded as they are asked for, see `RowFiles.scan`.
 
         Raises:
             ConflictError, CorruptError: as `rows`.
@@ -226,7 +225,7 @@ class Catalog:
         return base + 1
 
     def entry(self, version: int) -> tuple[bytes, dict[str, Place]]:
-        """A version's entry of the log, and where the files are that it adds, by name.
+        """Reads a version's entry of the log, and where the files are that it adds, by name.
 
         Raises:
             CorruptError: it cannot be read.
@@ -253,11 +252,11 @@ class Catalog:
             )
 
     def written(self, version: int) -> float:
-        """When a version's entry was put here, by the clock of the disk or store [s since 1970]."""
+        """Returns when a version's entry was put here, by the clock of the disk or store [s since 1970]."""
         return self._entries.path(version).stat().st_mtime
 
     def check_entries(self, first: int) -> None:
-        """Whether the entries from a version on are those that were written.
+        """Checks whether the entries from a version on are those that were written.
 
         Raises:
             CorruptError: one has changed, or cannot be read.
@@ -266,11 +265,11 @@ class Catalog:
         self._entries.entries(range(first, head + 1), head=head)
 
     def acknowledge(self, version: int) -> None:
-        """Note that a version that was adopted, and those before it, are there for good."""
+        """Notes that a version that was adopted, and those before it, are there for good."""
         self._entries.acknowledge(version)
 
     def is_due_for_tidying(self) -> bool:
-        """Whether `tidy` would do anything: `_TIDY_EVERY` versions after it last did."""
+        """Checks whether `tidy` would do anything: `_TIDY_EVERY` versions after it last did."""
         return self.head() - self._checkpoint() >= _TIDY_EVERY
 
     @_one_at_a_time
@@ -293,8 +292,8 @@ class Catalog:
             if (hint := self._log / _HINT).exists():
                 flush_file(hint)
             flush_folder(self._log)
-        made = file_hash(self._log / f"{version:020d}{CHECKPOINT}")
-        self._summaries.extend(self.history()[::-1], checkpoint=made)
+        checkpoint_hash = file_hash(self._log / f"{version:020d}{CHECKPOINT}")
+        self._summaries.extend(self.history()[::-1], checkpoint=checkpoint_hash)
         small = [name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL]
         if len(small) > 1:
             rows = pa.concat_tables(self._files.read(name) for name in small)
@@ -302,7 +301,7 @@ class Catalog:
             self._commit(table, rows, removed=small, rows_change=False, info=info)
 
     def unpublished_files(self) -> Sequence[Place]:
-        """What is left by processes that died before, or while, they put their log entry: no version refers to it.
+        """Lists what processes left that died before, or while, they put their log entry: no version refers to it.
 
         Raises:
             CorruptError: a log entry that cannot be read.
@@ -313,7 +312,7 @@ class Catalog:
         return sorted([*rows, *entries])  # type: ignore[type-var]
 
     def file_hashes(self) -> dict[Place, str | None]:
-        """Each file that some version is made of → its SHA-256 when it was written, `None` if that was not noted.
+        """Maps each file that some version is made of to its SHA-256 when it was written, `None` if that was not noted.
 
         Raises:
             CorruptError: a log entry that cannot be read.
@@ -330,7 +329,7 @@ class Catalog:
 
     @_one_at_a_time
     def history(self, limit: int | None = None) -> list[dict[str, Any]]:
-        """One entry a version, newest first: version, timestamp (UTC ms), operation and what the writer said of it.
+        """Lists one entry a version, newest first: version, timestamp (UTC ms), operation, what the writer said of it.
 
         Args:
             limit: the newest so many; all if `None`.
@@ -339,41 +338,41 @@ class Catalog:
             CorruptError: an entry of the log that cannot be read, or that no writer of a catalog writes.
         """
         head = self.head()
-        known = self._history
-        if known is None or known[0] > head:
+        cached = self._history
+        if cached is None or cached[0] > head:
             summarised = self._summaries.read(head)
-            known = (len(summarised) - 1, [dict(version) for version in reversed(summarised)])
+            cached = (len(summarised) - 1, [dict(version) for version in reversed(summarised)])
         # Entries never change, so that a process reads each once: in a bucket each is a request.
-        unread = range(known[0] + 1, head + 1)
+        unread = range(cached[0] + 1, head + 1)
         later = map(self._stated, unread, self._entries.entries(unread, head=head))
-        self._history = (head, [*reversed([*later]), *known[1]])
+        self._history = (head, [*reversed([*later]), *cached[1]])
         return self._history[1][:limit]
 
     def _stated(self, version: int, entry: Entry) -> dict[str, Any]:
-        """What the log says of a version."""
-        own = {k.removeprefix(_INFO_PREFIX): v for k, v in entry.info.items() if k.startswith(_INFO_PREFIX)}
+        """Returns what the log says of a version."""
+        info = {k.removeprefix(_INFO_PREFIX): v for k, v in entry.info.items() if k.startswith(_INFO_PREFIX)}
         message = {key: entry.info.get(key) for key in ("timestamp", "operation")}
-        stated = {"version": version, **message, **own, "files": list(entry.files)}
-        if not is_stated(stated, version):
+        version_facts = {"version": version, **message, **info, "files": list(entry.files)}
+        if not is_stated(version_facts, version):
             raise self._entries.damaged(version)
-        return stated
+        return version_facts
 
     def _noted(self, name: str) -> frozenset[str]:
-        """The SHA-256 of a file as its commit noted it; nothing where it noted none. Of one whose commit is known from
-        a summary without names of files, those of all such commits."""
+        """Returns the SHA-256 of a file as its commit noted it; nothing where it noted none. Of one whose commit is
+        known from a summary without names of files, those of all such commits."""
         if name not in self._hashes:
             noted: dict[str, frozenset[str]] = {}
-            others: set[str] = set()
+            unnamed: set[str] = set()
             complete = True
             for version in self.history():
-                found = version.get(_FILE_HASH)
+                file_sha = version.get(_FILE_HASH)
                 if "files" in version:
-                    noted |= dict.fromkeys(version["files"], frozenset({found} if found else ()))
-                elif found:
-                    others.add(found)
+                    noted |= dict.fromkeys(version["files"], frozenset({file_sha} if file_sha else ()))
+                elif file_sha:
+                    unnamed.add(file_sha)
                 else:
                     complete &= version["operation"] != "WRITE"
-            self._hashes = {name: frozenset(others if complete else ()), **noted}
+            self._hashes = {name: frozenset(unnamed if complete else ()), **noted}
         return self._hashes[name]
 
     def _commit(
@@ -416,22 +415,25 @@ class Catalog:
             self._entries.acknowledge(version)
 
     def _options(self) -> dict[str, str] | None:
-        """What the Delta library needs to reach the table; nothing on a disk."""
+        """Returns what the Delta library needs to reach the table; nothing on a disk."""
         return delta_options() if isinstance(self.path, RemotePath) else None
 
     def _checkpoint(self) -> int:
-        """The version of the newest, by the files' names: a process may die before `_last_checkpoint` is written."""
+        """Finds the newest checkpoint's version, by file names: a process may die before `_last_checkpoint` is
+        written."""
         return max(self._entries.checkpoints(), default=0)
 
     def _check_read(self, version: int) -> None:
-        """Compare what the Delta library reads for a version with what was noted of it: the newest checkpoint up to it,
-        and the entries after that. Those that no summary covers were compared when the history was read."""
+        """Compares what the Delta library reads for a version with what was noted of it: the newest checkpoint up to
+        it, and the entries after that. Those that no summary covers were compared when the history was read."""
         newest = max((number for number in self._entries.checkpoints() if number <= version), default=-1)
         checkpoint = self._log / f"{newest:020d}{CHECKPOINT}"
-        for place in (self._log / _HINT, checkpoint):
-            if isinstance(place, Path) and place.exists() and not place.is_file():  # of a pipe it would wait for ever
-                message = f"{place.name} of the catalog's log is no regular file"
-                raise CorruptError(message, where=str(place), fix=_DELETE)
+        for log_file in (self._log / _HINT, checkpoint):
+            if (
+                isinstance(log_file, Path) and log_file.exists() and not log_file.is_file()
+            ):  # of a pipe it would wait for ever
+                message = f"{log_file.name} of the catalog's log is no regular file"
+                raise CorruptError(message, where=str(log_file), fix=_DELETE)
         noted = self._summaries.checkpoints.get(newest)
         if noted is not None and file_hash(checkpoint) != noted:
             message = "a checkpoint of the catalog's log has changed since it was written"
@@ -460,7 +462,7 @@ class Catalog:
 
     @contextmanager
     def _log_errors(self, version: int) -> Iterator[None]:
-        """What the Delta library cannot read of the log, as an error that names the entry to blame, if one is."""
+        """Turns what the Delta library cannot read of the log into an error that names the entry to blame."""
         try:
             yield
         except (DeltaError, OSError) as error:
@@ -482,7 +484,7 @@ class Catalog:
             ) from None
 
     def _blamed(self, version: int) -> Place:
-        """The entry, or the checkpoint, with which the first version begins that the Delta library cannot open."""
+        """Finds the entry, or checkpoint, with which the first version begins that the Delta library cannot open."""
         low, high = 0, version
         while low < high:
             middle = (low + high) // 2
@@ -506,32 +508,32 @@ class Catalog:
         return table
 
     def _repeated(self, reading: Callable[[], T]) -> T:
-        """What the Delta library reads, which does not ask again where an answer of a store breaks off."""
+        """Repeats what the Delta library reads, which does not ask again where an answer of a store breaks off."""
         for _ in range(_BROKEN):
             try:
                 return reading()
             except (DeltaError, OSError) as error:
-                place = self.path
-                if not isinstance(place, RemotePath) or not _NO_ANSWER.search(str(error)):
+                location = self.path
+                if not isinstance(location, RemotePath) or not _NO_ANSWER.search(str(error)):
                     raise
-                if not refusal(error, bucket=place.bucket, where=str(place)).passing:
+                if not refusal(error, bucket=location.bucket, where=str(location)).passing:
                     raise
         return reading()
 
     def _refused(self, error: DeltaError) -> OSError:
-        """What the Delta library could not write, as an error of the system."""
+        """Turns what the Delta library could not write into an error of the system."""
         if isinstance(self.path, RemotePath):
             return refusal(error, bucket=self.path.bucket, where=str(self.path))
         return OSError(str(error))
 
     def _unreachable(self, error: Exception, log: RemotePath) -> FlagdataError:
-        """The error for a log in a bucket that the Delta library cannot read: without what it says of credentials."""
+        """Returns the error for a log in a bucket that the Delta library cannot read, without credentials."""
         self._entries.files()  # raises, where an entry is to blame
-        found = refusal(error, bucket=log.bucket, where=str(log))
-        return FlagdataError(f"the catalog's log cannot be read: {found.strerror}", where=str(log), fix=found.fix)
+        refused = refusal(error, bucket=log.bucket, where=str(log))
+        return FlagdataError(f"the catalog's log cannot be read: {refused.strerror}", where=str(log), fix=refused.fix)
 
     def _names(self, version: int) -> list[str]:
-        """The files of a version, which never change; those of the versions that were asked for last are kept."""
+        """Lists the files of a version, which never change; those of the versions that were asked for last are kept."""
         if version not in self._listed:
             table = self._open(version)
             with self._log_errors(version):
@@ -540,7 +542,7 @@ class Catalog:
         return self._listed[version]
 
     def _writable(self, version: int) -> DeltaTable:
-        """The table at `version`, if it has all columns of this format; else they are added, and `Moved` is raised."""
+        """Opens the table at `version`, if it has all columns of this format; else adds them and raises `Moved`."""
         table = self._open(version)
         present = {field.name for field in table.schema().fields}
         missing = [name for name in CATALOG if name not in present]
@@ -590,7 +592,7 @@ def _properties(info: Mapping[str, str]) -> CommitProperties:
 
 
 def newer(why: str, where: Place) -> ConflictError:
-    """The error for a lake of a later format."""
+    """Returns the error for a lake of a later format."""
     return ConflictError(
         f"the lake was written by a newer flagdata than this one, which reads formats up to {FORMAT_VERSION}: {why}",
         where=str(where),

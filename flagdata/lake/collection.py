@@ -58,7 +58,7 @@ class Garbage:
 
 
 def garbage(lake: Lake, *, grace: timedelta) -> Garbage:
-    """What `collect` would delete now.
+    """Lists what `collect` would delete now.
 
     Raises:
         LinkError: a folder of the lake is not its own.
@@ -70,24 +70,24 @@ def garbage(lake: Lake, *, grace: timedelta) -> Garbage:
 
 
 def collect(lake: Lake, *, grace: timedelta) -> Garbage:
-    """Delete the garbage and say what it was. Transactions wait while it works; none loses anything.
+    """Deletes the garbage and says what it was. Transactions wait while it works; none loses anything.
 
     Raises:
         LinkError: a folder of the lake is not its own; nothing was deleted.
         CorruptError: a ref cannot be read or the catalog is damaged, so what it needs is unknown; nothing was deleted.
     """
     with lake.changing("collecting", alone=True) as check:
-        found = _find(lake, grace)
-        for name in found.objects:
+        deletable = _find(lake, grace)
+        for name in deletable.objects:
             check()
             lake.objects.delete(name)
-        for path in found.leftovers:
+        for path in deletable.leftovers:
             check()
             Objects.remove(path)
-        for upload in found.uploads:
+        for upload in deletable.uploads:
             check()
             upload.abort()
-    return found
+    return deletable
 
 
 def _find(lake: Lake, grace: timedelta) -> Garbage:
@@ -95,29 +95,33 @@ def _find(lake: Lake, grace: timedelta) -> Garbage:
     marked = mark(lake, grace=grace)
     # Rows read from a changed file may name other objects than those they need, so files are re-hashed first.
     marked.check(*catalog_files(lake))
-    found = unneeded(lake, marked, states, grace=grace)
+    deletable = unneeded(lake, marked, states, grace=grace)
     try:
         limit = lake.now() - grace.total_seconds()
-        left = tuple(upload for upload in left_uploads(lake, states) if upload.begun <= limit)
+        abandoned = tuple(upload for upload in left_uploads(lake, states) if upload.begun <= limit)
     except StoreError as error:
-        return replace(found, unlisted=error)
-    return replace(found, uploads=left)
+        return replace(deletable, unlisted=error)
+    return replace(deletable, uploads=abandoned)
 
 
 def left_uploads(lake: Lake, states: Sequence[LeaseState]) -> tuple[Upload, ...]:
-    """Unfinished uploads to a lake in a bucket of which no living transaction has the object.
+    """Lists unfinished uploads to a lake in a bucket of which no living transaction has the object.
 
     Raises:
         StoreError: the store does not list them.
     """
     if not isinstance(lake.path, RemotePath):
         return ()
-    held = {str(lake.path / path_in_lake(name)) for state in states if state.alive for name in state.objects}
-    return tuple(one for one in lake.path.uploads() if not any(f"{one}/".startswith(f"{place}/") for place in held))
+    protected = {str(lake.path / path_in_lake(name)) for state in states if state.alive for name in state.objects}
+    return tuple(
+        upload
+        for upload in lake.path.uploads()
+        if not any(f"{upload}/".startswith(f"{protected_path}/") for protected_path in protected)
+    )
 
 
 def unneeded(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace: timedelta) -> Garbage:
-    """What neither a marked row nor a living transaction needs, and what is older than the grace period.
+    """Lists what neither a marked row nor a living transaction needs, and what is older than the grace period.
 
     Args:
         marked: what is needed, read after `states`.
@@ -192,7 +196,7 @@ class Usage:
 
 
 def usage(lake: Lake, *, at: str | None = None, grace: timedelta) -> Usage:
-    """What the lake takes, and of it what `at` shows, where one is given.
+    """Computes what the lake takes, and of it what `at` shows, where one is given.
 
     Raises:
         CorruptError: a ref cannot be read or is lost, so what is needed is unknown.
@@ -210,8 +214,8 @@ def usage(lake: Lake, *, at: str | None = None, grace: timedelta) -> Usage:
         tables.setdefault(at, lake.rows(at=at))
     branches, tags = lake.refs.branches(), lake.refs.tags()
     nouns = dict.fromkeys(tables, "version") | dict.fromkeys(["main", *branches], "branch") | dict.fromkeys(tags, "tag")
-    shown = {name: set(table["object"].drop_null().to_pylist()) for name, table in tables.items()}
-    counts = Counter(name for ref, objects in shown.items() if ref in marked.refs for name in objects)
+    objects_of_refs = {name: set(table["object"].drop_null().to_pylist()) for name, table in tables.items()}
+    counts = Counter(name for ref, objects in objects_of_refs.items() if ref in marked.refs for name in objects)
     versions = tuple(
         Shown(
             name=ref,
@@ -220,15 +224,15 @@ def usage(lake: Lake, *, at: str | None = None, grace: timedelta) -> Usage:
             share=_share(objects & sizes.keys(), sizes, artifacts=tables[ref].num_rows),
             own=sum(sizes[name] for name in objects if counts[name] <= int(ref in marked.refs)),
         )
-        for ref, objects in shown.items()
+        for ref, objects in objects_of_refs.items()
     )
     concerned = marked.refs if at is None else {at: tables[at]}
-    kinds = _kinds(concerned, sizes, others=at is None)
+    kinds = _kinds(concerned, sizes, with_rest=at is None)
     return Usage(kinds=kinds, versions=versions, total=sizes.total(), freed=freed, grace=grace)
 
 
 def files_of(root: Place) -> Iterator[tuple[str, int]]:
-    """The files of a lake: the path from its root, with slashes, and the size [B]; a link counts for itself."""
+    """Yields the files of a lake: the path from its root, with slashes, and the size [B]; a link counts for itself."""
     if isinstance(root, RemotePath):
         yield from ((key, status.st_size) for key, status in root.names())
         return
@@ -240,7 +244,7 @@ def files_of(root: Place) -> Iterator[tuple[str, int]]:
 
 
 def _owner(key: str) -> str:
-    """The object that a file belongs to, or what other part of the lake."""
+    """Returns the object that a file belongs to, or what other part of the lake."""
     store, _, rest = key.partition("/")
     name = f"{store}/{rest.partition('/')[0].removesuffix(STORES.get(store, ''))}"
     if store in STORES and OBJECT_NAME.fullmatch(name):
@@ -248,11 +252,11 @@ def _owner(key: str) -> str:
     return CATALOG if store in ("catalog", "refs", "lake.json") else OTHER
 
 
-def _kinds(tables: Mapping[str, pa.Table], sizes: Mapping[str, int], *, others: bool) -> dict[str, Share]:
-    """What each kind of rows takes.
+def _kinds(tables: Mapping[str, pa.Table], sizes: Mapping[str, int], *, with_rest: bool) -> dict[str, Share]:
+    """Computes what each kind of rows takes.
 
     Args:
-        others: whether also what no row needs, so that all files are counted.
+        with_rest: whether also what no row needs, so that all files are counted.
     """
     objects: dict[str, set[str]] = {kind: set() for kind in _ORDER}
     artifacts: dict[str, set[str]] = {kind: set() for kind in _ORDER}
@@ -262,17 +266,17 @@ def _kinds(tables: Mapping[str, pa.Table], sizes: Mapping[str, int], *, others: 
             artifacts.setdefault(kind, set()).add(artifact)
             if name in sizes:
                 objects.setdefault(kind, set()).add(name)
-    found: dict[str, Share] = {}
+    shares: dict[str, Share] = {}
     counted: set[str] = set()
     for kind, names in objects.items():
         if artifacts[kind]:
-            found[str(kind)] = _share(names - counted, sizes, artifacts=len(artifacts[kind]))
+            shares[str(kind)] = _share(names - counted, sizes, artifacts=len(artifacts[kind]))
         counted |= names
-    if others:
+    if with_rest:
         rest = {name for name in sizes if name not in counted and OBJECT_NAME.fullmatch(name)}
-        found[UNSHOWN] = _share(rest, sizes, artifacts=0)
-        found |= {part: Share(artifacts=0, objects=0, size=sizes.get(part, 0)) for part in (CATALOG, OTHER)}
-    return found
+        shares[UNSHOWN] = _share(rest, sizes, artifacts=0)
+        shares |= {part: Share(artifacts=0, objects=0, size=sizes.get(part, 0)) for part in (CATALOG, OTHER)}
+    return shares
 
 
 def _share(names: Collection[str], sizes: Mapping[str, int], *, artifacts: int) -> Share:

@@ -68,7 +68,7 @@ def clone(source: Lake, target: Place | str, *, bars: Bars) -> tuple[Lake, Trans
 
 
 def _with_push(error: ConflictError, source: Lake, target: Place | str) -> ConflictError:
-    """The refusal to clone to where something is; how to go on, where that is a clone of the source."""
+    """Returns the refusal to clone to where something is; how to go on, where that is a clone of the source."""
     try:
         lake = Lake.open(target)
         same = source.catalog.entry(0)[0] == lake.catalog.entry(0)[0]
@@ -84,7 +84,7 @@ def _with_push(error: ConflictError, source: Lake, target: Place | str) -> Confl
 
 
 def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
-    """Bring a lake to the newest version of another one.
+    """Brings a lake to the newest version of another one.
 
     Args:
         bars: makes a progress bar.
@@ -97,9 +97,9 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
     marked = mark(source, grace=timedelta(0))
     if damage := [finding for finding in marked.findings if finding.severity is Severity.ERROR]:
         raise CorruptError(damage[0].what, where=damage[0].where, fix=damage[0].fix or "run flagdata doctor")
-    head, there = source.catalog.head(), target.catalog.head()
-    _check_history(source, target, head=head, there=there)
-    source.catalog.check_entries(min(head, there))
+    head, target_head = source.catalog.head(), target.catalog.head()
+    _check_history(source, target, head=head, target_head=target_head)
+    source.catalog.check_entries(min(head, target_head))
     refs = _missing_refs(source, target)
     sizes = _sizes(marked)
     missing = [name for name in sorted(marked.objects) if not target.objects.is_there(name, sizes.get(name))]
@@ -118,32 +118,34 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
                 )
             size += transaction.hold(name)
             advance(1)
-        _adopt(source, target, transaction, versions=range(there + 1, head + 1), bars=bars)
+        _adopt(source, target, transaction, versions=range(target_head + 1, head + 1), bars=bars)
         _delete_refs(source, target)
         for (kind, name), stored in refs.items():
             target.refs.adopt(kind, name, stored)
     names = tuple(sorted(name for _, name in refs))
-    findings = tuple(_unprintable(source, marked, versions=head - there))
-    return Transfer(versions=head - there, head=head, objects=tuple(missing), size=size, refs=names, findings=findings)
+    findings = tuple(_unprintable(source, marked, versions=head - target_head))
+    return Transfer(
+        versions=head - target_head, head=head, objects=tuple(missing), size=size, refs=names, findings=findings
+    )
 
 
 def _unprintable(source: Lake, marked: Marked, *, versions: int) -> Iterator[Finding]:
-    """A warning where rows, or messages of the newest versions, hold what a terminal would obey. They come as they are:
+    """Warns where rows, or messages of the newest versions, hold what a terminal would obey. They come as they are:
     each version states the hash of the one before, so that a text that was cleaned would be another history."""
-    found: Counter[str] = Counter()
+    unprintable: Counter[str] = Counter()
     for entry in source.catalog.history(versions):
-        found["message"] += not str(entry.get("message", "")).isprintable()
+        unprintable["message"] += not str(entry.get("message", "")).isprintable()
     for table in marked.refs.values() if versions else ():
         for name in _SHOWN:
             texts = table[name].unique().drop_null().to_pylist()
-            found[name] += sum(not text.isprintable() for text in texts)
-    columns = [name for name, count in found.items() if count]
+            unprintable[name] += sum(not text.isprintable() for text in texts)
+    columns = [name for name, count in unprintable.items() if count]
     if columns:
         yield Finding.of(
             "control-characters",
-            f"{counted(found.total(), 'text')} of {', '.join(columns)} hold control characters or marks of "
+            f"{counted(unprintable.total(), 'text')} of {', '.join(columns)} hold control characters or marks of "
             "direction: they came as they are, and are shown escaped",
-            count=found.total(),
+            count=unprintable.total(),
             where=str(source.path),
             fix="none needed for flagdata; give other programs what flagdata prints, not the files of the catalog",
         )
@@ -170,28 +172,28 @@ def _adopt(source: Lake, target: Lake, transaction: Transaction, *, versions: ra
 
 
 def _delete_refs(source: Lake, target: Lake) -> None:
-    """Delete the target's refs that the source lacks and that the log says were deleted since they were made: also
+    """Deletes the target's refs that the source lacks and that the log says were deleted since they were made: also
     where an earlier transfer brought that entry, and was stopped."""
-    for kind, noun, known in (
+    for kind, noun, present in (
         ("tags", "tag", source.refs.tags()),
         ("branches", "branch", source.refs.branches()),
     ):
-        there = target.refs.tags() if kind == "tags" else target.refs.branches()
+        refs_of_target = target.refs.tags() if kind == "tags" else target.refs.branches()
         for entry in source.catalog.history():
             name = entry.get("deleted", "").removeprefix(f"{noun} ")
-            ref = there.get(name) if entry.get("deleted") == f"{noun} {name}" and name not in known else None
+            ref = refs_of_target.get(name) if entry.get("deleted") == f"{noun} {name}" and name not in present else None
             if ref is not None and datetime.fromisoformat(ref.created).timestamp() * 1000 <= entry["timestamp"]:
                 target.refs.remove(kind, name)
-                del there[name]
+                del refs_of_target[name]
 
 
-def _check_history(source: Lake, target: Lake, *, head: int, there: int) -> None:
-    """Whether all versions of the target are versions of the source.
+def _check_history(source: Lake, target: Lake, *, head: int, target_head: int) -> None:
+    """Checks whether all versions of the target are versions of the source.
 
     Raises:
         ConflictError: they are not.
     """
-    common = min(head, there)
+    common = min(head, target_head)
     if source.catalog.entry(common)[0] != target.catalog.entry(common)[0]:
         same = source.catalog.entry(0)[0] == target.catalog.entry(0)[0]
         raise ConflictError(
@@ -200,26 +202,26 @@ def _check_history(source: Lake, target: Lake, *, head: int, there: int) -> None
             fix=f"flagdata clone {target.path} NEW, and commit there what it lacks; or write to it directly:"
             f" --lake {target.path}",
         )
-    if there > head:
+    if target_head > head:
         raise ConflictError(
-            f"{target.path} is ahead: it has versions up to {there}, {source.path} up to {head}",
+            f"{target.path} is ahead: it has versions up to {target_head}, {source.path} up to {head}",
             where=str(target.path),
             fix="move them the other way: flagdata pull for push, or flagdata push for pull",
         )
 
 
 def _missing_refs(source: Lake, target: Lake) -> dict[tuple[str, str], bytes]:
-    """The refs that the target lacks.
+    """Lists the refs that the target lacks.
 
     Raises:
         ConflictError: it has another one of the same name.
     """
-    stored, there = source.refs.stored(), target.refs.stored()
+    stored, stored_there = source.refs.stored(), target.refs.stored()
     for key, content in stored.items():
-        if there.get(key, content) != content:
+        if stored_there.get(key, content) != content:
             raise ConflictError(
                 f"both lakes have a {_NOUNS[key[0]]} {key[1]!r}, and not the same",
                 where=str(target.path),
                 fix="delete one of the two",
             )
-    return {key: content for key, content in stored.items() if key not in there}
+    return {key: content for key, content in stored.items() if key not in stored_there}

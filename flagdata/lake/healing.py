@@ -71,7 +71,7 @@ ABSENT = Present(artifact=None, sound=False)
 
 
 def present(lake: Store, artifact: Artifact) -> Present:
-    """What a lake has of an artifact whose row a branch shows; an artifact without an object is sound."""
+    """Finds what a lake has of an artifact whose row a branch shows; an artifact without an object is sound."""
     sound = artifact.object is None or lake.objects.is_sound(artifact.object, artifact.object_bytes)
     return Present(artifact=artifact, sound=sound)
 
@@ -87,7 +87,7 @@ def unsound(lake: Store, artifacts: Iterable[str], *, at: str | None) -> frozens
 
 
 def healing(lake: Store, *, before: str, now: str) -> Healing:
-    """What became of an object that was damaged or missing, by the refs that there are now."""
+    """Finds what became of an object that was damaged or missing, by the refs that there are now."""
     if before == now:
         return Healing(before=before, now=now)
     refs = (MAIN, *lake.refs.branches(), *lake.refs.tags())
@@ -95,6 +95,6 @@ def healing(lake: Store, *, before: str, now: str) -> Healing:
     return Healing(before=before, now=now, refs=tuple(showing))
 
 
-def said(artifact: str, found: Healing) -> str:
-    """What was done about an artifact, in a line for people."""
-    return f"{artifact[:SHORT]}: {found.sentence}"
+def said(artifact: str, healed: Healing) -> str:
+    """Writes what was done about an artifact, in a line for people."""
+    return f"{artifact[:SHORT]}: {healed.sentence}"

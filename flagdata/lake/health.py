@@ -46,7 +46,7 @@ _BY_KIND = {
 
 
 def made_again(artifact: Artifact) -> str:
-    """What replaces the object of an artifact that is damaged or missing."""
+    """Names what replaces the object of an artifact that is damaged or missing."""
     branch = "" if artifact.branch == MAIN else f" --branch {artifact.branch}"
     if artifact.kind in (Kind.MEASUREMENT, Kind.MODEL):
         withdraw = f"flagdata withdraw {artifact.id[:SHORT]}{branch} -m 'its data are lost'"
@@ -66,7 +66,7 @@ GRACE = timedelta(hours=24)
 
 
 def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
-    """All that is wrong with the lake's structure; contents are `verify`'s.
+    """Finds all that is wrong with the lake's structure; contents are `verify`'s.
 
     Errors are damage: rows without object or parent, objects of another size than recorded, refs that cannot be read,
     links where the lake keeps files of its own, rows of a newer format. Warnings are what a crash leaves and `gc`
@@ -89,17 +89,21 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     if LogGapError.kind in {finding.kind for finding in marked.findings}:
         return tuple(findings)  # what follows would call the files of the missing entries' commits leftovers
     if not marked.findings:
-        held = {name for state in states if state.alive for name in state.objects}
+        in_use = {name for state in states if state.alive for name in state.objects}
         try:
-            findings += _gone(lake, marked, {found.name for found in stored})
+            findings += _gone(lake, marked, {stored_object.name for stored_object in stored})
         except FlagdataError as error:
             findings.append(_log_damaged(error))
-        needed = marked.objects | held
-        left = unfinished(lake, needed)
-        findings += [_unfinished(lake, name, *why) for name, why in left.items()]
-        findings += [_orphan(found, limit, grace) for found in stored if found.name not in needed | left.keys()]
+        needed = marked.objects | in_use
+        leftovers = unfinished(lake, needed)
+        findings += [_unfinished(lake, name, *why) for name, why in leftovers.items()]
+        findings += [
+            _orphan(stored_object, limit, grace)
+            for stored_object in stored
+            if stored_object.name not in needed | leftovers.keys()
+        ]
         findings += _left_uploads(lake, states, limit, grace)
-    findings += [*_strays(lake, foreign), *_beside(lake)]
+    findings += [*_strays(lake, foreign), *_system_files(lake)]
     findings += [_abandoned(state) for state in states if state.leased and not state.alive]
     findings += [_unleased(path, written, limit, grace) for path, written in unowned]
     try:
@@ -112,7 +116,7 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
 def verify(
     lake: Lake, names: Sequence[str], marked: Marked | None = None, *, advance: Callable[[int], None] = lambda _: None
 ) -> tuple[Finding, ...]:
-    """Re-hash the objects called `names`; a finding for each that is missing or has changed. Damage is noted beside the
+    """Re-hashes the objects called `names`; reports each that is missing or has changed. Damage is noted beside the
     object, so that what makes it again replaces it without comparing all its bytes, see `Objects.note_damage`.
 
     Args:
@@ -137,55 +141,57 @@ def verify(
 
 
 def _by_object(marked: Marked) -> dict[str, Artifact]:
-    """Object → the artifact that it was made as, and not a part of it."""
-    found: dict[str, Artifact] = {}
+    """Maps each object to the artifact that it was made as, and not a part of it."""
+    artifacts: dict[str, Artifact] = {}
     for table in marked.refs.values():
         for row in table.to_pylist():
-            if row["object"] is not None and (row["object"] not in found or row["kind"] != Kind.CLIP):
+            if row["object"] is not None and (row["object"] not in artifacts or row["kind"] != Kind.CLIP):
                 with suppress(FlagdataError):  # of a malformed row doctor says more
-                    found[row["object"]] = Artifact.from_row(row)
-    return found
+                    artifacts[row["object"]] = Artifact.from_row(row)
+    return artifacts
 
 
 def read_refs(lake: Lake) -> Marked:
-    """What every ref shows, for `verify_catalog` and `object_names`, which read it themselves where it is not given."""
+    """Reads what every ref shows, for `verify_catalog` and `object_names`, which read it themselves where it is not
+    given."""
     return mark(lake, grace=timedelta(0))
 
 
 def verify_catalog(lake: Lake, marked: Marked | None = None) -> tuple[Finding, ...]:
-    """Re-hash the catalog's files and read every ref; a finding for what is missing, damaged, a link, or cannot be
+    """Re-hashes the catalog's files and reads every ref; reports what is missing, damaged, a link, or cannot be
     checked."""
     foreign = [path for path in _foreign(lake) if path.parent.name not in STORES]  # objects are `verify`'s
-    found = (*map(_linked, foreign), *(marked or read_refs(lake)).findings, *catalog_files(lake))
-    return tuple(dict.fromkeys(found))  # an entry that cannot be read stops both
+    findings = (*map(_linked, foreign), *(marked or read_refs(lake)).findings, *catalog_files(lake))
+    return tuple(dict.fromkeys(findings))  # an entry that cannot be read stops both
 
 
 def object_names(lake: Lake, marked: Marked | None = None) -> list[str]:
-    """Every object that is stored or that a readable ref needs, sorted; `verify_catalog` reports unreadable refs."""
+    """Lists every object that is stored or that a readable ref needs, sorted; `verify_catalog` reports unreadable
+    refs."""
     needed = (marked or read_refs(lake)).objects
     return sorted(needed | {stored.name for stored in lake.objects})
 
 
 def sampled(names: Sequence[str], count: int) -> list[str]:
-    """`count` of them at random, others each time, so that repeated checks come round to all."""
+    """Draws `count` of them at random, others each time, so that repeated checks come round to all."""
     return sorted(random.SystemRandom().sample(list(names), min(count, len(names))))
 
 
 def is_healthy(findings: Sequence[Finding]) -> bool:
-    """Whether there is nothing to act on."""
+    """Checks whether there is nothing to act on."""
     return all(f.severity is Severity.NOTE for f in findings)
 
 
 def _foreign(lake: Lake) -> list[Path]:
-    """What is a link or special file, sorted; for what lies in an object, the object."""
+    """Lists what is a link or special file, sorted; for what lies in an object, the object."""
     root = lake.path
     if not isinstance(root, Path):
         return []
-    found = set()
+    paths = set()
     for path in foreign_entries(root):
         parts = path.relative_to(root).parts
-        found.add(root.joinpath(*parts[:2]) if parts[0] in STORES else path)
-    return sorted(found)
+        paths.add(root.joinpath(*parts[:2]) if parts[0] in STORES else path)
+    return sorted(paths)
 
 
 def _is_among(path: Place, foreign: Collection[Path]) -> bool:
@@ -203,32 +209,34 @@ def _linked(path: Path) -> Finding:
 
 def _rows(lake: Lake, marked: Marked, foreign: Collection[Path]) -> list[Finding]:
     findings: list[Finding] = []
-    seen: set[str] = set()
+    identities: set[str] = set()
     gone = set(erased_objects(lake)) - marked.objects if not marked.findings else set()
     for ref, table in marked.refs.items():
         ids = table["artifact"].to_pylist()
-        known = set(ids)
-        if len(known) < len(ids):
+        identities_here = set(ids)
+        if len(identities_here) < len(ids):
             findings.append(
                 Finding.of(
                     "identity-twice",
-                    f"{len(ids) - len(known)} rows have an identity that another row has",
+                    f"{len(ids) - len(identities_here)} rows have an identity that another row has",
                     where=f"ref {ref}",
                     fix="this is a defect of the lake: keep a copy and report it",
                 )
             )
-        fresh = table.filter(pa.array([identity not in seen for identity in ids], type=pa.bool_()))
-        seen |= known
+        fresh = table.filter(pa.array([identity not in identities for identity in ids], type=pa.bool_()))
+        identities |= identities_here
         for row in fresh.to_pylist():
             if row["object"] not in gone:
-                findings += _row(lake, row, known, ref, foreign)
+                findings += _row(lake, row, identities_here, ref, foreign)
     return findings
 
 
 _ROW_FIX = "withdraw the artifact and ingest its source again"
 
 
-def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign: Collection[Path]) -> list[Finding]:
+def _row(
+    lake: Lake, row: dict[str, object], identities_here: set[str], ref: str, foreign: Collection[Path]
+) -> list[Finding]:
     where = f"{row['kind']} {row['name']!r}, artifact {row['artifact']}, ref {ref}"
 
     def error(kind: str, message: str, fix: str) -> Finding:
@@ -243,9 +251,9 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
     findings = [
         error("parent-missing", f"its parent {parent} is not there", "ingest the parent again")
         for parent in artifact.parents
-        if parent not in known
+        if parent not in identities_here
     ]
-    if artifact.recording is not None and artifact.recording not in known:
+    if artifact.recording is not None and artifact.recording not in identities_here:
         findings.append(error("parent-missing", f"its recording {artifact.recording} is not there", "align it again"))
     if artifact.object is None and artifact.source_name is not None:
         findings.append(error("row-malformed", "it names no object", _ROW_FIX))
@@ -279,7 +287,7 @@ def _gone(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
 
 
 def _erased(lake: Lake, marked: Marked) -> list[Finding]:
-    """A note for each tag or branch that lists rows whose data were erased."""
+    """Notes each tag or branch that lists rows whose data were erased."""
     gone = {name: why for name, why in erased_objects(lake).items() if name not in marked.objects}
     findings = []
     for ref, table in marked.refs.items():
@@ -310,7 +318,7 @@ def _unfinished(lake: Lake, name: str, version: int, message: str) -> Finding:
 
 
 def _expired(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
-    """A note for each commit that let versions expire, of which data went."""
+    """Notes each commit that let versions expire, of which data went."""
     return [
         Finding.of(
             "expired",
@@ -327,7 +335,7 @@ def _expired(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Findin
 
 
 def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
-    """A note where gc has deleted what was withdrawn, so that older versions show rows without data."""
+    """Notes where gc has deleted what was withdrawn, so that older versions show rows without data."""
     try:
         gone = lake.catalog.objects() - _needed(marked) - frozenset(stored)
         removed = removals(lake.catalog.history())
@@ -368,7 +376,7 @@ def _orphan(stored: StoredObject, limit: float, grace: timedelta) -> Finding:
 
 
 def _left_uploads(lake: Lake, states: Sequence[LeaseState], limit: float, grace: timedelta) -> list[Finding]:
-    """A finding for each upload to a bucket that was begun and not finished."""
+    """Reports each upload to a bucket that was begun and not finished."""
     try:
         return [_left_upload(upload, limit, grace) for upload in left_uploads(lake, states)]
     except StoreError as error:
@@ -399,12 +407,12 @@ def _later(grace: timedelta) -> str:
 
 
 def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
-    known: set[Place] = {stored.path for stored in lake.objects} | set(foreign)
+    paths_known: set[Place] = {stored.path for stored in lake.objects} | set(foreign)
     strays = [
         path
         for store, suffix in STORES.items()
         for path in (lake.path / store).glob("*")
-        if path not in known and not OBJECT_NAME.fullmatch(f"{store}/{path.name.removesuffix(suffix + DAMAGED)}")
+        if path not in paths_known and not OBJECT_NAME.fullmatch(f"{store}/{path.name.removesuffix(suffix + DAMAGED)}")
     ]
     strays = [path for path in strays if not is_beside(path.name)]
     return [
@@ -419,21 +427,25 @@ def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
     ]
 
 
-def _beside(lake: Lake) -> list[Finding]:
-    """A note on files of an operating system in the lake's folders; what lies in objects is passed over."""
-    own = {COLLECT, TURN}
-    found = sorted(
+def _system_files(lake: Lake) -> list[Finding]:
+    """Notes files of an operating system in the lake's folders; what lies in objects is passed over."""
+    lock_names = {COLLECT, TURN}
+    system_files = sorted(
         str(path)
         for folder in ("", *FOLDERS)
         for path in (lake.path / folder).glob("*")
-        if is_beside(path.name) and path.name not in own and not SCRATCH.fullmatch(path.name)
+        if is_beside(path.name) and path.name not in lock_names and not SCRATCH.fullmatch(path.name)
     )
-    if not found:
+    if not system_files:
         return []
-    message = f"{counted(len(found), 'file')} of an operating system, as .DS_Store: passed over"
+    message = f"{counted(len(system_files), 'file')} of an operating system, as .DS_Store: passed over"
     fix = "none needed; they may be deleted"
     note = Severity.NOTE
-    return [Finding(kind="files-beside", severity=note, what=message, where=found[0], count=len(found), fix=fix)]
+    return [
+        Finding(
+            kind="files-beside", severity=note, what=message, where=system_files[0], count=len(system_files), fix=fix
+        )
+    ]
 
 
 def _abandoned(state: LeaseState) -> Finding:

@@ -52,7 +52,7 @@ def given(text: str) -> tuple[str, Value | None]:
 
 
 def _check(name: str, value: Value | None) -> None:
-    """Whether a name and value make a label.
+    """Checks whether a name and value make a label.
 
     Raises:
         UsageError: a name that cannot be a column, a number that is not finite or too large, or a long text.
@@ -69,24 +69,24 @@ def _check(name: str, value: Value | None) -> None:
 def put(
     lake: Store, artifacts: Collection[str], values: Mapping[str, Value | None], message: str, *, branch: str
 ) -> tuple[int, frozenset[str]]:
-    """See `Lake.label`."""
+    """Puts labels on artifacts, see `Lake.label`."""
 
     def attempt() -> tuple[int, frozenset[str]]:
         head = lake.catalog.head()
-        shown = lake.table(lake.refs.view(branch, head))
-        known = set(shown["artifact"].to_pylist())
-        if absent := sorted(set(artifacts) - known):
+        rows = lake.table(lake.refs.view(branch, head))
+        identities = set(rows["artifact"].to_pylist())
+        if absent := sorted(set(artifacts) - identities):
             raise NotFoundError(
                 f"{', '.join(absent)} is not on branch {branch!r}",
                 where=str(lake.path),
                 fix=f"give ids of rows that flagdata ls --at {branch} shows",
             )
-        labelled = frozenset(artifacts) | clips_of(shown, artifacts)
-        present = labels_of(shown)
-        others = {artifact: present[artifact] for artifact in sorted(present.keys() & known)}
-        _check_types(others, values, except_of=labelled)
+        labelled = frozenset(artifacts) | clips_of(rows, artifacts)
+        present = labels_of(rows)
+        present_labels = {artifact: present[artifact] for artifact in sorted(present.keys() & identities)}
+        _check_types(present_labels, values, except_of=labelled)
         if fresh := {name for name, value in values.items() if value is not None}:
-            _check_case(fresh, others)
+            _check_case(fresh, present_labels)
         noted = {artifact: dict(values) for artifact in sorted(labelled)}
         info = {"message": message, "branch": branch, LABELS: json.dumps(noted, ensure_ascii=False, allow_nan=False)}
         return lake.catalog.append(catalog_schema().empty_table(), base=head, info=info), labelled
@@ -100,7 +100,7 @@ def put(
 def _check_types(
     present: Mapping[str, Mapping[str, Value]], values: Mapping[str, Value | None], *, except_of: Collection[str]
 ) -> None:
-    """Whether a name keeps its type; that of artifacts which are labelled anew does not count.
+    """Checks whether a name keeps its type; that of artifacts which are labelled anew does not count.
 
     Raises:
         ConflictError: it does not.
@@ -118,31 +118,31 @@ def _check_types(
 
 
 def _check_case(fresh: Collection[str], present: Mapping[str, Mapping[str, Value]]) -> None:
-    """Whether all names, new ones and those that artifacts have, are other columns in SQL: it ignores capitals.
+    """Checks whether all names, new ones and those that artifacts have, are other columns in SQL: it ignores capitals.
 
     Raises:
         ConflictError: they are not.
     """
-    known = {name.lower(): name for name in sorted(fresh)}
+    names_by_lower = {name.lower(): name for name in sorted(fresh)}
     for name in {name: None for labels in present.values() for name in labels} | dict.fromkeys(sorted(fresh)):
-        other = known.setdefault(name.lower(), name)
-        if other != name:
+        first_name = names_by_lower.setdefault(name.lower(), name)
+        if first_name != name:
             raise ConflictError(
-                f"the labels {name} and {other} are one column in SQL, which takes capitals for small letters",
-                where=other,
+                f"the labels {name} and {first_name} are one column in SQL, which takes capitals for small letters",
+                where=first_name,
                 fix="keep one of the two names" + _taking_off(name, present),
             )
 
 
 def _taking_off(name: str, present: Mapping[str, Mapping[str, Value]]) -> str:
-    """How a label is taken off the artifacts that have it, if any do."""
+    """Explains how a label is taken off the artifacts that have it, if any do."""
     holders = [artifact for artifact, labels in present.items() if name in labels]
     rest = f"; then repeat this, for the rest of the {len(holders)}" if len(holders) > _NAMED else ""
     return f"; flagdata label {' '.join(holders[:_NAMED])} {name}= takes the other off{rest}" if holders else ""
 
 
 def kind(value: Value) -> str:
-    """The type of a label's value in words."""
+    """Names the type of a label's value in words."""
     return "truth value" if isinstance(value, bool) else "text" if isinstance(value, str) else "number"
 
 
@@ -150,9 +150,9 @@ def columns(catalog: pa.Table) -> dict[str, pa.Array]:
     """Name of a column → the values of the rows of a table, null where a row has no such label."""
     labels = labels_of(catalog)
     ids = catalog["artifact"].to_pylist()
-    shown = {artifact: labels[artifact] for artifact in ids if artifact in labels}
-    _check_case((), shown)
-    names = sorted({name for own in shown.values() for name in own})
+    labels_of_rows = {artifact: labels[artifact] for artifact in ids if artifact in labels}
+    _check_case((), labels_of_rows)
+    names = sorted({name for labels_of_row in labels_of_rows.values() for name in labels_of_row})
     return {PREFIX + name: _column([labels.get(artifact, {}).get(name) for artifact in ids]) for name in names}
 
 

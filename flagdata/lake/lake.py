@@ -33,13 +33,13 @@ from flagdata.storage import Place, RemotePath
 
 
 def check_reuse(lake: Store, name: str, view: View) -> None:
-    """Whether a tag may have a name: one that was published and deleted never shows anything else.
+    """Checks whether a tag may have a name: one that was published and deleted never shows anything else.
 
     Raises:
         ConflictError: a deleted tag of that name showed other artifacts.
     """
     for removal in removals(lake.catalog.history()):
-        if removal.deleted == f"tag {name}" and _shown(lake, removal.view) != _shown(lake, view):
+        if removal.deleted == f"tag {name}" and _quoted(lake, removal.view) != _quoted(lake, view):
             raise ConflictError(
                 f"a tag {name!r} showed other artifacts until it was deleted",
                 where=str(lake.path),
@@ -47,7 +47,7 @@ def check_reuse(lake: Store, name: str, view: View) -> None:
             )
 
 
-def _shown(lake: Store, view: View) -> set[str]:
+def _quoted(lake: Store, view: View) -> set[str]:
     return set(lake.table(view)["artifact"].to_pylist())
 
 
@@ -91,11 +91,11 @@ class Lake(Store):
         return lake
 
     def _entries(self) -> list[Place]:
-        """What lies in the lake's folder, without what `files.is_beside`."""
+        """Lists what lies in the lake's folder, without what `files.is_beside`."""
         return [entry for entry in self.path.iterdir() if not is_beside(entry.name)]
 
     def _taken(self) -> ConflictError:
-        """The error for a lake that cannot be made since something is there."""
+        """Returns the error for a lake that cannot be made since something is there."""
         where = str(self.path)
         if (self.path / _MARKER).exists():
             return ConflictError("there is a lake already", where=where, fix="choose an empty or new folder")
@@ -109,12 +109,13 @@ class Lake(Store):
         return ConflictError("there is something else already", where=where, fix="choose an empty or new folder")
 
     def _is_occupied(self) -> bool:
-        """Whether anything is there but, in a bucket, what a process left that was killed while it made a lake."""
+        """Checks whether anything is there but, in a bucket, what a process left that was killed while it made a
+        lake."""
         if isinstance(self.staging, RemotePath):
-            others = any(entry != self.staging for entry in self._entries())
-            return others and not TimedLocks(self.staging).unfinished(done=self.path / _MARKER)
-        there = self.path.exists() and not self.path.is_dir()
-        return there or (self.path.is_dir() and any(self._entries()))
+            has_more = any(entry != self.staging for entry in self._entries())
+            return has_more and not TimedLocks(self.staging).unfinished(done=self.path / _MARKER)
+        is_file = self.path.exists() and not self.path.is_dir()
+        return is_file or (self.path.is_dir() and any(self._entries()))
 
     def _clear(self) -> None:
         """Delete what such a process left; nothing but the claim of this one is there then."""
@@ -124,7 +125,7 @@ class Lake(Store):
                     entry.unlink()
 
     def _claim(self) -> bool:
-        """Whether this process makes the lake: the one that succeeds in making its staging."""
+        """Checks whether this process makes the lake: the one that succeeds in making its staging."""
         if isinstance(self.staging, RemotePath):
             self.check_writable()
             return TimedLocks(self.staging).claimed(done=self.path / _MARKER)
@@ -146,7 +147,7 @@ class Lake(Store):
 
     @classmethod
     def open(cls, path: Place | str) -> Lake:
-        """The lake in the folder `path`, or at `s3://bucket/prefix`.
+        """Opens the lake in the folder `path`, or at `s3://bucket/prefix`.
 
         Raises:
             NotFoundError: no lake there.
@@ -194,7 +195,8 @@ class Lake(Store):
         put_if_absent(self.path / _MARKER, (json.dumps(marker, indent=2) + "\n").encode())
 
     def transaction(self, message: str, *, branch: str = MAIN) -> Transaction:
-        """A context manager: collects objects and rows, publishes all when its block ends, nothing when that raises.
+        """Opens a context manager that collects objects and rows, publishes all when its block ends, nothing when that
+        raises.
 
         Raises:
             NotFoundError: no such branch.
@@ -204,7 +206,7 @@ class Lake(Store):
         return Transaction(self, message, branch=branch)
 
     def object_path(self, object: str) -> Path:  # noqa: A002 — the catalog's name for it
-        """Where an object lies: a file for "mcap/…", a folder for "zarr/…".
+        """Returns where an object lies: a file for "mcap/…", a folder for "zarr/…".
 
         Raises:
             InputError: not an object's name.
@@ -216,7 +218,8 @@ class Lake(Store):
             raise explained(self, object, error) from None
 
     def record_place(self, object: str) -> Place:  # noqa: A002 — the catalog's name for it
-        """Where `flagdata.record.Record.open` reads a record from: of a large one in a bucket the parts that are used.
+        """Returns where `flagdata.record.Record.open` reads a record from: of a large one in a bucket the parts that
+        are used.
 
         Raises:
             InputError, NotFoundError: as `object_path`.
@@ -227,8 +230,8 @@ class Lake(Store):
             raise explained(self, object, error) from None
 
     def openers(self, objects: Sequence[str]) -> tuple[Callable[[], Place], ...]:
-        """For each record a function that gives its place as `record_place` does, when it is needed; workers that read
-        records take these with them.
+        """Returns for each record a function that gives its place as `record_place` does, when it is needed; workers
+        that read records take these with them.
 
         Raises:
             NotFoundError: as `object_path`.
@@ -240,7 +243,7 @@ class Lake(Store):
             raise explained(self, name, error) from None
 
     def whole_object(self, object: str) -> Path:  # noqa: A002 — the catalog's name for it
-        """Where an object lies, once its bytes have been compared with its name.
+        """Returns where an object lies, once its bytes have been compared with its name.
 
         Raises:
             NotFoundError: as `object_path`.
@@ -253,7 +256,7 @@ class Lake(Store):
             raise explained(self, object, error) from None
 
     def resolve(self, at: str | None) -> int:
-        """The Delta version a ref stands for (for a tag of a branch, the branch's).
+        """Returns the Delta version a ref stands for (for a tag of a branch, the branch's).
 
         Raises:
             NotFoundError: no such ref.
@@ -381,7 +384,7 @@ class Lake(Store):
 
 @contextmanager
 def _readable(marker: Place) -> Iterator[None]:
-    """What the system refuses, but that the marker is absent, is a clear error."""
+    """Turns what the system refuses, but that the marker is absent, into a clear error."""
     try:
         yield
     except (FileNotFoundError, NotADirectoryError):
@@ -393,22 +396,22 @@ def _readable(marker: Place) -> Iterator[None]:
 
 def _usable(path: Place | str) -> Place:
     try:
-        place = lake_place(path)
-        if isinstance(place, RemotePath):
-            return place
-        whole = place.resolve()
+        location = lake_place(path)
+        if isinstance(location, RemotePath):
+            return location
+        absolute = location.resolve()
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a null byte
-        raise UsageError(f"not a path: {error}", where=repr(str(path)), fix="name another folder") from None
-    if _UNUSABLE.search(str(whole)):
+        raise UsageError(f"this is not a path: {error}", where=repr(str(path)), fix="name another folder") from None
+    if _UNUSABLE.search(str(absolute)):
         raise UsageError(
             "the path of a lake cannot have a backslash, or a byte that is not UTF-8",
-            where=str(whole).encode(errors="backslashreplace").decode(),
+            where=str(absolute).encode(errors="backslashreplace").decode(),
             fix="rename the folder",
         )
-    if unquote(str(whole)) != str(whole):  # deltalake 1.6 decodes such a path twice, and looks elsewhere
+    if unquote(str(absolute)) != str(absolute):  # deltalake 1.6 decodes such a path twice, and looks elsewhere
         raise UsageError(
             "the path of a lake cannot have a percent sign before two hexadecimal digits",
-            where=str(whole),
+            where=str(absolute),
             fix="rename the folder",
         )
-    return whole
+    return absolute

@@ -27,20 +27,20 @@ from flagdata.storage.refusals import DeniedError
 
 @cache
 def probe(folder: RemotePath) -> None:
-    """Put one object twice in `folder`, each time only if its name is free, and replace it by a version it has not:
+    """Puts one object twice in `folder`, each time only if its name is free, and replaces it by a version it has not:
     once a process and folder.
 
     Raises:
         RefusedError: the store did what it was asked not to do.
         FlagdataError: it cannot be written to.
     """
-    place = folder / f"probe-{uuid.uuid4().hex}"
+    probe_object = folder / f"probe-{uuid.uuid4().hex}"
     try:
-        first = place.create(b"1")
-        twice = place.create(b"2")
-        swapped = place.replace_if('"00000000000000000000000000000000"', b"3") is not None
-        there = place.read_bytes()
-        place.unlink()
+        first = probe_object.create(b"1")
+        twice = probe_object.create(b"2")
+        swapped = probe_object.replace_if('"00000000000000000000000000000000"', b"3") is not None
+        content = probe_object.read_bytes()
+        probe_object.unlink()
     except DeniedError as error:
         raise FlagdataError(
             f"this lake can be read, but not written: {error.strerror}", where=str(folder.parent), fix=error.fix
@@ -51,7 +51,7 @@ def probe(folder: RemotePath) -> None:
             where=str(folder.parent),
             fix=f"{error.fix}, then try again",
         ) from None
-    if not first or twice or swapped or there != b"1":
+    if not first or twice or swapped or content != b"1":
         raise RefusedError(
             "the store ignores the conditions of puts, so that writers would lose each other's commits",
             where=str(folder.parent),
@@ -73,7 +73,7 @@ class LinkError(CorruptError):
 
 
 def check_own(root: Place) -> None:
-    """Whether all folders of the lake at `root`, a path without links, are folders of the lake itself.
+    """Checks whether all folders of the lake at `root`, a path without links, are folders of the lake itself.
 
     Raises:
         LinkError: one is a link, or no folder.
@@ -90,8 +90,8 @@ def check_own(root: Place) -> None:
 
 
 def check_writable(root: Place) -> None:
-    """Whether this process may write in the lake at `root`: of a disk, as far as that can be said without writing; of
-    a bucket, see `flagdata.lake.layout`.
+    """Checks whether this process may write in the lake at `root`: of a disk, as far as that can be said without
+    writing; of a bucket, see `flagdata.lake.layout`.
 
     Raises:
         LinkError: as `check_own`.
@@ -115,7 +115,7 @@ def check_writable(root: Place) -> None:
 
 
 def scratch_files(root: Place) -> Sequence[Place]:
-    """What a process left that died while it put a file: the marker, a ref, a mark."""
+    """Lists what a process left that died while it put a file: the marker, a ref, a mark."""
     if isinstance(root, RemotePath):
         return []
     folders = [root, *(root / name for name in _NOTES)]

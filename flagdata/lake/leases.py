@@ -60,12 +60,12 @@ class Lease:
         return self._note.folder if isinstance(self._note, FileNote) else self._local.folder  # type: ignore[union-attr]
 
     def hold(self, object_name: str) -> None:
-        """Note that the transaction relies on the object; no collection that has not seen it runs afterwards."""
+        """Notes that the transaction relies on the object; no collection that has not seen it runs afterwards."""
         self._note.append(object_name)
 
     @contextmanager
     def keeping_collectors_out(self) -> Iterator[Check]:
-        """No collection runs during the block; the check is of the lease, too."""
+        """Keeps collections from running during the block; the check is of the lease, too."""
         with self._locks.sharing() as check:
 
             def check_both() -> None:
@@ -82,7 +82,7 @@ class Lease:
 
 
 def _scratch() -> Path:
-    """Where this machine's transactions write what goes into buckets; what those left that died is deleted."""
+    """Returns where this machine's transactions write what goes into buckets; what those left that died is deleted."""
     folder = user_cache() / "staging"
     folder.mkdir(parents=True, exist_ok=True)
     with collecting(folder):
@@ -93,23 +93,24 @@ def _scratch() -> Path:
 
 
 def keeping_collectors_out(staging: Place) -> AbstractContextManager[Check]:
-    """No collection runs during the block; any number of writers may."""
+    """Keeps collections from running during the block; any number of writers may."""
     return locks_of(staging).sharing()
 
 
 def collecting(staging: Place) -> AbstractContextManager[Check]:
-    """No transaction starts, puts an object, commits or ends, and no ref is made, during the block."""
+    """Keeps transactions from starting, putting an object, committing or ending, and refs from being made, during the
+    block."""
     return locks_of(staging).alone()
 
 
 def looking(staging: Place) -> AbstractContextManager[object]:
-    """Staging is looked at: on a disk, where folders appear before their leases do, none is being made meanwhile; in a
-    bucket each entry shows whole, so that no lock is put for which the keys would have to permit writing."""
+    """Allows a look at staging: on a disk, where folders appear before their leases do, none is being made meanwhile;
+    in a bucket each entry shows whole, so that no lock is put for which the keys would have to permit writing."""
     return nullcontext() if isinstance(staging, RemotePath) else collecting(staging)
 
 
 def leases(staging: Place) -> list[LeaseState]:
-    """All staging folders, by name."""
+    """Lists all staging folders, by name."""
     states, locks = [], locks_of(staging)
     for folder in sorted(path for path in _entries(staging) if _is_folder(path)):  # type: ignore[type-var]
         if folder.name == SHARED or is_beside(folder.name):
@@ -136,7 +137,7 @@ def unleased(staging: Place) -> list[Place]:
 
 
 def _entries(staging: Place) -> list[Place]:
-    """What lies in staging; nothing in a copy of a lake that came without its empty folders."""
+    """Lists what lies in staging; nothing in a copy of a lake that came without its empty folders."""
     try:
         return list(staging.iterdir())
     except FileNotFoundError:
@@ -144,10 +145,10 @@ def _entries(staging: Place) -> list[Place]:
 
 
 def last_written(path: Place) -> float:
-    """When a file, or anything in a folder, was written last [s since 1970]."""
+    """Returns when a file, or anything in a folder, was written last [s since 1970]."""
     inside = path.rglob("*") if _is_folder(path) else ()
-    own = () if isinstance(path, RemotePath) and inside else (path,)
-    return max((entry.lstat().st_mtime for entry in (*own, *inside)), default=0.0)  # its owner has just removed it
+    itself = () if isinstance(path, RemotePath) and inside else (path,)
+    return max((entry.lstat().st_mtime for entry in (*itself, *inside)), default=0.0)  # its owner has just removed it
 
 
 def _is_folder(path: Place) -> bool:

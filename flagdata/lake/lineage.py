@@ -26,7 +26,7 @@ Life = tuple[str, int]
 
 
 def noted_labels(entry: Entry) -> Mapping[str, Mapping[str, Any]]:
-    """The artifacts that a commit put labels on → name → value, `None` where it takes one off.
+    """Maps the artifacts that a commit put labels on to name → value, `None` where it takes one off.
 
     Raises:
         CorruptError: the note cannot be read.
@@ -34,7 +34,7 @@ def noted_labels(entry: Entry) -> Mapping[str, Mapping[str, Any]]:
     with _reading(entry):
         noted = {artifact: dict(values.items()) for artifact, values in from_json(entry[LABELS]).items()}
         if any(isinstance(value, list | dict) for values in noted.values() for value in values.values()):
-            raise ValueError("no value of a label")
+            raise ValueError("the value of a label is a list or table")
         return noted
 
 
@@ -106,7 +106,7 @@ class Removal:
         with _reading(self.entry):
             noted = dict(from_json(self.entry.get("erased", "{}")).items())
             if not all(name is None or isinstance(name, str) for name in noted.values()):
-                raise ValueError("no name of an object")
+                raise ValueError("the name of an object is not a text")
             return noted
 
     @property
@@ -157,8 +157,8 @@ class Lineage:
         self._forks = {**forks, MAIN: ()}
 
     def fork(self, part: Slice) -> View | None:
-        """What the branch that had a name at a version began from; nothing for main, and `None` where its ref is lost:
-        it is not there, though nobody deleted it."""
+        """Finds what the branch that had a name at a version began from; nothing for main, and `None` where its ref is
+        lost: it is not there, though nobody deleted it."""
         later = (entry for entry in self._entries.get(part.branch, ()) if entry["version"] > part.version)
         for entry in later:
             if "deleted" in entry:
@@ -166,7 +166,7 @@ class Lineage:
         return self._forks.get(part.branch)
 
     def view(self, part: Slice) -> View:
-        """What a branch shows at a version.
+        """Finds what a branch shows at a version.
 
         Raises:
             NotFoundError: its ref is lost.
@@ -177,12 +177,13 @@ class Lineage:
         return (part, *fork)
 
     def life(self, part: Slice) -> Life:
-        """Which of the branches of that name had it at a version."""
+        """Finds which of the branches of that name had it at a version."""
         deleted = (e["version"] for e in self._entries.get(part.branch, ()) if "deleted" in e)
         return (part.branch, max((version for version in deleted if version <= part.version), default=-1))
 
     def commits(self, part: Slice) -> Sequence[Entry]:
-        """The commits of a branch up to a version, oldest first; those of an earlier one of that name are not its."""
+        """Lists the commits of a branch up to a version, oldest first; those of an earlier one of that name are not
+        its."""
         begin = self.life(part)[1]
         return [e for e in self._entries.get(part.branch, ()) if begin < e["version"] <= part.version]
 
@@ -197,35 +198,37 @@ class Lineage:
             CorruptError: what a commit notes cannot be read.
         """
         labelled = [e for entries in self._entries.values() for e in entries if LABELS in e]
-        known = self._known(part) if labelled else {}
+        newest_versions = self._newest(part) if labelled else {}
         labels: dict[str, dict[str, Any]] = {}
         for entry in sorted(labelled, key=lambda entry: entry["version"]):
             life = self.life(Slice(branch=entry["branch"], version=entry["version"]))
-            for artifact, values in noted_labels(entry).items() if entry["version"] <= known.get(life, -1) else ():
+            for artifact, values in (
+                noted_labels(entry).items() if entry["version"] <= newest_versions.get(life, -1) else ()
+            ):
                 merged = {**labels.get(artifact, {}), **values}
                 labels[artifact] = {name: value for name, value in merged.items() if value is not None}
         return {artifact: values for artifact, values in labels.items() if values}
 
-    def knows(self, part: Slice, other: Slice) -> bool:
-        """Whether all commits that went into `other` went into `part` too."""
-        known = self._known(part)
-        return all(known.get(life, -1) >= version for life, version in self._known(other).items())
+    def knows(self, part: Slice, other_part: Slice) -> bool:
+        """Checks whether all commits that went into `other_part` went into `part` too."""
+        newest_versions = self._newest(part)
+        return all(newest_versions.get(life, -1) >= version for life, version in self._newest(other_part).items())
 
-    def merge_base(self, one: Slice, other: Slice) -> Slice | None:
-        """What two branches last had in common: of the branches whose commits went into both, the one that took in most
-        of the others; `None` where they share no commit."""
-        first, second = self._known(one), self._known(other)
+    def merge_base(self, first_part: Slice, second_part: Slice) -> Slice | None:
+        """Finds what two branches last had in common: of the branches whose commits went into both, the one that took
+        in most of the others; `None` where they share no commit."""
+        first, second = self._newest(first_part), self._newest(second_part)
         common = {life: min(first[life], second[life]) for life in first.keys() & second.keys()}
         points = [Slice(branch=branch, version=version) for (branch, _), version in common.items()]
 
         def rank(point: Slice) -> tuple[int, int]:
-            known = self._known(point)
-            return sum(known.get(life, -1) >= version for life, version in common.items()), point.version
+            newest_versions = self._newest(point)
+            return sum(newest_versions.get(life, -1) >= version for life, version in common.items()), point.version
 
         return max(points, key=rank, default=None)
 
-    def _known(self, part: Slice) -> dict[Life, int]:
-        """Each branch whose commits went into `part` → the newest of these."""
+    def _newest(self, part: Slice) -> dict[Life, int]:
+        """Maps each branch whose commits went into `part` to the newest of these."""
         newest: dict[Life, int] = {}
         begun: set[Life] = set()
         parts = [part]

@@ -107,22 +107,22 @@ class KernelLocks:
 
     @contextmanager
     def sharing(self) -> Iterator[Check]:
-        """See `Locks.sharing`."""
+        """Shares the lock, see `Locks.sharing`."""
         with self._locked(fcntl.LOCK_SH):
             yield _sure
 
     @contextmanager
     def alone(self) -> Iterator[Check]:
-        """See `Locks.alone`."""
+        """Takes the lock alone, see `Locks.alone`."""
         with self._locked(fcntl.LOCK_EX):
             yield _sure
 
     def note(self) -> FileNote:
-        """See `Locks.note`."""
+        """Makes a note, see `Locks.note`."""
         return FileNote(self)
 
     def lines(self, folder: Path) -> tuple[list[str], bool]:
-        """See `Locks.lines`."""
+        """Reads the lines of a note, see `Locks.lines`."""
         with _plain(folder / LEASE) as file:
             alive = not _try_lock(file.fileno())
             return file.read().splitlines(), alive
@@ -131,10 +131,10 @@ class KernelLocks:
     def _locked(self, mode: int) -> Iterator[None]:
         """Takes the lock behind a turnstile: a process that waits for it holds the turnstile, so that a stream of
         shared holders cannot keep an exclusive one out for ever. Not to be nested."""
-        with ExitStack() as held:
+        with ExitStack() as stack:
             with _opened(self.staging / TURN) as turn:
                 fcntl.flock(turn, fcntl.LOCK_EX)
-                lock = held.enter_context(_opened(self.staging / COLLECT))
+                lock = stack.enter_context(_opened(self.staging / COLLECT))
                 fcntl.flock(lock, mode)
             yield
 
@@ -166,7 +166,7 @@ class FileNote:
             self._line(line)
 
     def check(self) -> None:
-        """The kernel keeps a lock until it is given up."""
+        """Checks nothing: the kernel keeps a lock until it is given up."""
 
     def close(self) -> None:
         """Takes the lease away, and its folder."""
@@ -182,7 +182,7 @@ class FileNote:
 
 
 def _sure() -> None:
-    """The kernel keeps a lock until it is given up."""
+    """Checks nothing: the kernel keeps a lock until it is given up."""
 
 
 def _try_lock(descriptor: int) -> bool:
@@ -202,7 +202,7 @@ def _opened(path: Path) -> IO[str]:
 
 
 def _plain(path: Path) -> IO[str]:
-    """A file of staging, opened to read; a link is not followed, and a pipe not waited for.
+    """Opens a file of staging to read; a link is not followed, and a pipe not waited for.
 
     Raises:
         LinkError: a link.
@@ -224,38 +224,38 @@ class TimedLocks:
 
     @contextmanager
     def sharing(self) -> Iterator[Check]:
-        """See `Locks.sharing`."""
+        """Shares the lock, see `Locks.sharing`."""
         text = _line(owner())
         for _ in _pauses(self.staging):
-            held = Held(_put(self.staging / SHARED / uuid.uuid4().hex, text), text)
+            lock = Held(_put(self.staging / SHARED / uuid.uuid4().hex, text), text)
             try:
                 if living(self.staging / _EXCLUSIVE, self.staging) is None:
-                    yield held.check
+                    yield lock.check
                     return
             finally:
-                held.close()
+                lock.close()
 
     @contextmanager
     def alone(self) -> Iterator[Check]:
-        """See `Locks.alone`."""
-        place = self.staging / _EXCLUSIVE
+        """Takes the lock alone, see `Locks.alone`."""
+        target = self.staging / _EXCLUSIVE
         text = _line({**owner(), "id": uuid.uuid4().hex})
-        tag = next(tag for _ in _pauses(self.staging) if (tag := _taken(place, text, self.staging)) is not None)
-        held = Held(place, text, e_tag=tag)
+        tag = next(tag for _ in _pauses(self.staging) if (tag := _taken(target, text, self.staging)) is not None)
+        lock = Held(target, text, e_tag=tag)
         try:
             next(None for _ in _pauses(self.staging) if not self._are_shared())
-            held.check()
-            yield held.check
+            lock.check()
+            yield lock.check
         finally:
-            held.close()
+            lock.close()
 
     def note(self) -> TimedNote:
-        """See `Locks.note`."""
+        """Makes a note, see `Locks.note`."""
         text = _line(owner())
         return TimedNote(_put(self.staging / uuid.uuid4().hex / LEASE, text), text)
 
     def lines(self, folder: RemotePath) -> tuple[list[str], bool]:
-        """See `Locks.lines`."""
+        """Reads the lines of a note, see `Locks.lines`."""
         lease = folder / LEASE
         alive = living(lease, self.staging) is not None
         return lease.read_bytes().decode(errors="replace").splitlines(), alive
@@ -269,17 +269,17 @@ class TimedLocks:
 
     def unfinished(self, *, done: Place) -> bool:
         """Returns whether a process began to make the lake and was killed before `done` was there."""
-        made = self.staging / MADE
-        return made.exists() and living(made, self.staging) is None and not done.exists()
+        marker = self.staging / MADE
+        return marker.exists() and living(marker, self.staging) is None and not done.exists()
 
     def _are_shared(self) -> bool:
         """Returns whether anybody has the shared lock; what dead processes left of it is deleted."""
         alive = False
-        for place in (self.staging / SHARED).rglob("*"):
-            if living(place, self.staging) is not None:
+        for shared in (self.staging / SHARED).rglob("*"):
+            if living(shared, self.staging) is not None:
                 alive = True
             else:
-                place.unlink()
+                shared.unlink()
         return alive
 
 
@@ -308,7 +308,7 @@ class Held:
             self._write()
 
     def check(self) -> None:
-        """Whether others still see this.
+        """Checks whether others still see this.
 
         Raises:
             ConflictError: it may not be so, since it could not be written for long.
@@ -359,7 +359,7 @@ class TimedNote(Held):
 
 
 def owner() -> dict[str, Any]:
-    """Who writes: for people, and for other processes of this machine."""
+    """Describes who writes: for people, and for other processes of this machine."""
     return {
         "pid": os.getpid(),
         "host": socket.gethostname(),
@@ -370,41 +370,42 @@ def owner() -> dict[str, Any]:
     }
 
 
-def _taken(place: RemotePath, text: str, staging: RemotePath) -> str | None:
-    """The version of the exclusive lock if it is this process's now: it was free, or its holder is dead."""
+def _taken(lock: RemotePath, text: str, staging: RemotePath) -> str | None:
+    """Returns the version of the exclusive lock if it is this process's now: it was free, or its holder is dead."""
     data = text.encode()
     with suppress(FileNotFoundError):  # somebody gives it up in this moment
-        if place.create(data):
-            return place.stat().e_tag
-        tag = place.stat().e_tag
-        if living(place, staging) is None:
-            return _replaced(place, tag, data)
+        if lock.create(data):
+            return lock.stat().e_tag
+        tag = lock.stat().e_tag
+        if living(lock, staging) is None:
+            return _replaced(lock, tag, data)
     return None
 
 
-def _replaced(place: RemotePath, tag: str | None, data: bytes) -> str | None:
-    """The new version of an object that is replaced if it has that version; `None` where it had another one.
+def _replaced(lock: RemotePath, tag: str | None, data: bytes) -> str | None:
+    """Replaces an object if it has that version, and returns its new one; `None` where it had another one.
 
     A request that is sent again because its first answer was lost finds what itself has put, and counts as done.
     """
-    if (new := place.replace_if(tag, data)) is not None:
+    if (new := lock.replace_if(tag, data)) is not None:
         return new
     with suppress(FileNotFoundError):
-        now = place.stat().e_tag
-        if place.read_bytes() == data:
+        now = lock.stat().e_tag
+        if lock.read_bytes() == data:
             return now
     return None
 
 
 def _pauses(staging: RemotePath) -> Iterator[None]:
-    """Endless tries, the first at once, with waits between them that grow; a wait that becomes long is reported."""
-    wait, begun, said = _FIRST_WAIT, _now(), False
+    """Yields endless tries, the first at once, with waits between them that grow; a wait that becomes long is
+    reported."""
+    wait, begun, is_reported = _FIRST_WAIT, _now(), False
     while True:
         yield
         time.sleep(wait)
         wait = min(2 * wait, _LONGEST_WAIT)
-        if not said and _now() - begun > _SILENT:
-            said = True
+        if not is_reported and _now() - begun > _SILENT:
+            is_reported = True
             _LOG.warning(
                 "flagdata: waiting for another process that uses the lake: it collects, names a version or commits\n"
                 "  where: %s\n  fix:   none needed; if it was killed on another machine, its lock is void after %.0f s",
@@ -413,19 +414,19 @@ def _pauses(staging: RemotePath) -> Iterator[None]:
             )
 
 
-def _put(place: RemotePath, text: str) -> RemotePath:
-    place.write_bytes(text.encode())
-    return place
+def _put(target: RemotePath, text: str) -> RemotePath:
+    target.write_bytes(text.encode())
+    return target
 
 
 def _line(content: dict[str, Any]) -> str:
     return json.dumps(content) + "\n"
 
 
-def living(place: RemotePath, staging: RemotePath) -> dict[str, Any] | None:
-    """The owner of a lock or lease if it counts; None where it is not there, void, or its process has ended."""
+def living(lock: RemotePath, staging: RemotePath) -> dict[str, Any] | None:
+    """Reads the owner of a lock or lease if it counts; None where it is not there, void, or its process has ended."""
     try:
-        content = from_json(place.read_bytes().decode().split("\n")[0])
+        content = from_json(lock.read_bytes().decode().split("\n")[0])
         life, machine, pid, started = float(content["life"]), content["machine"], content["pid"], content["started"]
         life = min(_LONGEST_LIFE, life)  # also of what is not a number
     except FileNotFoundError:
@@ -435,7 +436,7 @@ def living(place: RemotePath, staging: RemotePath) -> dict[str, Any] | None:
     if machine is not None and machine == _machine() and _started(pid) != started:
         return None
     with suppress(FileNotFoundError):
-        written = RemotePath(place.bucket, place.key).stat().st_mtime
+        written = RemotePath(lock.bucket, lock.key).stat().st_mtime
         if staging.now() - written <= life:
             return content
     return None
@@ -452,7 +453,8 @@ def _now() -> float:
 
 @cache
 def _machine() -> str | None:
-    """This machine since it was started, and the processes that it numbers together; None where it does not say."""
+    """Identifies this machine since it was started, and the processes that it numbers together; None where it does not
+    say."""
     with suppress(OSError):
         boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
         return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
@@ -460,7 +462,7 @@ def _machine() -> str | None:
 
 
 def _started(pid: int) -> int | None:
-    """When a process was started, in ticks since this machine was; None if it has ended."""
+    """Reads when a process was started, in ticks since this machine was; None if it has ended."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         return None if fields[0] in _ENDED else int(fields[19])

@@ -95,11 +95,11 @@ class Log:
         self._put = (-1, "")
 
     def path(self, version: int) -> Place:
-        """Where the entry of a version is."""
+        """Returns where the entry of a version is."""
         return self.folder / _NAME.format(version)
 
     def head(self) -> int:
-        """The newest version.
+        """Finds the newest version.
 
         Raises:
             LogGapError: an entry before it, or one that was acknowledged after it, is missing, or there is none.
@@ -124,7 +124,7 @@ class Log:
         return max(newest, acknowledged)
 
     def _missing(self, present: Mapping[int, object], *, upto: int) -> Iterator[int]:
-        """The versions that have no entry, each looked for as it is asked for."""
+        """Yields the versions that have no entry, each looked for as it is asked for."""
         # A listing may leave out an entry that came while it was made, hence the second look.
         return (version for version in range(upto + 1) if version not in present and not self.path(version).exists())
 
@@ -166,17 +166,17 @@ class Log:
             OSError: what the disk refused; there is no such entry.
         """
         text = "\n".join(json.dumps(action, ensure_ascii=False, separators=(",", ":")) for action in actions)
-        if not put_if_absent(self.path(version), text.encode(), what=f"version {version}"):
+        if not put_if_absent(self.path(version), text.encode(), noun=f"version {version}"):
             return False
         self._put = (version, digest(text))
         return True
 
     def hash(self, version: int) -> str:
-        """SHA-256 of an entry, which is not read if this process has just put it."""
+        """Returns the SHA-256 of an entry, which is not read if this process has just put it."""
         return self._put[1] if self._put[0] == version else file_hash(self.path(version))
 
     def entry(self, version: int) -> tuple[bytes, list[str]]:
-        """The bytes of an entry, and the names of the files that it adds.
+        """Reads the bytes of an entry, and the names of the files that it adds.
 
         Raises:
             CorruptError: it cannot be read.
@@ -184,7 +184,7 @@ class Log:
         return self._text(version).encode(), self._content(version)[0]
 
     def entries(self, versions: Sequence[int], *, head: int) -> list[Entry]:
-        """The entries of consecutive versions, each of which is what the next one, or the mark, says that it is.
+        """Reads the entries of consecutive versions, each of which is what the next one, or the mark, says that it is.
 
         Args:
             head: the newest version of all.
@@ -193,16 +193,16 @@ class Log:
             CorruptError: one cannot be read, or has changed since it was written.
         """
         if isinstance(self.folder, Path) or len(versions) < _AT_ONCE:
-            found = [self._read(version) for version in versions]
+            read_entries = [self._read(version) for version in versions]
         else:
             with ThreadPoolExecutor(_AT_ONCE) as pool:
-                found = list(pool.map(self._read, versions))
-        for version, entry, following in zip(versions, found, found[1:], strict=False):
+                read_entries = list(pool.map(self._read, versions))
+        for version, entry, following in zip(versions, read_entries, read_entries[1:], strict=False):
             if following.info.get(PREVIOUS_HASH, entry.hash) != entry.hash:
                 raise self.disagreeing(version, self.path(version + 1))
-        if versions and versions[-1] == head and self._marked(head) not in (None, found[-1].hash):
+        if versions and versions[-1] == head and self._marked(head) not in (None, read_entries[-1].hash):
             raise self.disagreeing(head, self.marks / str(head))
-        return found
+        return read_entries
 
     def _read(self, version: int) -> Entry:
         text = self._text(version)
@@ -210,14 +210,14 @@ class Log:
         return Entry(files=files, info=info, hash=digest(text))
 
     def _marked(self, version: int) -> str | None:
-        """The SHA-256 of an entry that its mark notes, if there is one."""
+        """Reads the SHA-256 of an entry that its mark notes, if there is one."""
         try:
             return _content_of(self.marks / str(version)).strip() or None
         except FileNotFoundError:  # another commit has just replaced it
             return None
 
     def disagreeing(self, version: int, noting: Place) -> CorruptError:
-        """The error for an entry whose SHA-256 is not the one that the next entry, or its mark, notes."""
+        """Returns the error for an entry whose SHA-256 is not the one that the next entry, or its mark, notes."""
         path = self.path(version)
         fix = f"{COPY_BACK}; if it is the same there, "
         fix += f"delete {noting}" if noting.parent == self.marks else f"that of {noting.name}"
@@ -229,7 +229,7 @@ class Log:
         )
 
     def noted_of(self, version: int, entry: bytes) -> str | None:
-        """The SHA-256 that an entry, which may be of another lake, notes of its file.
+        """Reads the SHA-256 that an entry, which may be of another lake, notes of its file.
 
         Raises:
             CorruptError: it cannot be read.
@@ -239,7 +239,7 @@ class Log:
     def adopt(self, version: int, entry: bytes) -> bool:
         """Put an entry of another lake of the same history; False where there is another one of that version."""
         path = self.path(version)
-        if put_if_absent(path, entry, what=f"version {version}"):
+        if put_if_absent(path, entry, noun=f"version {version}"):
             return True
         return _content_of(path).encode() == entry
 
@@ -262,7 +262,7 @@ class Log:
             raise self.damaged(version) from None
 
     def _text(self, version: int) -> str:
-        """What an entry holds; the Delta library would take an empty one for a commit of nothing."""
+        """Reads what an entry holds; the Delta library would take an empty one for a commit of nothing."""
         try:
             text = _content_of(self.path(version))
         except FileNotFoundError as error:  # a link that leads nowhere
@@ -272,7 +272,7 @@ class Log:
         return text
 
     def damaged(self, version: int) -> CorruptError:
-        """The error of a reader to whom the entry of `version` makes no sense."""
+        """Returns the error of a reader to whom the entry of `version` makes no sense."""
         path = self.path(version)
         fix = "restore it from a copy"
         if version == max(self._present()) and version - 1 == self.acknowledged():  # as a power cut may leave it
@@ -280,7 +280,7 @@ class Log:
         return CorruptError(f"the log entry {path.name} is damaged", where=str(path), fix=fix)
 
     def acknowledge(self, version: int) -> None:
-        """Note for good that the entry of `version` is on the disk; durable when it returns."""
+        """Notes for good that the entry of `version` is on the disk; durable when it returns."""
         self.marks.mkdir(exist_ok=True)
         put_if_absent(self.marks / str(version), f"{self.hash(version)}\n".encode())
         for lower in self._marks():
@@ -288,7 +288,7 @@ class Log:
                 (self.marks / str(lower)).unlink(missing_ok=True)
 
     def acknowledged(self) -> int:
-        """The newest version that was acknowledged; -1 in a lake that has had no commit since marks are made."""
+        """Finds the newest version that was acknowledged; -1 in a lake that has had no commit since marks are made."""
         return max(self._marks(), default=-1)
 
     def checkpoints(self) -> list[int]:
@@ -296,7 +296,7 @@ class Log:
         return [int(match[1]) for name in _sizes_in(self.folder) if (match := _CHECKPOINT(name))]
 
     def _present(self) -> dict[int, int | None]:
-        """Version of each entry → its size, where a listing states it."""
+        """Maps the version of each entry to its size, where a listing states it."""
         sizes = _sizes_in(self.folder)
         for name in sizes.keys() - self._numbers.keys():
             match = _ENTRY(name)
@@ -309,8 +309,8 @@ class Log:
     def _gap(self, missing: Sequence[int], present: Mapping[int, object], *, acknowledged: int) -> LogGapError:
         newest = max(present)
         names = ", ".join(self.path(version).name for version in missing)
-        more = max(newest, acknowledged) + 1 - len(present) - len(missing)
-        message = f"an entry of the catalog's log is missing: {names}{f' and {more} more' if more > 0 else ''}"
+        further = max(newest, acknowledged) + 1 - len(present) - len(missing)
+        message = f"an entry of the catalog's log is missing: {names}{f' and {further} more' if further > 0 else ''}"
         fix = "restore it from a copy, and run neither gc nor another program on the lake before"
         if missing[0] > newest:  # what is left is a whole, older catalog
             mark = next(path for path in self.marks.iterdir() if _MARK(path.name) and int(path.name) == acknowledged)
@@ -323,7 +323,8 @@ class Log:
 
 
 def is_stated(version: object, number: int) -> bool:
-    """Whether this is what `Catalog.history` says of the version of that number, as a file that states it may not."""
+    """Checks whether this is what `Catalog.history` says of the version of that number, as a file that states it may
+    not."""
     if not isinstance(version, dict) or version.get("version") != number:
         return False
     when, files = version.get("timestamp"), version.get("files", [])
@@ -357,7 +358,7 @@ def _sizes_in(folder: Place) -> dict[str, int | None]:
 
 
 def _is_filled(path: Path) -> bool:
-    """Whether there is a file that is not empty."""
+    """Checks whether there is a file that is not empty."""
     try:
         status = path.stat()
     except OSError:
@@ -366,7 +367,7 @@ def _is_filled(path: Path) -> bool:
 
 
 def _content_of(path: Place) -> str:
-    """The text of a file, which is damaged if it is not UTF-8.
+    """Reads the text of a file, which is damaged if it is not UTF-8.
 
     Raises:
         FileNotFoundError: it is not there.
@@ -423,7 +424,7 @@ class Summaries:
         self.covered = 0
 
     def read(self, head: int) -> list[Mapping[str, Any]]:
-        """What is summarised of the versions from 0 on, oldest first, up to `head` at most.
+        """Reads what is summarised of the versions from 0 on, oldest first, up to `head` at most.
 
         Raises:
             CorruptError: a summary that cannot be read, or has changed.
@@ -431,7 +432,7 @@ class Summaries:
         return [version for summary in self._chain(head) for version in summary.versions]
 
     def extend(self, history: Sequence[Mapping[str, Any]], *, checkpoint: str) -> None:
-        """Summarise what is not yet.
+        """Summarises what is not yet.
 
         Args:
             history: all versions, oldest first.
@@ -449,7 +450,9 @@ class Summaries:
         merged = chain[len(chain) - small :] if small >= _MANY else []
         first = covered - sum(len(summary.versions) for summary in merged)
         if first < len(history):
-            noted = {number: made for summary in merged for number, made in summary.checkpoints.items()}
+            noted = {
+                number: checkpoint_hash for summary in merged for number, checkpoint_hash in summary.checkpoints.items()
+            }
             self._put(history, first, {**noted, len(history) - 1: checkpoint})
         for summary in merged:
             (self._folder / summary.name).unlink(missing_ok=True)
@@ -468,7 +471,8 @@ class Summaries:
         put_if_absent(self._folder / f"{first:020d}-{last:020d}-{digest(text)}.json", text.encode())
 
     def _chain(self, head: int) -> list[Summary]:
-        """Summaries of versions from 0 on, each of which goes on from the one before it, the last as the log does."""
+        """Reads summaries of versions from 0 on, each of which goes on from the one before it, the last as the log
+        does."""
         names: dict[int, list[tuple[int, str]]] = {}
         for name in names_in(self._folder):
             first, _, rest = name.partition("-")
@@ -479,11 +483,13 @@ class Summaries:
         following, before = 0, ""
         while following in names:
             read = (self._read(name) for _, name in sorted(names[following], reverse=True))
-            found = next((summary for summary in read if summary is not None and summary.before == before), None)
-            if found is None:
+            summary_found = next(
+                (summary for summary in read if summary is not None and summary.before == before), None
+            )
+            if summary_found is None:
                 break
-            chain.append(found)
-            following, before = following + len(found.versions), found.end
+            chain.append(summary_found)
+            following, before = following + len(summary_found.versions), summary_found.end
         while chain and self._log.hash(following - 1) != chain[-1].end:
             following -= len(chain.pop().versions)
         self.covered = following

@@ -39,24 +39,24 @@ class Marked:
     objects: frozenset[str]
     findings: tuple[Finding, ...]
 
-    def check(self, *more: Finding, outcome: str = "", fix: str | None = None) -> None:
+    def check(self, *further: Finding, outcome: str = "", fix: str | None = None) -> None:
         """Checks that it is known which objects are needed.
 
         Args:
-            more: findings on the catalog's files.
+            further: findings on the catalog's files.
             outcome: what follows, for the message; fix: in place of the remedy of what is damaged.
 
         Raises:
             CorruptError: a ref cannot be read or is lost, or a file is damaged.
         """
-        for finding in (*self.findings, *more):
+        for finding in (*self.findings, *further):
             if finding.severity is Severity.ERROR:
                 message = f"which objects are needed is unknown{outcome}: {finding.what}"
                 raise CorruptError(message, where=finding.where, fix=fix or finding.fix or "run flagdata doctor")
 
 
 def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
-    """Read every ref, and what was shown before each withdrawal and deletion younger than `grace`.
+    """Reads every ref, and what was shown before each withdrawal and deletion younger than `grace`.
 
     Args:
         first: and what any version from this one on shows.
@@ -74,12 +74,12 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
         names = [MAIN, *lake.refs.branches(), *lake.refs.tags()]
     except FlagdataError as error:
         return Marked(refs={}, objects=frozenset(), findings=(_unreadable(error, error.where or "refs"),))
-    kept: list[pa.Table] = []
+    tables: list[pa.Table] = []
     for name in names:
         try:
             view = lake.view(name)
             refs[name] = lake.table(view)
-            kept.append(_unerased(lake, refs[name], view))
+            tables.append(_unerased(lake, refs[name], view))
         except FlagdataError as error:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
@@ -87,12 +87,12 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
         recent = list(_withdrawn(lake, since=lake.now() - grace.total_seconds() if grace else inf, first=first))
     except FlagdataError as error:
         findings.append(_unreadable(error, "recent versions"))
-    objects = {name for table in (*kept, *recent) for name in table["object"].drop_null().to_pylist()}
+    objects = {name for table in (*tables, *recent) for name in table["object"].drop_null().to_pylist()}
     return Marked(refs=refs, objects=frozenset(objects), findings=tuple(findings))
 
 
 def catalog_files(lake: Store) -> tuple[Finding, ...]:
-    """Re-hash the files of the catalog, of all its versions: an error for each that is missing or has changed, a note
+    """Re-hashes the files of the catalog, of all its versions: an error for each that is missing or has changed, a note
     on how many were written before hashes were noted."""
     try:
         hashes = lake.catalog.file_hashes()
@@ -102,7 +102,7 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
     findings = [_damaged("log-damaged", "an entry of the catalog's log has changed", path) for path in changed]
     for path, noted in sorted(hashes.items(), key=lambda item: str(item[0])):
         try:
-            found = file_hash(path)
+            hash_now = file_hash(path)
         except FileNotFoundError:
             findings.append(_damaged("catalog-file-missing", "a file of the catalog is missing", path))
             continue
@@ -110,7 +110,7 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
             message = f"a file of the catalog cannot be read: {error.strerror}"
             findings.append(_damaged("catalog-file-unreadable", message, path))
             continue
-        if noted is not None and found != noted:
+        if noted is not None and hash_now != noted:
             findings.append(_damaged("catalog-file-changed", "a file of the catalog has changed", path))
     unchecked = list(hashes.values()).count(None)
     if unchecked:
@@ -126,11 +126,11 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def _damaged(kind: str, what: str, path: Place) -> Finding:
-    return Finding(kind=kind, severity=Severity.ERROR, what=what, where=str(path), fix=COPY_BACK)
+def _damaged(kind: str, text: str, path: Place) -> Finding:
+    return Finding(kind=kind, severity=Severity.ERROR, what=text, where=str(path), fix=COPY_BACK)
 
 
-def _lost(head: pa.Table, known: list[str], where: str) -> list[Finding]:
+def _lost(head: pa.Table, identities: list[str], where: str) -> list[Finding]:
     rows = Counter(head["branch"].to_pylist())
     return [
         Finding.of(
@@ -142,7 +142,7 @@ def _lost(head: pa.Table, known: list[str], where: str) -> list[Finding]:
             f"pull SOURCE --lake {where}); where there was none, restore refs/branches/{name}.json from a copy",
         )
         for name, count in sorted(rows.items())
-        if name not in known
+        if name not in identities
     ]
 
 
@@ -164,8 +164,10 @@ def _withdrawn(lake: Store, *, since: float, first: int | None) -> Iterator[pa.T
 def _is_recent(lake: Store, removal: Removal, since: float) -> bool:
     """Returns whether rows went since then: as the writer's clock says, or that of the disk or store, since the
     writer's may be behind."""
-    stated = removal.entry["timestamp"] / 1000
-    return bool(stated >= since or (stated >= since - _BEHIND and lake.catalog.written(removal.version) >= since))
+    writers_time = removal.entry["timestamp"] / 1000
+    return bool(
+        writers_time >= since or (writers_time >= since - _BEHIND and lake.catalog.written(removal.version) >= since)
+    )
 
 
 def _unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
@@ -176,6 +178,6 @@ def _unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
 
 
 def _unreadable(error: FlagdataError, where: str) -> Finding:
-    """The finding of what is to blame, where the error names a file, else of what was read."""
+    """Reports what is to blame, where the error names a file, else of what was read."""
     at = error.where or where
     return Finding.of("ref-unreadable", error.what, where=at, fix=error.fix)

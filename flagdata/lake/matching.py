@@ -21,7 +21,7 @@ Where: TypeAlias = str | Values
 
 
 def matching(rows: pa.Table, values: Values) -> pa.Table:
-    """The rows with these values in these columns, in their order; all rows where no column is named.
+    """Selects the rows with these values in these columns, in their order; all rows where no column is named.
 
     Raises:
         UnknownNameError: no such column.
@@ -31,7 +31,7 @@ def matching(rows: pa.Table, values: Values) -> pa.Table:
 
 
 def condition(values: Values) -> pc.Expression:
-    """What rows with these values, at least one, meet.
+    """Builds the condition that rows with these values, at least one, meet.
 
     Raises:
         UnknownNameError, UsageError: as `matching`.
@@ -40,10 +40,10 @@ def condition(values: Values) -> pc.Expression:
 
 
 def made_from(rows: pa.Table, artifacts: Collection[str]) -> pa.Table:
-    """The rows of which some of `artifacts` are parents, in their order."""
+    """Selects the rows of which some of `artifacts` are parents, in their order."""
     parents = rows["parents"].combine_chunks()
-    found = pc.is_in(pc.list_flatten(parents), value_set=pa.array(sorted(artifacts), pa.string()))  # type: ignore[attr-defined]
-    return rows.take(pc.list_parent_indices(parents).filter(found).unique())  # type: ignore[attr-defined]
+    is_made = pc.is_in(pc.list_flatten(parents), value_set=pa.array(sorted(artifacts), pa.string()))  # type: ignore[attr-defined]
+    return rows.take(pc.list_parent_indices(parents).filter(is_made).unique())  # type: ignore[attr-defined]
 
 
 def _condition(column: str, value: object) -> pc.Expression:
@@ -51,10 +51,10 @@ def _condition(column: str, value: object) -> pc.Expression:
         raise UnknownNameError.of("column", column, CATALOG)
     wanted = list(value) if isinstance(value, list | tuple | set | frozenset) else [value]
     try:
-        known = pa.array([one for one in wanted if one is not None], CATALOG[column].type)
+        values = pa.array([value for value in wanted if value is not None], CATALOG[column].type)
     except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError, OverflowError) as error:
         raise UsageError(
             f"the column {column} cannot hold {value!r}: {error}", where=column, fix=f"give {CATALOG[column].type}"
         ) from None
-    condition = pc.field(column).isin(known)
+    condition = pc.field(column).isin(values)
     return condition | pc.field(column).is_null() if None in wanted else condition

@@ -54,7 +54,7 @@ class MergeResult:
 
 
 def merge(lake: Store, branch: str, message: str, *, into: str) -> MergeResult:
-    """See `Lake.merge`."""
+    """Merges a branch, see `Lake.merge`."""
     if not message.strip():
         raise UsageError("the commit has no message", fix="say in a few words what it brings in")
     lake.check_writable()
@@ -67,20 +67,20 @@ def merge(lake: Store, branch: str, message: str, *, into: str) -> MergeResult:
 def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
     head = lake.catalog.head()
     views = {name: lake.refs.view(name, head) for name in (into, branch)}
-    mine, other = (lake.columns(views[name], _COLUMNS) for name in (into, branch))
+    mine, theirs_rows = (lake.columns(views[name], _COLUMNS) for name in (into, branch))
     ours, theirs = Slice(branch=into, version=head), Slice(branch=branch, version=head)
     lineage = lake.lineage()
     if lineage.knows(ours, theirs):
         return MergeResult(version=head, commit=None, left_out={}, brought_back={})
     base = lineage.merge_base(ours, theirs)
     before = frozenset(lake.identities(lineage.view(base)).to_pylist()) if base is not None else frozenset()
-    here, there = _ids(mine), _ids(other)
-    new = there - before
-    left_out, brought_back = _decided(lake, ours, theirs, new - here, since=-1 if base is None else base.version)
-    added, withdrawn = new - here - left_out.keys(), (before - there) & here
+    ids_here, ids_there = _ids(mine), _ids(theirs_rows)
+    new = ids_there - before
+    left_out, brought_back = _decided(lake, ours, theirs, new - ids_here, since=-1 if base is None else base.version)
+    added, withdrawn = new - ids_here - left_out.keys(), (before - ids_there) & ids_here
     fresh = lake.matching(views[branch], {"artifact": sorted(added)})
     _check_objects(lake, fresh)
-    _check_parents(mine, other, added=added, withdrawn=withdrawn, branch=branch, into=into)
+    _check_parents(mine, theirs_rows, added=added, withdrawn=withdrawn, branch=branch, into=into)
 
     commit = f"c{secrets.token_hex(8)}"
     info = {
@@ -99,10 +99,10 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
         version=version,
         commit=commit,
         added=tuple(sorted(added)),
-        existing=tuple(sorted(new & here)),
+        existing=tuple(sorted(new & ids_here)),
         withdrawn=tuple(sorted(withdrawn)),
         left_out=left_out,
-        brought_back={artifact: found for artifact, found in brought_back.items() if artifact in added},
+        brought_back={artifact: version for artifact, version in brought_back.items() if artifact in added},
     )
 
 
@@ -123,8 +123,8 @@ def _published(rows: pa.Table, branch: str) -> pa.Table:
 def _decided(
     lake: Store, ours: Slice, theirs: Slice, candidates: frozenset[str], *, since: int
 ) -> tuple[dict[str, int], dict[str, int]]:
-    """Of new rows of the branch that ours withdrew after `since`: those that stay withdrawn, since the branch had them
-    when that was done, and those that are newer. Each with the version that withdrew it last."""
+    """Decides on new rows of the branch that ours withdrew after `since`: those that stay withdrawn, since the branch
+    had them when that was done, and those that are newer. Each with the version that withdrew it last."""
     lineage = lake.lineage()
     left_out: dict[str, int] = {}
     brought_back: dict[str, int] = {}
@@ -132,14 +132,14 @@ def _decided(
     for removal in reversed(removals(lake.catalog.history())):
         if not (candidates and removal.withdrawn and removal.version > first and removal.branch == ours.branch):
             continue
-        if found := (left(lake, removal).keys() | removal.hidden) & candidates:
+        if removed := (left(lake, removal).keys() | removal.hidden) & candidates:
             then = Slice(branch=theirs.branch, version=max(removal.version, lineage.life(theirs)[1]))
-            had = found & frozenset(lake.identities(lineage.view(then)).to_pylist())
-            for artifact in found:
+            had = removed & frozenset(lake.identities(lineage.view(then)).to_pylist())
+            for artifact in removed:
                 left_out.pop(artifact, None)
                 brought_back.pop(artifact, None)
             left_out |= dict.fromkeys(had, removal.version)
-            brought_back |= dict.fromkeys(found - had, removal.version)
+            brought_back |= dict.fromkeys(removed - had, removal.version)
     return left_out, brought_back
 
 
@@ -150,28 +150,28 @@ def _check_objects(lake: Store, rows: pa.Table) -> None:
 
 
 def _check_parents(
-    mine: pa.Table, other: pa.Table, *, added: frozenset[str], withdrawn: frozenset[str], branch: str, into: str
+    mine: pa.Table, branch_rows: pa.Table, *, added: frozenset[str], withdrawn: frozenset[str], branch: str, into: str
 ) -> None:
-    """Whether each row finds what it was made from.
+    """Checks whether each row finds what it was made from.
 
     Raises:
         ConflictError: one would lack a parent that was withdrawn on the other side.
         NotFoundError: one lacks a parent on its own branch already.
     """
     after = (_ids(mine) - withdrawn) | added
-    known = _ids(other)
-    for row in matching(other, {"artifact": list(added)}).to_pylist():
+    ids_on_branch = _ids(branch_rows)
+    for row in matching(branch_rows, {"artifact": list(added)}).to_pylist():
         for parent in row["parents"]:
             if parent not in after:
                 message = f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}"
-                if parent not in known:
+                if parent not in ids_on_branch:
                     raise NotFoundError(
                         f"{message}, a parent that is not there", where=f"branch {branch}", fix="run flagdata doctor"
                     )
                 raise ConflictError(
                     f"{message}, which was withdrawn from {into!r}",
                     where=f"branch {branch}",
-                    fix=_apart(parent, gone=into, there=branch),
+                    fix=_ways_to_agree(parent, gone=into, branch=branch),
                 )
     for row in made_from(mine, withdrawn).to_pylist():
         for parent in row["parents"]:
@@ -180,14 +180,14 @@ def _check_parents(
                     f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}, which was withdrawn"
                     f" from {branch!r}",
                     where=f"branch {into}",
-                    fix=_apart(parent, gone=branch, there=into),
+                    fix=_ways_to_agree(parent, gone=branch, branch=into),
                 )
 
 
-def _apart(parent: str, *, gone: str, there: str) -> str:
-    """How two branches agree again on an artifact that one withdrew and the other made something from."""
+def _ways_to_agree(parent: str, *, gone: str, branch: str) -> str:
+    """Explains how two branches agree again on an artifact that one withdrew and the other made something from."""
     return (
-        f"flagdata withdraw {parent} --with-descendants --branch {there} -m {shlex.quote(f'as on {gone}')}, or ingest "
+        f"flagdata withdraw {parent} --with-descendants --branch {branch} -m {shlex.quote(f'as on {gone}')}, or ingest "
         f"its source again with --branch {gone}"
     )
 
@@ -208,7 +208,7 @@ class Difference:
 
 
 def difference(lake: Store, before: str | None, after: str | None) -> Difference:
-    """What `after` shows that `before` does not, and the other way round; rows are compared by identity.
+    """Finds what `after` shows that `before` does not, and the other way round; rows are compared by identity.
 
     Raises:
         NotFoundError: no such ref.
@@ -224,8 +224,8 @@ def difference(lake: Store, before: str | None, after: str | None) -> Difference
 
 
 def added_since(lake: Store, branch: str) -> Callable[[], str]:
-    """What a branch has gained since this call, in words, such as "on branch main: camera 2, recording 1"; "" if
-    nothing. For `flagdata.console.in_steps`.
+    """Returns a call that says what a branch has gained since, in words, such as "on branch main: camera 2, recording
+    1"; "" if nothing. For `flagdata.console.in_steps`.
 
     Raises:
         NotFoundError: no such branch.
@@ -240,10 +240,10 @@ def added_since(lake: Store, branch: str) -> Callable[[], str]:
     return words
 
 
-def _without(table: pa.Table, other: pa.Table) -> pa.Table:
-    known = set(other["artifact"].to_pylist())
+def _without(table: pa.Table, other_table: pa.Table) -> pa.Table:
+    identities = set(other_table["artifact"].to_pylist())
     return table.filter(
-        pa.array([identity not in known for identity in table["artifact"].to_pylist()], type=pa.bool_())
+        pa.array([identity not in identities for identity in table["artifact"].to_pylist()], type=pa.bool_())
     )
 
 

@@ -79,7 +79,7 @@ class _Moving(ABC):
 
     @abstractmethod
     def frame(self, index: int) -> Mesh:
-        """The mesh at one time; negative indices count from the end."""
+        """Returns the mesh at one time; negative indices count from the end."""
 
     def __len__(self) -> int:
         return len(self.time)
@@ -126,7 +126,7 @@ class MeshSequence(_Moving):
         _check_faces(self.faces, self.positions.shape[1], "faces")
 
     def frame(self, index: int) -> Mesh:
-        """The mesh at one time; negative indices count from the end."""
+        """Returns the mesh at one time; negative indices count from the end."""
         return Mesh(time=int(self.time[index]), positions=self.positions[index], faces=self.faces, rest=self.rest)
 
 
@@ -162,11 +162,11 @@ class RaggedMeshSequence(_Moving):
         _check_offsets(self.vertex_offset, len(self.time), len(self.positions), "vertex_offset")
         _check_offsets(self.face_offset, len(self.time), len(self.faces), "face_offset")
         for i in range(len(self.time)):
-            own = self.faces[self.face_offset[i] : self.face_offset[i + 1]]
-            _check_faces(own, int(self.vertex_offset[i + 1] - self.vertex_offset[i]), f"faces of frame {i}")
+            frame_faces = self.faces[self.face_offset[i] : self.face_offset[i + 1]]
+            _check_faces(frame_faces, int(self.vertex_offset[i + 1] - self.vertex_offset[i]), f"faces of frame {i}")
 
     def frame(self, index: int) -> Mesh:
-        """The mesh at one time; negative indices count from the end."""
+        """Returns the mesh at one time; negative indices count from the end."""
         i = range(len(self.time))[index]
         vertices = slice(self.vertex_offset[i], self.vertex_offset[i + 1])
         faces = slice(self.face_offset[i], self.face_offset[i + 1])
@@ -250,7 +250,7 @@ def read_meshes(path: Path, *, first: int = 0, count: int | None = None) -> Mesh
 
 
 def open_meshes(path: Path) -> xr.Dataset:
-    """The store as an xarray dataset; arrays are read when they are used. `time` is decoded to datetime64[ns].
+    """Opens the store as an xarray dataset; arrays are read when they are used. `time` is decoded to datetime64[ns].
 
     Raises:
         CorruptError: not such a store, or of a newer format.
@@ -269,21 +269,23 @@ _DAMAGED = "the mesh store is damaged"
 def _open(path: Path) -> zarr.Group:
     import zarr
 
-    with store_errors(path, "not a Zarr store"):
+    with store_errors(path, "this is not a Zarr store"):
         return zarr.open_group(path, mode="r", zarr_format=3)
 
 
-def check_format(head: Any, known: int, path: Path, *, noun: str) -> dict[str, Any]:
-    """The head of a store of meshes or markers in its attributes, of a format that is known.
+def check_format(head: Any, newest_format: int, path: Path, *, noun: str) -> dict[str, Any]:
+    """Reads the head of a store of meshes or markers in its attributes, of a format that is known.
 
     Raises:
         CorruptError: there is none, or it is of a newer format.
     """
     if not isinstance(head, dict) or not isinstance(head.get("format"), int):
-        raise CorruptError(f"a Zarr store, but not of {noun}", where=str(path), fix="open it with zarr or xarray")
-    if head["format"] > known:
         raise CorruptError(
-            f"its format {head['format']} is newer than this flagdata's, {known}",
+            f"this is a Zarr store, but not of {noun}", where=str(path), fix="open it with zarr or xarray"
+        )
+    if head["format"] > newest_format:
+        raise CorruptError(
+            f"its format {head['format']} is newer than this flagdata's, {newest_format}",
             where=str(path),
             fix="install the newer flagdata",
         )
@@ -291,7 +293,7 @@ def check_format(head: Any, known: int, path: Path, *, noun: str) -> dict[str, A
 
 
 def _layout(group: zarr.Group, path: Path) -> str:
-    with store_errors(path, "not a Zarr store"):
+    with store_errors(path, "this is not a Zarr store"):
         head = check_format(group.attrs.get(_HEAD), MESHES_FORMAT, path, noun="meshes")
     if head.get("layout") not in ("fixed", "ragged"):
         raise CorruptError("a Zarr store, but not of meshes", where=str(path), fix="open it with zarr or xarray")
@@ -299,8 +301,8 @@ def _layout(group: zarr.Group, path: Path) -> str:
 
 
 @contextmanager
-def store_errors(path: Path, what: str, *, fix: str = _RESTORE) -> Iterator[None]:
-    """Whatever a damaged or foreign Zarr store makes its reader raise becomes one error.
+def store_errors(path: Path, problem: str, *, fix: str = _RESTORE) -> Iterator[None]:
+    """Turns whatever a damaged or foreign Zarr store makes its reader raise into one error.
 
     Raises:
         CorruptError: for any exception inside the block but a LimitError.
@@ -310,10 +312,10 @@ def store_errors(path: Path, what: str, *, fix: str = _RESTORE) -> Iterator[None
     except (LimitError, CorruptError):
         raise
     except FlagdataError as error:
-        raise CorruptError(f"{what}: {error.what}", where=str(path), fix=fix) from error
+        raise CorruptError(f"{problem}; its reader says: {error.what}", where=str(path), fix=fix) from error
     except Exception as error:
-        said = " ".join(f"{type(error).__name__}: {error}".split())
-        raise CorruptError(f"{what}: {said[:300]}", where=str(path), fix=fix) from error
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise CorruptError(f"{problem}; its reader says: {reason[:300]}", where=str(path), fix=fix) from error
 
 
 def read_part(group: zarr.Group, name: str, first: int | None, last: int | None, *, where: str) -> AnyArray:
@@ -376,8 +378,8 @@ def write_array(group: zarr.Group, name: str, values: AnyArray, dims: tuple[str,
     array[...] = values
 
 
-def _wrong(what: str, wanted: str) -> InputError:
-    return InputError(what, where="mesh sequence", fix=f"give {wanted}")
+def _wrong(problem: str, wanted: str) -> InputError:
+    return InputError(problem, where="mesh sequence", fix=f"give {wanted}")
 
 
 def _check(
@@ -399,11 +401,11 @@ def _check(
         raise _wrong(f"attributes that are not JSON: {error}", "text, finite numbers, lists and mappings") from None
 
 
-def _check_faces(faces: Indices, vertices: int, what: str) -> None:
+def _check_faces(faces: Indices, vertices: int, noun: str) -> None:
     if faces.ndim != 2 or faces.shape[1] != 3:
-        raise _wrong(f"{what} have shape {faces.shape}", "(face, 3)")
+        raise _wrong(f"{noun} have shape {faces.shape}", "(face, 3)")
     if faces.size and not 0 <= int(faces.min()) <= int(faces.max()) < vertices:
-        raise _wrong(f"{what} name vertices outside 0 to {vertices - 1}", "indices into the frame's vertices, from 0")
+        raise _wrong(f"{noun} name vertices outside 0 to {vertices - 1}", "indices into the frame's vertices, from 0")
 
 
 def _check_offsets(offset: Instants, frames: int, total: int, name: str) -> None:
@@ -470,8 +472,8 @@ class MarkerSequence:
         if len(set(self.names)) < markers:
             raise self._wrong("two markers of one name", "give each its own")
 
-    def _wrong(self, what: str, fix: str) -> InputError:
-        return InputError(what, where="markers", fix=fix)
+    def _wrong(self, problem: str, fix: str) -> InputError:
+        return InputError(problem, where="markers", fix=fix)
 
     @property
     def tracked(self) -> int:
@@ -505,7 +507,7 @@ def write_markers(path: Path, sequence: MarkerSequence) -> None:
 
 
 def read_markers(path: Path) -> MarkerSequence:
-    """A stored sequence.
+    """Reads a stored sequence.
 
     Raises:
         CorruptError: not such a store, damaged, or of a newer format.

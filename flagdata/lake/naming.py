@@ -22,14 +22,14 @@ OF_RESULTS = (*COLUMNS, "recipe", "created")
 
 
 def condition(wanted: str) -> pc.Expression:
-    """What all rows meet that `meant` may choose."""
+    """Builds the condition that all rows meet that `meant` may choose."""
     file = PurePath(wanted).name
     begins = pc.starts_with(pc.field("artifact"), wanted)  # type: ignore[attr-defined]
     return begins | (pc.field("name") == wanted) | (pc.field("source_name") == file)
 
 
 def meant(rows: Iterable[Mapping[str, Any]], wanted: str, *, kinds: Collection[Kind] = ()) -> list[Mapping[str, Any]]:
-    """The artifacts that `wanted` may mean: one, or none, or several that nothing decides between.
+    """Selects the artifacts that `wanted` may mean: one, or none, or several that nothing decides between.
 
     An id comes first, then a name, then the file that was ingested, then the beginning of an id. Of several of one
     name those of `kinds` come first; then a clip is not meant beside its recording, nor an artifact beside what was
@@ -40,18 +40,18 @@ def meant(rows: Iterable[Mapping[str, Any]], wanted: str, *, kinds: Collection[K
     """
     rows = [row for row in rows if wanted]
     file = PurePath(wanted).name
-    named = [row for row in rows if row["artifact"] == wanted]
-    named = named or [row for row in rows if row["name"] == wanted]
-    named = named or [row for row in rows if row["source_name"] == file]
-    if not named:
+    matches = [row for row in rows if row["artifact"] == wanted]
+    matches = matches or [row for row in rows if row["name"] == wanted]
+    matches = matches or [row for row in rows if row["source_name"] == file]
+    if not matches:
         return [row for row in rows if row["artifact"].startswith(wanted)]
-    named = [row for row in named if row["kind"] in kinds] or named
-    named = [row for row in named if row["kind"] != Kind.CLIP] or named
-    if len(named) > 1 and "recipe" in named[0]:
-        older = superseded(named)
-        named = [row for row in named if row["artifact"] not in older]
-    parents = {parent for row in named for parent in row["parents"] or ()}
-    return [row for row in named if row["artifact"] not in parents]
+    matches = [row for row in matches if row["kind"] in kinds] or matches
+    matches = [row for row in matches if row["kind"] != Kind.CLIP] or matches
+    if len(matches) > 1 and "recipe" in matches[0]:
+        older = superseded(matches)
+        matches = [row for row in matches if row["artifact"] not in older]
+    parents = {parent for row in matches for parent in row["parents"] or ()}
+    return [row for row in matches if row["artifact"] not in parents]
 
 
 REVISION = "revision"
@@ -60,9 +60,9 @@ it. The models that a verdict left have that of the verdict."""
 
 
 def revised(recipe: Mapping[str, Any]) -> str | None:
-    """Id of the first version of what a row revises; `None` where it revises nothing."""
-    stated = recipe.get(REVISION)
-    return stated.get("of") if isinstance(stated, Mapping) else None
+    """Returns the id of the first version of what a row revises; `None` where it revises nothing."""
+    revision = recipe.get(REVISION)
+    return revision.get("of") if isinstance(revision, Mapping) else None
 
 
 def superseded(rows: Iterable[Mapping[str, Any]]) -> set[str]:
@@ -84,10 +84,10 @@ def superseded(rows: Iterable[Mapping[str, Any]]) -> set[str]:
             newest[of] = max(newest.get(of, row["created"]), row["created"])
     if not newest:
         return set()
-    found: set[str] = set()
+    older: set[str] = set()
     for row in rows:
         artifact = row["artifact"]
-        known = (first[artifact],) if artifact in first else (artifact, *(row["parents"] or ()))
-        if any(newest[one] > row["created"] for one in known if one in newest):
-            found.add(artifact)
-    return found
+        revised_ids = (first[artifact],) if artifact in first else (artifact, *(row["parents"] or ()))
+        if any(newest[identity] > row["created"] for identity in revised_ids if identity in newest):
+            older.add(artifact)
+    return older

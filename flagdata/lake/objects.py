@@ -59,7 +59,7 @@ class Objects:
         self.root = root
 
     def path(self, name: str) -> Place:
-        """Where the object called `name` is, whether or not it is there.
+        """Returns where the object called `name` is, whether or not it is there.
 
         Raises:
             InputError: not an object name; nothing outside the stores can be named.
@@ -70,11 +70,11 @@ class Objects:
         return self.root / path_in_lake(name)
 
     def has(self, name: str) -> bool:
-        """Whether the object is there."""
+        """Checks whether the object is there."""
         return self.path(name).exists()
 
     def existing(self, name: str) -> Path:
-        """Where the object is.
+        """Finds where the object is.
 
         Raises:
             NotFoundError: it is not there.
@@ -85,7 +85,7 @@ class Objects:
         return path
 
     def readable(self, name: str) -> Place:
-        """Where the record called `name` is read from, see `flagdata.record.Record`.
+        """Returns where the record called `name` is read from, see `flagdata.record.Record`.
 
         Raises:
             NotFoundError: it is not there.
@@ -93,7 +93,7 @@ class Objects:
         return self.existing(name)
 
     def openers(self, names: Sequence[str]) -> tuple[Callable[[], Place], ...]:
-        """For each record a function that says where it is read from, which other processes may call, too.
+        """Returns for each record a function that says where it is read from, which other processes may call, too.
 
         Raises:
             NotFoundError: one is not there.
@@ -101,7 +101,7 @@ class Objects:
         return tuple(partial(Path, self.existing(name)) for name in names)
 
     def missing(self, name: str) -> NotFoundError:
-        """The error for an object that is not there."""
+        """Returns the error for an object that is not there."""
         return NotFoundError(f"object {name} is missing", where=str(self.path(name)), fix="run flagdata doctor")
 
     def size(self, name: str) -> int:
@@ -113,14 +113,16 @@ class Objects:
         return size_of(self.existing(name))
 
     def name_of(self, staged: Path) -> str:
-        """The name the content at `staged` will have.
+        """Computes the name the content at `staged` will have.
 
         Raises:
             InputError: neither an .mcap file nor a folder of a known kind, or empty.
         """
         files = files_of(staged)
         if staged.is_file() and staged.suffix != ".mcap":
-            raise InputError("not an .mcap file", where=str(staged), fix="objects are .mcap files and Zarr folders")
+            raise InputError(
+                "this is not an .mcap file", where=str(staged), fix="objects are .mcap files and Zarr folders"
+            )
         if sum(f.stat().st_size for f in files) == 0:
             raise InputError("the object is empty", where=str(staged), fix="write it before putting it")
         store = "mcap" if staged.is_file() else "model" if staged.suffix == STORES["model"] else "zarr"
@@ -166,25 +168,25 @@ class Objects:
         return True
 
     def is_there(self, name: str, size: int | None) -> bool:
-        """Whether the object is there, has `size` bytes if that is known, and was not found damaged before."""
+        """Checks whether the object is there, has `size` bytes if that is known, and was not found damaged before."""
         try:
-            found = self.size(name)
+            stored_size = self.size(name)
         except (NotFoundError, InputError):  # a link in its place
             return False
-        return size in (None, found) and not self._note(name).exists()
+        return size in (None, stored_size) and not self._note(name).exists()
 
     def is_sound(self, name: str, size: int | None) -> bool:
         """As `is_there`, and its bytes are those that its name says."""
         return self.is_there(name, size) and self.is_whole(name)
 
     def unsound(self, sizes: Mapping[str, int | None]) -> frozenset[str]:
-        """Those of many objects, by name with their sizes, that are not as `is_sound` has it."""
+        """Selects those of many objects, by name with their sizes, that are not as `is_sound` has it."""
         with ThreadPoolExecutor(_AT_ONCE) as pool:
             sound = pool.map(lambda name: self.is_sound(name, sizes[name]), sizes)
-            return frozenset(name for name, found in zip(sizes, sound, strict=True) if not found)
+            return frozenset(name for name, is_right in zip(sizes, sound, strict=True) if not is_right)
 
     def note_damage(self, name: str) -> None:
-        """Note beside an object that it was found damaged, so that what makes it again, or has it, replaces it; where
+        """Notes beside an object that it was found damaged, so that what makes it again, or has it, replaces it; where
         the lake can only be read, nothing is noted."""
         with suppress(OSError, FlagdataError):
             self._note(name).write_bytes(b"")
@@ -213,7 +215,7 @@ class Objects:
         return path.parent / f"{path.name}{DAMAGED}"
 
     def is_whole(self, name: str) -> bool:
-        """Whether the object is there and its content hashes to its name."""
+        """Checks whether the object is there and its content hashes to its name."""
         try:
             self.check(name)
         except (NotFoundError, CorruptError):
@@ -221,7 +223,7 @@ class Objects:
         return True
 
     def check(self, name: str) -> None:
-        """Re-hash one object.
+        """Re-hashes one object.
 
         Raises:
             NotFoundError: it is not there.
@@ -230,19 +232,20 @@ class Objects:
         """
         path = self.existing(name)
         try:
-            whole = content_hash(path) == name.partition("/")[2]
+            is_unchanged = content_hash(path) == name.partition("/")[2]
         except InputError:
             raise LinkError(f"{name} is, or holds, a link or special file", where=str(path), fix=REMEDY) from None
-        if not whole:
+        if not is_unchanged:
             raise CorruptError(f"the bytes of {name} have changed since they were written", where=str(path), fix=REMEDY)
 
     def whole(self, name: str) -> Path:
-        """Where the object is, once its bytes have been compared with its name; raises as `check`."""
+        """Returns where the object is, once its bytes have been compared with its name; raises as `check`."""
         self.check(name)
         return self.existing(name)
 
     def __iter__(self) -> Iterator[StoredObject]:
-        """Everything in the stores that has an object's name; a link counts for itself, not for what it leads to."""
+        """Yields everything in the stores that has an object's name; a link counts for itself, not for what it leads
+        to."""
         for store, suffix in STORES.items():
             for path in sorted((self.root / store).glob("*")):
                 name = f"{store}/{path.name.removesuffix(suffix)}"
@@ -261,7 +264,7 @@ class Objects:
 
 
 def path_in_lake(name: str) -> Path:
-    """Where the object called `name` is in a lake, from its root.
+    """Returns where the object called `name` is in a lake, from its root.
 
     Raises:
         InputError: not an object name; nothing outside the stores can be named.
@@ -298,7 +301,7 @@ class RemoteObjects(Objects):
         self._root = root
 
     def path(self, name: str) -> RemotePath:
-        """Where the object called `name` is in the bucket, whether or not it is there.
+        """Returns where the object called `name` is in the bucket, whether or not it is there.
 
         Raises:
             InputError: not an object name.
@@ -306,53 +309,53 @@ class RemoteObjects(Objects):
         return self._root / path_in_lake(name)
 
     def has(self, name: str) -> bool:
-        return self._whole_by(name).exists()
+        return self._put_last(name).exists()
 
     def existing(self, name: str) -> Path:
-        """A local copy of the object.
+        """Returns a local copy of the object.
 
         Raises:
             NotFoundError: it is not there.
             CorruptError: its bytes are not what its name says.
         """
-        place = self.path(name)
-        if (copy := copy_of(name, place.suffix)) is not None:
+        remote = self.path(name)
+        if (copy := copy_of(name, remote.suffix)) is not None:
             return copy
         size = self.size(name)
         try:
-            return fetched(name, place.suffix, size=size, fetch=partial(self._fetch, name), where=str(place))
+            return fetched(name, remote.suffix, size=size, fetch=partial(self._fetch, name), where=str(remote))
         except CorruptError:
             self.note_damage(name)
             raise
 
     def readable(self, name: str) -> Place:
-        """A local copy, or the place in the bucket of a record that is larger than `WHOLE`: of it only what is needed
-        is fetched.
+        """Returns a local copy, or the place in the bucket of a record that is larger than `WHOLE`: of it only what is
+        needed is fetched.
 
         Raises:
             NotFoundError, CorruptError: see `existing`.
         """
-        place = self.path(name)
+        remote = self.path(name)
         if self._copied(name):
             return self.existing(name)
         try:
-            status = place.stat()
+            status = remote.stat()
         except FileNotFoundError:
             raise self.missing(name) from None
         large = status.st_size > WHOLE
-        return RemotePath(place.bucket, place.key, status=status) if large else self.existing(name)
+        return RemotePath(remote.bucket, remote.key, status=status) if large else self.existing(name)
 
     def openers(self, names: Sequence[str]) -> tuple[Callable[[], Place], ...]:
-        """As for a disk; what is needed is fetched once its function was called."""
+        """Returns functions as for a disk; what is needed is fetched once its function was called."""
         if not all(map(self._copied, names)):
-            there = {stored.name for stored in self}
+            stored_names = {stored.name for stored in self}
             for name in names:
-                if name not in there:
+                if name not in stored_names:
                     raise self.missing(name)
         return tuple(partial(self.readable, name) for name in names)
 
     def whole(self, name: str) -> Path:
-        """A local copy, whose bytes are compared with its name again."""
+        """Returns a local copy, whose bytes are compared with its name again."""
         path = self.existing(name)
         if content_hash(path) != name.partition("/")[2]:
             forget(name, path.suffix)
@@ -360,16 +363,16 @@ class RemoteObjects(Objects):
         return path
 
     def size(self, name: str) -> int:
-        place = self.path(name)
+        remote = self.path(name)
         try:
-            if place.suffix == ".mcap":
-                return place.stat().st_size
-            found = {key: status.st_size for key, status in place.names()}
+            if remote.suffix == ".mcap":
+                return remote.stat().st_size
+            sizes = {key: status.st_size for key, status in remote.names()}
         except FileNotFoundError:
             raise self.missing(name) from None
-        if found.pop(SUMS, None) is None:
+        if sizes.pop(SUMS, None) is None:
             raise self.missing(name)
-        return sum(size for key, size in found.items() if not _is_beside(key))
+        return sum(size for key, size in sizes.items() if not _is_beside(key))
 
     def is_sound(self, name: str, size: int | None) -> bool:
         """As `is_there`: to compare the bytes would fetch all of them. What verify or a reader found damaged counts."""
@@ -378,16 +381,16 @@ class RemoteObjects(Objects):
     def unsound(self, sizes: Mapping[str, int | None]) -> frozenset[str]:
         if len(sizes) <= _FEW:
             return super().unsound(sizes)
-        found = {stored.name: stored.size for stored in self}
+        stored_sizes = {stored.name: stored.size for stored in self}
         noted = {path.name for store in STORES for path in (self._root / store).glob(f"*{DAMAGED}")}
         return frozenset(
             name
             for name, size in sizes.items()
-            if name not in found or size not in (None, found[name]) or self._note(name).name in noted
+            if name not in stored_sizes or size not in (None, stored_sizes[name]) or self._note(name).name in noted
         )
 
     def publish(self, staged: Path, name: str) -> bool:
-        """Put `staged`, whose name was computed by `name_of`; durable when it returns.
+        """Puts `staged`, whose name was computed by `name_of`; durable when it returns.
 
         What is there under that name has the same bytes, unless it was damaged, and is put anew: so it counts as young,
         and ingesting again heals a lake.
@@ -395,32 +398,32 @@ class RemoteObjects(Objects):
         Returns:
             whether nothing that `is_sound` was there before.
         """
-        place = self.path(name)
+        remote = self.path(name)
         fresh = not self.is_sound(name, size_of(staged))
         if staged.is_file():
-            place.upload(staged)
+            remote.upload(staged)
         else:
             with ThreadPoolExecutor(_FILES_AT_ONCE) as pool:
-                uploads = [pool.submit((place / file.relative_to(staged)).upload, file) for file in files_of(staged)]
+                uploads = [pool.submit((remote / file.relative_to(staged)).upload, file) for file in files_of(staged)]
                 for upload in uploads:
                     upload.result()
-            (place / SUMS).write_bytes(sums_of(staged).encode())
+            (remote / SUMS).write_bytes(sums_of(staged).encode())
         if fresh:
             self._mended(name)
-        kept(name, place.suffix, staged)
+        kept(name, remote.suffix, staged)
         return fresh
 
     def check(self, name: str) -> None:
-        place = self.path(name)
+        remote = self.path(name)
         if not self.has(name):
             raise self.missing(name)
         try:
-            whole = self._hash(name) == name.partition("/")[2]
+            is_unchanged = self._hash(name) == name.partition("/")[2]
         except FileNotFoundError:
-            whole = False
-        if not whole:
+            is_unchanged = False
+        if not is_unchanged:
             raise CorruptError(
-                f"the bytes of {name} have changed since they were written", where=str(place), fix=REMEDY
+                f"the bytes of {name} have changed since they were written", where=str(remote), fix=REMEDY
             )
 
     def __iter__(self) -> Iterator[StoredObject]:
@@ -446,52 +449,52 @@ class RemoteObjects(Objects):
     def _copied(self, name: str) -> bool:
         return copy_of(name, self.path(name).suffix) is not None
 
-    def _whole_by(self, name: str) -> RemotePath:
-        """What was put last of an object."""
-        place = self.path(name)
-        return place if place.suffix == ".mcap" else place / SUMS
+    def _put_last(self, name: str) -> RemotePath:
+        """Returns what was put last of an object."""
+        remote = self.path(name)
+        return remote if remote.suffix == ".mcap" else remote / SUMS
 
     def _fetch(self, name: str, target: Path) -> None:
-        place = self.path(name)
-        if place.suffix == ".mcap":
-            _download(place, target)
+        remote = self.path(name)
+        if remote.suffix == ".mcap":
+            _download(remote, target)
             return
         target.mkdir()
-        files = self._sums(place)
+        files = self._sums(remote)
         for file in files:
             (target / file).parent.mkdir(parents=True, exist_ok=True)
         with ThreadPoolExecutor(_FILES_AT_ONCE) as pool:
-            list(pool.map(lambda file: _download(place / file, target / file), files))
+            list(pool.map(lambda file: _download(remote / file, target / file), files))
 
-    def _sums(self, place: RemotePath) -> dict[str, str]:
-        """Relative path → SHA-256 of a folder's files.
+    def _sums(self, remote: RemotePath) -> dict[str, str]:
+        """Reads relative path → SHA-256 of a folder's files.
 
         Raises:
             CorruptError: they cannot be read, are not those of its name, or name files outside the folder.
         """
-        stated = (place / SUMS).read_bytes()
+        content = (remote / SUMS).read_bytes()
         try:
-            sums = read_sums(stated.decode())
+            sums = read_sums(content.decode())
         except ValueError:
             sums = None
         if (
             sums is None
-            or hashlib.sha256(stated).hexdigest() != place.stem
+            or hashlib.sha256(content).hexdigest() != remote.stem
             or any("\0" in file or file.startswith("/") or ".." in Path(file).parts for file in sums)
         ):
-            raise CorruptError("the sums of its files are damaged", where=str(place / SUMS), fix=REMEDY)
+            raise CorruptError("the sums of its files are damaged", where=str(remote / SUMS), fix=REMEDY)
         return sums
 
     def _hash(self, name: str) -> str:
-        place = self.path(name)
-        if place.suffix == ".mcap":
-            return _digest(place)
-        text = "".join(f"{_digest(place / file)}  {file}\n" for file in sorted(self._sums(place)))
+        remote = self.path(name)
+        if remote.suffix == ".mcap":
+            return _digest(remote)
+        text = "".join(f"{_digest(remote / file)}  {file}\n" for file in sorted(self._sums(remote)))
         return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _is_beside(key: str) -> bool:
-    """Whether a key is that of the sums, or of what an operating system put beside an object's files."""
+    """Checks whether a key is that of the sums, or of what an operating system put beside an object's files."""
     return any(map(is_beside, key.split("/")))
 
 

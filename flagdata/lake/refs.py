@@ -32,7 +32,7 @@ _SECONDS = {"second": 1, "minute": 60, "hour": 3600, "day": 86_400, "week": 7 * 
 
 
 def moment(text: str, *, now: datetime | None = None) -> int | None:
-    """The instant that a text names [UTC ns]; `None` for what names none.
+    """Reads the instant that a text names [UTC ns]; `None` for what names none.
 
     Args:
         now: from which "ago" counts; the system's clock if `None`.
@@ -91,19 +91,19 @@ View = tuple[Slice, ...]
 
 
 def as_json(view: View) -> list[dict[str, Any]]:
-    """The form in which a view is stored."""
+    """Returns the form in which a view is stored."""
     return [{"branch": part.branch, "version": part.version} for part in view]
 
 
 def view_from(stored: Iterable[Mapping[str, Any]]) -> View:
-    """The view that `as_json` stored.
+    """Reads the view that `as_json` stored.
 
     Raises:
         ValueError, KeyError, TypeError: it is no view.
     """
     view = tuple(Slice(branch=part["branch"], version=part["version"]) for part in stored)
     if not view:
-        raise ValueError("a view of nothing")
+        raise ValueError("the view is empty")
     return view
 
 
@@ -121,7 +121,7 @@ class Ref:
 
 
 def check_name(name: str, *, noun: str) -> str:
-    """`name`, if it can name a tag or branch.
+    """Checks whether `name` can name a tag or branch, and returns it.
 
     Raises:
         UsageError: characters that are not allowed, or a name that could be taken for a version or commit.
@@ -149,11 +149,11 @@ class Refs:
             (self.root / kind).mkdir(parents=True)
 
     def tags(self) -> dict[str, Ref]:
-        """All tags by name."""
+        """Reads all tags by name."""
         return self._all("tags")
 
     def branches(self) -> dict[str, Ref]:
-        """All branches but `main`, by name."""
+        """Reads all branches but `main`, by name."""
         return self._all("branches")
 
     def put(self, kind: str, name: str, view: View) -> Ref:
@@ -166,7 +166,7 @@ class Refs:
             ConflictError: the name is taken, by a tag or by a branch.
         """
         check_name(name, noun=_NOUNS[kind])
-        other = "branches" if kind == "tags" else "tags"
+        other_kind = "branches" if kind == "tags" else "tags"
         ref = Ref(name=name, created=datetime.now(UTC).isoformat(timespec="seconds"), view=view)
         content = {
             "schema": "flagdata.ref/1",
@@ -178,7 +178,7 @@ class Refs:
         path = self.root / kind / f"{name}.json"
         with disk_errors(f"creating the ref {name}", path):
             # In a bucket a put of the same bytes counts as one that was sent twice, so that it would not say so.
-            taken = name == MAIN or any((self.root / folder / f"{name}.json").exists() for folder in (other, kind))
+            taken = name == MAIN or any((self.root / folder / f"{name}.json").exists() for folder in (other_kind, kind))
             if taken or not put_if_absent(path, (json.dumps(content, indent=2) + "\n").encode()):
                 raise ConflictError(
                     f"there is a tag or branch {name!r} already",
@@ -188,13 +188,13 @@ class Refs:
         return ref
 
     def stored(self) -> dict[tuple[str, str], bytes]:
-        """The bytes of each ref by its kind ("tags" or "branches") and name."""
-        found: dict[tuple[str, str], bytes] = {}
-        for kind, known in (("tags", self.tags()), ("branches", self.branches())):
-            for name in known:
+        """Reads the bytes of each ref by its kind ("tags" or "branches") and name."""
+        contents: dict[tuple[str, str], bytes] = {}
+        for kind, refs in (("tags", self.tags()), ("branches", self.branches())):
+            for name in refs:
                 with open_regular(self.root / kind / f"{name}.json") as stream:
-                    found[kind, name] = stream.read()
-        return found
+                    contents[kind, name] = stream.read()
+        return contents
 
     def adopt(self, kind: str, name: str, stored: bytes) -> None:
         """Put a ref of another lake of the same history, unless it is there."""
@@ -203,20 +203,20 @@ class Refs:
             put_if_absent(path, stored)
 
     def view(self, branch: str, head: int) -> View:
-        """What a branch shows when the table is at version `head`.
+        """Returns what a branch shows when the table is at version `head`.
 
         Raises:
             NotFoundError: no such branch, with the nearest name.
         """
         if branch == MAIN:
             return (Slice(branch=MAIN, version=head),)
-        known = self.branches()
-        if branch not in known:
-            raise _not_there("branch", branch, [MAIN, *known])
-        return (Slice(branch=branch, version=head), *self.checked("branches", known[branch], head))
+        refs = self.branches()
+        if branch not in refs:
+            raise _not_there("branch", branch, [MAIN, *refs])
+        return (Slice(branch=branch, version=head), *self.checked("branches", refs[branch], head))
 
     def checked(self, kind: str, ref: Ref, head: int) -> View:
-        """The view of a tag or branch, once it is known to name versions that there are.
+        """Returns the view of a tag or branch, once it is known to name versions that there are.
 
         Raises:
             CorruptError: it names a later one.
@@ -270,7 +270,7 @@ def resolve(
     commits: Callable[[], Mapping[str, View]],
     history: Callable[[], Iterable[Mapping[str, Any]]],
 ) -> View:
-    """The view of a tag, branch, version number, commit id, or of main at an instant; `None` is the head of main.
+    """Finds the view of a tag, branch, version number, commit id, or of main at an instant; `None` is the head of main.
 
     Args:
         commits: gives commit id → what it shows; called only when `at` has the form of a commit id.
@@ -285,13 +285,13 @@ def resolve(
     if _VERSION.fullmatch(at):
         number = at.lstrip("0") or "0"
         if len(number) > len(str(head)) or int(number) > head:  # Python reads no number of thousands of digits
-            raise NotFoundError(f"there is no version {_shown(at)}", fix=f"the newest is {head}")
+            raise NotFoundError(f"there is no version {_quoted(at)}", fix=f"the newest is {head}")
         return (Slice(branch=MAIN, version=int(number)),)
     if _COMMIT.fullmatch(at):
-        known = commits()
-        if at not in known:
-            raise _not_there("commit", at, known)
-        return known[at]
+        views = commits()
+        if at not in views:
+            raise _not_there("commit", at, views)
+        return views[at]
     tags = refs.tags()
     if at in tags:
         return refs.checked("tags", tags[at], head)
@@ -307,10 +307,10 @@ def resolve(
     raise _not_there("tag, branch or commit", at, [MAIN, *tags, *branches])
 
 
-def _not_there(noun: str, at: str, known: Iterable[str]) -> NotFoundError:
-    at = _shown(at)  # also since names that are alike are sought in time with the square of the length
-    return NotFoundError(f"there is no {noun} {at!r}", fix=UnknownNameError.of(noun, at, known).fix)
+def _not_there(noun: str, at: str, names: Iterable[str]) -> NotFoundError:
+    at = _quoted(at)  # also since names that are alike are sought in time with the square of the length
+    return NotFoundError(f"there is no {noun} {at!r}", fix=UnknownNameError.of(noun, at, names).fix)
 
 
-def _shown(name: str) -> str:
+def _quoted(name: str) -> str:
     return name if len(name) <= _SHOWN else f"{name[:_SHOWN]}…"

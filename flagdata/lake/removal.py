@@ -106,15 +106,15 @@ class Withdrawal:
 
 
 def withdraw(lake: Store, artifacts: Collection[str], message: str, *, branch: str) -> Withdrawal:
-    """See `Lake.withdraw`."""
+    """Withdraws artifacts, see `Lake.withdraw`."""
     asked = frozenset(artifacts)
 
     def attempt() -> Withdrawal:
         head = lake.catalog.head()
-        shown = lake.columns(lake.refs.view(branch, head), _COLUMNS)
-        clips = clips_of(shown, asked)
+        rows = lake.columns(lake.refs.view(branch, head), _COLUMNS)
+        clips = clips_of(rows, asked)
         leaving = asked | clips
-        check_leaving(shown, leaving, branch=branch, where=str(lake.path))
+        check_leaving(rows, leaving, branch=branch, where=str(lake.path))
         info = {"message": message, "withdrawn": str(len(leaving))}
         version = remove(lake, leaving, branch=branch, base=head, info=info)
         return Withdrawal(version=version, asked=tuple(sorted(asked)), clips=tuple(sorted(clips)))
@@ -123,48 +123,48 @@ def withdraw(lake: Store, artifacts: Collection[str], message: str, *, branch: s
         return persist(attempt, where=lake.catalog.path)
 
 
-def clips_of(shown: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
+def clips_of(rows: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
     """Ids of the clips that are slices of the objects of `artifacts` themselves, so that they mean nothing without."""
-    named = matching(shown, {"artifact": list(artifacts)}).select(_COLUMNS).to_pylist()
-    objects = {row["artifact"]: row["object"] for row in named}
-    made = matching(made_from(shown, objects), {"kind": Kind.CLIP}).select(_COLUMNS).to_pylist()
+    parents = matching(rows, {"artifact": list(artifacts)}).select(_COLUMNS).to_pylist()
+    objects = {row["artifact"]: row["object"] for row in parents}
+    clips = matching(made_from(rows, objects), {"kind": Kind.CLIP}).select(_COLUMNS).to_pylist()
     return frozenset(
         row["artifact"]
-        for row in made
+        for row in clips
         if row["object"] is not None and any(objects.get(parent) == row["object"] for parent in row["parents"])
     ) - frozenset(artifacts)
 
 
-def descendants(shown: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
+def descendants(rows: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
     """Ids of all rows that were made from `artifacts`, or from what was made from them; without `artifacts`."""
-    found, newest = set(artifacts), set(artifacts)
+    reached, newest = set(artifacts), set(artifacts)
     while newest:
-        newest = set(made_from(shown, newest)["artifact"].to_pylist()) - found
-        found |= newest
-    return frozenset(found - set(artifacts))
+        newest = set(made_from(rows, newest)["artifact"].to_pylist()) - reached
+        reached |= newest
+    return frozenset(reached - set(artifacts))
 
 
-def check_leaving(shown: pa.Table, leaving: Collection[str], *, branch: str, where: str) -> None:
-    """Whether the rows `leaving` can go.
+def check_leaving(rows: pa.Table, leaving: Collection[str], *, branch: str, where: str) -> None:
+    """Checks whether the rows `leaving` can go.
 
     Raises:
         NotFoundError: one that the branch does not show.
         ConflictError: a row that stays on the branch was made from one of them.
     """
-    there = matching(shown, {"artifact": list(leaving)})["artifact"].to_pylist()
-    if foreign := set(leaving) - set(there):
+    present = matching(rows, {"artifact": list(leaving)})["artifact"].to_pylist()
+    if foreign := set(leaving) - set(present):
         raise NotFoundError(
             f"{', '.join(sorted(foreign))} is not on branch {branch!r}",
             where=where,
             fix=f"give ids of rows that flagdata ls --at {branch} shows",
         )
-    made = made_from(shown, leaving).select(_COLUMNS).to_pylist()
-    staying = [row for row in made if row["artifact"] not in leaving]
+    made_from_leaving = made_from(rows, leaving).select(_COLUMNS).to_pylist()
+    staying = [row for row in made_from_leaving if row["artifact"] not in leaving]
     if staying:
         first = f"{staying[0]['kind']} {staying[0]['name']!r} ({staying[0]['artifact']})"
-        more = f", and {len(staying) - 1} more," if len(staying) > 1 else ""
+        further = f", and {len(staying) - 1} more," if len(staying) > 1 else ""
         raise ConflictError(
-            f"{first}{more} would stay, made from what would be withdrawn",
+            f"{first}{further} would stay, made from what would be withdrawn",
             where=where,
             fix="withdraw all that was made from it too: flagdata withdraw --with-descendants",
         )
@@ -192,20 +192,20 @@ class Erasure:
 
 
 def erase(lake: Store, artifacts: Collection[str], message: str, *, with_descendants: bool) -> Erasure:
-    """See `Lake.erase`."""
+    """Erases artifacts, see `Lake.erase`."""
     asked = frozenset(artifacts)
     with lake.changing("erasing", alone=True) as check:
         tags = lake.refs.tags()
-        shown = {ref: lake.rows(at=ref) for ref in (MAIN, *lake.refs.branches(), *tags)}
+        rows_of_refs = {ref: lake.rows(at=ref) for ref in (MAIN, *lake.refs.branches(), *tags)}
         version, before = _erased_with(lake, asked)
-        going = _all(shown, asked, erased=before, with_descendants=with_descendants, where=str(lake.path))
+        going = _all(rows_of_refs, asked, erased=before, with_descendants=with_descendants, where=str(lake.path))
         erased = {artifact: name for artifact, name in before.items() if artifact in going} | {
             row["artifact"]: row["object"]
-            for table in shown.values()
+            for table in rows_of_refs.values()
             for row in table.select(["artifact", "object"]).to_pylist()
             if row["artifact"] in going
         }
-        concerned = [ref for ref, table in shown.items() if going.intersection(table["artifact"].to_pylist())]
+        concerned = [ref for ref, table in rows_of_refs.items() if going.intersection(table["artifact"].to_pylist())]
         branches = [ref for ref in concerned if ref not in tags]
 
         def attempt(branch: str) -> int:
@@ -217,14 +217,14 @@ def erase(lake: Store, artifacts: Collection[str], message: str, *, with_descend
         for branch in branches or ([] if going <= before.keys() else [MAIN]):
             version = persist(partial(attempt, branch), where=lake.catalog.path)
         objects = {name for name in (*erased.values(), *before.values()) if name is not None}
-        removed, kept = _delete(lake, objects, check)
+        removed, kept_objects = _delete(lake, objects, check)
     return Erasure(
         version=version,
         artifacts=tuple(sorted(erased)),
         branches=tuple(branches),
         tags=tuple(ref for ref in concerned if ref in tags),
         objects=removed,
-        kept=kept,
+        kept=kept_objects,
     )
 
 
@@ -251,38 +251,41 @@ def erased_objects(lake: Store) -> dict[str, tuple[int, str]]:
 
 
 def unfinished(lake: Store, needed: Collection[str]) -> dict[str, tuple[int, str]]:
-    """Object that is stored though all artifacts of it were erased → the version that erased it, and why.
+    """Finds objects that are stored though all artifacts of them were erased: name → the version that erased it, and
+    why.
 
     Args:
         needed: objects of other rows, and those that running transactions hold.
     """
-    known = erased_objects(lake)
-    stored = {stored.name for stored in lake.objects} if known else set()
-    return {name: known[name] for name in sorted((known.keys() & stored) - set(needed))}
+    erased = erased_objects(lake)
+    stored = {stored.name for stored in lake.objects} if erased else set()
+    return {name: erased[name] for name in sorted((erased.keys() & stored) - set(needed))}
 
 
 def erased_as(lake: Store, artifact: str) -> str | None:
-    """The id of an artifact that was erased, by an id, its beginning, or the name that it had; `None` where there is
-    none, or more than one."""
+    """Finds the id of an artifact that was erased, by an id, its beginning, or the name that it had; `None` where there
+    is none, or more than one."""
     for removal in removals(lake.catalog.history()):
         if gone := removal.erased:
             rows = lake.catalog.rows(removal.version - 1).select(naming.COLUMNS)
-            named = naming.meant(rows.filter(pc.field("artifact").isin(sorted(gone))).to_pylist(), artifact)
-            found = {row["artifact"] for row in named} or {one for one in gone if one.startswith(artifact)}
-            if found:
-                return found.pop() if len(found) == 1 else None
+            matches = naming.meant(rows.filter(pc.field("artifact").isin(sorted(gone))).to_pylist(), artifact)
+            identities = {row["artifact"] for row in matches} or {
+                identity for identity in gone if identity.startswith(artifact)
+            }
+            if identities:
+                return identities.pop() if len(identities) == 1 else None
     return None
 
 
 def _all(
-    shown: dict[str, pa.Table],
+    rows_of_refs: dict[str, pa.Table],
     asked: frozenset[str],
     *,
     erased: Collection[str],
     with_descendants: bool,
     where: str,
 ) -> frozenset[str]:
-    """What goes: what was asked for, its clips and, if wanted, its descendants, wherever a ref shows them.
+    """Lists what goes: what was asked for, its clips and, if wanted, its descendants, wherever a ref shows them.
 
     Args:
         erased: those that were erased before, which no ref need show.
@@ -292,21 +295,21 @@ def _all(
         ConflictError: on a branch, something made from them would stay.
     """
     going = set(asked)
-    for table in shown.values():
+    for table in rows_of_refs.values():
         going |= clips_of(table, asked)
         if with_descendants:
             going |= descendants(table, asked)
-    known = {artifact for table in shown.values() for artifact in table["artifact"].to_pylist()}
-    if foreign := sorted(asked - known - set(erased)):
+    identities = {artifact for table in rows_of_refs.values() for artifact in table["artifact"].to_pylist()}
+    if foreign := sorted(asked - identities - set(erased)):
         raise NotFoundError(f"no ref shows {', '.join(foreign)}", where=where, fix="flagdata ls --at REF lists ids")
-    for ref, table in shown.items():
+    for ref, table in rows_of_refs.items():
         present = going.intersection(table["artifact"].to_pylist())
         check_leaving(table, present, branch=ref, where=where)
     return frozenset(going)
 
 
 def _delete(lake: Store, names: Collection[str], check: Check) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Delete the objects that nothing else needs; the lock that keeps transactions out is held, and checked.
+    """Deletes the objects that nothing else needs; the lock that keeps transactions out is held, and checked.
 
     Raises:
         ConflictError: the lock may have been lost.
@@ -315,10 +318,10 @@ def _delete(lake: Store, names: Collection[str], check: Check) -> tuple[tuple[st
     """
     marked = mark(lake, grace=timedelta(0))
     marked.check(outcome=", so none was deleted", fix="mend what flagdata doctor reports, and run the command again")
-    held = _held(lake)
-    kept = dict.fromkeys(sorted(set(names) & marked.objects), "another artifact has the same content")
-    kept |= dict.fromkeys(sorted(set(names) & held - marked.objects), "a running transaction holds it")
-    gone = sorted({stored.name for stored in lake.objects}.intersection(names) - kept.keys())
+    in_use = _in_use(lake)
+    reasons_kept = dict.fromkeys(sorted(set(names) & marked.objects), "another artifact has the same content")
+    reasons_kept |= dict.fromkeys(sorted(set(names) & in_use - marked.objects), "a running transaction holds it")
+    gone = sorted({stored.name for stored in lake.objects}.intersection(names) - reasons_kept.keys())
     refused: dict[str, OSError] = {}
     for name in gone:
         check()
@@ -334,7 +337,7 @@ def _delete(lake: Store, names: Collection[str], check: Check) -> tuple[tuple[st
             where=str(lake.objects.path(name)),
             fix="let its folder and what is in it be written, and run the same command again, or flagdata gc",
         )
-    return tuple(gone), kept
+    return tuple(gone), reasons_kept
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -355,8 +358,8 @@ class Expiry:
 
 
 def last_version(lake: Store, *, older_than: timedelta | None, keep: int | None) -> int:
-    """The newest version that expires: one that another replaced so long ago, and that is not among the newest `keep`;
-    −1 where there is none. The head never expires."""
+    """Finds the newest version that expires: one that another replaced so long ago, and that is not among the newest
+    `keep`; −1 where there is none. The head never expires."""
     history = lake.catalog.history()  # newest first
     last = history[0]["version"] - 1
     if keep is not None:
@@ -397,22 +400,24 @@ def expire(lake: Store, up_to: int, message: str | None = None, *, dry_run: bool
 
 def _expiring(lake: Store, up_to: int) -> Expiry:
     """Returns what goes with the versions up to one; transactions are kept out."""
-    held = _held(lake)
+    in_use = _in_use(lake)
     marked = mark(lake, grace=timedelta(0), first=up_to + 1)
     # Rows read from a changed file may name other objects than those they need, so files are re-hashed first.
     marked.check(*catalog_files(lake))
-    committed = lake.catalog.objects() - marked.objects - held
+    committed = lake.catalog.objects() - marked.objects - in_use
     going = [stored for stored in lake.objects if stored.name in committed]
-    return Expiry(up_to=up_to, objects=tuple(sorted(one.name for one in going)), size=sum(one.size for one in going))
+    return Expiry(
+        up_to=up_to, objects=tuple(sorted(stored.name for stored in going)), size=sum(stored.size for stored in going)
+    )
 
 
-def _held(lake: Store) -> set[str]:
+def _in_use(lake: Store) -> set[str]:
     """Returns the names of the objects that running transactions hold."""
     return {name for state in leases(lake.staging) if state.alive for name in state.objects}
 
 
 def check_whole(lake: Store, view: View) -> None:
-    """Whether a new tag or branch may show a view: not that of an expired version whose data went.
+    """Checks whether a new tag or branch may show a view: not that of an expired version whose data went.
 
     Raises:
         ConflictError: some of its data are not in the lake.
@@ -424,7 +429,7 @@ def check_whole(lake: Store, view: View) -> None:
 
 
 def delete(lake: Store, kind: str, name: str, message: str | None, *, discard: bool) -> int:
-    """See `Lake.delete_tag` and `Lake.delete_branch`.
+    """Deletes a ref, see `Lake.delete_tag` and `Lake.delete_branch`.
 
     Args:
         kind: "tags" or "branches".
@@ -433,19 +438,19 @@ def delete(lake: Store, kind: str, name: str, message: str | None, *, discard: b
 
     def attempt() -> int:
         head = lake.catalog.head()
-        known = lake.refs.tags() if kind == "tags" else lake.refs.branches()
-        if name not in known:
+        refs = lake.refs.tags() if kind == "tags" else lake.refs.branches()
+        if name not in refs:
             raise NotFoundError(
-                f"there is no {noun} {name!r}", where=str(lake.path), fix=UnknownNameError.of(noun, name, known).fix
+                f"there is no {noun} {name!r}", where=str(lake.path), fix=UnknownNameError.of(noun, name, refs).fix
             )
-        shown = lake.table(known[name].view if kind == "tags" else lake.refs.view(name, head))
+        rows = lake.table(refs[name].view if kind == "tags" else lake.refs.view(name, head))
         if not discard:
-            _check_elsewhere(lake, noun, name, set(shown["artifact"].to_pylist()))
+            _check_elsewhere(lake, noun, name, set(rows["artifact"].to_pylist()))
         info = {"message": message or f"delete the {noun} {name}", "deleted": f"{noun} {name}"}
-        info["view"] = json.dumps(as_json(known[name].view))
+        info["view"] = json.dumps(as_json(refs[name].view))
         if kind == "tags":
             return remove(lake, (), base=head, info=info)
-        leaving = shown.filter(pc.field("branch") == name)["artifact"].to_pylist()
+        leaving = rows.filter(pc.field("branch") == name)["artifact"].to_pylist()
         return remove(lake, leaving, branch=name, base=head, info={**info, "withdrawn": str(len(leaving))})
 
     lake.check_writable()
@@ -457,18 +462,18 @@ def delete(lake: Store, kind: str, name: str, message: str | None, *, discard: b
     return version
 
 
-def _check_elsewhere(lake: Store, noun: str, name: str, shown: set[str]) -> None:
-    """Whether other refs show all rows, too.
+def _check_elsewhere(lake: Store, noun: str, name: str, identities: set[str]) -> None:
+    """Checks whether other refs show all rows, too.
 
     Raises:
         ConflictError: some would be lost.
     """
     for ref in (MAIN, *lake.refs.branches(), *lake.refs.tags()):
         if ref != name:
-            shown = shown - set(lake.rows(at=ref, columns=["artifact"])["artifact"].to_pylist())
-    if shown:
+            identities = identities - set(lake.rows(at=ref, columns=["artifact"])["artifact"].to_pylist())
+    if identities:
         raise ConflictError(
-            f"{len(shown)} artifacts are shown by this {noun} alone: without it, gc deletes them",
+            f"{len(identities)} artifacts are shown by this {noun} alone: without it, gc deletes them",
             where=f"{noun} {name}",
             fix="merge or tag them first, or add --discard to give them up",
         )
@@ -491,7 +496,7 @@ def _stored(lake: Store, version: int) -> pa.Table:
 
 
 def _keys(rows: pa.Table) -> pa.ChunkedArray:
-    """What distinguishes rows: artifact and branch."""
+    """Returns what distinguishes rows: artifact and branch."""
     return pc.binary_join_element_wise(rows["artifact"], rows["branch"], "/")  # type: ignore[attr-defined]
 
 
@@ -517,7 +522,7 @@ def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
             for removal in filter(went, gone):
                 restored = f"use a tag, or a version from {removal.version} on; {_RESTORE}"
                 return NotFoundError(
-                    f"{name} {message.format(removal)}",
+                    f"{name} is gone: it {message.format(removal)}",
                     where=missing.where,
                     fix=_LEAVE_OUT if name in removal.erased.values() else restored,
                 )
@@ -527,9 +532,9 @@ def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
 
 
 def lost(lake: Store, rows: pa.Table) -> dict[str, NotFoundError]:
-    """Object of some of the rows that is not in the lake → why."""
-    found: dict[str, NotFoundError] = {}
+    """Maps each object of some of the rows that is not in the lake to why."""
+    errors: dict[str, NotFoundError] = {}
     for name in sorted(rows["object"].drop_null().unique().to_pylist()):
         if not lake.objects.has(name):
-            found[name] = explained(lake, name, lake.objects.missing(name))
-    return found
+            errors[name] = explained(lake, name, lake.objects.missing(name))
+    return errors

@@ -43,7 +43,7 @@ class Placed:
     @property
     def version(self) -> int:
         """Its number, from 1."""
-        return len(self.others) + 1 if self.new else [one.id for one in self.others].index(self.artifact.id) + 1
+        return len(self.others) + 1 if self.new else [version.id for version in self.others].index(self.artifact.id) + 1
 
     @property
     def sentence(self) -> str:
@@ -55,36 +55,36 @@ class Placed:
         if self.new:
             return f"committed as version {self.version} of {self.artifact.name!r}; {by}"
         if newest.id == self.artifact.id:
-            there = "there already"
+            outcome = "there already"
         else:
-            there = f"there already as version {self.version} of {self.artifact.name!r}; {by}"
-        return there if self.healed is None else f"{there}; {self.healed.sentence}"
+            outcome = f"there already as version {self.version} of {self.artifact.name!r}; {by}"
+        return outcome if self.healed is None else f"{outcome}; {self.healed.sentence}"
 
 
 def versions(lake: Store, result: Artifact, *, at: str | None = None) -> tuple[Artifact, ...]:
-    """The versions of a measurement that a ref shows, in the order of their commits; none of another kind."""
+    """Lists the versions of a measurement that a ref shows, in the order of their commits; none of another kind."""
     if result.kind is not Kind.MEASUREMENT:
         return ()
     first = revised(result.recipe) or result.id
     mentioned = pc.match_substring(pc.field("recipe"), first)  # type: ignore[attr-defined]
     wanted = (pc.field("kind") == result.kind.value) & ((pc.field("artifact") == first) | mentioned)
     rows = sorted(lake.meeting(lake.view(at), wanted).to_pylist(), key=lambda row: row["created"])
-    return tuple(one for one in map(Artifact.from_row, rows) if first in (one.id, revised(one.recipe)))
+    return tuple(version for version in map(Artifact.from_row, rows) if first in (version.id, revised(version.recipe)))
 
 
 def placed(lake: Store, result: Artifact, *, branch: str = MAIN) -> Placed:
-    """Where a result goes that this code inferred: it is there already if the same code's is, else it is new.
+    """Finds where a result goes that this code inferred: it is there already if the same code's is, else it is new.
 
     Args:
         result: its row as a first version, without its object.
     """
-    others = versions(lake, result, at=branch)
-    for one in others:
-        if one.code_version == result.code_version:
-            return Placed(artifact=one, others=others, new=False)
-    if others:
+    present_versions = versions(lake, result, at=branch)
+    for version in present_versions:
+        if version.code_version == result.code_version:
+            return Placed(artifact=version, others=present_versions, new=False)
+    if present_versions:
         result = replace(result, recipe={**result.recipe, REVISION: {"of": result.id, "code": result.code_version}})
-    return Placed(artifact=result, others=others, new=True)
+    return Placed(artifact=result, others=present_versions, new=True)
 
 
 def keep(
@@ -94,26 +94,26 @@ def keep(
     message: str,
     *,
     branch: str = MAIN,
-    left: Callable[[Artifact], Iterable[Artifact]] = lambda kept: (),
+    derived: Callable[[Artifact], Iterable[Artifact]] = lambda kept: (),
 ) -> Placed:
-    """Commit a result where it is new (see `placed`), or its object damaged or missing, with what it left.
+    """Commits a result where it is new (see `placed`), or its object damaged or missing, with what was derived from it.
 
     Args:
         result: its row as a first version, without its object.
         write: writes its object, a Zarr folder that is not there yet.
-        left: rows made from it, by its row as it is kept.
+        derived: rows made from it, by its row as it is kept.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
     with lake.transaction(message, branch=branch) as transaction:
-        found = placed(lake, result, branch=branch)
-        if found.new or present(lake, found.artifact).whole is None:
+        placement = placed(lake, result, branch=branch)
+        if placement.new or present(lake, placement.artifact).whole is None:
             staged = transaction.staging(".zarr")
             write(staged)
-            transaction.add(replace(found.artifact, object=transaction.put(staged)))
-            for one in left(found.artifact):
-                transaction.add(one)
-    if found.new and found.artifact.id not in transaction.result.added:  # another process was faster
+            transaction.add(replace(placement.artifact, object=transaction.put(staged)))
+            for row in derived(placement.artifact):
+                transaction.add(row)
+    if placement.new and placement.artifact.id not in transaction.result.added:  # another process was faster
         return placed(lake, result, branch=branch)
-    return replace(found, healed=transaction.result.healed.get(found.artifact.id))
+    return replace(placement, healed=transaction.result.healed.get(placement.artifact.id))

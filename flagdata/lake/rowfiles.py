@@ -42,7 +42,7 @@ _DIGITS = 5  # of a film's number, at least
 
 
 def with_data_sets(rows: pa.Table) -> pa.Table:
-    """The rows with `dataset` and `side` filled where films and clips were built before these columns existed.
+    """Fills `dataset` and `side` of rows where films and clips were built before these columns existed.
 
     Args:
         rows: with the catalog's columns.
@@ -53,12 +53,12 @@ def with_data_sets(rows: pa.Table) -> pa.Table:
         & pc.field("seed").is_valid()
         & pc.field("dataset").is_null()
     )
-    stated = {
+    sets_of_films = {
         artifact: of
         for artifact, name, recipe in zip(*(films[c].to_pylist() for c in ("artifact", "name", "recipe")), strict=True)
-        if (of := _stated(name)) is not None and "film" in column_json(recipe or "{}", "recipe", artifact=artifact)
+        if (of := _data_set_of(name)) is not None and "film" in column_json(recipe or "{}", "recipe", artifact=artifact)
     }
-    if not stated:
+    if not sets_of_films:
         return rows
     made_of = [
         recording if kind == Kind.CLIP else artifact
@@ -66,18 +66,18 @@ def with_data_sets(rows: pa.Table) -> pa.Table:
             *(rows[column].to_pylist() for column in ("artifact", "kind", "recording")), strict=True
         )
     ]
-    for place, column in enumerate(("dataset", "side")):
+    for position, column in enumerate(("dataset", "side")):
         filled = [
-            known if known is not None or film not in stated else stated[film][place]
-            for known, film in zip(rows[column].to_pylist(), made_of, strict=True)
+            value if value is not None or film not in sets_of_films else sets_of_films[film][position]
+            for value, film in zip(rows[column].to_pylist(), made_of, strict=True)
         ]
         number = rows.schema.get_field_index(column)
         rows = rows.set_column(number, rows.schema.field(number), pa.array(filled, CATALOG[column].type))
     return rows
 
 
-def _stated(name: str) -> tuple[str, str] | None:
-    """The data set and the side that a film is called after."""
+def _data_set_of(name: str) -> tuple[str, str] | None:
+    """Reads the data set and the side that a film is called after."""
     rest, _, number = name.rpartition("-")
     dataset, _, side = rest.rpartition("-")
     if not dataset or side not in _SIDES or len(number) < _DIGITS or not (number.isascii() and number.isdigit()):
@@ -104,8 +104,8 @@ class RowFiles:
         self._tables: dict[str, pa.Table] = {}
 
     def table(self, names: Sequence[str]) -> pa.Table:
-        """All rows of these files in the catalog's schema and `ROW_ORDER`. Columns that old rows lack are null, but
-        for those that `flagdata.lake.rowfiles` fills.
+        """Reads all rows of these files in the catalog's schema and `ROW_ORDER`. Columns that old rows lack are null,
+        but for those that `flagdata.lake.rowfiles` fills.
 
         Raises:
             CorruptError: a file cannot be read.
@@ -116,14 +116,14 @@ class RowFiles:
         return in_order(rows)
 
     def scan(self, names: Sequence[str]) -> Scan | None:
-        """The same rows, by commit, of which only the columns and rows that are asked for are decoded; `None` where
-        rows of an older format have columns to be filled, or a file lacks columns.
+        """Opens the same rows, by commit, of which only the columns and rows that are asked for are decoded; `None`
+        where rows of an older format have columns to be filled, or a file lacks columns.
 
         Raises:
             CorruptError: a file cannot be read.
         """
         self._contents = {name: self._content(name) for name in names}
-        found: list[tuple[int, pa.Buffer]] = []
+        timed_contents: list[tuple[int, pa.Buffer]] = []
         count = size = 0
         for name, content in self._contents.items():
             with self._reading(name):
@@ -133,14 +133,14 @@ class RowFiles:
                 oldest, created = _statistics(file)
                 if oldest < SINCE:
                     return None
-                found.append((created, content))
+                timed_contents.append((created, content))
             count += file.num_rows
             size += sum(file.row_group(number).total_byte_size for number in range(file.num_row_groups))
-        contents = tuple(content for _, content in sorted(found, key=lambda pair: pair[0]))
+        contents = tuple(content for _, content in sorted(timed_contents, key=lambda pair: pair[0]))
         return Scan(contents=contents, count=count, size=size, check=lambda: self.table(names))
 
     def holding(self, names: Sequence[str], condition: pc.Expression) -> list[str]:
-        """Those of the files of which some rows meet a condition.
+        """Selects those of the files of which some rows meet a condition.
 
         Raises:
             CorruptError: a file cannot be read.
@@ -148,16 +148,16 @@ class RowFiles:
         import pyarrow.dataset as ds
 
         self._contents = {name: self._content(name) for name in names}
-        form, found = ds.ParquetFileFormat(), []
+        form, names_with_rows = ds.ParquetFileFormat(), []
         for name, content in self._contents.items():
             with self._reading(name):
                 rows = ds.FileSystemDataset([form.make_fragment(content)], catalog_schema(), form)
                 if rows.count_rows(filter=condition):
-                    found.append(name)
-        return found
+                    names_with_rows.append(name)
+        return names_with_rows
 
     def read(self, name: str) -> pa.Table:
-        """The rows of one file, as they are in it.
+        """Reads the rows of one file, as they are in it.
 
         Raises:
             CorruptError: it cannot be read.
@@ -183,8 +183,8 @@ class RowFiles:
             noted = self._noted(name)
             if noted and hashlib.sha256(content).hexdigest() not in noted:
                 raise changed_file(self._folder / name)
-            stated = pq.read_metadata(pa.BufferReader(content))
-            check_stated(stated, content.size, where=where, fix=COPY_BACK)
+            footer = pq.read_metadata(pa.BufferReader(content))
+            check_stated(footer, content.size, where=where, fix=COPY_BACK)
         return content
 
     @contextmanager
@@ -200,7 +200,7 @@ class RowFiles:
 
 
 def changed_file(path: Place) -> CorruptError:
-    """The error for a file that is not what its commit noted."""
+    """Returns the error for a file that is not what its commit noted."""
     return CorruptError("a file of the catalog has changed since it was written", where=str(path), fix=COPY_BACK)
 
 
@@ -223,12 +223,12 @@ class Scan:
     condition: pc.Expression | None = None
 
     def matching(self, condition: pc.Expression) -> Scan:
-        """Those of the rows that meet a condition."""
-        both = condition if self.condition is None else self.condition & condition
-        return replace(self, condition=both)
+        """Selects those of the rows that meet a condition."""
+        conditions = condition if self.condition is None else self.condition & condition
+        return replace(self, condition=conditions)
 
     def table(self, columns: Iterable[str]) -> pa.Table:
-        """Some columns of the rows.
+        """Reads some columns of the rows.
 
         Raises:
             CorruptError: a file cannot be read.
@@ -249,7 +249,7 @@ def _conform(table: pa.Table) -> pa.Table:
 
 
 def _statistics(file: pq.FileMetaData) -> tuple[int, int]:
-    """The lowest format version of a file's rows and when the first was committed [us]; 0 where it does not state
+    """Reads the lowest format version of a file's rows and when the first was committed [us]; 0 where it does not state
     them."""
     lowest: dict[str, list[int]] = {"format_version": [], "created": []}
     for number in range(file.num_row_groups):
@@ -268,12 +268,12 @@ def _first_created(part: pa.Table) -> int:
 
 
 def in_order(rows: pa.Table) -> pa.Table:
-    """The rows in `ROW_ORDER`; they are copied only where they are not in it."""
+    """Sorts the rows in `ROW_ORDER`; they are copied only where they are not in it."""
     return rows if _is_ordered(rows) else rows.sort_by([(name, "ascending") for name in ROW_ORDER])
 
 
 def _is_ordered(rows: pa.Table) -> bool:
-    """Whether rows are in `ROW_ORDER`, in which what is unknown comes last."""
+    """Checks whether rows are in `ROW_ORDER`, in which what is unknown comes last."""
     if rows.num_rows < 2:
         return True
     equal = np.ones(rows.num_rows - 1, dtype=np.bool_)
@@ -284,4 +284,4 @@ def _is_ordered(rows: pa.Table) -> bool:
         equal &= values[:-1] == values[1:]
     (ties,) = np.nonzero(equal)
     first, second = (rows["artifact"].take(pa.array(index)).to_pylist() for index in (ties, ties + 1))
-    return all(one <= other for one, other in zip(first, second, strict=True))
+    return all(first_value <= second_value for first_value, second_value in zip(first, second, strict=True))

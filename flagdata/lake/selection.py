@@ -73,11 +73,11 @@ class Request:
                 fix="put WHERE, the columns and ORDER BY into the SQL",
             )
         if self.limit is not None and self.limit < 0:
-            raise UsageError(f"a limit of {self.limit} rows", fix="give 0 or more")
+            raise UsageError(f"the limit is {self.limit} rows", fix="give 0 or more")
         if not (math.isfinite(self.time_limit) and self.time_limit > 0):
-            raise UsageError(f"a time limit of {self.time_limit} s", fix="give seconds, more than 0")
+            raise UsageError(f"the time limit is {self.time_limit} s", fix="give seconds, more than 0")
         if self.columns is not None and not self.columns:
-            raise UsageError("no columns", fix=f"name some of: {', '.join(COLUMNS)}")
+            raise UsageError("no columns are named", fix=f"name some of: {', '.join(COLUMNS)}")
         for name in self.columns or ():
             if name not in COLUMNS and not name.startswith(PREFIX):
                 raise UnknownNameError.of("column", name, COLUMNS)
@@ -133,18 +133,18 @@ class Selection:
                 columns=request.columns or tuple(CATALOG),
                 limit=request.limit,
                 memory=MEMORY,
-                shown=_shown(request),
+                shown=_sql_of(request),
             ),
             closed,
         )
         weakref.finalize(self, self._process.closed.append, self._number)
 
     def total(self) -> int:
-        """How many rows there are without the limit."""
+        """Counts the rows without the limit."""
         return int(self._ask("total"))
 
     def batches(self, size: int = 65_536) -> pa.RecordBatchReader:
-        """The rows as a stream of record batches of at most `size` rows."""
+        """Streams the rows as record batches of at most `size` rows."""
         schema = self._schema(self._ask("stream", size))
 
         def stream() -> Iterator[pa.RecordBatch]:
@@ -157,7 +157,7 @@ class Selection:
         return pa.RecordBatchReader.from_batches(schema, stream())
 
     def table(self) -> pa.Table:
-        """The rows, whole. Columns of the catalog carry their unit and description; those of free SQL do not.
+        """Returns the rows, whole. Columns of the catalog carry their unit and description; those of free SQL do not.
 
         Raises:
             LimitError: SQL gives more than can be held.
@@ -177,16 +177,16 @@ class Selection:
         return pa.Table.from_batches(batches, schema=stream.schema)
 
     def _schema(self, raw: pa.Schema) -> pa.Schema:
-        """The catalog's own schema, for rows of the catalog; what free SQL makes has no description."""
+        """Returns the catalog's own schema, for rows of the catalog; what free SQL makes has no description."""
         if self.request.sql is not None:
             return raw
         if self.request.columns is None:
             return catalog_schema()
-        known = COLUMNS | self._labels
-        return pa.schema([_field(name, known[name]) for name in self.request.columns])
+        descriptions = COLUMNS | self._labels
+        return pa.schema([_field(name, descriptions[name]) for name in self.request.columns])
 
     def _ask(self, verb: str, *rest: object) -> Any:
-        """The process's answer, within the time that is left.
+        """Asks the process, and returns its answer within the time that is left.
 
         Raises:
             LimitError: there is none left, or there was not enough.
@@ -203,14 +203,14 @@ class Selection:
             if ended.late:
                 self._left = 0.0
                 raise LimitError(
-                    f"the query took longer than {self.request.time_limit:g} s",
-                    where=_shown(self.request),
+                    f"the query was stopped, since it took longer than {self.request.time_limit:g} s",
+                    where=_sql_of(self.request),
                     fix="narrow it down; `flagdata query --time-limit SECONDS` allows more",
                 ) from None
             self._check_rows()
             raise UsageError(
                 "it needs more memory than there is",
-                where=_shown(self.request),
+                where=_sql_of(self.request),
                 fix=f"narrow it down, or aggregate in SQL: it may take {MEMORY / 1e9:g} GB",
             ) from None
         self._left -= time.monotonic() - begun
@@ -228,10 +228,10 @@ class Selection:
 _numbers = count()
 
 
-def _shown(request: Request) -> str | None:
-    """The user's own SQL, for a message."""
-    given = (request.sql, request.where, request.order)
-    return "; ".join(text for text in given if isinstance(text, str) and text) or None
+def _sql_of(request: Request) -> str | None:
+    """Returns the user's own SQL, for a message."""
+    texts = (request.sql, request.where, request.order)
+    return "; ".join(text for text in texts if isinstance(text, str) and text) or None
 
 
 def _field(name: str, field: Field) -> pa.Field:

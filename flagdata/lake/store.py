@@ -52,7 +52,7 @@ class Store:
         self._lineage: tuple[int, dict[str, View], Lineage] | None = None
 
     def check_writable(self) -> None:
-        """Whether this process may write here: called before the first second of work that ends in a commit.
+        """Checks whether this process may write here: called before the first second of work that ends in a commit.
 
         Raises:
             LinkError: a folder of the lake is a link, so that what is written would lie elsewhere.
@@ -124,7 +124,7 @@ class Store:
         return table if columns is None else table.select(list(columns))
 
     def artifact(self, artifact: str, *, at: str | None = None, kinds: Collection[Kind] = ()) -> Artifact:
-        """The artifact that `artifact` means, as in `flagdata.lake.naming`, or NAME@REF at that tag or branch.
+        """Finds the artifact that `artifact` means, as in `flagdata.lake.naming`, or NAME@REF at that tag or branch.
 
         Args:
             kinds: which of several of that name are meant, if they are of these.
@@ -136,7 +136,7 @@ class Store:
         return Artifact.from_row(self._row(artifact, at, kinds).to_pylist()[0])
 
     def identity(self, artifact: str, *, at: str | None = None) -> str:
-        """The full id of what `artifact` means, as in `artifact`; its row may be malformed.
+        """Finds the full id of what `artifact` means, as in `artifact`; its row may be malformed.
 
         Raises:
             NotFoundError: none, or several.
@@ -145,50 +145,50 @@ class Store:
 
     def _row(self, artifact: str, at: str | None, kinds: Collection[Kind] = ()) -> pa.Table:
         view = self.view(at)
-        named = self.meeting(view, naming.condition(artifact), naming.OF_RESULTS)
-        found = naming.meant(named.to_pylist(), artifact, kinds=kinds)
+        candidates = self.meeting(view, naming.condition(artifact), naming.OF_RESULTS)
+        meant_rows = naming.meant(candidates.to_pylist(), artifact, kinds=kinds)
         name, _, ref = artifact.rpartition("@")
-        if not found and name and at is None:
+        if not meant_rows and name and at is None:
             return self._row(name, ref, kinds)
-        if len(found) == 1:
-            return self.matching(view, {"artifact": found[0]["artifact"]})
+        if len(meant_rows) == 1:
+            return self.matching(view, {"artifact": meant_rows[0]["artifact"]})
         where = str(self.path)
         listed = "flagdata ls lists them" if at is None else f"flagdata ls --at {at} lists them"
-        if not found:
+        if not meant_rows:
             names = self.columns(view, ["name"])["name"].unique().to_pylist()
             close = difflib.get_close_matches(artifact, filter(None, names[:_NAMES]), n=1)
             suggestion = f"did you mean {close[0]!r}? {listed}" if close else listed
-            raise NotFoundError(f"no artifact {artifact!r}", where=where, fix=suggestion)
-        several = ", ".join(f"{row['kind']} {row['artifact'][:SHORT]}" for row in found[:4])
-        message = f"{artifact!r} may mean {len(found)} artifacts: {several}{', …' if len(found) > 4 else ''}"
+            raise NotFoundError(f"there is no artifact {artifact!r}", where=where, fix=suggestion)
+        several = ", ".join(f"{row['kind']} {row['artifact'][:SHORT]}" for row in meant_rows[:4])
+        message = f"{artifact!r} may mean {len(meant_rows)} artifacts: {several}{', …' if len(meant_rows) > 4 else ''}"
         raise NotFoundError(message, where=where, fix=f"give the id of one: {listed}")
 
     def view(self, at: str | None) -> View:
-        """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""
+        """Finds what a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""
         history = self.catalog.history
         return references.resolve(self.refs, at, head=self.catalog.head(), commits=self._commits, history=history)
 
     def table(self, view: View) -> pa.Table:
-        """All rows of a view, its base first. An identity is on one branch of a view only."""
+        """Reads all rows of a view, its base first. An identity is on one branch of a view only."""
         *later, first = view
-        rows, lineage = self._own(first), self.lineage()
+        rows, lineage = self._of_branch(first), self.lineage()
         for part in reversed(later):
             hidden = lineage.hidden(part)
             if hidden:
                 rows = rows.filter(~pc.field("artifact").isin(sorted(hidden)))
-            rows = pa.concat_tables([rows, self._own(part)])
+            rows = pa.concat_tables([rows, self._of_branch(part)])
         return with_labels(rows, lineage.labels(view[0]))
 
     def scan(self, view: View) -> pa.Table | Scan:
-        """What `table` gives, decoded as it is asked for where the view is one branch's rows without labels."""
+        """Opens what `table` gives, decoded as it is asked for where the view is one branch's rows without labels."""
         if len(view) == 1 and not self.lineage().labels(view[0]):
-            found = self.catalog.scan(view[0].version)
-            if found is not None:
-                return found.matching(pc.field("branch") == view[0].branch)
+            opened = self.catalog.scan(view[0].version)
+            if opened is not None:
+                return opened.matching(pc.field("branch") == view[0].branch)
         return self.table(view)
 
     def meeting(self, view: View, condition: pc.Expression, columns: Sequence[str] = tuple(CATALOG)) -> pa.Table:
-        """Some columns of the rows of a view that meet a condition."""
+        """Reads some columns of the rows of a view that meet a condition."""
         rows = self.scan(view)
         if isinstance(rows, Scan):
             return rows.matching(condition).table(columns)
@@ -207,42 +207,43 @@ class Store:
         return pa.concat_tables(in_order(scan.matching(condition(values)).table(wanted)) for scan in scans)
 
     def columns(self, view: View, names: Sequence[str]) -> pa.Table:
-        """Some columns of all rows of a view, its base first, by commit; no others are decoded where that can be."""
+        """Reads some columns of all rows of a view, its base first, by commit; no others are decoded where that can
+        be."""
         scans = self._scans(view)
         if scans is None:
             return self.table(view).select(names)
         return pa.concat_tables(scan.table(names) for scan in scans)
 
     def _scans(self, view: View) -> list[Scan] | None:
-        """The rows of a view by branch, its base first, without labels; `None` where files cannot be scanned."""
-        found: list[Scan] = []
+        """Opens the rows of a view by branch, its base first, without labels; `None` where files cannot be scanned."""
+        scans: list[Scan] = []
         hidden: frozenset[str] = frozenset()
         for part in view:
             rows = self.catalog.scan(part.version)
             if rows is None:
                 return None
-            shown = pc.field("branch") == part.branch
+            condition = pc.field("branch") == part.branch
             if hidden:
-                shown &= ~pc.field("artifact").isin(sorted(hidden))
-            found.append(rows.matching(shown))
+                condition &= ~pc.field("artifact").isin(sorted(hidden))
+            scans.append(rows.matching(condition))
             if len(view) > 1:
                 hidden |= self.lineage().hidden(part)
-        return found[::-1]
+        return scans[::-1]
 
     def identities(self, view: View) -> pa.ChunkedArray:
-        """The ids of all rows of a view."""
+        """Lists the ids of all rows of a view."""
         return self.columns(view, ["artifact"])["artifact"]
 
     def lineage(self) -> Lineage:
-        """How branches came to be, as known at the head."""
+        """Reads how branches came to be, as known at the head."""
         history = self.catalog.history()
         forks = {name: ref.view for name, ref in self.refs.branches().items()}
         if self._lineage is None or self._lineage[:2] != (history[0]["version"], forks):
             self._lineage = (history[0]["version"], forks, Lineage(history, forks))
         return self._lineage[2]
 
-    def _own(self, part: Slice) -> pa.Table:
-        """The rows of one branch at one version."""
+    def _of_branch(self, part: Slice) -> pa.Table:
+        """Reads the rows of one branch at one version."""
         rows = self.catalog.rows(part.version)
         if rows["branch"].unique().to_pylist() == [part.branch]:
             return rows  # a filter would copy all columns

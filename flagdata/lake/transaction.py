@@ -135,11 +135,12 @@ class Transaction:
     def _healed(self) -> dict[str, Healing]:
         objects = {identity: (name, name) for identity, name in self._restored.items()}
         objects |= {identity: (before, str(row.object)) for identity, (before, row) in self._moved.items()}
-        each = {pair: healing(self._lake, before=pair[0], now=pair[1]) for pair in set(objects.values())}
-        return {identity: each[pair] for identity, pair in objects.items()}
+        healings = {pair: healing(self._lake, before=pair[0], now=pair[1]) for pair in set(objects.values())}
+        return {identity: healings[pair] for identity, pair in objects.items()}
 
     def staging(self, suffix: str) -> Path:
-        """A fresh path with `suffix` (".mcap", ".zarr", ".model"), nothing at it yet; removed with the transaction."""
+        """Returns a fresh path with `suffix` (".mcap", ".zarr", ".model"), nothing at it yet; removed with the
+        transaction."""
         return self._lease.folder / f"{uuid.uuid4().hex}{suffix}"
 
     def put(self, path: Path) -> str:
@@ -164,7 +165,8 @@ class Transaction:
         return name
 
     def hold(self, name: str) -> int:
-        """Rely on an object that is stored; its size [B]. No collection takes it before the transaction ends.
+        """Relies on an object that is stored and returns its size [B]. No collection takes it before the transaction
+        ends.
 
         Raises:
             NotFoundError: it is not there.
@@ -173,7 +175,8 @@ class Transaction:
 
     @contextmanager
     def keeping_collectors_out(self) -> Iterator[None]:
-        """No collection runs during the block, and nobody takes this process for dead as it begins."""
+        """Keeps collections from running during the block, and anybody from taking this process for dead as it
+        begins."""
         with self._lease.keeping_collectors_out() as check:
             check()
             yield
@@ -200,26 +203,30 @@ class Transaction:
         self._pending[identity] = replace(artifact, branch=self.branch, object_bytes=size)
         return True
 
-    def _heal(self, identity: str, made: Artifact) -> None:
-        """Note what the object that was put for an existing artifact mends.
+    def _heal(self, identity: str, remade: Artifact) -> None:
+        """Notes what the object that was put for an existing artifact mends.
 
         Args:
-            made: the artifact as it was made now.
+            remade: the artifact as it was made now.
         """
-        kept = self._lake.artifact(identity, at=self.branch)
-        if made.object is None or kept.object is None:
+        present = self._lake.artifact(identity, at=self.branch)
+        if remade.object is None or present.object is None:
             return
-        if made.object == kept.object:
-            if made.object in self._fresh:
-                self._restored[identity] = made.object
-        elif not self._lake.objects.is_sound(kept.object, kept.object_bytes):
+        if remade.object == present.object:
+            if remade.object in self._fresh:
+                self._restored[identity] = remade.object
+        elif not self._lake.objects.is_sound(present.object, present.object_bytes):
             row = replace(
-                made, branch=self.branch, object_bytes=self.hold(made.object), name=kept.name, session=kept.session
+                remade,
+                branch=self.branch,
+                object_bytes=self.hold(remade.object),
+                name=present.name,
+                session=present.session,
             )
-            self._moved[identity] = (kept.object, row)
+            self._moved[identity] = (present.object, row)
 
     def find(self, artifact_id: str) -> Artifact | None:
-        """The artifact of that full id if it is in this transaction or on the branch, else `None`."""
+        """Finds the artifact of that full id if it is in this transaction or on the branch, else `None`."""
         if artifact_id in self._pending:
             return self._pending[artifact_id]
         return self._lake.artifact(artifact_id, at=self.branch) if artifact_id in self._known else None
@@ -231,14 +238,14 @@ class Transaction:
         return self._held
 
     def _look(self) -> tuple[int, frozenset[str]]:
-        """The head, and the ids of the rows that the branch shows at it."""
+        """Reads the head, and the ids of the rows that the branch shows at it."""
         head = self._lake.catalog.head()
         if head != self._seen:
             self._known = frozenset(self._lake.identities(self._lake.refs.view(self.branch, head)).to_pylist())
             self._seen = head
         return head, self._known
 
-    def _there(self, version: int, identities: Collection[str]) -> dict[str, Artifact]:
+    def _artifacts_at(self, version: int, identities: Collection[str]) -> dict[str, Artifact]:
         """Artifacts that the branch shows at a version, by id."""
         if not identities:
             return {}
@@ -253,20 +260,20 @@ class Transaction:
         commit = f"c{secrets.token_hex(8)}"
 
         def attempt() -> CommitResult:
-            version, known = self._look()
-            fresh = {i: replace(a, created=created) for i, a in self._pending.items() if i not in known}
-            existing = (*self._existing, *(identity for identity in self._pending if identity in known))
-            if gone := [identity for identity in self._existing if identity not in known]:
+            version, identities = self._look()
+            fresh = {i: replace(a, created=created) for i, a in self._pending.items() if i not in identities}
+            existing = (*self._existing, *(identity for identity in self._pending if identity in identities))
+            if gone := [identity for identity in self._existing if identity not in identities]:
                 raise ConflictError(
                     f"{gone[0]} was withdrawn from branch {self.branch!r} meanwhile",
                     where=str(self._lake.path),
                     fix="do it again",
                 )
             moved = {i: replace(row, created=created) for i, (_, row) in self._moved.items()}
-            artifacts = self._there(version, existing) | fresh | moved
+            artifacts = self._artifacts_at(version, existing) | fresh | moved
             if not fresh and not moved:
                 return CommitResult(version=version, commit=None, added=(), existing=existing, artifacts=artifacts)
-            self._check_parents(fresh.values(), known)
+            self._check_parents(fresh.values(), identities)
             written = [artifact.row() for artifact in (*fresh.values(), *moved.values())]
             rows = pa.Table.from_pylist(written, schema=catalog_schema())
             info = {
@@ -292,10 +299,10 @@ class Transaction:
         self._sizes[name] = self._lake.objects.size(name)
         return self._sizes[name]
 
-    def _check_parents(self, artifacts: Iterable[Artifact], known: frozenset[str]) -> None:
+    def _check_parents(self, artifacts: Iterable[Artifact], identities: frozenset[str]) -> None:
         for artifact in artifacts:
             for parent in artifact.parents:
-                if parent not in known and parent not in self._pending:
+                if parent not in identities and parent not in self._pending:
                     raise NotFoundError(
                         f"its parent {parent} is not on branch {self.branch!r}",
                         where=f"{artifact.kind} {artifact.name!r}",

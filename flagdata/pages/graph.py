@@ -93,10 +93,10 @@ def layout(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> Layout:
     _order(columns, ways)
     for column in columns:
         y = _MARGIN + (height - _stacked(column)) / 2
-        for place in column:
-            place.y = y + place.height / 2
-            y += place.height + _GAP_Y
-    at = {place.key: (number, place) for number, column in enumerate(columns) for place in column}
+        for box_place in column:
+            box_place.y = y + box_place.height / 2
+            y += box_place.height + _GAP_Y
+    at = {box_place.key: (number, box_place) for number, column in enumerate(columns) for box_place in column}
     return Layout(
         size=(2 * _MARGIN + len(columns) * WIDTH + (len(columns) - 1) * _GAP_X, 2 * _MARGIN + height),
         at=at,
@@ -105,7 +105,7 @@ def layout(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> Layout:
 
 
 def svg(boxes: Sequence[Box], edges: Collection[tuple[str, str]], *, title: str) -> str:
-    """The drawing as an SVG document, which can also be a part of a page.
+    """Draws boxes and lines as an SVG document, which can also be a part of a page.
 
     Args:
         edges: (from, to) by key, each from a column to one further right; others are left out.
@@ -132,7 +132,7 @@ def svg(boxes: Sequence[Box], edges: Collection[tuple[str, str]], *, title: str)
 def _placed(
     boxes: Sequence[Box], edges: Collection[tuple[str, str]], tall: int
 ) -> tuple[list[list[Place]], list[tuple[str, ...]]]:
-    """The places of each column, and the keys that each line leads through."""
+    """Places the boxes of each column, and lists the keys that each line leads through."""
     numbers = {column: number for number, column in enumerate(sorted({box.column for box in boxes}))}
     columns: list[list[Place]] = [[] for _ in numbers]
     where = {box.key: numbers[box.column] for box in boxes}
@@ -155,15 +155,17 @@ def _order(columns: Sequence[list[Place]], ways: Sequence[Sequence[str]]) -> Non
     before: dict[str, list[str]] = {}
     behind: dict[str, list[str]] = {}
     for way in ways:
-        for one, other in pairwise(way):
-            before.setdefault(other, []).append(one)
-            behind.setdefault(one, []).append(other)
+        for nearer, farther in pairwise(way):
+            before.setdefault(farther, []).append(nearer)
+            behind.setdefault(nearer, []).append(farther)
     for sweep in range(_SWEEPS):
         forth = sweep % 2 == 0
         neighbours = before if forth else behind
         for column in columns if forth else reversed(columns):
-            rank = {place.key: number / max(1, len(c) - 1) for c in columns for number, place in enumerate(c)}
-            column.sort(key=lambda place: _mean([rank[key] for key in neighbours.get(place.key, [place.key])]))
+            rank = {box_place.key: number / max(1, len(c) - 1) for c in columns for number, box_place in enumerate(c)}
+            column.sort(
+                key=lambda box_place: _mean([rank[key] for key in neighbours.get(box_place.key, [box_place.key])])
+            )
 
 
 def _mean(values: Sequence[float]) -> float:
@@ -171,11 +173,11 @@ def _mean(values: Sequence[float]) -> float:
 
 
 def _stacked(column: Sequence[Place]) -> float:
-    return sum(place.height for place in column) + _GAP_Y * (len(column) - 1)
+    return sum(box_place.height for box_place in column) + _GAP_Y * (len(column) - 1)
 
 
 def left(column: int) -> float:
-    """Where the boxes of a column begin [px]."""
+    """Computes where the boxes of a column begin [px]."""
     return _MARGIN + column * (WIDTH + _GAP_X)
 
 
@@ -183,28 +185,31 @@ Point = tuple[float, float]
 
 
 def curves(way: Sequence[tuple[int, Place]]) -> list[tuple[Point, Point, Point, Point]]:
-    """A line as cubic curves, each from one column to the next; where it passes a column it goes on straight."""
-    (number, place), *others = way
-    x, y = left(number) + WIDTH, place.y
-    found = []
-    for number, place in others:
+    """Computes a line as cubic curves, each from one column to the next; where it passes a column it goes on
+    straight."""
+    (number, box_place), *following = way
+    x, y = left(number) + WIDTH, box_place.y
+    pieces = []
+    for number, box_place in following:
         end = left(number)
         middle = (x + end) / 2
-        found.append(((x, y), (middle, y), (middle, place.y), (end, place.y)))
-        x, y = end + WIDTH, place.y
-    return found
+        pieces.append(((x, y), (middle, y), (middle, box_place.y), (end, box_place.y)))
+        x, y = end + WIDTH, box_place.y
+    return pieces
 
 
 def _line(way: Sequence[tuple[int, Place]]) -> str:
     path: list[str] = []
-    for (x, y), one, two, (end, below) in curves(way):
+    for (x, y), control_1, control_2, (end, below) in curves(way):
         path.append(f"{'H' if path else 'M'}{x:.0f}" + ("" if path else f" {y:.1f}"))
-        path.append(f"C{one[0]:.1f} {one[1]:.1f} {two[0]:.1f} {two[1]:.1f} {end:.0f} {below:.1f}")
+        path.append(
+            f"C{control_1[0]:.1f} {control_1[1]:.1f} {control_2[0]:.1f} {control_2[1]:.1f} {end:.0f} {below:.1f}"
+        )
     return f'<path class="edge" d="{" ".join(path)}" fill="none" stroke="{RULE}" stroke-width="1.5"/>'
 
 
-def _box(box: Box, column: int, place: Place) -> str:
-    x, y = left(column), place.y - place.height / 2
+def _box(box: Box, column: int, box_place: Place) -> str:
+    x, y = left(column), box_place.y - box_place.height / 2
     colour = COLOURS.get(box.kind or "", QUIET)
     frame = (MARKED, 2.5) if box.marked else (RULE, 1)
     title = f'<text class="title" x="{x + 14:.0f}" y="{y + 20:.1f}" font-weight="600" fill="{INK}">'
@@ -217,21 +222,21 @@ def _box(box: Box, column: int, place: Place) -> str:
     drawn = (
         f"<title>{_text(box.about)}</title>"
         f'<rect class="box{" marked" if box.marked else ""}" x="{x:.0f}" y="{y:.1f}" width="{WIDTH}" '
-        f'height="{place.height}" rx="6" fill="{PAPER}" stroke="{frame[0]}" stroke-width="{frame[1]}"/>'
-        f'<rect x="{x + 5:.0f}" y="{y + 8:.1f}" width="3" height="{place.height - 16}" rx="1.5" fill="{colour}"/>'
+        f'height="{box_place.height}" rx="6" fill="{PAPER}" stroke="{frame[0]}" stroke-width="{frame[1]}"/>'
+        f'<rect x="{x + 5:.0f}" y="{y + 8:.1f}" width="3" height="{box_place.height - 16}" rx="1.5" fill="{colour}"/>'
         + "".join(texts)
     )
     return f"<g>{drawn}</g>" if box.link is None else f'<a href="{html.escape(box.link)}">{drawn}</a>'
 
 
 def _text(text: str) -> str:
-    """Text of XML, in which characters that a page cannot hold are escaped."""
+    """Escapes text of XML, with characters that a page cannot hold."""
     return html.escape(printable(text))
 
 
 def cut(text: str, cells: int) -> str:
-    """The text, or so much of it as fits a width [cells of a digit], with an ellipsis."""
-    widths = [2 if unicodedata.east_asian_width(one) in "WF" else 1 for one in text]
+    """Cuts a text to as much of it as fits a width [cells of a digit], with an ellipsis."""
+    widths = [2 if unicodedata.east_asian_width(letter) in "WF" else 1 for letter in text]
     if sum(widths) <= cells:
         return text
     taken, used = 0, 1

@@ -18,7 +18,7 @@ _STEPS = 24  # straight pieces of a curve
 
 
 def png(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> bytes:
-    """The file; arguments as of `graph.svg`. Pillow's own font has ASCII alone: see `_ascii`."""
+    """Draws boxes and lines as a PNG; arguments as of `graph.svg`. Pillow's own font has ASCII alone: see `_ascii`."""
     drawn = graph.layout(boxes, edges)
     picture = Image.new("RGB", (round(_SCALE * drawn.size[0]), round(_SCALE * drawn.size[1])), graph.PAPER)
     pen = ImageDraw.Draw(picture)
@@ -35,13 +35,13 @@ def png(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> bytes:
     return content.getvalue()
 
 
-def _box(pen: ImageDraw.ImageDraw, box: Box, column: int, place: graph.Place) -> None:
-    x, y = graph.left(column), place.y - place.height / 2
+def _box(pen: ImageDraw.ImageDraw, box: Box, column: int, box_place: graph.Place) -> None:
+    x, y = graph.left(column), box_place.y - box_place.height / 2
     edge, width = (graph.MARKED, 5) if box.marked else (graph.RULE, 2)
-    corners = [_scaled((x, y)), _scaled((x + graph.WIDTH, y + place.height))]
+    corners = [_scaled((x, y)), _scaled((x + graph.WIDTH, y + box_place.height))]
     pen.rounded_rectangle(corners, radius=6 * _SCALE, fill=graph.PAPER, outline=edge, width=width)
     colour = graph.COLOURS.get(box.kind or "", graph.QUIET)
-    pen.rectangle([_scaled((x + 5, y + 8)), _scaled((x + 8, y + place.height - 8))], fill=colour)
+    pen.rectangle([_scaled((x + 5, y + 8)), _scaled((x + 8, y + box_place.height - 8))], fill=colour)
     _write(pen, (x + 14, y + 20), graph.cut(box.title, graph.TITLE_CELLS), size=13, colour=graph.INK)
     for number, text in enumerate(box.lines):
         below = (x + 14, y + 36 + graph.NEXT * number)
@@ -54,20 +54,23 @@ def _write(pen: ImageDraw.ImageDraw, at: Point, text: str, *, size: int, colour:
 
 
 def _ascii(text: str) -> str:
-    """The text in ASCII: letters without their accents, and "?" for what has nothing like it."""
+    """Converts a text to ASCII: letters without their accents, and "?" for what has nothing like it."""
     plain = unicodedata.normalize("NFKD", text.translate(_LIKE))
-    return "".join(one for one in plain if not unicodedata.combining(one)).encode("ascii", "replace").decode()
+    return "".join(letter for letter in plain if not unicodedata.combining(letter)).encode("ascii", "replace").decode()
 
 
-def _points(begin: Point, one: Point, two: Point, end: Point) -> list[Point]:
+def _points(begin: Point, control_1: Point, control_2: Point, end: Point) -> list[Point]:
     """Points on a cubic Bézier curve."""
-    found = []
+    points = []
     for step in range(_STEPS + 1):
         t = step / _STEPS
         weights = (1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3
-        x, y = (sum(w * p[axis] for w, p in zip(weights, (begin, one, two, end), strict=True)) for axis in (0, 1))
-        found.append((x, y))
-    return found
+        x, y = (
+            sum(w * p[axis] for w, p in zip(weights, (begin, control_1, control_2, end), strict=True))
+            for axis in (0, 1)
+        )
+        points.append((x, y))
+    return points
 
 
 def _scaled(point: Point) -> Point:

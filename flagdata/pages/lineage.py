@@ -13,22 +13,22 @@ MOST = 8
 
 
 def picture(
-    found: Ancestry, *, details: bool = False, most: int | None = MOST, link: Callable[[str], str] | None = None
+    ancestry: Ancestry, *, details: bool = False, most: int | None = MOST, link: Callable[[str], str] | None = None
 ) -> str:
-    """The lineage as SVG.
+    """Draws the lineage as SVG.
 
     Args:
         details, most, link: as of `graph`.
     """
-    boxes, edges = graph(found, details=details, most=most, link=link)
-    name = found.relatives[found.artifact].name or found.artifact
+    boxes, edges = graph(ancestry, details=details, most=most, link=link)
+    name = ancestry.relatives[ancestry.artifact].name or ancestry.artifact
     return svg(boxes, edges, title=f"Lineage of {name}")
 
 
 def graph(
-    found: Ancestry, *, details: bool = False, most: int | None = MOST, link: Callable[[str], str] | None = None
+    ancestry: Ancestry, *, details: bool = False, most: int | None = MOST, link: Callable[[str], str] | None = None
 ) -> tuple[list[Box], list[tuple[str, str]]]:
-    """The boxes and edges of its picture.
+    """Builds the boxes and edges of the lineage's picture.
 
     Args:
         details: with recipe hash, code version and seed.
@@ -38,21 +38,21 @@ def graph(
     boxes: list[Box] = []
     key_of: dict[str, str] = {}
     generations: dict[int, list[Relative]] = {}
-    for relative in found.relatives.values():
+    for relative in ancestry.relatives.values():
         generations.setdefault(relative.generation, []).append(relative)
     for generation, members in generations.items():
         for group in grouped(members, most=most):
             first = group[0]
-            key_of |= {one.artifact: first.artifact for one in group}
+            key_of |= {relative_in_group.artifact: first.artifact for relative_in_group in group}
             if len(group) > 1:
                 boxes.append(_several(group, generation))
             else:
-                boxes.append(_single(first, details=details, link=link, marked=first.artifact == found.artifact))
-    return boxes, list(dict.fromkeys((key_of[parent], key_of[child]) for parent, child in found.edges))
+                boxes.append(_single(first, details=details, link=link, marked=first.artifact == ancestry.artifact))
+    return boxes, list(dict.fromkeys((key_of[parent], key_of[child]) for parent, child in ancestry.edges))
 
 
 def detail_lines(relative: Relative) -> list[str]:
-    """What shaped it: recipe, code and seed, as far as they are known."""
+    """Lists what shaped it: recipe, code and seed, as far as they are known."""
     lines = []
     if relative.recipe_hash is not None:
         lines.append(f"recipe {relative.recipe_hash[:SHORT]}")
@@ -64,7 +64,7 @@ def detail_lines(relative: Relative) -> list[str]:
 
 
 def _single(relative: Relative, *, details: bool, link: Callable[[str], str] | None, marked: bool) -> Box:
-    known = relative.kind is not None
+    is_listed = relative.kind is not None
     message = detail_lines(relative)
     return Box(
         key=relative.artifact,
@@ -74,19 +74,19 @@ def _single(relative: Relative, *, details: bool, link: Callable[[str], str] | N
         title=relative.name or "not at this version",
         lines=[f"{relative.kind or 'artifact'} {relative.artifact[:SHORT]}", *(message if details else ())],
         about="\n".join([relative.name or "", relative.artifact, *message]),
-        link=link(relative.artifact) if link is not None and known else None,
+        link=link(relative.artifact) if link is not None and is_listed else None,
     )
 
 
 def _several(group: Sequence[Relative], generation: int) -> Box:
     kind = group[0].kind
-    names = sorted({one.name for one in group if one.name is not None})
-    shown = names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}" if names else ""
+    names = sorted({relative.name for relative in group if relative.name is not None})
+    name_range = names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}" if names else ""
     return Box(
         key=group[0].artifact,
         column=generation,
         kind=kind,
         title=f"{len(group):,} × {kind or 'artifact'}",
-        lines=[shown],
+        lines=[name_range],
         about=f"{len(group)} artifacts of one kind in one generation",
     )

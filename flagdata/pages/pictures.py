@@ -17,34 +17,34 @@ if TYPE_CHECKING:
 
 
 def data_url(data: bytes, media_type: str) -> str:
-    """The bytes as a URL that holds them."""
+    """Writes the bytes as a URL that holds them."""
     return f"data:{media_type};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 def png(figure: Figure, *, dpi: float = 110) -> bytes:
-    """The figure as a PNG that does not name the program it was drawn by."""
+    """Writes the figure as a PNG that does not name the program it was drawn by."""
     target = io.BytesIO()
     figure.savefig(target, format="png", dpi=dpi, metadata={"Software": None})
     return target.getvalue()
 
 
 def figure_url(figure: Figure, *, dpi: float = 110) -> str:
-    """The figure as a PNG in a data URL."""
+    """Writes the figure as a PNG in a data URL."""
     return data_url(png(figure, dpi=dpi), "image/png")
 
 
 def still(frame: UInt8Array | Image.Image, *, side: int | None = None) -> str:
-    """A frame (height, width) as a JPEG in a data URL, at its own size or `side` pixels wide and high."""
+    """Writes a frame (height, width) as a JPEG in a data URL, at its own size or `side` pixels wide and high."""
     return _url([_sized(frame, side)], "jpeg", quality=85)
 
 
 def moving(clip: Sequence[UInt8Array] | UInt8Array, *, rate: float, side: int) -> str:
-    """The largest centred square of a clip (frame, height, width), gray or in colour, endless at `rate` [Hz], as a WebP
-    in a data URL."""
+    """Writes the largest centred square of a clip (frame, height, width), gray or in colour, endless at `rate` [Hz], as
+    a WebP in a data URL."""
     frames = np.asarray(clip)
     square = min(frames.shape[1:3])
-    top, left = (frames.shape[1] - square) // 2, (frames.shape[2] - square) // 2
-    cut = frames[:, top : top + square, left : left + square]
+    top, left_edge = (frames.shape[1] - square) // 2, (frames.shape[2] - square) // 2
+    cut = frames[:, top : top + square, left_edge : left_edge + square]
     return _url([_sized(frame, side) for frame in cut], "webp", quality=60, duration=round(1000 / rate), loop=0)
 
 

@@ -13,7 +13,7 @@ from markupsafe import Markup
 def render(
     package: str, template: str, values: Mapping[str, Any], *, filters: Mapping[str, Callable[..., Any]] | None = None
 ) -> str:
-    """The page that `template` of `package` makes of `values`.
+    """Renders the page that `template` of `package` makes of `values`.
 
     Templates extend "base.html.j2" and may use `filters` and `asset(name)`, the text of a style or script of theirs.
     Values are escaped unless they are `Markup`; a name the template uses and
@@ -33,5 +33,5 @@ def render(
 
 
 def text_of(package: str, name: str) -> str:
-    """A style, script or other text that a package brings along."""
+    """Reads a style, script or other text that a package brings along."""
     return files(package).joinpath(name).read_text(encoding="utf-8")

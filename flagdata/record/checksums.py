@@ -67,7 +67,7 @@ class Checksums:
 
     @classmethod
     def parse(cls, stored: Mapping[str, str], *, where: str) -> Checksums:
-        """The checksums that a metadata record holds.
+        """Reads the checksums that a metadata record holds.
 
         Raises:
             CorruptError: they are damaged themselves.
@@ -98,7 +98,7 @@ def _channel(entry: Mapping[str, Any]) -> ChannelChecksums:
 
 
 def metadata_checksum(values: Mapping[str, str]) -> int:
-    """The checksum of the content of a metadata record."""
+    """Computes the checksum of the content of a metadata record."""
     return zlib.crc32(json.dumps(values, sort_keys=True, ensure_ascii=True).encode())
 
 
@@ -136,7 +136,7 @@ class ChecksummedFile(McapFile):
     def register_channel(
         self, *, topic: str, message_encoding: str, schema_id: int, metadata: Mapping[str, str] | None = None
     ) -> int:
-        """See `McapFile`."""
+        """Registers a channel, see `McapFile`."""
         channel = super().register_channel(
             topic=topic, message_encoding=message_encoding, schema_id=schema_id, metadata=metadata
         )
@@ -144,14 +144,14 @@ class ChecksummedFile(McapFile):
         return channel
 
     def add_message(self, *, channel_id: int, log_time: int, publish_time: int, sequence: int, data: bytes) -> None:
-        """See `McapFile`."""
+        """Adds a message, see `McapFile`."""
         super().add_message(
             channel_id=channel_id, log_time=log_time, publish_time=publish_time, sequence=sequence, data=data
         )
         self._tallies[channel_id].add(_HEAD.pack(channel_id, sequence, log_time, publish_time), data)
 
     def add_messages(self, block: MessageBlock, *, channel_id: int, sequence: int) -> None:
-        """See `McapFile`."""
+        """Adds messages, see `McapFile`."""
         super().add_messages(block, channel_id=channel_id, sequence=sequence)
         count = len(block.log_time)
         heads = np.empty(count, dtype=[("ch", "<u2"), ("seq", "<u4"), ("log", "<u8"), ("pub", "<u8")])
@@ -160,12 +160,12 @@ class ChecksummedFile(McapFile):
         self._tallies[channel_id].add(heads.tobytes(), block.payload[block.used].tobytes(), count)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """See `McapFile`."""
+        """Adds metadata, see `McapFile`."""
         super().add_metadata(name, values)
         self._checksums[name] = metadata_checksum(values)
 
     def finish(self) -> None:
-        """See `McapFile`."""
+        """Finishes the file, see `McapFile`."""
         document = {
             "schema": SCHEMA,
             "channels": {tally.topic: tally.as_dict() for tally in self._tallies.values()},

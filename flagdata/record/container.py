@@ -86,17 +86,17 @@ class Messages:
 
 
 def read_exact(file: Bytes, length: int, offset: int, *, where: str) -> bytes:
-    """`length` bytes at `offset`.
+    """Reads `length` bytes at `offset`.
 
     Raises:
         CorruptError: the file ends before.
     """
     data = file.read(length, offset)
     while len(data) < length:
-        more = file.read(length - len(data), offset + len(data))
-        if not more:
+        further = file.read(length - len(data), offset + len(data))
+        if not further:
             raise CorruptError(f"the record ends before byte {offset + length}", where=where, fix=_RECOVER)
-        data += more
+        data += further
     return data
 
 
@@ -150,7 +150,7 @@ def _summary(body: bytes, start: int, *, where: str) -> Summary:
             chunk = parse(ChunkIndex.read, record, where=where)
             _check_span(chunk.chunk_start_offset, chunk.chunk_length + chunk.message_index_length, start, where=where)
             if CHUNK_HEAD + len(chunk.compression.encode()) + chunk.compressed_size != chunk.chunk_length:
-                raise CorruptError("a chunk's lengths contradict each other", where=where, fix=_RECOVER)
+                raise CorruptError("the lengths of a chunk do not agree", where=where, fix=_RECOVER)
             chunks.append(chunk)
         elif opcode == Opcode.ATTACHMENT_INDEX:
             attachment = parse(AttachmentIndex.read, record, where=where)
@@ -179,7 +179,7 @@ def _check_span(offset: int, length: int, end: int, *, where: str) -> None:
 
 
 def split_records(body: bytes | memoryview, *, where: str) -> Iterator[tuple[int, memoryview]]:
-    """Opcode and content of each record in `body`; nothing is copied.
+    """Yields opcode and content of each record in `body`; nothing is copied.
 
     Raises:
         CorruptError: a record reaches beyond the end.
@@ -198,7 +198,7 @@ def split_records(body: bytes | memoryview, *, where: str) -> Iterator[tuple[int
 
 
 def parse(read: Callable[[ReadDataStream], R], record: bytes | memoryview, *, where: str) -> R:
-    """`record`'s content by the `read` of one of mcap.records.
+    """Parses `record`'s content by the `read` of one of mcap.records.
 
     Raises:
         CorruptError: it is not of that kind.
@@ -210,14 +210,15 @@ def parse(read: Callable[[ReadDataStream], R], record: bytes | memoryview, *, wh
 
 
 def data_start(chunk: ChunkIndex) -> int:
-    """Where the records of an uncompressed chunk begin in the file [B]."""
+    """Returns where the records of an uncompressed chunk begin in the file [B]."""
     return chunk.chunk_start_offset + CHUNK_HEAD + len(chunk.compression.encode())
 
 
 def read_messages(
     file: Bytes, summary: Summary, topic: str, *, where: str, span: tuple[int, int] | None = None
 ) -> Messages:
-    """Where each message of `topic` lies; every head is read and compared with the index. None if the topic is absent.
+    """Finds where each message of `topic` lies; every head is read and compared with the index. None if the topic is
+    absent.
 
     Args:
         span: only these messages, (first, count) of a topic in order, see `in_order`; no head of others is read.
@@ -229,10 +230,10 @@ def read_messages(
     channel = summary.channels.get(topic)
     if channel is None:
         return Messages(log_time=_empty(), publish_time=_empty(), offset=_empty(), length=_empty())
-    time, place, limit = _places(file, summary, channel.id, where=where, span=span)
+    time, head_offsets, limit = _places(file, summary, channel.id, where=where, span=span)
     first = 0 if span is None else span[0]
-    heads = b"".join([file.read(MESSAGE_HEAD, at) for at in place.tolist()])
-    if len(heads) != MESSAGE_HEAD * len(place):
+    heads = b"".join([file.read(MESSAGE_HEAD, at) for at in head_offsets.tolist()])
+    if len(heads) != MESSAGE_HEAD * len(head_offsets):
         raise CorruptError("the record ends before its last message", where=where, fix=_RECOVER)
     head = np.frombuffer(heads, dtype=_MESSAGE)
     length = head["length"].astype(np.int64) - (MESSAGE_HEAD - RECORD_HEAD)
@@ -241,70 +242,77 @@ def read_messages(
         & (head["channel"] == channel.id)
         & (head["log"].astype(np.int64) == time)
         & (length >= 0)
-        & (place + MESSAGE_HEAD + length <= limit)
+        & (head_offsets + MESSAGE_HEAD + length <= limit)
     )
     if not bool(sound.all()):
         bad = int(np.flatnonzero(~sound)[0])
         raise CorruptError(
             f"message {first + bad} of {topic} is not where the index says",
-            where=f"{where}, byte {place[bad]}",
+            where=f"{where}, byte {head_offsets[bad]}",
             fix=_RECOVER,
         )
-    kept = None
+    stored_checksums = None
     if summary.checksums is not None:
-        kept = summary.checksums.channels.get(topic)
-        kept = _check_heads(head, kept, topic, where=where) if span is None else _of_span(kept, span)
+        stored_checksums = summary.checksums.channels.get(topic)
+        stored_checksums = (
+            _check_heads(head, stored_checksums, topic, where=where)
+            if span is None
+            else _of_span(stored_checksums, span)
+        )
     order = np.argsort(time, kind="stable")
     if span is not None and not np.array_equal(order, np.arange(len(time))):
         raise CorruptError(f"the messages of {topic} are not in order of time", where=where, fix=_RECOVER)
     return Messages(
         log_time=time[order],
         publish_time=head["publish"].astype(np.int64)[order],
-        offset=(place + MESSAGE_HEAD)[order],
+        offset=(head_offsets + MESSAGE_HEAD)[order],
         length=length[order],
-        checksums=None if kept is None or kept.messages is None else kept.messages[order],
-        checksum=None if kept is None else kept.data,
+        checksums=None
+        if stored_checksums is None or stored_checksums.messages is None
+        else stored_checksums.messages[order],
+        checksum=None if stored_checksums is None else stored_checksums.data,
         first=first,
     )
 
 
 def in_order(file: Bytes, summary: Summary, topic: str, *, where: str) -> bool:
-    """Whether a topic's messages lie in order of time from chunk to chunk, each with a checksum of its own, so that
-    `read_messages` may read a span of them. The summary states from when to when each chunk has messages; an index is
-    read only of chunks in which other topics overlap with the next.
+    """Checks whether a topic's messages lie in order of time from chunk to chunk, each with a checksum of its own, so
+    that `read_messages` may read a span of them. The summary states from when to when each chunk has messages; an index
+    is read only of chunks in which other topics overlap with the next.
 
     Raises:
         CorruptError: an index that is damaged.
     """
-    kept = None if summary.checksums is None else summary.checksums.channels.get(topic)
-    if kept is None or kept.messages is None or topic not in summary.channels:
+    stored_checksums = None if summary.checksums is None else summary.checksums.channels.get(topic)
+    if stored_checksums is None or stored_checksums.messages is None or topic not in summary.channels:
         return False
     channel = summary.channels[topic].id
     chunks = [chunk for chunk in summary.chunks if channel in chunk.message_index_offsets]
     if (
         any(chunk.compression for chunk in chunks)
-        or sum(message_count(chunk, channel) for chunk in chunks) != kept.count
+        or sum(message_count(chunk, channel) for chunk in chunks) != stored_checksums.count
     ):
         return False
     bounds = [(chunk.message_start_time, chunk.message_end_time) for chunk in chunks]
-    overlaps = {i + k for i, (one, other) in enumerate(pairwise(bounds)) if other[0] <= one[1] for k in (0, 1)}
+    overlaps = {i + k for i, (earlier, later) in enumerate(pairwise(bounds)) if later[0] <= earlier[1] for k in (0, 1)}
     shared = [i for i in sorted(overlaps) if len(chunks[i].message_index_offsets) > 1]
     file.prepare([_index_span(chunks[i], channel) for i in shared])
     for i in shared:
         time, _ = _message_index(file, chunks[i].message_index_offsets[channel], channel, summary.data_end, where=where)
         bounds[i] = (int(time.min(initial=0)), int(time.max(initial=0)))
-    return all(one[1] < other[0] for one, other in pairwise(bounds))
+    return all(earlier[1] < later[0] for earlier, later in pairwise(bounds))
 
 
 def _index_span(chunk: ChunkIndex, channel: int) -> tuple[int, int]:
-    """Where the index of a channel's messages in a chunk begins and ends [B]: indexes follow their chunk in a row."""
+    """Returns where the index of a channel's messages in a chunk begins and ends [B]: indexes follow their chunk in a
+    row."""
     first = chunk.message_index_offsets[channel]
     later = [at for at in chunk.message_index_offsets.values() if at > first]
     return first, min(later, default=chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length)
 
 
 def message_count(chunk: ChunkIndex, channel: int) -> int:
-    """How many messages of a channel a chunk has, by the length of their index."""
+    """Counts the messages of a channel in a chunk, by the length of their index."""
     first, end = _index_span(chunk, channel)
     return (end - first - _INDEX.size) // _INDEX_ENTRY
 
@@ -312,7 +320,7 @@ def message_count(chunk: ChunkIndex, channel: int) -> int:
 def _places(
     file: Bytes, summary: Summary, channel: int, *, where: str, span: tuple[int, int] | None
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Log time of messages, where their heads lie, and where the records of their chunks end, in file order.
+    """Finds the log time of messages, where their heads lie, and where the records of their chunks end, in file order.
 
     Args:
         span: see `read_messages`; what is read of these messages next is prepared.
@@ -353,26 +361,28 @@ def _places(
     return np.concatenate(times), np.concatenate(places), np.concatenate(limits)
 
 
-def _of_span(kept: ChannelChecksums | None, span: tuple[int, int]) -> ChannelChecksums | None:
-    if kept is None or kept.messages is None:
+def _of_span(stored_checksums: ChannelChecksums | None, span: tuple[int, int]) -> ChannelChecksums | None:
+    if stored_checksums is None or stored_checksums.messages is None:
         return None
     first, count = span
-    return replace(kept, messages=kept.messages[first : first + count], count=count)
+    return replace(stored_checksums, messages=stored_checksums.messages[first : first + count], count=count)
 
 
-def _check_heads(head: NDArray[np.void], kept: ChannelChecksums | None, topic: str, *, where: str) -> ChannelChecksums:
-    """The channel's checksums, once its heads, in file order, agree with them."""
-    if kept is None or kept.count != len(head):
-        count = "no" if kept is None else str(kept.count)
+def _check_heads(
+    head: NDArray[np.void], stored_checksums: ChannelChecksums | None, topic: str, *, where: str
+) -> ChannelChecksums:
+    """Returns the channel's checksums, once its heads, in file order, agree with them."""
+    if stored_checksums is None or stored_checksums.count != len(head):
+        count = "no" if stored_checksums is None else str(stored_checksums.count)
         raise CorruptError(f"{topic} has {len(head)} messages, and {count} checksums", where=where, fix=FIX)
-    whole = np.frombuffer(head.tobytes(), dtype=np.uint8).reshape(len(head), MESSAGE_HEAD)
-    if zlib.crc32(np.ascontiguousarray(whole[:, MESSAGE_HEAD - HEAD_BYTES :]).tobytes()) != kept.heads:
+    head_bytes = np.frombuffer(head.tobytes(), dtype=np.uint8).reshape(len(head), MESSAGE_HEAD)
+    if zlib.crc32(np.ascontiguousarray(head_bytes[:, MESSAGE_HEAD - HEAD_BYTES :]).tobytes()) != stored_checksums.heads:
         raise CorruptError(f"the times of {topic} have changed since they were written", where=where, fix=FIX)
-    return kept
+    return stored_checksums
 
 
 def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str, *, first: int, where: str) -> None:
-    """Hold the payloads of consecutive messages from row `first` on against their checksums, where there are any.
+    """Compares the payloads of consecutive messages from row `first` on with their checksums, where there are any.
 
     Of a channel with one checksum, `parts` are all messages.
 
@@ -400,7 +410,7 @@ def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str
 
 
 def check_chunk(file: Bytes, chunk: ChunkIndex, *, where: str) -> None:
-    """Hold the records of an uncompressed chunk against the chunk's own checksum, where it has one.
+    """Compares the records of an uncompressed chunk with the chunk's own checksum, where it has one.
 
     Raises:
         CorruptError: they have changed since they were written.
@@ -424,40 +434,40 @@ def _message_index(file: Bytes, at: int, channel: int, end: int, *, where: str) 
     if at + _INDEX.size > end:
         raise CorruptError("a message index lies beyond the data", where=where, fix=_RECOVER)
     opcode, length, owner, size = _INDEX.unpack(read_exact(file, _INDEX.size, at, where=where))
-    whole = size + 6 == length and size % _INDEX_ENTRY == 0
-    if opcode != Opcode.MESSAGE_INDEX or owner != channel or not whole or at + size > end:
+    is_sound = size + 6 == length and size % _INDEX_ENTRY == 0
+    if opcode != Opcode.MESSAGE_INDEX or owner != channel or not is_sound or at + size > end:
         raise CorruptError("no message index where the summary says", where=f"{where}, byte {at}", fix=_RECOVER)
     pairs = np.frombuffer(read_exact(file, size, at + _INDEX.size, where=where), dtype="<u8").astype(np.int64)
     return pairs[0::2], pairs[1::2]
 
 
 def read_metadata(file: Bytes, summary: Summary, *, where: str) -> dict[str, dict[str, str]]:
-    """All metadata records but the checksums, by name.
+    """Reads all metadata records but the checksums, by name.
 
     Raises:
         CorruptError: not what the summary says, or changed since they were written.
     """
-    found: dict[str, dict[str, str]] = {}
-    kept = None if summary.checksums is None else summary.checksums.metadata
+    metadata: dict[str, dict[str, str]] = {}
+    stored_checksums = None if summary.checksums is None else summary.checksums.metadata
     for entry in summary.metadata:
         if entry.name == CHECKSUMS:
             continue
         record = _record_at(file, entry.offset, entry.length, Opcode.METADATA, where=where)
         content = parse(Metadata.read, record, where=where)
-        if kept is not None and (
-            content.name != entry.name or kept.get(entry.name) != metadata_checksum(content.metadata)
+        if stored_checksums is not None and (
+            content.name != entry.name or stored_checksums.get(entry.name) != metadata_checksum(content.metadata)
         ):
             raise CorruptError(
                 f"the metadata {entry.name!r} has changed since it was written: its checksum is wrong",
                 where=f"{where}, byte {entry.offset}",
                 fix=FIX,
             )
-        found[entry.name] = content.metadata
-    return found
+        metadata[entry.name] = content.metadata
+    return metadata
 
 
 def read_attachment(file: Bytes, entry: AttachmentIndex, *, where: str) -> bytes:
-    """The bytes of an attachment as stored, checked.
+    """Reads the bytes of an attachment as stored, checked.
 
     Raises:
         CorruptError: the checksum is wrong.
@@ -469,8 +479,8 @@ def read_attachment(file: Bytes, entry: AttachmentIndex, *, where: str) -> bytes
 
 
 def _record_at(file: Bytes, offset: int, length: int, opcode: Opcode, *, where: str) -> memoryview:
-    whole = read_exact(file, length, offset, where=where)
-    records = list(split_records(whole, where=where))
+    record = read_exact(file, length, offset, where=where)
+    records = list(split_records(record, where=where))
     if len(records) != 1 or records[0][0] != opcode:
         raise CorruptError(f"there is no {opcode.name.lower()} at byte {offset}", where=where, fix=_RECOVER)
     return records[0][1]

@@ -9,5 +9,5 @@ _KEY_UNIT = re.compile(rb"\x00\x00\x01[\x25\x27\x45\x47\x65\x67]")
 
 
 def is_key(picture: bytes | memoryview) -> bool:
-    """Whether decoding can start at this picture."""
+    """Checks whether decoding can start at this picture."""
     return _KEY_UNIT.search(picture) is not None

@@ -77,14 +77,14 @@ class _Sheet:
         self._file.source_code_info.location.add(path=self._path + tail, leading_comments=f" {text}\n")
 
     def field(self, name: str, number: int, kind: int, about: str, *, type_name: str | None = None) -> None:
-        """A field without presence: its zero value is not written."""
+        """Adds a field without presence: its zero value is not written."""
         self._add(name, number, kind, about, type_name, _FIELD.LABEL_OPTIONAL)
 
     def repeated(self, name: str, number: int, kind: int, about: str, *, type_name: str | None = None) -> None:
         self._add(name, number, kind, about, type_name, _FIELD.LABEL_REPEATED)
 
     def optional(self, name: str, number: int, kind: int, about: str) -> None:
-        """A field whose absence differs from zero (proto3 `optional`: a synthetic oneof)."""
+        """Adds a field whose absence differs from zero (proto3 `optional`: a synthetic oneof)."""
         field = self._add(name, number, kind, about, None, _FIELD.LABEL_OPTIONAL)
         field.proto3_optional = True
         field.oneof_index = len(self._message.oneof_decl)
@@ -156,14 +156,15 @@ TruthParameters: Any = _message_class("TruthParameters")
 
 
 def descriptor_set(message: Any) -> bytes:
-    """The FileDescriptorSet an MCAP schema embeds for a message class, dependencies first; our own with comments."""
+    """Returns the FileDescriptorSet an MCAP schema embeds for a message class, dependencies first; our own with
+    comments."""
     files = descriptor_pb2.FileDescriptorSet()
-    seen: set[str] = set()
+    added: set[str] = set()
 
     def visit(file: Any) -> None:
-        if file.name in seen:
+        if file.name in added:
             return
-        seen.add(file.name)
+        added.add(file.name)
         for dependency in file.dependencies:
             visit(dependency)
         if file.name == _FILE:
@@ -181,7 +182,7 @@ def set_timestamp(stamp: Any, instant: int) -> None:
 
 
 def timestamp_of(stamp: Any) -> int:
-    """UTC nanoseconds of a google.protobuf.Timestamp."""
+    """Converts a google.protobuf.Timestamp to UTC nanoseconds."""
     return stamp.seconds * NANOSECONDS + stamp.nanos
 
 
@@ -202,18 +203,18 @@ _FIXED: Mapping[int, int] = {1: 8, 5: 4}
 
 
 def data_field(kind: Any) -> int:
-    """Number of the field `data` of CompressedImage or CompressedVideo (it differs)."""
+    """Returns the number of the field `data` of CompressedImage or CompressedVideo (it differs)."""
     return kind.DESCRIPTOR.fields_by_name["data"].number
 
 
 def payload(message: memoryview, *, field: int) -> memoryview:
-    """The bytes of one length-delimited field of a protobuf message, without a copy.
+    """Finds the bytes of one length-delimited field of a protobuf message, without a copy.
 
     Raises:
         CorruptError: not a protobuf message, without that field, or a length that leads out of it.
     """
     at, end = 0, len(message)
-    found: memoryview | None = None
+    data: memoryview | None = None
     try:
         while at < end:
             tag, at = _varint(message, at)
@@ -223,7 +224,7 @@ def payload(message: memoryview, *, field: int) -> memoryview:
                 if at + length > end:
                     break
                 if tag >> 3 == field:
-                    found = message[at : at + length]
+                    data = message[at : at + length]
                 at += length
             elif wire == 0:
                 _, at = _varint(message, at)
@@ -232,8 +233,8 @@ def payload(message: memoryview, *, field: int) -> memoryview:
             else:
                 break
         else:
-            if found is not None and at == end:
-                return found
+            if data is not None and at == end:
+                return data
     except IndexError:
         pass
     raise CorruptError(f"a frame's message is not a protobuf with bytes in field {field}", fix="run flagdata verify")

@@ -22,7 +22,7 @@ ROWS = "artifacts.parquet"
 
 
 def sensor_metadata(sensor: Sensor) -> dict[str, str]:
-    """A sensor's known properties as text; numbers in SI, written so that they read back exactly."""
+    """Writes a sensor's known properties as text; numbers in SI, so that they read back exactly."""
     values = {field.name: getattr(sensor, field.name) for field in dataclasses.fields(sensor)}
     return {
         name: value if isinstance(value, str) else repr(value) for name, value in values.items() if value is not None
@@ -30,7 +30,7 @@ def sensor_metadata(sensor: Sensor) -> dict[str, str]:
 
 
 def sensor_of(metadata: Mapping[str, Mapping[str, str]], *, where: str) -> Sensor:
-    """The sensor that `sensor_metadata` wrote.
+    """Reads the sensor that `sensor_metadata` wrote.
 
     Raises:
         CorruptError: no such metadata, or a property that is not a number.
@@ -39,9 +39,9 @@ def sensor_of(metadata: Mapping[str, Mapping[str, str]], *, where: str) -> Senso
     if "name" not in written:
         raise CorruptError("a wind record without its sensor", where=where, fix="ingest the log again")
     name = written.pop("name")
-    known = {field.name for field in dataclasses.fields(Sensor)}
+    names = {field.name for field in dataclasses.fields(Sensor)}
     try:
-        numbers = {key: float(value) for key, value in written.items() if key in known}
+        numbers = {key: float(value) for key, value in written.items() if key in names}
     except ValueError as error:
         raise CorruptError(
             f"the sensor's metadata cannot be read: {error}", where=where, fix="ingest the log again"
@@ -59,7 +59,7 @@ def sensor_of(metadata: Mapping[str, Mapping[str, str]], *, where: str) -> Senso
 
 
 def camera_metadata(info: CameraInfo) -> dict[str, str]:
-    """A camera's settled options as text; rates in Hz, sizes in pixels, `start` in UTC nanoseconds."""
+    """Writes a camera's settled options as text; rates in Hz, sizes in pixels, `start` in UTC nanoseconds."""
     values = {field.name: getattr(info, field.name) for field in dataclasses.fields(info)}
     return {
         name: ",".join(map(str, value)) if isinstance(value, tuple) else str(value)

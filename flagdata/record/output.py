@@ -42,7 +42,7 @@ class Output(io.BufferedWriter):
             super().flush()
 
     def sync(self) -> None:
-        """Force all that was written to the disk."""
+        """Forces all that was written to the disk."""
         self.flush()
         with _clear_errors(self._path):
             os.fsync(self.fileno())

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def open_parent(lake: Lake, name: str) -> Record:
-    """The record stored as `name` ("mcap/…"), of which all that is read is checked.
+    """Opens the record stored as `name` ("mcap/…"), of which all that is read is checked.
 
     A record with checksums checks each part as it is read. One that was written before there were any is hashed whole.
 

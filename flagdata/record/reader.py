@@ -123,8 +123,8 @@ class Record:
 
     @property
     def frame_count(self) -> int:
-        kept = self._summary.checksums
-        return kept.channels[TOPIC_IMAGE].count if kept is not None and self._in_spans else len(self._frames)
+        checksums = self._summary.checksums
+        return checksums.channels[TOPIC_IMAGE].count if checksums is not None and self._in_spans else len(self._frames)
 
     @property
     def frame_times(self) -> IntArray:
@@ -137,7 +137,7 @@ class Record:
         return self._frames.publish_time
 
     def times(self, first: int, count: int) -> IntArray:
-        """(count,) instants of consecutive frames from index `first` on the common clock [UTC ns].
+        """Reads (count,) instants of consecutive frames from index `first` on the common clock [UTC ns].
 
         Raises:
             NotFoundError: the record has no such frames.
@@ -146,7 +146,7 @@ class Record:
         return table.log_time[first - table.first :][:count]
 
     def frames(self, first: int, count: int) -> UInt8Array:
-        """`count` consecutive frames from index `first`: (count, height, width) gray.
+        """Decodes `count` consecutive frames from index `first`: (count, height, width) gray.
 
         Raises:
             NotFoundError: the record has no such frames.
@@ -174,11 +174,12 @@ class Record:
         return out[..., 0]
 
     def jpeg(self, index: int) -> bytes:
-        """One frame as JPEG, see `jpegs`."""
+        """Reads one frame as JPEG, see `jpegs`."""
         return self.jpegs(index, 1)[0]
 
     def jpegs(self, first: int, count: int) -> list[bytes]:
-        """Consecutive frames as JPEG: the stored bytes, or the decoded frames encoded anew where the record is H.264.
+        """Reads consecutive frames as JPEG: the stored bytes, or the decoded frames encoded anew where the record is
+        H.264.
 
         Raises:
             NotFoundError: the record has no such frames.
@@ -188,7 +189,7 @@ class Record:
         return [bytes(picture) for picture in self._payloads(first, count)]
 
     def timestamps(self, first: int, count: int) -> IntArray:
-        """(count,) mid-exposures of frames on the common clock [UTC ns], from their messages.
+        """Reads (count,) mid-exposures of frames on the common clock [UTC ns], from their messages.
 
         Raises:
             NotFoundError: the record has no such frames.
@@ -204,7 +205,7 @@ class Record:
         return np.array([messages.timestamp_of(m.timestamp) for m in decoded], dtype=np.int64)
 
     def wind(self) -> WindSeries | None:
-        """All samples of the anemometer, on the common clock; `None` if the record has no wind."""
+        """Reads all samples of the anemometer, on the common clock; `None` if the record has no wind."""
         table = self._messages(TOPIC_WIND)
         if not len(table):
             return None
@@ -257,7 +258,7 @@ class Record:
         return tuple(_own_name(entry.name, entry.media_type) for entry in self._summary.attachments)
 
     def attachment(self, name: str) -> bytes:
-        """The bytes of an attached file, as they were before packing.
+        """Reads the bytes of an attached file, as they were before packing.
 
         Raises:
             NotFoundError: no attachment of that name.
@@ -302,7 +303,7 @@ class Record:
         return self._read(TOPIC_IMAGE, table, first - table.first, count)
 
     def _span(self, first: int, count: int) -> container.Messages:
-        """Where consecutive frames lie, and maybe others.
+        """Finds where consecutive frames lie, and maybe others.
 
         Raises:
             UsageError: no frames are asked for.
@@ -322,7 +323,7 @@ class Record:
         return container.read_messages(self._file, self._summary, TOPIC_IMAGE, where=where, span=span)
 
     def _read(self, topic: str, table: container.Messages, first: int, count: int) -> Sequence[memoryview]:
-        """The payloads of consecutive rows, checked; of any channel but that of the frames, all its messages."""
+        """Reads the payloads of consecutive rows, checked; of any channel but that of the frames, all its messages."""
         parts = self._parts(table, first, count)
         if self.has_checksums:
             container.check_parts(parts, table, topic, first=first, where=str(self.path))

@@ -65,30 +65,30 @@ class SoundMessages:
         self._summary = summary
 
     def between(self, start: int, end: int) -> list[Message | None] | None:
-        """Messages that begin between two bytes of the file, in file order, and a `None` for each that is lost: damaged
-        itself, or of a channel without checksums or with changed heads, so that no instant of it is certain.
+        """Finds messages that begin between two bytes of the file, in file order, and a `None` for each that is lost:
+        damaged itself, or of a channel without checksums or with changed heads, so that no instant of it is certain.
 
         `None` instead of all where no summary states what was there.
         """
         if self._summary is None:
             return None
-        found: dict[int, Message | None] = {}
+        messages: dict[int, Message | None] = {}
         for channel, table in self._tables.items():
             for row in np.flatnonzero((table.offset >= start) & (table.offset < end)).tolist():
-                found[int(table.offset[row])] = self._message(channel, table, row)
+                messages[int(table.offset[row])] = self._message(channel, table, row)
         unknown = sum(
             message_count(chunk, channel)
             for chunk in self._summary.chunks
             if start <= chunk.chunk_start_offset < end
             for channel in chunk.message_index_offsets.keys() - self._tables.keys()
         )
-        return [found[offset] for offset in sorted(found)] + [None] * unknown
+        return [messages[offset] for offset in sorted(messages)] + [None] * unknown
 
     def _message(self, channel: int, table: Messages, row: int) -> Message | None:
         offset, length = int(table.offset[row]), int(table.length[row])
         head = self._read(offset - MESSAGE_HEAD, MESSAGE_HEAD)
         data = self._read(offset, length)
-        right = self._whole[channel] if table.checksums is None else zlib.crc32(data) == table.checksums[row]
+        right = self._are_right[channel] if table.checksums is None else zlib.crc32(data) == table.checksums[row]
         if not right:
             return None
         return Message(
@@ -107,29 +107,29 @@ class SoundMessages:
     @cached_property
     def _tables(self) -> dict[int, Messages]:
         """Channel → where its messages are, of channels whose heads have a right checksum."""
-        found: dict[int, Messages] = {}
+        tables: dict[int, Messages] = {}
         if self._summary is None or self._summary.checksums is None:
-            return found
+            return tables
         file = open_bytes(self._path)
         try:
             for topic, channel in self._summary.channels.items():
                 with suppress(FlagdataError):
-                    found[channel.id] = read_messages(file, self._summary, topic, where=str(self._path))
+                    tables[channel.id] = read_messages(file, self._summary, topic, where=str(self._path))
         finally:
             file.close()
-        return found
+        return tables
 
     @cached_property
-    def _whole(self) -> dict[int, bool]:
+    def _are_right(self) -> dict[int, bool]:
         """Channel with one checksum of all its payloads → whether it is right."""
-        found: dict[int, bool] = {}
+        are_right: dict[int, bool] = {}
         for channel, table in self._tables.items():
             if table.checksums is None:
                 total = 0
                 for row in np.argsort(table.offset, kind="stable").tolist():
                     total = zlib.crc32(self._read(int(table.offset[row]), int(table.length[row])), total)
-                found[channel] = total == table.checksum
-        return found
+                are_right[channel] = total == table.checksum
+        return are_right
 
 
 CHUNK_LIMIT = 1 << 30
@@ -203,7 +203,7 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
 
 
 def _summary(source: Path) -> Summary | None:
-    """The record's summary, where it is sound."""
+    """Reads the record's summary, where it is sound."""
     file = open_bytes(source)
     try:
         return read_summary(file, where=str(source))
@@ -235,8 +235,8 @@ class _Copy:
         for channel in summary.channels.values():
             self.channel(channel)
 
-    def find(self, kind: str, severity: Severity, what: str, *, where: str | None = None, count: int = 1) -> None:
-        self.findings.append(Finding(kind=kind, severity=severity, what=what, where=where, count=count))
+    def find(self, kind: str, severity: Severity, text: str, *, where: str | None = None, count: int = 1) -> None:
+        self.findings.append(Finding(kind=kind, severity=severity, what=text, where=where, count=count))
 
     def schema(self, schema: Schema) -> None:
         if schema.id not in self._schemas:
@@ -255,7 +255,7 @@ class _Copy:
         self._channels[channel.id] = (channel, written)
 
     def schema_name(self, channel_id: int) -> str | None:
-        """The name of a channel's schema; `None` for a channel that is not known."""
+        """Returns the name of a channel's schema; `None` for a channel that is not known."""
         if channel_id not in self._channels:
             return None
         schema = self._schemas.get(self._channels[channel_id][0].schema_id)
@@ -338,8 +338,8 @@ class _Pass:
             if opcode == Opcode.DATA_END and length == _DATA_END_BYTES:
                 self._stream.seek(length, os.SEEK_CUR)
                 return self._end()
-            known = opcode in _DATA_OPCODES or opcode >= _FIRST_PRIVATE
-            if known and start + RECORD_HEAD + length <= self._size and length <= CHUNK_LIMIT:
+            is_known = opcode in _DATA_OPCODES or opcode >= _FIRST_PRIVATE
+            if is_known and start + RECORD_HEAD + length <= self._size and length <= CHUNK_LIMIT:
                 self._record(opcode, self._stream.read(length), start)
                 continue
             following = self._next_chunk(start + 1)
@@ -348,17 +348,17 @@ class _Pass:
                 self._stream.seek(start + RECORD_HEAD)
                 self._partial(start)
             if following is None:
-                if known:
+                if is_known:
                     return self._cut_off(start, f"inside a {_name(opcode)}")
                 return self._unreadable(start, self._size, spared)
             self._unreadable(start, following, spared)
             self._stream.seek(following)
 
     def _next_chunk(self, start: int) -> int | None:
-        """Where the next chunk begins whose lengths fit and whose checksum is right, at or after `start`."""
+        """Finds where the next chunk begins whose lengths fit and whose checksum is right, at or after `start`."""
         with mmap.mmap(self._stream.fileno(), 0, access=mmap.ACCESS_READ) as view:
-            for found in _CHUNK_START.finditer(view, start):
-                at = found.start()
+            for start_match in _CHUNK_START.finditer(view, start):
+                at = start_match.start()
                 length = int.from_bytes(view[at + 1 : at + RECORD_HEAD], "little")
                 end = at + RECORD_HEAD + length
                 if end > self._size or length > CHUNK_LIMIT or not _is_chunk(view, at, length):
@@ -389,17 +389,17 @@ class _Pass:
             self._copy.find("damaged-record", Severity.ERROR, f"a record left out: {error.what}", where=f"byte {start}")
 
     def _spared(self, start: int, end: int) -> tuple[int, int] | None:
-        """Copy the messages of damaged bytes of the file that are sound by themselves: how many these are, and how many
-        there were; `None` where the record does not state it."""
-        found = self._sound.between(start, end)
-        if found is None:
+        """Copies the messages of damaged bytes of the file that are sound by themselves: how many these are, and how
+        many there were; `None` where the record does not state it."""
+        messages = self._sound.between(start, end)
+        if messages is None:
             return None
-        for message in found:
+        for message in messages:
             if message is not None:
                 self._copy.message(message)
-        lost = sum(message is None for message in found)
+        lost = sum(message is None for message in messages)
         self._lost += lost
-        return len(found) - lost, len(found)
+        return len(messages) - lost, len(messages)
 
     def _chunk(self, content: bytes, start: int) -> None:
         chunk = parse(Chunk.read, content, where=self._where)
@@ -432,7 +432,7 @@ class _Pass:
         self._copy.attachment(parse(Attachment.read, content, where=self._where))
 
     def _rest(self) -> bytes:
-        """What follows in the file, up to what a chunk may hold; a read of more would take the memory first."""
+        """Reads what follows in the file, up to what a chunk may hold; a read of more would take the memory first."""
         return self._stream.read(min(CHUNK_LIMIT, max(0, self._size - self._stream.tell())))
 
     def _partial(self, start: int) -> None:
@@ -443,28 +443,29 @@ class _Pass:
         first, last, _, _, name_length = _CHUNK_FIELDS.unpack_from(content)
         if name_length:
             return
-        kept = 0
+        copied = 0
         for opcode, record in _whole_records(content[CHUNK_HEAD - RECORD_HEAD :]):
             try:
                 if opcode == Opcode.MESSAGE:
                     message = parse(_read_message(len(record)), record, where=self._where)
                     if not first <= message.log_time <= last or not self._plausible(message):
                         break
-                    kept += 1
+                    copied += 1
                 self._inner(opcode, record)
             except FlagdataError:
                 break
-        if kept:
+        if copied:
             self._copy.find(
                 "unchecked-messages",
                 Severity.WARNING,
-                f"{kept} messages kept from a chunk whose end, and so its checksum, is missing",
+                f"{copied} messages kept from a chunk whose end, and so its checksum, is missing",
                 where=f"byte {start}",
-                count=kept,
+                count=copied,
             )
 
     def _plausible(self, message: Message) -> bool:
-        """Whether a message without a checksum decodes as what its channel says (a crash may leave zeros behind)."""
+        """Checks whether a message without a checksum decodes as what its channel says (a crash may leave zeros
+        behind)."""
         kind = _KNOWN.get(self._copy.schema_name(message.channel_id) or "")
         if kind is None:
             return True
@@ -475,20 +476,21 @@ class _Pass:
         return kind is not messages.CompressedImage or decoded.data.endswith(b"\xff\xd9")
 
     def _end(self) -> None:
-        """All data was read. The summary is written anew; what is left of the old one says how much there was."""
-        held: int | None = None
+        """Ends the copy once all data was read. The summary is written anew; what is left of the old one says how much
+        there was."""
+        stated_count: int | None = None
         for opcode, record in _whole_records(self._rest(), among=frozenset(Opcode)):
             if opcode == Opcode.STATISTICS and len(record) >= 8:
-                held = int.from_bytes(record[:8], "little")
-        lost = 0 if held is None else held - self._copy.counts.total() - self._lost
+                stated_count = int.from_bytes(record[:8], "little")
+        lost = 0 if stated_count is None else stated_count - self._copy.counts.total() - self._lost
         if lost > 0 and len(self._damaged) == 1:
-            (place,) = self._damaged
-            known = self._copy.findings[place]
-            said = f"{known.what}; {lost} of the record's {held} messages are lost with it"
-            self._copy.findings[place] = replace(known, what=said, count=lost)
+            (damage_index,) = self._damaged
+            finding = self._copy.findings[damage_index]
+            text = f"{finding.what}; {lost} of the record's {stated_count} messages are lost with it"
+            self._copy.findings[damage_index] = replace(finding, what=text, count=lost)
         elif lost > 0:
             self._copy.find(
-                "lost-messages", Severity.ERROR, f"{lost} of {held} messages of the record are lost", count=lost
+                "lost-messages", Severity.ERROR, f"{lost} of {stated_count} messages of the record are lost", count=lost
             )
         self._stream.seek(self._size - len(MAGIC))
         if self._stream.read() != MAGIC:
@@ -499,9 +501,9 @@ class _Pass:
                 where=f"byte {self._size}",
             )
 
-    def _cut_off(self, start: int, place: str) -> None:
+    def _cut_off(self, start: int, position: str) -> None:
         self._copy.find(
-            "cut-off", Severity.WARNING, f"the file ends {place}, at byte {self._size}", where=f"byte {start}"
+            "cut-off", Severity.WARNING, f"the file ends {position}, at byte {self._size}", where=f"byte {start}"
         )
 
     def _unreadable(self, start: int, end: int, spared: tuple[int, int] | None) -> None:
@@ -514,42 +516,43 @@ class _Pass:
         spared = self._spared(start, end)
         self._damage("damaged-chunk", start, ("a chunk left out: " if spared is None else "a chunk: ") + why, spared)
 
-    def _damage(self, kind: str, start: int, what: str, spared: tuple[int, int] | None = None) -> None:
-        """One finding for one place."""
+    def _damage(self, kind: str, start: int, text: str, spared: tuple[int, int] | None = None) -> None:
+        """Reports damage at one place."""
         if spared is None:
             self._damaged.append(len(self._copy.findings))
-            self._copy.find(kind, Severity.ERROR, what, where=f"byte {start}")
+            self._copy.find(kind, Severity.ERROR, text, where=f"byte {start}")
             return
-        kept, there = spared
-        if not there:
-            self._copy.find(kind, Severity.WARNING, f"{what}; no message was there", where=f"byte {start}")
+        copied, present = spared
+        if not present:
+            self._copy.find(kind, Severity.WARNING, f"{text}; no message was there", where=f"byte {start}")
             return
         self._copy.find(
             kind,
             Severity.ERROR,
-            f"{what}; {there - kept} of its {there} messages are lost",
+            f"{text}; {present - copied} of its {present} messages are lost",
             where=f"byte {start}",
-            count=there - kept,
+            count=present - copied,
         )
 
 
 def _is_chunk(view: mmap.mmap, at: int, length: int) -> bool:
-    """Whether the head of a chunk of that length lies there, by the lengths that it states: one read in place, since
-    any byte may look like a chunk's first."""
+    """Checks whether the head of a chunk of that length lies there, by the lengths that it states: one read in place,
+    since any byte may look like a chunk's first."""
     fields = view[at + RECORD_HEAD : at + CHUNK_HEAD]
     if len(fields) < CHUNK_HEAD - RECORD_HEAD:
         return False
-    named = _CHUNK_FIELDS.unpack_from(fields)[-1]
-    if named > _LONGEST_NAME:
+    name_length = _CHUNK_FIELDS.unpack_from(fields)[-1]
+    if name_length > _LONGEST_NAME:
         return False
-    packed = int.from_bytes(view[at + CHUNK_HEAD - 8 + named : at + CHUNK_HEAD + named], "little")
-    return CHUNK_HEAD - RECORD_HEAD + named + packed == length
+    packed = int.from_bytes(view[at + CHUNK_HEAD - 8 + name_length : at + CHUNK_HEAD + name_length], "little")
+    return CHUNK_HEAD - RECORD_HEAD + name_length + packed == length
 
 
 def _whole_records(
     body: bytes | memoryview, *, among: frozenset[Opcode] = _IN_CHUNK
 ) -> Iterator[tuple[int, memoryview]]:
-    """Opcode and content of the records that lie whole in `body`, up to the first that does not or is not `among`."""
+    """Yields opcode and content of the records that lie whole in `body`, up to the first that does not or is not
+    `among`."""
     at = 0
     body = memoryview(body)
     while at + RECORD_HEAD <= len(body):

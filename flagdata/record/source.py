@@ -22,7 +22,7 @@ class Bytes(Protocol):
     size: int
 
     def read(self, length: int, offset: int) -> bytes:
-        """At most `length` bytes at `offset`; fewer where the end, or the system, says so."""
+        """Reads at most `length` bytes at `offset`; fewer where the end, or the system, says so."""
         ...
 
     def prepare(self, spans: Sequence[tuple[int, int]]) -> None:
@@ -41,23 +41,23 @@ class _FileBytes:
         return os.pread(self._file, length, offset)
 
     def prepare(self, spans: Sequence[tuple[int, int]]) -> None:
-        """Nothing: the system reads ahead."""
+        """Prepares nothing: the system reads ahead."""
 
     def close(self) -> None:
         os.close(self._file)
 
 
-def open_bytes(place: Place) -> Bytes:
-    """The bytes of a record, opened for reading by offset.
+def open_bytes(path: Place) -> Bytes:
+    """Opens the bytes of a record for reading by offset.
 
     Raises:
         NotFoundError: no such file or object.
     """
     try:
-        if isinstance(place, Path):
-            return _FileBytes(os.open(place, os.O_RDONLY | os.O_CLOEXEC))
-        return ObjectRanges(place)
+        if isinstance(path, Path):
+            return _FileBytes(os.open(path, os.O_RDONLY | os.O_CLOEXEC))
+        return ObjectRanges(path)
     except (FileNotFoundError, NotADirectoryError):
         raise NotFoundError(
-            "there is no such record", where=str(place), fix="check the path, or run flagdata doctor"
+            "there is no such record", where=str(path), fix="check the path, or run flagdata doctor"
         ) from None

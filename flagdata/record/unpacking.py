@@ -23,7 +23,7 @@ _FIX = "run `flagdata recover` on the file"
 
 
 def unpacked(chunk: Chunk, *, where: str | None = None) -> memoryview:
-    """The records of a chunk.
+    """Unpacks the records of a chunk.
 
     Raises:
         LimitError: a compressed chunk that states more than `UNPACKED_LIMIT`.
@@ -56,20 +56,20 @@ def check_stated(size: int, *, where: str | None = None) -> None:
         )
 
 
-def _joined(pieces: Iterator[bytes], stated: int, *, where: str | None) -> bytearray:
-    held = bytearray()
+def _joined(pieces: Iterator[bytes], stated_size: int, *, where: str | None) -> bytearray:
+    unpacked_bytes = bytearray()
     try:
         for piece in pieces:
-            held += piece
-            if len(held) > stated:
-                message = f"the chunk unpacks to more than the {stated} bytes that it states"
+            unpacked_bytes += piece
+            if len(unpacked_bytes) > stated_size:
+                message = f"the chunk unpacks to more than the {stated_size} bytes that it states"
                 raise CorruptError(message, where=where, fix=_FIX)
     except (zstandard.ZstdError, RuntimeError) as error:  # the second is LZ4's
         raise CorruptError(f"the chunk does not unpack: {error}", where=where, fix=_FIX) from None
-    if len(held) < stated:
-        message = f"the chunk unpacks to {len(held)} of the {stated} bytes that it states"
+    if len(unpacked_bytes) < stated_size:
+        message = f"the chunk unpacks to {len(unpacked_bytes)} of the {stated_size} bytes that it states"
         raise CorruptError(message, where=where, fix=_FIX)
-    return held
+    return unpacked_bytes
 
 
 def _pieces(compression: str, data: bytes, *, where: str | None) -> Iterator[bytes]:

@@ -59,7 +59,7 @@ class VideoEncoder:
         self._codec = codec
 
     def encode(self, image: UInt8Array) -> bytes:
-        """The next picture, Annex B.
+        """Encodes the next picture, Annex B.
 
         Raises:
             InputError: another size or type than said.

@@ -62,7 +62,8 @@ class Payloads:
 
 
 def samples(series: WindSeries, log_time: IntArray, rows: slice) -> Payloads:
-    """`WindSample` of some rows of a series, whose instants on the common clock are `log_time` (n,) [UTC ns]."""
+    """Encodes `WindSample` of some rows of a series, whose instants on the common clock are `log_time` (n,) [UTC
+    ns]."""
     numbers = {messages.WIND_FIELDS[name]: values for name, values in series.channels.items()}
     parts = [_timestamp("timestamp", messages.WindSample, log_time[rows])]
     for (name, _), values in sorted(numbers.items(), key=lambda item: item[0][1]):
@@ -74,7 +75,7 @@ def samples(series: WindSeries, log_time: IntArray, rows: slice) -> Payloads:
 
 
 def means(average: WindAverage) -> Payloads:
-    """`WindMean` of each bin."""
+    """Encodes `WindMean` of each bin."""
     kind = messages.WindMean
     period = np.full(len(average.time), average.period)
     return _joined(
@@ -115,7 +116,7 @@ def _tagged(tag: list[int], values: Payloads, present: BoolArray) -> Payloads:
 
 
 def _double(name: str, kind: object, values: Series, *, presence: bool) -> Payloads:
-    """A double; a field without presence leaves out +0."""
+    """Encodes a double; a field without presence leaves out +0."""
     raw = np.ascontiguousarray(values, dtype="<f8")
     bits = raw.view("<u8")
     written = np.ones(len(raw), dtype=bool) if presence else bits != 0
@@ -124,12 +125,12 @@ def _double(name: str, kind: object, values: Series, *, presence: bool) -> Paylo
 
 
 def _integer(name: str, kind: object, values: IntArray) -> Payloads:
-    """A whole number; 0 is left out."""
+    """Encodes a whole number; 0 is left out."""
     return _tagged(_tag(_number(name, kind), _VARINT), _varint(values), values != 0)
 
 
 def _timestamp(name: str, kind: object, time: IntArray) -> Payloads:
-    """A google.protobuf.Timestamp."""
+    """Encodes a google.protobuf.Timestamp."""
     seconds, nanos = np.divmod(time, NANOSECONDS)
     inner = _joined(
         [
@@ -143,13 +144,13 @@ def _timestamp(name: str, kind: object, time: IntArray) -> Payloads:
 
 
 def _varint(values: IntArray) -> Payloads:
-    """Base-128 varints, least significant group first; of a negative number those of its two's complement."""
+    """Encodes base-128 varints, least significant group first; of a negative number those of its two's complement."""
     unsigned = np.ascontiguousarray(values, dtype=np.int64).view(np.uint64)
     width = max(1, -(-int(unsigned.max(initial=0)).bit_length() // 7))
     groups = unsigned[:, None] >> (7 * np.arange(width, dtype=np.uint64))
-    more = (groups >> 7) > 0
-    used = np.hstack([np.ones((len(values), 1), dtype=bool), more[:, :-1]])
-    return Payloads(data=((groups & 0x7F) | (more.astype(np.uint64) << np.uint64(7))).astype(np.uint8), used=used)
+    continues = (groups >> 7) > 0
+    used = np.hstack([np.ones((len(values), 1), dtype=bool), continues[:, :-1]])
+    return Payloads(data=((groups & 0x7F) | (continues.astype(np.uint64) << np.uint64(7))).astype(np.uint8), used=used)
 
 
 PIECE = 1 << 20
@@ -160,7 +161,7 @@ _GZIP = 31  # wbits of zlib for a gzip stream, whose header then holds neither n
 
 
 def pieces_of(path: Path, size: int) -> Iterator[bytes]:
-    """The content of a file of `size` bytes.
+    """Yields the content of a file of `size` bytes.
 
     Raises:
         InputError: it cannot be read.
@@ -181,13 +182,13 @@ def pieces_of(path: Path, size: int) -> Iterator[bytes]:
 
 
 def packed(data: Iterable[bytes], size: int) -> list[bytes] | None:
-    """`data` of `size` bytes gzipped, in pieces; `None` where that is not smaller."""
+    """Compresses `data` of `size` bytes by gzip, in pieces; `None` where that is not smaller."""
     level = 1 if size > QUICK_ABOVE else 9
     coder = zlib.compressobj(level, zlib.DEFLATED, _GZIP)
     out = [coder.compress(piece) for piece in data]
     out.append(coder.flush())
-    kept = [piece for piece in out if piece]
-    return kept if sum(map(len, kept)) < size else None
+    pieces = [piece for piece in out if piece]
+    return pieces if sum(map(len, pieces)) < size else None
 
 
 JPEG_QUALITY = 90
@@ -222,7 +223,7 @@ CHUNK_BYTES = {Chunking.COMMITTED: 1 << 20, Chunking.LIVE: 256 << 10}
 
 
 def library_name() -> str:
-    """What the header of a record says wrote it: the format, not the program's version, so that bytes last."""
+    """Returns what the header of a record says wrote it: the format, not the program's version, so that bytes last."""
     return f"flagdata format {FORMAT_VERSION}"
 
 
@@ -286,7 +287,7 @@ class RecordWriter:
                 self._stream.sync()
 
     def frame(self, *, log_time: int, publish_time: int, timestamp: int, image: UInt8Array | bytes) -> None:
-        """Append one frame.
+        """Appends one frame.
 
         Args:
             log_time: instant on the common clock [UTC ns]; greater than the last frame's.
@@ -352,8 +353,8 @@ class RecordWriter:
         self._message(TOPIC_TRUTH, message, log_time=log_time, publish_time=log_time)
 
     def attach(self, name: str, data: bytes, *, media_type: str, log_time: int) -> None:
-        """Attach a file (the vendor's log, a calibration). Above 64 KiB it is stored gzipped as `name`.gz where that is
-        smaller; readers give it back by its own name.
+        """Attaches a file (the vendor's log, a calibration). Above 64 KiB it is stored gzipped as `name`.gz where that
+        is smaller; readers give it back by its own name.
 
         Raises:
             ConflictError: the name is taken.
@@ -363,7 +364,7 @@ class RecordWriter:
         self._attach(name, lambda: [data], len(data), media_type=media_type, log_time=log_time)
 
     def attach_file(self, name: str, path: Path, *, media_type: str, log_time: int) -> None:
-        """Attach the content of a file as `attach` does, without holding it in memory.
+        """Attaches the content of a file as `attach` does, without holding it in memory.
 
         Raises:
             ConflictError, LimitError: as `attach`.
@@ -373,7 +374,7 @@ class RecordWriter:
         self._attach(name, lambda: pieces_of(path, size), size, media_type=media_type, log_time=log_time)
 
     def _check_attachment(self, name: str, size: int, media_type: str) -> int:
-        """The size, if such an attachment may be added; its name is taken from now on."""
+        """Returns the size, if such an attachment may be added; its name is taken from now on."""
         if size > ATTACHMENT_LIMIT:
             raise LimitError(f"attachment of {size} bytes", where=name, fix=f"attach at most {ATTACHMENT_LIMIT} bytes")
         if f"attachment {name}" in self._names:
@@ -389,10 +390,10 @@ class RecordWriter:
     def _attach(
         self, name: str, read: Callable[[], Iterable[bytes]], size: int, *, media_type: str, log_time: int
     ) -> None:
-        kept = packed(read(), size) if size > COMPRESS_ATTACHMENTS_ABOVE else None
-        if kept is not None:
-            size, name, media_type = sum(map(len, kept)), f"{name}.gz", media_type + GZIP_SUFFIX
-        data = read() if kept is None else kept
+        gzipped = packed(read(), size) if size > COMPRESS_ATTACHMENTS_ABOVE else None
+        if gzipped is not None:
+            size, name, media_type = sum(map(len, gzipped)), f"{name}.gz", media_type + GZIP_SUFFIX
+        data = read() if gzipped is None else gzipped
         self._writer.add_attachment(log_time=log_time, name=name, media_type=media_type, data=data, size=size)
 
     def _jpeg(self, image: UInt8Array | bytes) -> bytes:
@@ -479,7 +480,7 @@ class RecordWriter:
             first = last
 
     def _channel(self, topic: str, kind: Any, earliest: int) -> int:
-        """The number of a topic's channel, for messages from `earliest` on [UTC ns]."""
+        """Returns the number of a topic's channel, for messages from `earliest` on [UTC ns]."""
         if earliest < 0:
             raise TimeError(
                 "an instant before 1970, which MCAP cannot hold",
@@ -505,7 +506,7 @@ class RecordWriter:
 
 
 def encode_jpeg(image: UInt8Array, *, quality: int = JPEG_QUALITY) -> bytes:
-    """JPEG of a (height, width) uint8 gray image.
+    """Encodes a (height, width) uint8 gray image as JPEG.
 
     Raises:
         InputError: another shape or type.

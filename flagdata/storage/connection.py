@@ -50,30 +50,36 @@ def settings() -> dict[str, str]:
     Raises:
         UsageError: a profile that is not there, or that has no keys of its own.
     """
-    found = {name: value for name, variable in _ENVIRONMENT.items() if (value := os.environ.get(variable))}
+    credentials = {name: value for name, variable in _ENVIRONMENT.items() if (value := os.environ.get(variable))}
     profile = os.environ.get("AWS_PROFILE")
-    stated = _profile(profile or os.environ.get("AWS_DEFAULT_PROFILE") or "default", required=profile is not None)
-    if profile is not None or "aws_access_key_id" not in found:
-        found |= {name: stated[name] for name in _ENVIRONMENT if name in stated}
-        if profile is not None and "aws_access_key_id" not in stated:
+    profile_settings = _profile(
+        profile or os.environ.get("AWS_DEFAULT_PROFILE") or "default", required=profile is not None
+    )
+    if profile is not None or "aws_access_key_id" not in credentials:
+        credentials |= {name: profile_settings[name] for name in _ENVIRONMENT if name in profile_settings}
+        if profile is not None and "aws_access_key_id" not in profile_settings:
             raise UsageError(
                 f"the profile {profile!r} has no access key of its own",
                 where="AWS_PROFILE",
                 fix="put its keys into the environment: eval $(aws configure export-credentials --format env)",
             )
-    region = os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION") or stated.get("region")
-    endpoint = os.environ.get("AWS_ENDPOINT_URL_S3") or os.environ.get("AWS_ENDPOINT_URL") or stated.get("endpoint_url")
-    found["aws_region"] = region or "us-east-1"
+    region = os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION") or profile_settings.get("region")
+    endpoint = (
+        os.environ.get("AWS_ENDPOINT_URL_S3")
+        or os.environ.get("AWS_ENDPOINT_URL")
+        or profile_settings.get("endpoint_url")
+    )
+    credentials["aws_region"] = region or "us-east-1"
     if endpoint:
-        found["aws_endpoint"] = endpoint
+        credentials["aws_endpoint"] = endpoint
         if endpoint.startswith("http://"):
-            found["aws_allow_http"] = "true"
-    return found
+            credentials["aws_allow_http"] = "true"
+    return credentials
 
 
 def delta_options() -> dict[str, str]:
-    """What the Delta library needs to reach a bucket. It publishes by conditional puts too, said here so that a change
-    of its defaults cannot undo it."""
+    """Returns what the Delta library needs to reach a bucket. It publishes by conditional puts too, said here so that a
+    change of its defaults cannot undo it."""
     return {
         **settings(),
         "conditional_put": "etag",
@@ -88,7 +94,7 @@ _PROCESS = OneProcess("object storage", fix="start workers by spawn")
 
 
 def client(bucket: str) -> S3Store:
-    """The client of a bucket, one a process.
+    """Returns the client of a bucket, one a process.
 
     Raises:
         FlagdataError: the package obstore is not installed; or a forked child of a process that used one: it would
@@ -128,17 +134,17 @@ def _client(bucket: str) -> S3Store:
 
 
 def plain(error: BaseException | str) -> str:
-    """What a client or server said, in one line, without credentials and colours."""
+    """Shortens what a client or server said to one line, without credentials and colours."""
     text = COLOUR.sub("", str(error))
-    said = " ".join((text.split("Debug source:")[0].split("<?xml")[0]).split()).rstrip(": ")
+    line = " ".join((text.split("Debug source:")[0].split("<?xml")[0]).split()).rstrip(": ")
     if message := _MESSAGE.search(text):
         status = _STATUS.search(text)
-        said = f"{status[1].strip()}: {message[1]}" if status else message[1]
-    return redacted(said)[:_SHOWN]
+        line = f"{status[1].strip()}: {message[1]}" if status else message[1]
+    return redacted(line)[:_SHOWN]
 
 
 def redacted(text: str) -> str:
-    """`text` without the credentials in use, the user of an address, or anything of the form of an access key."""
+    """Removes from `text` the credentials in use, the user of an address, and anything of the form of an access key."""
     for variable in _ENVIRONMENT:
         if (value := settings().get(variable)) and len(value) > 3:
             text = text.replace(value, "…")
@@ -146,9 +152,9 @@ def redacted(text: str) -> str:
 
 
 def _profile(name: str, *, required: bool) -> dict[str, str]:
-    """What the files of profiles state of one."""
+    """Reads what the files of profiles state of one."""
     home = Path.home() / ".aws"
-    stated: dict[str, str] = {}
+    profile_settings: dict[str, str] = {}
     for variable, file, section in (
         ("AWS_CONFIG_FILE", "config", name if name == "default" else f"profile {name}"),
         ("AWS_SHARED_CREDENTIALS_FILE", "credentials", name),
@@ -160,7 +166,7 @@ def _profile(name: str, *, required: bool) -> dict[str, str]:
         except (configparser.Error, OSError, UnicodeDecodeError):  # whose text may show a line of the file
             raise UsageError("the profiles cannot be read", where=str(path), fix="mend the file") from None
         if parser.has_section(section):
-            stated |= dict(parser.items(section))
-    if required and not stated:
+            profile_settings |= dict(parser.items(section))
+    if required and not profile_settings:
         raise UsageError(f"there is no profile {name!r}", where="AWS_PROFILE", fix=f"name one of {home / 'config'}")
-    return stated
+    return profile_settings

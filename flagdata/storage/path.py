@@ -69,28 +69,28 @@ class RemotePath:
 
     @classmethod
     def parse(cls, address: str) -> RemotePath:
-        """The place at an address "s3://bucket/prefix".
+        """Parses an address "s3://bucket/prefix".
 
         Raises:
             UsageError: not such an address, or a prefix that not every client writes in the same way.
         """
-        found = _ADDRESS.fullmatch(address)
-        if found is None:
-            shown = "s3://…" if _SECRET.search(address) else address
+        match = _ADDRESS.fullmatch(address)
+        if match is None:
+            safe_address = "s3://…" if _SECRET.search(address) else address
             raise UsageError(
                 "this is not the address of a bucket",
-                where=shown,
+                where=safe_address,
                 fix="write s3://bucket/prefix; credentials are read from the environment or a profile",
             )
-        key = (found[2] or "").rstrip("/")
+        key = (match[2] or "").rstrip("/")
         if key and (not _KEY.fullmatch(key) or {".", ".."} & set(key.split("/"))):
-            shown = f"{SCHEME}{found[1]}/…" if _SECRET.search(address) else address
+            safe_address = f"{SCHEME}{match[1]}/…" if _SECRET.search(address) else address
             raise UsageError(
                 "the prefix of a lake has letters, digits and . _ = + - only, between single slashes",
-                where=shown,
+                where=safe_address,
                 fix="choose another prefix",
             )
-        return cls(found[1], key)
+        return cls(match[1], key)
 
     def __reduce__(self) -> tuple[type[RemotePath], tuple[str, str]]:
         return (RemotePath, (self.bucket, self.key))
@@ -136,7 +136,7 @@ class RemotePath:
         return str(self)
 
     def exists(self) -> bool:
-        """Whether there is an object of this key; what only has others beneath it is none."""
+        """Checks whether there is an object of this key; what only has others beneath it is none."""
         try:
             self.stat()
         except FileNotFoundError:
@@ -147,14 +147,14 @@ class RemotePath:
         return self.exists()
 
     def is_dir(self) -> bool:
-        """Whether there is anything beneath."""
+        """Checks whether there is anything beneath."""
         return next(iter(self.rglob("*")), None) is not None
 
     def is_symlink(self) -> bool:
         return False
 
     def stat(self) -> Status:
-        """Its size and age.
+        """Asks for its size and age.
 
         Raises:
             FileNotFoundError: no object of this key.
@@ -167,7 +167,7 @@ class RemotePath:
     lstat = stat
 
     def read_bytes(self) -> bytes:
-        """The object.
+        """Reads the object.
 
         Raises:
             FileNotFoundError: no object of this key.
@@ -176,13 +176,13 @@ class RemotePath:
         return self._ask(lambda obstore, store: bytes(obstore.get(store, self.key).bytes()))
 
     def read_range(self, offset: int, length: int) -> bytes:
-        """At most `length` bytes at `offset`, fewer at the end of the object."""
+        """Reads at most `length` bytes at `offset`, fewer at the end of the object."""
         if length == 0:
             return b""
         return self._ask(lambda obstore, store: bytes(obstore.get_range(store, self.key, start=offset, length=length)))
 
     def read_ranges(self, offsets: Sequence[int], lengths: Sequence[int]) -> list[bytes]:
-        """Several ranges; those that lie within 1 MiB of each other are read together."""
+        """Reads several ranges; those that lie within 1 MiB of each other are read together."""
         return self._ask(
             lambda obstore, store: [
                 bytes(part) for part in obstore.get_ranges(store, self.key, starts=offsets, lengths=lengths)
@@ -190,7 +190,7 @@ class RemotePath:
         )
 
     def blocks(self) -> Iterator[bytes]:
-        """The object, block after block."""
+        """Yields the object, block after block."""
         size = self.stat().st_size
         for offset in range(0, size, BLOCK):
             yield self.read_range(offset, min(BLOCK, size - offset))
@@ -218,16 +218,20 @@ class RemotePath:
             raise
 
     def uploads(self) -> list[Upload]:
-        """Uploads of this key and of those beneath that were begun and are not finished, nor aborted.
+        """Lists uploads of this key and of those beneath that were begun and are not finished, nor aborted.
 
         Raises:
             StoreError: the store did not list them; some cannot.
         """
         beneath = unfinished(self.bucket, self.key)
-        return [one for one in beneath if one.key == self.key or not self.key or one.key.startswith(f"{self.key}/")]
+        return [
+            upload
+            for upload in beneath
+            if upload.key == self.key or not self.key or upload.key.startswith(f"{self.key}/")
+        ]
 
     def now(self) -> float:
-        """The store's clock, which gives objects their times [s since 1970].
+        """Reads the store's clock, which gives objects their times [s since 1970].
 
         Raises:
             StoreError: the store did not say.
@@ -235,7 +239,7 @@ class RemotePath:
         return store_time(self.bucket)
 
     def _unfinished(self) -> set[Upload]:
-        """What `uploads` gives; nothing where the store does not say."""
+        """Lists what `uploads` gives; nothing where the store does not say."""
         with suppress(StoreError):
             return {*self.uploads()}
         return set()
@@ -251,7 +255,7 @@ class RemotePath:
         raise StoreError(errno.EREMOTEIO, "the store lost the parts of an upload", str(self))
 
     def create(self, data: bytes) -> bool:
-        """Put an object if its key is free; False where it was taken.
+        """Puts an object if its key is free; False where it was taken.
 
         Raises:
             StoreError: the store did not say whether it took it; it may yet appear.
@@ -260,8 +264,8 @@ class RemotePath:
             try:
                 self._ask(lambda obstore, store: obstore.put(store, self.key, data, mode="create"))
             except FileExistsError:
-                if (there := self._content()) is not None:
-                    return there == data
+                if (content := self._content()) is not None:
+                    return content == data
                 continue  # 409: of two puts in one moment the store may take neither
             except DeniedError:
                 raise
@@ -292,7 +296,7 @@ class RemotePath:
         self._ask(lambda obstore, store: obstore.delete(store, self.key))
 
     def mkdir(self, *, parents: bool = False, exist_ok: bool = False) -> None:
-        """Nothing: what is put makes the folders that it is in."""
+        """Does nothing: what is put makes the folders that it is in."""
 
     def names(self, *, after: str | None = None) -> Iterator[tuple[str, Status]]:
         """Keys beneath, from this one on, and their status, in order.
@@ -315,7 +319,7 @@ class RemotePath:
                     raise
 
     def _listed(self, offset: str | None) -> Iterator[Any]:
-        """What is beneath, after a key; a listing that breaks off cannot be gone on with."""
+        """Yields what is beneath, after a key; a listing that breaks off cannot be gone on with."""
         store = connection.client(self.bucket)
         import obstore
         from obstore import exceptions
@@ -331,25 +335,25 @@ class RemotePath:
             yield from chunk
 
     def rglob(self, pattern: str) -> Iterator[RemotePath]:
-        """All objects beneath whose last name fits; folders are none."""
+        """Yields all objects beneath whose last name fits; folders are none."""
         for name, status in self.names():
             if fnmatch.fnmatchcase(posixpath.basename(name), pattern):
                 yield RemotePath(self.bucket, posixpath.join(self.key, name), status=status)
 
     def iterdir(self) -> Iterator[RemotePath]:
-        """What lies directly beneath: objects, and folders."""
-        found = self._ask(lambda obstore, store: obstore.list_with_delimiter(store, self.key or None))
-        for key in found["common_prefixes"]:
+        """Yields what lies directly beneath: objects, and folders."""
+        listing = self._ask(lambda obstore, store: obstore.list_with_delimiter(store, self.key or None))
+        for key in listing["common_prefixes"]:
             yield RemotePath(self.bucket, key.rstrip("/"))
-        for meta in found["objects"]:
+        for meta in listing["objects"]:
             yield RemotePath(self.bucket, meta["path"], status=_status(meta))
 
     def glob(self, pattern: str) -> Iterator[RemotePath]:
-        """What lies directly beneath and has a name that fits."""
+        """Yields what lies directly beneath and has a name that fits."""
         return (path for path in self.iterdir() if fnmatch.fnmatchcase(path.name, pattern))
 
     def relative_to(self, other: RemotePath) -> Path:
-        """The rest of the key behind that of `other`."""
+        """Returns the rest of the key behind that of `other`."""
         return Path(self.key).relative_to(other.key)
 
     def remove_tree(self, *, first: str | None = None) -> None:
@@ -366,12 +370,12 @@ class RemotePath:
             return None
 
     def _ask(self, request: Callable[[Any, S3Store], T]) -> T:
-        """The answer of the store; what it refuses is an error of the system that shows no credentials."""
+        """Asks the store; what it refuses is an error of the system that shows no credentials."""
         store = connection.client(self.bucket)
         import obstore
         from obstore import exceptions
 
-        for left in reversed(range(_BROKEN)):
+        for tries_left in reversed(range(_BROKEN)):
             try:
                 return request(obstore, store)
             except (FileNotFoundError, exceptions.NotFoundError) as error:
@@ -386,9 +390,9 @@ class RemotePath:
                 ) from None
             except (exceptions.BaseError, OSError) as error:
                 refused = self._refusal(error)
-                if not refused.passing or not left:
+                if not refused.passing or not tries_left:
                     raise refused from None
-        raise AssertionError("unreachable")
+        raise AssertionError("the last try returns or raises")
 
     def _refusal(self, error: Exception) -> StoreError:
         return refusal(error, bucket=self.bucket, where=str(self))

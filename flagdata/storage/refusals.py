@@ -157,7 +157,7 @@ _BY_STATUS = {429: _SLOW, 501: _LACKING, 405: _LACKING, 307: _REDIRECTED, 302: _
 
 
 def refusal(error: BaseException, *, bucket: str, where: str) -> StoreError:
-    """What a request ended with in place of an answer.
+    """Turns what a request ended with in place of an answer into an error.
 
     Args:
         error: of the client, or of the Delta library.
@@ -178,15 +178,15 @@ def refusal(error: BaseException, *, bucket: str, where: str) -> StoreError:
             passing = cause is None and status is None
     if cause is None:
         cause = _of_status(status, needs)
-    said = plain(error) if cause.what == "" or "<Message>" in text else "" if state is None else state[0]
-    message = f"{cause.what} ({said})" if cause.what and said else cause.what or said
-    found = _error(cause, message, where)
-    found.passing = passing
-    return found
+    store_said = plain(error) if cause.what == "" or "<Message>" in text else "" if state is None else state[0]
+    message = f"{cause.what} ({store_said})" if cause.what and store_said else cause.what or store_said
+    error_found = _error(cause, message, where)
+    error_found.passing = passing
+    return error_found
 
 
 def refused(answer: Answer | Unreachable, *, bucket: str, where: str, needs: str) -> StoreError:
-    """The error for an answer that is not what was asked for.
+    """Returns the error for an answer that is not what was asked for.
 
     Args:
         needs: the action that had to be permitted.
@@ -199,7 +199,7 @@ def refused(answer: Answer | Unreachable, *, bucket: str, where: str, needs: str
 
 
 def store_time(bucket: str) -> float:
-    """The store's clock, which gives objects their times [s since 1970].
+    """Reads the store's clock, which gives objects their times [s since 1970].
 
     Raises:
         StoreError: it did not answer, or stated no time.
@@ -212,21 +212,21 @@ def store_time(bucket: str) -> float:
     return answer.date.timestamp()
 
 
-def _error(cause: Cause, what: str, where: str) -> StoreError:
+def _error(cause: Cause, text: str, where: str) -> StoreError:
     permitted = not issubclass(cause.kind, PermissionError)
-    error = cause.kind(errno.EREMOTEIO if permitted else errno.EACCES, what, where)
+    error = cause.kind(errno.EREMOTEIO if permitted else errno.EACCES, text, where)
     error.fix = cause.fix
     return error
 
 
 def _first(pattern: re.Pattern[str], text: str) -> str | None:
-    """What the first of a pattern's groups found."""
-    found = pattern.search(text)
-    return next(filter(None, found.groups()), None) if found else None
+    """Returns what the first of a pattern's groups matched."""
+    match = pattern.search(text)
+    return next(filter(None, match.groups()), None) if match else None
 
 
 def _needs(text: str) -> str:
-    """The action that a request of the client needed."""
+    """Names the action that a request of the client needed."""
     if _LISTING.search(text):
         return "s3:ListBucket"
     if _DELETING.search(text):
@@ -236,7 +236,7 @@ def _needs(text: str) -> str:
 
 
 def _cause(code: str | None, status: int | None, text: str, *, bucket: str, needs: str) -> Cause | None:
-    """The cause that a code names."""
+    """Finds the cause that a code names."""
     if code in _ABROAD:
         return _abroad(_first(_REGION, text) or _region_of(bucket))
     if code == "NoSuchBucket":
@@ -252,7 +252,7 @@ def _cause(code: str | None, status: int | None, text: str, *, bucket: str, need
 
 
 def _answered(answer: Answer, *, bucket: str, needs: str, refused: int | None) -> Cause | None:
-    """The cause that the store's answer to another request shows."""
+    """Finds the cause that the store's answer to another request shows."""
     region = answer.headers.get("x-amz-bucket-region")
     if answer.status != 200 and region is not None and region != settings()["aws_region"]:
         return _abroad(region)
@@ -282,7 +282,7 @@ def _of_status(status: int | None, needs: str) -> Cause:
 
 
 def _abroad(region: str | None) -> Cause:
-    """The bucket is in another region than requests are signed for."""
+    """Returns the cause that the bucket is in another region than requests are signed for."""
     used = settings()["aws_region"]
     end = ", and AWS_ENDPOINT_URL, if it is set, to the end point of that region"
     if region is None or region == used:
@@ -315,5 +315,5 @@ def _region_of(bucket: str) -> str | None:
 
 
 def _ahead(answer: Answer) -> float | None:
-    """By how much this machine's clock is ahead of the store's [s]."""
+    """Computes by how much this machine's clock is ahead of the store's [s]."""
     return None if answer.date is None else time.time() - answer.date.timestamp()

@@ -51,8 +51,8 @@ class Answer:
     @property
     def code(self) -> str | None:
         """The store's word for an error."""
-        found = _CODE.search(self.body)
-        return found[1].decode() if found and self.status >= 300 else None
+        match = _CODE.search(self.body)
+        return match[1].decode() if match and self.status >= 300 else None
 
     @property
     def date(self) -> datetime | None:
@@ -89,7 +89,7 @@ class _Staying(urllib.request.HTTPRedirectHandler):
 def asked(
     bucket: str, query: Mapping[str, str], *, method: str = "GET", key: str = "", waits: Sequence[float] = _WAITS
 ) -> Answer | Unreachable:
-    """The store's answer to a request for a bucket, or for a key of it.
+    """Sends a request for a bucket, or for a key of it, and returns the store's answer.
 
     Args:
         waits: before a request that failed in the store, or whose answer broke off, is sent again [s].
@@ -121,7 +121,7 @@ def _once(bucket: str, query: Mapping[str, str], method: str, key: str) -> Answe
 def signed(
     method: str, url: str, query: str, options: Mapping[str, str], *, when: datetime, service: str = "s3"
 ) -> dict[str, str]:
-    """The headers of a request without a body; without access keys those of one that nobody has signed.
+    """Signs the headers of a request without a body; without access keys those of one that nobody has signed.
 
     Args:
         query: as it is sent, its names in order.
@@ -151,7 +151,7 @@ def signed(
 
 
 def _address(bucket: str, key: str) -> str:
-    """The URL of a key as the client writes it: behind the bucket's name, or at a host of the bucket's own."""
+    """Builds the URL of a key as the client writes it: behind the bucket's name, or at a host of the bucket's own."""
     options = settings()
     virtual = os.environ.get(_VIRTUAL, "").lower() in ("1", "true", "yes", "on")
     endpoint = options.get("aws_endpoint")
@@ -168,12 +168,12 @@ def _answer(status: int, headers: Any, body: bytes) -> Answer:
 
 
 def _unreachable(reason: Any, url: str) -> Unreachable:
-    """What keeps a request from the store."""
+    """Explains what keeps a request from the store."""
     parts = urlsplit(url)
     host = parts.hostname or ""
     proxy = urllib.request.getproxies().get(parts.scheme)
     if proxy is not None and not urllib.request.proxy_bypass(host):
-        message = f"there was no answer of {host} through the proxy {redacted(proxy)}: {_said(reason)}"
+        message = f"there was no answer of {host} through the proxy {redacted(proxy)}: {_one_line(reason)}"
         variable = f"{parts.scheme.upper()}_PROXY"
         return Unreachable(
             what=message, fix=f"check {variable}, or name {host} in NO_PROXY to reach it without a proxy"
@@ -190,16 +190,18 @@ def _unreachable(reason: Any, url: str) -> Unreachable:
             " (AWS_ENDPOINT_URL) and this machine's clock",
         )
     if isinstance(reason, ssl.SSLError):
-        return Unreachable(what=f"{host} does not speak TLS: {_said(reason)}", fix=f"{end_point}: http:// or https://")
+        return Unreachable(
+            what=f"{host} does not speak TLS: {_one_line(reason)}", fix=f"{end_point}: http:// or https://"
+        )
     if isinstance(reason, ConnectionRefusedError):
         message = f"{host} refuses connections to port {parts.port or (443 if parts.scheme == 'https' else 80)}"
         return Unreachable(what=message, fix=f"{end_point}, and that the store runs")
     if isinstance(reason, TimeoutError):
         return Unreachable(what=f"{host} did not answer in time", fix=f"{end_point}, the network and its firewall")
-    message = f"there was no answer of {host}: {_said(reason)}"
+    message = f"there was no answer of {host}: {_one_line(reason)}"
     broken = isinstance(reason, HTTPException | ConnectionError)
     return Unreachable(what=message, fix=f"{end_point} and the network", broken=broken)
 
 
-def _said(reason: object) -> str:
+def _one_line(reason: object) -> str:
     return redacted(" ".join(str(reason).split()))[:200]

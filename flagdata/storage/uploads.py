@@ -38,7 +38,7 @@ class Upload:
         return f"s3://{self.bucket}/{self.key}"
 
     def abort(self) -> None:
-        """Have its parts deleted, if it is still there.
+        """Deletes its parts, if it is still there.
 
         Raises:
             StoreError: the store did not.
@@ -49,7 +49,7 @@ class Upload:
 
 
 def unfinished(bucket: str, prefix: str) -> list[Upload]:
-    """The unfinished uploads whose keys begin so, by key.
+    """Lists the unfinished uploads whose keys begin so, by key.
 
     Raises:
         StoreError: the store did not list them; some cannot.
@@ -75,7 +75,7 @@ def _listed(bucket: str, prefix: str) -> Iterator[Upload]:
 
 
 def _page(answer: object) -> ET.Element | None:
-    """A page of the listing, if the answer is one."""
+    """Parses a page of the listing, if the answer is one."""
     if not isinstance(answer, Answer) or answer.status != _LISTED:
         return None
     try:

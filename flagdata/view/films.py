@@ -52,7 +52,7 @@ class Film:
 
 
 def film_of(lake: Lake, row: Mapping[str, Any], opened: Callable[[str], Record]) -> Film | None:
-    """What moves in an artifact; `None` where nothing does.
+    """Finds what moves in an artifact; `None` where nothing does.
 
     Args:
         opened: gives the record of an object.
@@ -87,23 +87,23 @@ def film_of(lake: Lake, row: Mapping[str, Any], opened: Callable[[str], Record])
 
 def _meshes(lake: Lake, name: str) -> Film:
     sequence = read_meshes(lake.object_path(name))
-    place = _camera(sequence.positions.reshape(-1, 3))
+    project = _camera(sequence.positions.reshape(-1, 3))
 
     def drawn(index: int) -> bytes:
         mesh = sequence.frame(index)
-        return _jpeg(_cloth(place(mesh.positions), mesh.positions, mesh.faces))
+        return _jpeg(_cloth(project(mesh.positions), mesh.positions, mesh.faces))
 
     return Film(times=sequence.time, jpegs=lambda at, count: [drawn(index) for index in range(at, at + count)])
 
 
 def _markers(lake: Lake, name: str) -> Film:
     sequence = read_markers(lake.object_path(name))
-    place = _camera(sequence.positions.reshape(-1, 3))
+    project = _camera(sequence.positions.reshape(-1, 3))
 
     def drawn(index: int) -> bytes:
         image = Image.new("L", (_SIDE, _SIDE), _GROUND)
         pen = ImageDraw.Draw(image)
-        points = place(sequence.positions[index])
+        points = project(sequence.positions[index])
         for x, y, _ in points[np.isfinite(points).all(axis=1)].tolist():
             pen.ellipse((x - 2, y - 2, x + 2, y + 2), fill=_INK)
         return _jpeg(image)
@@ -123,9 +123,9 @@ def _camera(points: AnyArray) -> Callable[[AnyArray], FloatArray]:
     middle = (low + high)[:2] / 2
 
     def place(points: AnyArray) -> FloatArray:
-        seen = points @ axes.T
-        seen[:, :2] = (seen[:, :2] - middle) * scale + _SIDE / 2
-        return seen
+        projected = points @ axes.T
+        projected[:, :2] = (projected[:, :2] - middle) * scale + _SIDE / 2
+        return projected
 
     return place
 
@@ -134,8 +134,8 @@ def _cloth(corners: FloatArray, positions: AnyArray, faces: NDArray[np.int32]) -
     """Triangles from the farthest to the nearest, lighter where they face the viewer."""
     image = Image.new("L", (_SIDE, _SIDE), _GROUND)
     pen = ImageDraw.Draw(image)
-    one, two, three = (positions[faces[:, corner]].astype(np.float64) for corner in range(3))
-    normal = np.cross(two - one, three - one)
+    first, second, third = (positions[faces[:, corner]].astype(np.float64) for corner in range(3))
+    normal = np.cross(second - first, third - first)
     length = np.linalg.norm(normal, axis=1)
     facing = np.abs(normal @ np.array([np.cos(_AZIMUTH), np.sin(_AZIMUTH), 0.5])) / np.maximum(length, 1e-12) / 1.12
     gray = (_CLOTH - _SHADE * (1 - facing)).astype(int)
@@ -150,7 +150,7 @@ def _jpeg(image: Image.Image) -> bytes:
 
 
 def thumbnail(film: Film, *, side: int) -> bytes:
-    """The middle picture of a film, as a JPEG of at most `side` pixels either way."""
+    """Draws the middle picture of a film, as a JPEG of at most `side` pixels either way."""
     (picture,) = film.jpegs(len(film) // 2, 1)
     with Image.open(io.BytesIO(picture)) as image:
         image.thumbnail((side, side))

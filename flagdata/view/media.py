@@ -45,7 +45,7 @@ class Media:
         self._drawn: dict[str, Film | None] = {}
 
     def film(self, row: Mapping[str, Any]) -> Film:
-        """What moves in an artifact.
+        """Finds what moves in an artifact.
 
         Raises:
             NotFoundError: nothing does, or its data are lost.
@@ -57,7 +57,7 @@ class Media:
         return film
 
     def thumbnail(self, row: Mapping[str, Any]) -> bytes:
-        """A small JPEG of an artifact.
+        """Draws a small JPEG of an artifact.
 
         Raises:
             NotFoundError: it has no picture, or its data are lost.
@@ -69,15 +69,15 @@ class Media:
                 self._thumbnails.move_to_end(key)
                 return self._thumbnails[key]
         with self._busy:
-            made = thumbnail(self.film(row), side=_SIDE)
+            thumbnail_bytes = thumbnail(self.film(row), side=_SIDE)
         with self._lock:
-            self._thumbnails[key] = made
+            self._thumbnails[key] = thumbnail_bytes
             while sum(map(len, self._thumbnails.values())) > _KEPT:
                 self._thumbnails.popitem(last=False)
-        return made
+        return thumbnail_bytes
 
     def frames(self, row: Mapping[str, Any], first: int) -> bytes:
-        """At most `FRAMES_AT_ONCE` JPEGs from a frame on, each behind its length in four bytes.
+        """Encodes at most `FRAMES_AT_ONCE` JPEGs from a frame on, each behind its length in four bytes.
 
         Raises:
             UsageError: no such frame.
@@ -92,31 +92,36 @@ class Media:
         return b"".join(len(picture).to_bytes(4, "big") + picture for picture in pictures)
 
     def series(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """The frames' times and the wind beside them as JSON values: seconds from the first frame, or from the first
-        mean of a wind; m/s; radians, blowing from, clockwise from north."""
+        """Returns the frames' times and the wind beside them as JSON values: seconds from the first frame, or from the
+        first mean of a wind; m/s; radians, blowing from, clockwise from north."""
         film = self._film(row)
         record = film.record if film is not None else self._record(row["object"]) if row["kind"] == Kind.WIND else None
         mean = record.wind_1hz() if record is not None else None
-        found: dict[str, Any] = {"frames": None, "wind": None, "clip": None}
+        charts: dict[str, Any] = {"frames": None, "wind": None, "clip": None}
         origin = 0
         if film is not None:
             origin = int(film.times[0])
             step = math.ceil(len(film) / POINTS)
-            kept = np.unique([*range(0, len(film), step), len(film) - 1])
-            seconds = (film.times[kept] - origin) / NANOSECONDS
-            found["frames"] = {"count": len(film), "index": kept.tolist(), "time": np.round(seconds, 6).tolist()}
+            frame_indices = np.unique([*range(0, len(film), step), len(film) - 1])
+            seconds = (film.times[frame_indices] - origin) / NANOSECONDS
+            charts["frames"] = {
+                "count": len(film),
+                "index": frame_indices.tolist(),
+                "time": np.round(seconds, 6).tolist(),
+            }
         if mean is not None:
             low, high = (-(2**63), 2**63 - 1) if film is None or film.wind_span is None else film.wind_span
             inside = (mean.time >= low) & (mean.time <= high)
             if not inside.any():
-                return found
+                return charts
             origin = origin or int(mean.time[inside][0])
             middle = (mean.time[inside] - origin) / NANOSECONDS - mean.period / 2
-            found["wind"] = _line(middle, mean.speed[inside], mean.sigma[inside], mean.direction[inside])
-        return found
+            charts["wind"] = _line(middle, mean.speed[inside], mean.sigma[inside], mean.direction[inside])
+        return charts
 
     def evidence(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """The search that led to a recording's clock model: offsets [s], score, evidence, and what accidents reach.
+        """Returns the search that led to a recording's clock model: offsets [s], score, evidence, and what accidents
+        reach.
 
         Raises:
             NotFoundError: nothing was searched.
@@ -127,18 +132,18 @@ class Media:
         if CURVE not in record.attachments:
             raise NotFoundError("no search led to its clock model", where=row["artifact"], fix="look at its report")
         try:
-            stated = from_stored_json(record.attachment(CURVE).decode())
-            found = {name: stated[name] for name in ("offset", "score", "evidence", "chance_score")}
+            curve = from_stored_json(record.attachment(CURVE).decode())
+            shown_curve = {name: curve[name] for name in ("offset", "score", "evidence", "chance_score")}
         except (ValueError, KeyError, TypeError):
             raise CorruptError("its search cannot be read", where=row["artifact"], fix="run flagdata verify") from None
-        return found
+        return shown_curve
 
     def is_lost(self, row: Mapping[str, Any]) -> bool:
-        """Whether the artifact's object is not in the lake."""
+        """Checks whether the artifact's object is not in the lake."""
         return row["object"] is not None and not self._lake.objects.has(row["object"])
 
     def _check_there(self, row: Mapping[str, Any]) -> None:
-        """Also of what is kept here: an erased film is shown no more.
+        """Checks that the object is there, also of what is kept here: an erased film is shown no more.
 
         Raises:
             NotFoundError: it has no data, or they are lost; why.
@@ -176,16 +181,17 @@ class Media:
 
 
 def _line(time: FloatArray, speed: FloatArray, sigma: FloatArray, direction: FloatArray) -> dict[str, Any]:
-    """A line of at most `POINTS` points, and a band: ± σ, or the lowest and highest of the stretch of each point."""
+    """Reduces a line to at most `POINTS` points, and a band: ± σ, or the lowest and highest of the stretch of each
+    point."""
     stretch = math.ceil(len(time) / POINTS)
     starts = np.arange(0, len(time), stretch)
     if stretch == 1:
         half = np.where(np.isfinite(sigma), sigma, 0.0)
         mean, low, high = speed, speed - half, speed + half
     else:
-        known = np.isfinite(speed)
-        count = np.maximum(np.add.reduceat(known, starts), 1)
-        mean = np.add.reduceat(np.where(known, speed, 0.0), starts) / count
+        finite = np.isfinite(speed)
+        count = np.maximum(np.add.reduceat(finite, starts), 1)
+        mean = np.add.reduceat(np.where(finite, speed, 0.0), starts) / count
         low = np.fmin.reduceat(speed, starts)
         high = np.fmax.reduceat(speed, starts)
         mean = np.where(np.isfinite(low), mean, np.nan)

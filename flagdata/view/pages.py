@@ -72,7 +72,7 @@ class Tables:
         self._known: dict[View, pa.Table] = {}
 
     def of(self, lake: Lake, view: View) -> pa.Table:
-        """All rows of a view."""
+        """Reads all rows of a view."""
         with self._lock:
             if view not in self._known:
                 self._known = {view: lake.table(view), **dict(list(self._known.items())[: _VIEWS - 1])}
@@ -98,12 +98,12 @@ class Site:
     tables: Tables = field(default_factory=Tables)
 
     def link(self, path: str = "", **values: Any) -> str:
-        """The address of a page of this version."""
-        given = {name: value for name, value in {"at": self.at, **values}.items() if value not in (None, "")}
-        return f"{self.base}{path}" + (f"?{urlencode(given)}" if given else "")
+        """Returns the address of a page of this version."""
+        query = {name: value for name, value in {"at": self.at, **values}.items() if value not in (None, "")}
+        return f"{self.base}{path}" + (f"?{urlencode(query)}" if query else "")
 
     def rows(self) -> pa.Table:
-        """All rows that the version shows.
+        """Reads all rows that the version shows.
 
         Raises:
             NotFoundError: no such version.
@@ -111,18 +111,18 @@ class Site:
         return self.tables.of(self.lake, self.lake.view(self.at))
 
     def row(self, artifact: str) -> dict[str, Any]:
-        """One row, by its full id.
+        """Reads one row, by its full id.
 
         Raises:
             NotFoundError: the version does not show it.
         """
-        found = self.rows().filter(pc.field("artifact") == artifact).to_pylist()
-        if not found:
+        matches = self.rows().filter(pc.field("artifact") == artifact).to_pylist()
+        if not matches:
             raise NotFoundError(
                 f"there is no artifact {artifact[:SHORT]} at this version",
                 fix="choose another version, or go to the overview",
             )
-        return found[0]
+        return matches[0]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,14 +141,14 @@ class Table:
 
 
 def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> str:
-    """The artifacts of a version, newest first; clips are listed where that kind is asked for.
+    """Renders the artifacts of a version, newest first; clips are listed where that kind is asked for.
 
     Raises:
         NotFoundError: no such version.
         UnknownNameError: no such kind.
     """
     if kind is not None and kind not in list(Kind):
-        raise UnknownNameError.of("kind", kind, [one.value for one in Kind])
+        raise UnknownNameError.of("kind", kind, [known_kind.value for known_kind in Kind])
     rows = site.rows()
     counts = {entry["values"]: entry["counts"] for entry in pc.value_counts(rows["kind"]).to_pylist()}  # type: ignore[attr-defined]
     chosen = pc.field("kind") != Kind.CLIP.value if kind is None else pc.field("kind") == kind
@@ -156,10 +156,10 @@ def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> st
         chosen &= pc.match_substring(pc.field("name"), name, ignore_case=True)  # type: ignore[attr-defined]
     # Of a large catalog a filter or sort of whole rows would copy them all.
     listed = rows.select([*_ORDER, "kind", "name"]).append_column("row", pa.array(np.arange(rows.num_rows)))
-    found = listed.filter(chosen).sort_by(list(_ORDER.items()))["row"]
-    last = max(0, (len(found) - 1) // CARDS)
+    newest_first = listed.filter(chosen).sort_by(list(_ORDER.items()))["row"]
+    last = max(0, (len(newest_first) - 1) // CARDS)
     page = min(page, last)
-    cards = [_card(site, row) for row in rows.take(found.slice(page * CARDS, CARDS)).to_pylist()]
+    cards = [_card(site, row) for row in rows.take(newest_first.slice(page * CARDS, CARDS)).to_pylist()]
     return _page(
         site,
         "overview.html.j2",
@@ -169,27 +169,27 @@ def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> st
         name=name or "",
         page=page,
         last=last,
-        total=len(found),
+        total=len(newest_first),
         everything=rows.num_rows - counts.get(Kind.CLIP.value, 0),
     )
 
 
 def artifact(site: Site, identity: str) -> str:
-    """One artifact: its film beside its wind, what was found, how it was aligned, where it comes from.
+    """Renders one artifact: its film beside its wind, what was found, how it was aligned, where it comes from.
 
     Raises:
         NotFoundError: no such version, or it does not show the artifact.
     """
-    shown, row = site.rows(), site.row(identity)
-    report = _stated(row, "report") or {}
+    rows, row = site.rows(), site.row(identity)
+    report = _from_column(row, "report") or {}
     lost = site.media.is_lost(row)
-    clips, count = _clips(site, shown, row)
-    labels = labels_of(shown).get(identity, {})
+    clips, count = _clips(site, rows, row)
+    labels = labels_of(rows).get(identity, {})
     facts = [(name, printable(said(name, value))) for name, value in row.items() if _is_fact(name, value)]
     facts += [(PREFIX + name, printable(str(value))) for name, value in labels.items()]
     facts += [(f"version {number}", text) for number, text in _versions(site, row)]
-    drawn = picture(ancestry(shown, identity), link=lambda one: site.link(f"artifact/{one}"))
-    stated = {name: _stated(row, name) for name in ("recipe", "parameters", "clock_model")}
+    drawn = picture(ancestry(rows, identity), link=lambda relative: site.link(f"artifact/{relative}"))
+    documents = {name: _from_column(row, name) for name in ("recipe", "parameters", "clock_model")}
     return _page(
         site,
         "artifact.html.j2",
@@ -200,7 +200,7 @@ def artifact(site: Site, identity: str) -> str:
         findings=_findings(report),
         words=report.get("words"),
         evidence=_evidence(row, report),
-        stated={name: json.dumps(value, indent=2, ensure_ascii=False) for name, value in stated.items() if value},
+        stated={name: json.dumps(value, indent=2, ensure_ascii=False) for name, value in documents.items() if value},
         films=row["kind"] in _FILMED and row["object"] is not None,
         blows=row["kind"] == Kind.WIND,
         lineage=Markup(drawn),  # its texts are escaped
@@ -210,34 +210,34 @@ def artifact(site: Site, identity: str) -> str:
 
 
 def sql(site: Site, text: str | None) -> tuple[str, FlagdataError | None]:
-    """The page of a query, and what is wrong with it.
+    """Renders the page of a query, and says what is wrong with it.
 
     Raises:
         NotFoundError: no such version.
     """
-    found, error = Table(), None
+    table, error = Table(), None
     if text:
         try:
-            found = _answer(site, text)
+            table = _answer(site, text)
         except FlagdataError as refused:
             error = refused
     columns = [(name, str(column.type), column.unit, column.about) for name, column in COLUMNS.items()]
-    return _page(site, "query.html.j2", sql=text or "", found=found, error=error, columns=columns, rows=ROWS), error
+    return _page(site, "query.html.j2", sql=text or "", found=table, error=error, columns=columns, rows=ROWS), error
 
 
 def problem(site: Site, error: FlagdataError, status: int) -> str:
-    """The page of an error; it reads nothing of the lake."""
+    """Renders the page of an error; it reads nothing of the lake."""
     return _filled(site, "problem.html.j2", error=error, status=status, refs=[], version=None)
 
 
 def style() -> bytes:
-    """The sheet of all pages."""
+    """Returns the sheet of all pages."""
     kinds = "".join(f".k-{kind} {{ --kind: {colour}; }}\n" for kind, colour in COLOURS.items())
     return (text_of("flagdata.pages", "base.css") + text_of("flagdata.view", "view.css") + kinds).encode()
 
 
 def script() -> bytes:
-    """What moves on the pages."""
+    """Returns what moves on the pages."""
     return text_of("flagdata.view", "view.js").encode()
 
 
@@ -248,18 +248,18 @@ def _page(site: Site, template: str, **values: Any) -> str:
 
 
 def _filled(site: Site, template: str, **values: Any) -> str:
-    known = {"site": site, "link": site.link, "lake": str(site.lake.path), "examples": EXAMPLES, "short": SHORT}
-    return render("flagdata.view", template, {**known, **values}, filters={"printable": printable})
+    common_values = {"site": site, "link": site.link, "lake": str(site.lake.path), "examples": EXAMPLES, "short": SHORT}
+    return render("flagdata.view", template, {**common_values, **values}, filters={"printable": printable})
 
 
 def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
-    """What a tile shows of a row."""
+    """Returns what a tile shows of a row."""
     seconds = None if row["start"] is None or row["end"] is None else (row["end"] - row["start"]) / 1e9
     length = None if seconds is None else f"{seconds:.3g} s" if seconds < 120 else f"{seconds / 60:.3g} min"
     size = None if row["kind"] == Kind.CLIP else size_text(row["object_bytes"])
     wind = row["wind"]
     if row["kind"] == Kind.WIND:
-        wind = (_stated(row, "report") or {}).get("mean_speed")
+        wind = (_from_column(row, "report") or {}).get("mean_speed")
     sigma = "" if row["wind_sigma"] is None else f" ± {row['wind_sigma']:.2f}"
     return {
         "artifact": row["artifact"],
@@ -277,53 +277,56 @@ def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _together(text: str | None) -> str | None:
-    """A number and its unit in one line."""
+    """Joins a number and its unit in one line."""
     return text and text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _versions(site: Site, row: Mapping[str, Any]) -> list[tuple[int, str]]:
-    """Number, id and code of each version of a result that has several."""
-    known = versions(site.lake, Artifact.from_row(row), at=site.at)
+    """Lists number, id and code of each version of a result that has several."""
+    result_versions = versions(site.lake, Artifact.from_row(row), at=site.at)
     return [
-        (number, f"{one.id[:SHORT]} by code {one.code_version}{', this one' if one.id == row['artifact'] else ''}")
-        for number, one in enumerate(known if len(known) > 1 else (), start=1)
+        (
+            number,
+            f"{result.id[:SHORT]} by code {result.code_version}{', this one' if result.id == row['artifact'] else ''}",
+        )
+        for number, result in enumerate(result_versions if len(result_versions) > 1 else (), start=1)
     ]
 
 
-def _clips(site: Site, shown: pa.Table, row: Mapping[str, Any]) -> tuple[list[dict[str, Any]], int]:
-    """Some of the clips of a recording, in order, and how many there are."""
+def _clips(site: Site, rows: pa.Table, row: Mapping[str, Any]) -> tuple[list[dict[str, Any]], int]:
+    """Lists some of the clips of a recording, in order, and counts them."""
     if row["kind"] != Kind.RECORDING:
         return [], 0
     wanted = (pc.field("kind") == Kind.CLIP.value) & (pc.field("recording") == row["artifact"])
-    clips = shown.filter(wanted).sort_by("start")
+    clips = rows.filter(wanted).sort_by("start")
     step = max(1, -(-clips.num_rows // CLIPS))
     return [_card(site, clip) for clip in clips.take(list(range(0, clips.num_rows, step))).to_pylist()], clips.num_rows
 
 
 def _evidence(row: Mapping[str, Any], report: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """How the clocks of a recording were brought together, in numbers."""
+    """Lists in numbers how the clocks of a recording were brought together."""
     if row["clock_method"] is None:
         return []
-    found = [("method", str(row["clock_method"]))]
-    found += [(words, f"{row[name]:.4g} {unit}") for name, words, unit in _CLOCK if row[name] is not None]
+    facts = [("method", str(row["clock_method"]))]
+    facts += [(words, f"{row[name]:.4g} {unit}") for name, words, unit in _CLOCK if row[name] is not None]
     for name, words, unit in _EVIDENCE:
         value = report.get(name)
         if isinstance(value, int | float):
-            found.append((words, f"{value:.4g} {unit}".strip()))
+            facts.append((words, f"{value:.4g} {unit}".strip()))
         elif isinstance(value, list) and len(value) == 2:
-            found.append((f"{words}, {report.get('level', 0.9):.0%}", f"{value[0]:.4g} to {value[1]:.4g} {unit}"))
-    return found
+            facts.append((f"{words}, {report.get('level', 0.9):.0%}", f"{value[0]:.4g} to {value[1]:.4g} {unit}"))
+    return facts
 
 
 def _findings(report: Mapping[str, Any]) -> list[dict[str, str]]:
-    """What a report found; one of another program may lack parts of it."""
+    """Lists what a report found; one of another program may lack parts of it."""
     return [
         {name: printable(str(finding.get(name) or "")) for name in ("severity", "kind", "what", "fix")}
         for finding in report.get("findings", [])
     ]
 
 
-def _stated(row: Mapping[str, Any], column: str) -> Any:
+def _from_column(row: Mapping[str, Any], column: str) -> Any:
     return column_json(row[column], column, artifact=row["artifact"]) if row[column] else None
 
 
@@ -338,10 +341,10 @@ def _answer(site: Site, text: str) -> Table:
     selection = Selection(rows, Request(sql=text, limit=ROWS, time_limit=SECONDS))
     answer = selection.table()
     values = [column.to_pylist() for column in answer.columns]
-    named = {value for column in values for value in column if isinstance(value, str) and len(value) == _ID}
+    texts = {value for column in values for value in column if isinstance(value, str) and len(value) == _ID}
     ids = rows["artifact"]
-    known = set(ids.filter(pc.is_in(ids, value_set=pa.array(sorted(named), pa.string()))).to_pylist())  # type: ignore[attr-defined]
-    columns = [[_cell(site, value, known) for value in column] for column in values]
+    identities = set(ids.filter(pc.is_in(ids, value_set=pa.array(sorted(texts), pa.string()))).to_pylist())  # type: ignore[attr-defined]
+    columns = [[_cell(site, value, identities) for value in column] for column in values]
     return Table(
         header=[printable(name) for name in answer.column_names],
         rows=list(zip(*columns, strict=True)),
@@ -349,12 +352,12 @@ def _answer(site: Site, text: str) -> Table:
     )
 
 
-def _cell(site: Site, value: Any, known: set[str]) -> tuple[str, str | None]:
-    shown = plain(value)
-    if shown is None:
+def _cell(site: Site, value: Any, identities: set[str]) -> tuple[str, str | None]:
+    plain_value = plain(value)
+    if plain_value is None:
         return "", None
-    if isinstance(shown, str) and shown in known:
-        return shown[:SHORT], site.link(f"artifact/{shown}")
-    if isinstance(shown, float):
-        return f"{shown:.6g}", None
-    return printable(", ".join(map(str, shown)) if isinstance(shown, list) else str(shown)), None
+    if isinstance(plain_value, str) and plain_value in identities:
+        return plain_value[:SHORT], site.link(f"artifact/{plain_value}")
+    if isinstance(plain_value, float):
+        return f"{plain_value:.6g}", None
+    return printable(", ".join(map(str, plain_value)) if isinstance(plain_value, list) else str(plain_value)), None

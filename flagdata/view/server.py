@@ -64,41 +64,41 @@ Route = Callable[[Site, tuple[str, ...], Mapping[str, str]], Answer]
 
 
 def answer(site: Site, target: str) -> Answer:
-    """The answer to a request for an address.
+    """Answers a request for an address.
 
     Args:
         site: at the head of main.
         target: path and query of the address.
     """
     try:
-        site, function, groups, fields = _found(site, target)
+        site, function, groups, fields = _route_of(site, target)
         return function(site, groups, fields)
     except Exception as error:  # noqa: BLE001  every error is a page
         return refusal(site, foreseen(error))
 
 
 def refusal(site: Site, error: FlagdataError, status: HTTPStatus | None = None) -> Answer:
-    """The page of an error.
+    """Renders the page of an error.
 
     Args:
         status: by the kind of the error if `None`.
     """
     if status is None:
-        kinds = (found for kind, found in _STATUS if isinstance(error, kind))
+        kinds = (answer_status for kind, answer_status in _STATUS if isinstance(error, kind))
         status = next(kinds, HTTPStatus.INTERNAL_SERVER_ERROR)
     return _html(pages.problem(replace(site, at=None), error, status), status)
 
 
-def _found(site: Site, target: str) -> tuple[Site, Route, tuple[str, ...], Mapping[str, str]]:
+def _route_of(site: Site, target: str) -> tuple[Site, Route, tuple[str, ...], Mapping[str, str]]:
     try:
         address = urlsplit(target)
-        given = parse_qs(address.query, max_num_fields=_FIELDS, errors="strict")
+        query = parse_qs(address.query, max_num_fields=_FIELDS, errors="strict")
     except ValueError:
         raise UsageError("an address that cannot be read", fix="go back to the overview") from None
     if not address.path.startswith(site.base):
         raise NotFoundError("nothing is here", fix="open the whole address that flagdata view printed")
     path = address.path.removeprefix(site.base)
-    fields = {name: values[-1] for name, values in given.items()}
+    fields = {name: values[-1] for name, values in query.items()}
     for pattern, function in _ROUTES.items():
         if match := re.fullmatch(pattern, path, flags=re.ASCII):
             return replace(site, at=fields.get("at")), function, match.groups(), fields
@@ -221,7 +221,7 @@ class Server(ThreadingHTTPServer):
 
 
 def respond(server: Server, method: str, target: str, headers: Message) -> Answer:
-    """The answer to a request, or the refusal of one that may not be made.
+    """Answers a request, or refuses one that may not be made.
 
     Args:
         target: path and query of the address.
@@ -242,7 +242,7 @@ def respond(server: Server, method: str, target: str, headers: Message) -> Answe
 
 
 def _nowhere(server: Server) -> Site:
-    """The site without its address, for those who do not know it."""
+    """Returns the site without its address, for those who do not know it."""
     return Site(lake=server.site.lake, media=server.site.media, base="/")
 
 
@@ -252,22 +252,22 @@ class _Asked(BaseHTTPRequestHandler):
     timeout = _PATIENCE
 
     def do_GET(self) -> None:
-        found = respond(cast(Server, self.server), self.command, self.path, self.headers)
-        self.send_response(found.status)
-        self.send_header("Content-Type", found.media_type)
-        self.send_header("Content-Length", str(len(found.content)))
+        answer = respond(cast(Server, self.server), self.command, self.path, self.headers)
+        self.send_response(answer.status)
+        self.send_header("Content-Type", answer.media_type)
+        self.send_header("Content-Length", str(len(answer.content)))
         for name, value in HEADERS.items():
             self.send_header(name, value)
-        if found.status is HTTPStatus.METHOD_NOT_ALLOWED:
+        if answer.status is HTTPStatus.METHOD_NOT_ALLOWED:
             self.send_header("Allow", "GET, HEAD")
         if self.command not in ("GET", "HEAD"):  # what it carries is not read
             self.send_header("Connection", "close")
             self.close_connection = True
         self.end_headers()
         if self.command != "HEAD":
-            self.wfile.write(found.content)
+            self.wfile.write(answer.content)
 
     do_HEAD = do_POST = do_PUT = do_DELETE = do_PATCH = do_OPTIONS = do_GET  # noqa: N815
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 — as the library names it
-        """Nothing: the terminal is the user's, and addresses hold the key."""
+        """Logs nothing: the terminal is the user's, and addresses hold the key."""

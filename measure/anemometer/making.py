@@ -137,7 +137,7 @@ def made(
     seconds = sum(min(subject.film.duration, math.inf if last is None else last) - first for subject in opened_subjects)
     if seconds < LEAST:
         raise InputError(
-            f"{max(seconds, 0.0):.0f} s of film beside a log",
+            f"only {max(seconds, 0.0):.0f} s of film have a log beside them",
             where=opened_subjects[0].film.name,
             fix=f"give {LEAST:.0f} s or more; {ENOUGH / 60:.0f} minutes are better",
         )

@@ -132,7 +132,7 @@ def keep(lake: Lake, answer: VerdictAnswer, *, branch: str = "main") -> Kept:
         lambda staged: write(staged, answer.verdict, page=answer.page),
         f"close loop: {answer.name}",
         branch=branch,
-        left=lambda verdict: [_model(answer, model, verdict) for model in answer.models],
+        derived=lambda verdict: [_model(answer, model, verdict) for model in answer.models],
     )
     verdict = entry.artifact
     ids = tuple(_model(answer, model, verdict).id for model in answer.models)

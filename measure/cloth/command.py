@@ -226,5 +226,7 @@ def weight(stated: Stated) -> tuple[float, float]:
     """
     middle = (stated.low + stated.high) / 2
     if not middle > 0:
-        raise UsageError(f"{stated.text} kg/m²", where="--area-weight", fix="give one above 0, as in 0.155±0.005")
+        raise UsageError(
+            f"the area weight is {stated.text} kg/m²", where="--area-weight", fix="give one above 0, as in 0.155±0.005"
+        )
     return middle, max(stated.sigma, (stated.high - stated.low) / 12**0.5, _RELATIVE * middle)

@@ -46,7 +46,9 @@ class Normal:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.mean) and self.sigma > 0):
-            raise InputError(f"{self.mean} ± {self.sigma}", where="prior", fix="give a finite mean and a deviation > 0")
+            raise InputError(
+                f"the prior is {self.mean} ± {self.sigma}", where="prior", fix="give a finite mean and a deviation > 0"
+            )
 
     def at(self, share: FloatArray) -> FloatArray:
         """Quantiles of shares in (0, 1)."""
@@ -231,7 +233,9 @@ def stated_angle(about: Uncertain, stated: Stated, *, where: str) -> Uncertain:
     """
     least, most = (1.0, 179.0) if about.name == "azimuth" else (-60.0, 60.0)
     if stated.low < least or stated.high > most:
-        raise UsageError(f"{stated.text}°", where=where, fix=f"give degrees from {least:g} to {most:g}, as in 70±7")
+        raise UsageError(
+            f"{about.name} is {stated.text}°", where=where, fix=f"give degrees from {least:g} to {most:g}, as in 70±7"
+        )
     low, high = math.radians(stated.low), math.radians(stated.high)
     if low < high:
         return replace(about, prior=Range(low=low, high=high), source="stated", limits=(low, high))

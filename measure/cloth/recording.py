@@ -266,7 +266,7 @@ def check_duration(seconds: float, *, where: str) -> None:
     """
     if seconds < LEAST_WINDOWS * WINDOW:
         raise InputError(
-            f"{max(seconds, 0.0):.3g} s of film with a log beside them",
+            f"only {max(seconds, 0.0):.3g} s of film have a log beside them",
             where=where,
             fix=f"give {LEAST_WINDOWS * WINDOW:g} s or more; two minutes are better",
         )
@@ -293,7 +293,7 @@ def check_in_all(recordings: Sequence[_Lasting], *, left_out: Sequence[Finding] 
     if seconds < LEAST_IN_ALL * WINDOW - 1e-9:
         without = "".join(f"; {finding.what}" for finding in left_out)
         raise InputError(
-            f"{seconds:.3g} s of film with a log beside them{without}",
+            f"only {seconds:.3g} s of film have a log beside them{without}",
             where=", ".join(recording.name for recording in recordings),
             fix=f"give {LEAST_IN_ALL * WINDOW:g} s or more in all; two minutes are better",
         )

@@ -249,11 +249,13 @@ def _of_table(
     beside, parent = None, None
     if log is not None:
         if lake is None:
-            raise UsageError("a log of no lake", where="--log", fix="name the lake that it was ingested into: --lake")
+            raise UsageError(
+                "the log is of no lake", where="--log", fix="name the lake that it was ingested into: --lake"
+            )
         beside, parent = joined(path, size, lake=lake, log=log, at=at, offset=offset)
     elif offset is not None:
         raise UsageError(
-            "an offset without a log", where="--clock-offset", fix="name the log: --log ARTIFACT --lake LAKE"
+            "an offset needs a log", where="--clock-offset", fix="name the log: --log ARTIFACT --lake LAKE"
         )
     found = of_table(path, size, beside=beside)
     if found[0].place is None:

@@ -93,7 +93,9 @@ def declared(table: Columns, offset: Stated, *, names: tuple[str, str]) -> Clock
     """
     if offset.low < offset.high or not offset.sigma > 0:
         raise UsageError(
-            f"an offset of {offset.text} s", where="--clock-offset", fix="state how well it is known, as in 0.3±0.1"
+            f"the offset {offset.text} s has no uncertainty",
+            where="--clock-offset",
+            fix="state how well it is known, as in 0.3±0.1",
         )
     times = instants(table)
     return given(names[1], names[0], start=int(times[0]), end=int(times[-1]) + 1, offset=offset.low, sigma=offset.sigma)

@@ -192,7 +192,7 @@ def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
         try:
             table = read_parquet(path)
         except pa.ArrowException as error:
-            raise InputError(f"no Parquet table: {error}", where=str(path), fix="name a table") from None
+            raise InputError(f"this is no Parquet table: {error}", where=str(path), fix="name a table") from None
         headings = []
         for field in table.schema:
             stated = (field.metadata or {}).get(b"unit", b"").decode()
@@ -289,10 +289,14 @@ def of_columns(table: Columns, *, name: str, identity: str, beside: Beside | Non
         raise InputError(what, where=table.where, fix="give the wind in the table or as a log (--log), in one of them")
     if TIME not in table:
         if beside is not None:
-            raise InputError("no column time to join the log by", where=table.where, fix="add the rows' times")
+            raise InputError(
+                "the table has no column time to join the log by", where=table.where, fix="add the rows' times"
+            )
         return _against_wind(table, name=name, identity=identity)
     if extra := [one for one in (DURATION, COUNT) if one in table]:
-        raise InputError(f"columns {TIME} and {', '.join(extra)}", where=table.where, fix="keep one of them")
+        raise InputError(
+            f"the table has columns {TIME} and {', '.join(extra)}", where=table.where, fix="keep one of them"
+        )
     return (_against_time(table, name=name, identity=identity, beside=beside),)
 
 
@@ -304,7 +308,7 @@ def rows_of(path: Path, size: FlagSize) -> Columns:
     """
     table = read_table(path, size)
     if TIME not in table:
-        raise InputError("no column time", where=table.where, fix="add the rows' times")
+        raise InputError("the table has no column time", where=table.where, fix="add the rows' times")
     spacing(table)
     return table
 
@@ -343,7 +347,9 @@ def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | 
     if beside is None:
         there = np.isfinite(table[WIND])
         if there.sum() < _FEWEST_ROWS:
-            raise InputError("no wind", where=table.where, fix="fill the column in, or give a log beside the table")
+            raise InputError(
+                "the table has no wind", where=table.where, fix="fill the column in, or give a log beside the table"
+            )
         log = Log(times=times[there] - begin, speed=table[WIND][there], averaging=step)
     else:
         start = instants(table)[:1] - round(step / 2 * NANOSECONDS)
@@ -396,7 +402,7 @@ def _against_wind(table: Columns, *, name: str, identity: str) -> tuple[Observed
     for line, wind, own in zip(table.lines, table[WIND].tolist(), windows.tolist(), strict=True):
         if not (wind > 0 and own >= LEAST_WINDOWS - 1e-6):
             raise InputError(
-                f"a row of {own * WINDOW:g} s in a wind of {wind:g} m/s",
+                f"a row lasts {own * WINDOW:g} s in a wind of {wind:g} m/s",
                 where=f"{table.where}, line {line}",
                 fix=f"leave out rows in still air or of less than {LEAST_WINDOWS * WINDOW:g} s",
             )

@@ -180,7 +180,9 @@ def _check_only(chosen: CalibrateCommand) -> None:
     others = {"weight": {"name", "model"}, "anemometer": _OF_WEIGHT}.get(chosen.only or "", set())
     for name in sorted(others & typed(chosen)):
         spelled = described(CalibrateCommand)[name][1].spelled(name)
-        raise UsageError(f"{spelled} with --only {chosen.only}", where=spelled, fix=f"leave {spelled} out")
+        raise UsageError(
+            f"{spelled} cannot be combined with --only {chosen.only}", where=spelled, fix=f"leave {spelled} out"
+        )
 
 
 def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: Reading, lake: Lake | None) -> Made | None:

@@ -85,9 +85,9 @@ def measure(chosen: MeasureCommand) -> None:
       flagdata measure --lake lake --query "wind between 3 and 6" --json
     """
     if chosen.as_json and chosen.as_csv:
-        raise UsageError("more than one form of output", fix="choose one of --json and --csv")
+        raise UsageError("more than one form of output is given", fix="choose one of --json and --csv")
     if chosen.cache is not None and chosen.refine is None:
-        raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
+        raise UsageError("--cache needs --refine", fix="give --refine N, or leave --cache out")
     from flagdata.outputs import check_file, check_folder
 
     if chosen.report is not None:

@@ -127,7 +127,7 @@ class RecordingRecipe:
     def __post_init__(self) -> None:
         if self.duration < 10 or self.rate < 1:
             raise InputError(
-                f"a recording of {self.duration} s at {self.rate} Hz",
+                f"the recording is {self.duration} s long at {self.rate} Hz",
                 where="demonstration",
                 fix="make it at least 10 s long, at 1 Hz",
             )

@@ -153,7 +153,9 @@ def quantities(
         InputError: a level that is not between 0 and 1.
     """
     if not 0 < level < 1:
-        raise InputError(f"an interval of {level:g}", where="--level", fix="give a share between 0 and 1, as in 0.9")
+        raise InputError(
+            f"the level of an interval is {level:g}", where="--level", fix="give a share between 0 and 1, as in 0.9"
+        )
     answers = []
     for k, name in enumerate(names):
         ends = float(assumed[k, 0]), float(assumed[k, 1])

@@ -113,7 +113,7 @@ class FlagSize:
     def __post_init__(self) -> None:
         if not (_SHORTEST <= self.length <= _LONGEST and _SHORTEST <= self.height <= _LONGEST):
             raise UsageError(
-                f"a flag of {self.length:g} m × {self.height:g} m",
+                f"the flag is {self.length:g} m × {self.height:g} m",
                 where="--flag-size",
                 fix=f"give length x height in metres, each from {_SHORTEST:g} to {_LONGEST:g}, as in 1.5x1.0",
             )

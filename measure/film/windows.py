@@ -110,12 +110,14 @@ def lay_out(
     begin, end = first if first is not None else 0.0, last if last is not None else duration
     if not 0 <= begin < end or begin >= duration:
         raise UsageError(
-            f"from {begin:g} s to {end:g} s of a film of {duration:.2f} s",
+            f"the part from {begin:g} s to {end:g} s is not in the film, which lasts {duration:.2f} s",
             where="--start, --end",
             fix="give a part that it has",
         )
     if step is not None and not step > 0:
-        raise UsageError(f"a window every {step:g} s", where="--windows", fix="give a time above 0, as in 1.2s")
+        raise UsageError(
+            f"the time between windows is {step:g} s", where="--windows", fix="give a time above 0, as in 1.2s"
+        )
     longest = frames * max(spacings)
     layout = Layout(
         frames=frames,

@@ -60,7 +60,8 @@ def level(count: int, false_alarm: float, confidence: float) -> float:
     """
     if not (0 < false_alarm < 1 and 0 < confidence < 1):
         raise InputError(
-            f"a false-alarm rate of {false_alarm:g} with confidence {confidence:g}", fix="give shares between 0 and 1"
+            f"the false-alarm rate is {false_alarm:g} and the confidence {confidence:g}",
+            fix="give shares between 0 and 1",
         )
     k = np.arange(1, count + 1)
     admissible = np.flatnonzero(betainc(k, count + 1 - k, false_alarm) >= confidence)

@@ -221,7 +221,7 @@ def verdict(
         InputError: no window, a rate out of range, or a window about which the gate said nothing.
     """
     if not windows or any(not sizes or any(not reasons for reasons in sizes) for sizes in windows):
-        raise InputError("a window without a reason", where="gate", fix="this is a defect of the gate")
+        raise InputError("a window has no reason", where="gate", fix="this is a defect of the gate")
     count = len(windows)
     at, needed = level(window_rate(count, false_alarm)), refusing(count)
     p = np.array([[reasons[0].p for reasons in sizes] for sizes in windows])

@@ -7,7 +7,7 @@ import numpy as np
 from flagdata.arrays import FloatArray
 from measure.observables.cloth import ClothWindow
 from measure.observables.film import FilmWindow
-from measure.observables.unseen import UnseenError
+from measure.observables.unseen import EDGE_ON, NO_SILHOUETTE, UnseenError
 
 Window = FilmWindow | ClothWindow
 """Both have `times`, `free_edge`, `middle`, `silhouettes`, `length` and `height`."""
@@ -25,7 +25,7 @@ def chord(window: Window) -> FloatArray:
     places = window.free_edge
     places = places[np.isfinite(places).all(axis=1)]
     if len(places) < 2:
-        raise UnseenError("no-silhouette")
+        raise UnseenError(NO_SILHOUETTE)
     if window.silhouettes.area.mean() < _NARROWEST * window.length * window.height:
-        raise UnseenError("edge-on")
+        raise UnseenError(EDGE_ON)
     return places

@@ -40,7 +40,7 @@ class View:
     def __post_init__(self) -> None:
         if not abs(self.elevation) < math.radians(80) or not self.distance > 0:
             raise InputError(
-                f"elevation {math.degrees(self.elevation):.0f}°, distance {self.distance:g} m",
+                f"the elevation is {math.degrees(self.elevation):.0f}° and the distance {self.distance:g} m",
                 where="view",
                 fix="give an elevation below 80° and a distance above 0",
             )

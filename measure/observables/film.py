@@ -10,7 +10,7 @@ import numpy as np
 from flagdata.arrays import BoolArray, FloatArray, UInt8Array
 from flagdata.errors import InputError
 from measure.observables.silhouettes import Silhouettes
-from measure.observables.unseen import UnseenError
+from measure.observables.unseen import NO_SILHOUETTE, UnseenError
 
 _LARGEST = 1.15
 """Mean area over that of the flat flag above which the hoist's height, and with it the scale, is wrong."""
@@ -63,12 +63,12 @@ class FilmWindow:
             UnseenError: too few of them do.
         """
         if self.shown.mean() < _SHOWN or self.shown.sum() < 2:
-            raise UnseenError("no-silhouette")
+            raise UnseenError(NO_SILHOUETTE)
         masks, middle = self.masks[self.shown], self.hoist.mean(axis=0)
         if self.side < 0:
             masks, middle = masks[:, :, ::-1], np.array([masks.shape[2] - middle[0], middle[1]])
         if masks.sum(axis=(1, 2)).mean() > _LARGEST * self.length * self.height * self.scale**2:
-            raise UnseenError("no-silhouette")
+            raise UnseenError(NO_SILHOUETTE)
         return Silhouettes(
             times=self.times[self.shown],
             masks=masks,

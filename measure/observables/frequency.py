@@ -8,7 +8,7 @@ from flagdata.arrays import FloatArray
 from measure.observables.chord import Window, chord
 from measure.observables.motion import spectrum
 from measure.observables.observable import Observable
-from measure.observables.unseen import UnseenError
+from measure.observables.unseen import NO_MOTION, UnseenError
 
 _STILL = 0.004
 """Root mean square motion of the free edge, in flag lengths, below which there is no spectrum but of noise."""
@@ -21,7 +21,7 @@ def moving(window: Window) -> tuple[FloatArray, FloatArray]:
         UnseenError: it does not move, or is not seen.
     """
     if np.sqrt(chord(window).var(axis=0).sum()) < _STILL * window.length:
-        raise UnseenError("no-motion")
+        raise UnseenError(NO_MOTION)
     return spectrum(window.silhouettes.times, window.free_edge)
 
 

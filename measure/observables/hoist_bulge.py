@@ -6,7 +6,7 @@ import numpy as np
 
 from measure.observables.chord import Window, chord
 from measure.observables.observable import Observable
-from measure.observables.unseen import UnseenError
+from measure.observables.unseen import NO_SILHOUETTE, UnseenError
 
 _BETWEEN = 0.45
 """Share of the hoist's height above and below its middle in which the cloth's edge is looked at: at the ends it is
@@ -29,7 +29,7 @@ def hoist_bulge(window: Window) -> float:
     masks = shapes.masks[:, between]
     has_cloth = masks.any(axis=2)
     if not has_cloth.size or has_cloth.mean() < _ROWS:
-        raise UnseenError("no-silhouette")
+        raise UnseenError(NO_SILHOUETTE)
     # The first cloth's edge is half a pixel before its middle.
     first = shapes.columns[masks.argmax(axis=2)] - 0.5 / shapes.scale
     return float(np.maximum(first, 0.0)[has_cloth].mean() / shapes.length)

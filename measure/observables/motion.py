@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from flagdata.arrays import FloatArray
-from measure.observables.unseen import UnseenError
+from measure.observables.unseen import FEW_FRAMES, UnseenError
 
 RATE = 25.0
 """Rate [Hz] at which courses are compared: films of 25 fps and more have it."""
@@ -28,7 +28,7 @@ def even(times: FloatArray, course: FloatArray) -> tuple[FloatArray, FloatArray]
     finite = np.isfinite(course).reshape(len(course), -1).all(axis=1)
     times, course = times[finite], course[finite]
     if len(times) < 4 or np.ptp(times) * RATE + 1 < _FEWEST or np.diff(times).max() > _LARGEST_GAP:
-        raise UnseenError("few-frames")
+        raise UnseenError(FEW_FRAMES)
     at = times[0] + np.arange(int(np.ptp(times) * RATE + 1e-6) + 1) / RATE
     return at, make_interp_spline(times, course, k=3)(at)
 

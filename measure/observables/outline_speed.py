@@ -8,7 +8,7 @@ from measure.observables.chord import Window
 from measure.observables.motion import RATE
 from measure.observables.observable import Observable
 from measure.observables.silhouettes import BESIDE
-from measure.observables.unseen import UnseenError
+from measure.observables.unseen import FEW_FRAMES, UnseenError
 
 
 def outline_speed(window: Window) -> float:
@@ -20,7 +20,7 @@ def outline_speed(window: Window) -> float:
     intervals = shapes.times[step:] - shapes.times[:-step]
     usable = intervals < 2 / RATE
     if usable.sum() < 2:
-        raise UnseenError("few-frames")
+        raise UnseenError(FEW_FRAMES)
     swept = (masks[step:] ^ masks[:-step]).sum(axis=(1, 2))[usable] / shapes.scale**2
     around = 2 * (shapes.length * (1 - BESIDE)) + shapes.height
     return float((swept / intervals[usable]).mean() / around / shapes.length)

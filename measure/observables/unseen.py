@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+NO_SILHOUETTE, NO_MOTION, NO_WAVE = "no-silhouette", "no-motion", "no-wave"
+EDGE_ON, FEW_FRAMES = "edge-on", "few-frames"
+
 REASONS = {
-    "no-silhouette": "the cloth's outline was not found in enough frames",
-    "no-motion": "the free edge hardly moves, so that its spectrum is noise",
-    "no-wave": "no wave travels along the chord: the phases at its sections do not belong together",
-    "edge-on": "the flag flies towards the camera or away from it: hardly any of it is in the picture",
-    "few-frames": "the window has fewer frames than the observable takes",
+    NO_SILHOUETTE: "the cloth's outline was not found in enough frames",
+    NO_MOTION: "the free edge hardly moves, so that its spectrum is noise",
+    NO_WAVE: "no wave travels along the chord: the phases at its sections do not belong together",
+    EDGE_ON: "the flag flies towards the camera or away from it: hardly any of it is in the picture",
+    FEW_FRAMES: "the window has fewer frames than the observable takes",
 }
 """Kind of reason, by which windows are counted → a sentence for people."""
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from measure.observables.chord import Window, chord
 from measure.observables.motion import HIGHEST, LOWEST, RATE, even, transformed
-from measure.observables.unseen import UnseenError
+from measure.observables.unseen import EDGE_ON, NO_WAVE, UnseenError
 
 _SECTIONS = np.linspace(0.35, 0.85, 6)
 """Of the mean chord, where the middle line is followed."""
@@ -46,7 +46,7 @@ def wave(window: Window) -> Wave:
     half = 0.04 * shapes.length
     sections = [np.abs(shapes.columns - share * reach) <= half for share in _SECTIONS]
     if not all(section.any() for section in sections):
-        raise UnseenError("edge-on")
+        raise UnseenError(EDGE_ON)
     course = np.stack([line[:, section].mean(axis=1) for section in sections], axis=1)
     at, places = even(shapes.times, course)
     spectra = transformed(at, places)
@@ -57,9 +57,9 @@ def wave(window: Window) -> Wave:
     power = (np.abs(spectra[:, 1:]) * np.abs(spectra[:, :-1])).sum(axis=1)
     total = cross.sum()
     if power.sum() <= 0 or abs(total) < _COHERENT * power.sum():
-        raise UnseenError("no-wave")
+        raise UnseenError(NO_WAVE)
     spacing = float(np.diff(_SECTIONS).mean()) * reach / window.length
     number = -math.atan2(total.imag, total.real) / spacing
     if number * _LONGEST < 2 * math.pi:
-        raise UnseenError("no-wave")
+        raise UnseenError(NO_WAVE)
     return Wave(frequency=float((power * frequency).sum() / power.sum()), number=number)

@@ -124,12 +124,11 @@ def _record(value: Any, kind: Any, where: str) -> Any:
         for f in dataclasses.fields(kind)
         if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
     }
-    for has, wrong in (
-        ("it has the unknown field", content.keys() - hints.keys()),
-        ("it lacks the field", needed - content.keys()),
-    ):
-        if wrong:
-            raise InputError(f"{has} {', '.join(sorted(wrong))}", where=where, fix=f"the fields are {', '.join(hints)}")
+    fix = f"the fields are {', '.join(hints)}"
+    if unknown := content.keys() - hints.keys():
+        raise InputError(f"it has the unknown field {', '.join(sorted(unknown))}", where=where, fix=fix)
+    if lacking := needed - content.keys():
+        raise InputError(f"it lacks the field {', '.join(sorted(lacking))}", where=where, fix=fix)
     return kind(**{name: _read(item, hints[name], f"{where}.{name}") for name, item in content.items()})
 
 

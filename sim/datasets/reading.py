@@ -222,7 +222,9 @@ def _anemometer(content: Mapping[str, Any], *, where: str) -> AnemometerSpec:
 
 def _check(recipe: DatasetRecipe, *, where: str) -> None:
     if not recipe.licence:
-        raise InputError("no licence", where=where, fix='say how the data may be used: licence = "CC-BY-4.0"')
+        raise InputError(
+            "the recipe states no licence", where=where, fix='say how the data may be used: licence = "CC-BY-4.0"'
+        )
     time, anemometer = recipe.simulation.time, recipe.anemometer
     samples = anemometer.rate * (anemometer.before + time.settle + time.frames / time.rate)
     if samples > SAMPLES_LIMIT:

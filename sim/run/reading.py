@@ -294,7 +294,9 @@ def _given_mesh(mesh: _Mesh, *, where: str) -> SceneSpec:
         )
     if max(*used, *cloth.held) >= len(cloth.rest):
         raise InputError(
-            f"a vertex {max(*used, *cloth.held)} of {len(cloth.rest)}", where=where, fix="number them from 0"
+            f"vertex {max(*used, *cloth.held)} is beyond the {len(cloth.rest)} of the cloth",
+            where=where,
+            fix="number them from 0",
         )
     width, height = (max(axis) - min(axis) for axis in zip(*cloth.rest, strict=True))
     return SceneSpec(

@@ -248,7 +248,9 @@ class Recipe:
     def __post_init__(self) -> None:
         for counted, number in (("members", self.count), ("members a batch", self.batch)):
             if number > MEMBERS_LIMIT:
-                raise LimitError(f"{number} {counted}", where=self.name, fix=f"have at most {MEMBERS_LIMIT}")
+                raise LimitError(
+                    f"the recipe has {number} {counted}", where=self.name, fix=f"have at most {MEMBERS_LIMIT}"
+                )
         vertices = self.scene.vertices
         if vertices > VERTICES_LIMIT:
             raise LimitError(

@@ -34,13 +34,17 @@ class VonKarman:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.mean) and self.mean > 0):
-            raise InputError(f"mean wind {self.mean} m/s", where="VonKarman.mean", fix="give a speed above 0")
+            raise InputError(f"the mean wind is {self.mean} m/s", where="VonKarman.mean", fix="give a speed above 0")
         if not 0 <= self.intensity <= 1:
             raise InputError(
-                f"turbulence intensity {self.intensity}", where="VonKarman.intensity", fix="give a ratio from 0 to 1"
+                f"the turbulence intensity is {self.intensity}",
+                where="VonKarman.intensity",
+                fix="give a ratio from 0 to 1",
             )
         if not (math.isfinite(self.length) and self.length > 0):
-            raise InputError(f"length scale {self.length} m", where="VonKarman.length", fix="give a length above 0")
+            raise InputError(
+                f"the length scale is {self.length} m", where="VonKarman.length", fix="give a length above 0"
+            )
 
     @property
     def sigma(self) -> float:

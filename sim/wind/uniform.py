@@ -26,7 +26,7 @@ class UniformWind:
     def __post_init__(self) -> None:
         if self.constant.ndim != 2 or self.constant.shape[0] != 3:
             raise InputError(
-                f"wind of shape {tuple(self.constant.shape)}", where="uniform wind", fix="give (3, batch) in m/s"
+                f"the wind has shape {tuple(self.constant.shape)}", where="uniform wind", fix="give (3, batch) in m/s"
             )
         bad = ~torch.isfinite(self.constant).all(0)
         if bad.any():

@@ -39,7 +39,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 def test_an_unforeseen_exception_is_one_line_with_the_request_to_report_it(run, error: Exception) -> None:
     code, out, err = run(error)
     assert (code, out) == (1, "")
-    assert err.startswith(f"flagdata: unforeseen error: {type(error).__name__}")
+    assert err.startswith(f"flagdata: an unforeseen error occurred: {type(error).__name__}")
     assert "please report it" in err
     assert "Traceback" not in err
 
@@ -72,7 +72,7 @@ def test_what_the_system_refuses_is_named_with_its_file(run) -> None:
 def test_a_file_that_ends_too_early_is_no_interruption_by_the_user(run) -> None:
     code, _, err = run(EOFError("No data left in file"))
     assert code == 1
-    assert "unforeseen error: EOFError: No data left in file" in err
+    assert "an unforeseen error occurred: EOFError: No data left in file" in err
     assert "interrupted" not in err
     code, _, err = run(KeyboardInterrupt())
     assert (code, err.strip()) == (1, "flagdata: interrupted")

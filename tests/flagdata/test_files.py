@@ -23,7 +23,7 @@ def test_a_file_is_checked_before_it_is_opened(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_bytes(b"1234")
     check_input(path, limit=4)
-    with pytest.raises(LimitError, match="a table of 4 bytes"):
+    with pytest.raises(LimitError, match="the table has 4 bytes"):
         check_input(path, noun="table", limit=3)
     with pytest.raises(InputError, match="a folder, not a table"):
         check_input(tmp_path, noun="table")

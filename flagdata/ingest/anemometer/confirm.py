@@ -55,7 +55,7 @@ class Drafted:
         return tuple(_sentence(log, f" at {log.series.sensor.name!r}" if several else "") for log, _ in self.readings)
 
     def preview(self) -> str:
-        """How the file was understood, for people: reasons, rows beside what was read of them, findings."""
+        """Shows how the file was understood: reasons, rows beside what was read of them, findings."""
         lines = [f"{self.path.name} is a table that no recipe describes. This is how it is read:"]
         for number, (log, _) in enumerate(self.readings, start=1):
             if len(self.readings) > 1:
@@ -65,8 +65,8 @@ class Drafted:
                 lines.append(f"    line {row.line}  {row.text[:_WIDE]}  →  {iso(row.time)}  {row.wind}")
             series = log.series
             lines.append(f"  {len(series)} rows from {iso(int(series.time[0]))} to {iso(int(series.time[-1]))}")
-            for found in log.findings:
-                lines.append(f"  {found.severity}: {found.what}{f'; {found.fix}' if found.fix else ''}")
+            for finding in log.findings:
+                lines.append(f"  {finding.severity}: {finding.what}{f'; {finding.fix}' if finding.fix else ''}")
         return "\n".join(lines)
 
 
@@ -82,7 +82,7 @@ class UnconfirmedError(RefusedError):
 
     @classmethod
     def of(cls, drafted: Drafted) -> UnconfirmedError:
-        """The error for some drafted readings, with both ways out."""
+        """Returns the error for some drafted readings, with both ways out."""
         return cls(
             "parts of how this file is read are inferred or assumed, and nobody has confirmed them",
             where=str(drafted.path),
@@ -106,7 +106,7 @@ class Confirm(Protocol):
         ...
 
     def answered(self, read: Callable[[Answers], T]) -> T:
-        """What `read` gives, called with the answers to all that the file leaves open; at first with none.
+        """Calls `read` with answers to all that the file leaves open, at first with none, and returns what it gives.
 
         Raises:
             ZoneMissingError, OpenFactsError: there is nobody to ask.
@@ -114,7 +114,7 @@ class Confirm(Protocol):
         ...
 
     def __call__(self, drafted: Drafted) -> str:
-        """How they were confirmed, for the report. Raises UnconfirmedError where they were not."""
+        """Returns how the readings were confirmed, for the report. Raises UnconfirmedError where they were not."""
         ...
 
 
@@ -129,7 +129,7 @@ class Accepting:
     accept: str | None = None
 
     def answered(self, read: Callable[[Answers], T]) -> T:
-        """See `Confirm.answered`; nobody is asked."""
+        """Reads once, as `Confirm.answered` does, and asks nobody."""
         return read({})
 
     def __call__(self, drafted: Drafted) -> str:
@@ -145,7 +145,7 @@ UNASKED = Accepting()
 def confirmed(
     path: Path, source_hash: str, readings: Sequence[tuple[WindLog, WindOptions]], confirm: Confirm
 ) -> str | None:
-    """How the drafted ones of a file's readings were confirmed; `None` where none of them is a draft.
+    """Confirms the drafted ones of a file's readings and returns how; `None` where none of them is a draft.
 
     Raises:
         UnconfirmedError: nobody confirmed them.

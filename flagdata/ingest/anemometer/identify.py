@@ -24,7 +24,7 @@ _MESHES = {".obj"}
 
 
 def opened(path: Path, options: WindOptions, encoding: str | None = None) -> TextFile:
-    """A log as lines: JSON lines as a table, rows that carry no time on the clock that was given.
+    """Opens a log as lines: JSON lines as a table, rows that carry no time on the clock that was given.
 
     Raises:
         FlagdataError: it cannot be read as text, or does not fit the options.
@@ -47,25 +47,25 @@ def signed(source: TextFile) -> tuple[str, ...]:
 
 
 def recognised(source: TextFile) -> tuple[Guess, ...]:
-    """The formats and recipes that know a file, the surest first; none where it is unknown."""
+    """Lists the formats and recipes that know a file, the surest first; none where it is unknown."""
     return tuple(guess for guess in _guesses(source) if guess.score >= SURE)
 
 
 def _guesses(source: TextFile) -> tuple[Guess, ...]:
     head = Head(lines=tuple(source.head(HEAD_LINES)), counted=source.counted)
-    found: list[Guess] = []
+    candidates: list[Guess] = []
     for _, form in FORMATS.usable(signed(source) or None):
         reader: Format = form()
         guess = reader.recognise(head)
         if guess is not None and guess.score >= NAMED:
             return (guess,)
         if guess is not None:
-            found.append(guess)
-    return tuple(sorted(found, key=lambda guess: -guess.score))
+            candidates.append(guess)
+    return tuple(sorted(candidates, key=lambda guess: -guess.score))
 
 
 def guess_of(draft: Draft) -> Guess:
-    """What `sniff` says of a draft."""
+    """Describes a draft as `sniff` does."""
     return Guess(
         format=Delimited.name,
         score=0.3 if draft.open else 0.55,
@@ -73,8 +73,8 @@ def guess_of(draft: Draft) -> Guess:
         notes=(f"not used: {', '.join(draft.unused)}",) if draft.unused else (),
         draft=draft.recipe,
         winds=draft.winds,
-        doubts=tuple(f"{one.question}: {one.fix()}" for one in draft.open),
-        fix="; ".join(one.fix() for one in draft.open) or None,
+        doubts=tuple(f"{question.question}: {question.fix()}" for question in draft.open),
+        fix="; ".join(question.fix() for question in draft.open) or None,
     )
 
 
@@ -90,15 +90,15 @@ def sniff(path: Path | str, *, encoding: str | None = None) -> tuple[Guess, ...]
     """
     path = local_path(path)
     if not path.exists():
-        raise NotFoundError(f"no file {path.name}", where=str(path), fix="check the path")
+        raise NotFoundError(f"there is no file {path.name}", where=str(path), fix="check the path")
     if path.is_dir():
         return (_folder(path),)
     head = first_bytes(path)
     if mesh := others.format_of(path.name, head):
         return (_other_mesh(f"the file is a {mesh} mesh"),)
-    other = None if is_workbook(path, head) else signature(head)
-    if other is not None:
-        message, fix = other
+    other_file = None if is_workbook(path, head) else signature(head)
+    if other_file is not None:
+        message, fix = other_file
         kind: GuessKind = "camera" if "video" in message else "record" if "MCAP" in message else "other"
         reason = f"this is {message}: its first bytes are {head[:8].hex(' ')}"
         return (
@@ -110,20 +110,20 @@ def sniff(path: Path | str, *, encoding: str | None = None) -> tuple[Guess, ...]
     try:
         source = opened(path, WindOptions(limits=Limits(), encoding=encoding))
         rewritten = tuple(finding.what for finding in source.findings)
-        found = recognised(source) or tuple(filter(None, [completed(path, WindOptions(encoding=encoding))]))
+        formats = recognised(source) or tuple(filter(None, [completed(path, WindOptions(encoding=encoding))]))
     except FlagdataError as error:
         return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
-    return tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in found) or (unknown(source),)
+    return tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in formats) or (unknown(source),)
 
 
 def completed(path: Path | str, options: WindOptions) -> Guess | None:
-    """The guess at a table that no recipe describes, with what the user gives; `None` where it is no table of a log.
+    """Drafts a table that no recipe describes, with what the user gives; `None` where it is no table of a log.
 
     Raises:
         FlagdataError: the file cannot be read as text.
     """
-    found = drafted(opened(Path(path), options), options)
-    return None if found is None else guess_of(found)
+    draft = drafted(opened(Path(path), options), options)
+    return None if draft is None else guess_of(draft)
 
 
 def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[str, ...]:
@@ -140,15 +140,16 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
     source = opened(Path(path), options)
     if options.format is None and options.columns is None and recognised(source):
         return ()
-    found = drafted(source, options)
-    return found.winds if found is not None and len(found.winds) > 1 else ()
+    draft = drafted(source, options)
+    return draft.winds if draft is not None and len(draft.winds) > 1 else ()
 
 
 def unknown(source: TextFile) -> Guess:
-    """A text that no format and no recipe knows, and that is no table of a time and a wind; or what a format says."""
-    said = next((guess for guess in _guesses(source) if guess.fix), None)
-    if said is not None:
-        return said
+    """Describes a text that no format and no recipe knows, and that is no table of a time and a wind; or what a format
+    says."""
+    refused = next((guess for guess in _guesses(source) if guess.fix), None)
+    if refused is not None:
+        return refused
     text = "its text is neither a table with a time and a wind, nor lines of an instrument that is known"
     fix = (
         'if it is a log, say what its columns are, in order: --columns "time[FORMAT],wind_speed[UNIT]"; where none is '

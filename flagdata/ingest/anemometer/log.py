@@ -39,17 +39,17 @@ _FIRST = 2
 
 
 def shown_rows(source: TextFile, reading: Reading) -> tuple[LogRow, ...]:
-    """The first two rows with a speed, the slowest, the fastest and the last, in the order of the file.
+    """Selects the first two rows with a speed, the slowest, the fastest and the last, in the order of the file.
 
     Args:
         source: the text that was read.
         reading: its rows, put in order and judged; at least one.
     """
     speed = _speed(reading)
-    known = np.flatnonzero(np.isfinite(speed))
-    first = known if len(known) else np.arange(len(reading.time))
+    finite = np.flatnonzero(np.isfinite(speed))
+    first = finite if len(finite) else np.arange(len(reading.time))
     chosen = {*map(int, first[:_FIRST]), len(reading.time) - 1}
-    if len(known):
+    if len(finite):
         chosen |= {int(np.nanargmin(speed)), int(np.nanargmax(speed))}
     texts = _lines(source, {int(reading.line[row]) for row in chosen})
     return tuple(
@@ -64,7 +64,7 @@ def shown_rows(source: TextFile, reading: Reading) -> tuple[LogRow, ...]:
 
 
 def wind_of(reading: Reading, row: int) -> str:
-    """The wind of a row for people: speed in m/s and direction in degrees, or components, and its flags."""
+    """Describes the wind of a row: speed in m/s and direction in degrees, or components, and its flags."""
     speeds = [reading.channels[name][row] for name in _SPEEDS if name in reading.channels]
     parts = [f"{speed:.2f} m/s" if np.isfinite(speed) else "no speed," for speed in speeds]
     if not parts:
@@ -90,12 +90,12 @@ def _speed(reading: Reading) -> Series:
 
 
 def _lines(source: TextFile, wanted: set[int]) -> dict[int, str]:
-    found: dict[int, str] = {}
+    texts: dict[int, str] = {}
     for first, lines in source.blocks():
-        found |= {number: lines[number - first] for number in wanted if first <= number < first + len(lines)}
-        if len(found) == len(wanted):
+        texts |= {number: lines[number - first] for number in wanted if first <= number < first + len(lines)}
+        if len(texts) == len(wanted):
             break
-    return found
+    return texts
 
 
 READER = 2
@@ -141,7 +141,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         raise UsageError(
             f"the format {name} has no use for: {', '.join(sorted(unused))}", where=str(path), fix="leave it out"
         )
-    statement = zones.stated(source.head(zones.LINES))
+    statement = zones.stated_zone(source.head(zones.LINES))
     try:
         reading = reader.read(source, options)
     except ZoneMissingError as error:
@@ -195,12 +195,12 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
 
 
 def _text(recipe: str) -> str:
-    """What a recipe says, in TOML; its file may be damaged where nothing of it was read."""
+    """Quotes what a recipe says, in TOML; its file may be damaged where nothing of it was read."""
     return recipes.SENSORS.find(recipe).data.decode(errors="replace")
 
 
 def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
-    """A finding where no wind can be used, but the log measured something else.
+    """Reports that no wind can be used, but the log measured something else.
 
     Raises:
         NothingMeasuredError: nothing else either; a direction beside speeds that are all missing is none.
@@ -209,7 +209,7 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     usable = (reading.flags & UNUSABLE) == 0
     if any((np.isfinite(values) & usable).any() for values in winds):
         return ()
-    others = sorted(
+    quantities = sorted(
         name
         for name, values in reading.channels.items()
         if name not in WIND_CHANNELS and (CHANNELS[name].unit != "rad" or not winds) and np.isfinite(values).any()
@@ -217,12 +217,14 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     counts = ((flag, int(((reading.flags & flag) != 0).sum())) for flag in UNUSABLE)
     why = ", ".join(f"{count} {flag.name.lower().replace('_', ' ')}" for flag, count in counts if count and flag.name)
     message = f"not one value of the wind in {len(reading.time)} rows can be used{f' ({why})' if why else ''}"
-    if not others:
+    if not quantities:
         fix = "check the sensor, and which columns are read"
         below = any((values < 0).any() for name, values in reading.channels.items() if name in rules.SPEEDS)
         fix += "; if calm air reads below zero, give --zero-offset" if below else ""
-        raise NothingMeasuredError(f"nothing to measure: {message}", where=f"{where}, line {reading.line[0]}", fix=fix)
-    text = f"{message}; kept for {', '.join(others)}: no ground truth comes of it"
+        raise NothingMeasuredError(
+            f"there is nothing to measure: {message}", where=f"{where}, line {reading.line[0]}", fix=fix
+        )
+    text = f"{message}; kept for {', '.join(quantities)}: no ground truth comes of it"
     return (
         Finding.of(
             "no-usable-wind",
@@ -248,15 +250,15 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
     guesses = recognised(source)
     if not guesses:
         if drafted(source, options) is None:
-            other = unknown(source)
-            message = f"not a log of a known format: {'; '.join(other.reasons)}"
-            raise InputError(message, where=str(source.path), fix=other.fix or "describe it by a recipe")
+            guess = unknown(source)
+            message = f"not a log of a known format: {'; '.join(guess.reasons)}"
+            raise InputError(message, where=str(source.path), fix=guess.fix or "describe it by a recipe")
         return Delimited.name, options, ()
     best = guesses[0]
     return best.format, replace(options, recipe=best.recipe), best.reasons
 
 
 def understood(format_name: str, recipe: str | None) -> Mapping[str, Any]:
-    """The plan by which a log was read: its format, the digest of the recipe (TOML), of the user or of the catalog's
-    format, if one was used, and the reader."""
+    """Describes the plan by which a log was read: its format, the digest of the recipe (TOML), of the user or of the
+    catalog's format, if one was used, and the reader."""
     return {"format": format_name, "recipe": None if recipe is None else digest(recipe), "reader": READER}

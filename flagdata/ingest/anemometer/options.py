@@ -91,18 +91,20 @@ class WindOptions:
 
     def __post_init__(self) -> None:
         if self.date_order not in (None, "dmy", "mdy", "ymd"):
-            raise UsageError(f"date order {self.date_order!r}", where="date_order", fix="give dmy, mdy or ymd")
+            raise UsageError(
+                f"the date order cannot be {self.date_order!r}", where="date_order", fix="give dmy, mdy or ymd"
+            )
         if self.platform not in (None, "fixed", "moving", "corrected"):
             fix = "give fixed, moving or corrected"
-            raise UsageError(f"platform {self.platform!r}", where="platform", fix=fix)
+            raise UsageError(f"the platform cannot be {self.platform!r}", where="platform", fix=fix)
         if self.clock not in (None, "first", "last", "sort"):
-            raise UsageError(f"clock {self.clock!r}", where="clock", fix="give first or last, or sort")
+            raise UsageError(f"the clock cannot be {self.clock!r}", where="clock", fix="give first or last, or sort")
         if self.azimuth is not None and not -7.0 < self.azimuth < 7.0:
             raise UsageError(f"azimuth {self.azimuth} is not in radians", where="azimuth", fix="give -2π to 2π")
         if self.unit is not None and unit(self.unit, where="unit").si != "m/s":
             raise UsageError(f"{self.unit} is no unit of speed", where="unit", fix="give m/s, km/h, mph, kn or ft/s")
         if self.rate is not None and not 1e-6 <= self.rate <= 1e5:
-            raise UsageError(f"a rate of {self.rate:g} Hz", where="rate", fix="give readings a second, 1e-6 to 1e5")
+            raise UsageError(f"the rate is {self.rate:g} Hz", where="rate", fix="give readings a second, 1e-6 to 1e5")
         check_zero_offset(self.zero_offset, where="zero_offset")
 
     def given(self) -> frozenset[str]:
@@ -111,15 +113,15 @@ class WindOptions:
         Limits, encoding, topic and a rate are settled before it; zero offset, a clock set anew and the platform after
         it, for every format alike.
         """
-        apart = {"format", "recipe", "limits", "encoding", "zero_offset", "clock", "platform", "rate", "topic"}
-        return frozenset(f.name for f in fields(self) if f.name not in apart and self._is_given(f.name))
+        of_their_own = {"format", "recipe", "limits", "encoding", "zero_offset", "clock", "platform", "rate", "topic"}
+        return frozenset(f.name for f in fields(self) if f.name not in of_their_own and self._is_given(f.name))
 
     def _is_given(self, name: str) -> bool:
         value = getattr(self, name)
         return bool(value) if isinstance(value, tuple) else value is not None
 
     def as_dict(self) -> Mapping[str, Any]:
-        """Everything that shapes the result, for a recipe hash; limits do not (they only refuse).
+        """Returns everything that shapes the result, for a recipe hash; limits do not (they only refuse).
 
         Options that came later are there only where they are given, so that older artifacts keep their hash.
         """
@@ -139,4 +141,6 @@ def check_zero_offset(value: object, *, where: str) -> None:
         return
     if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 100:
         return
-    raise UsageError(f"zero offset {value!r}", where=where, fix='give "report", "estimate" or a speed in m/s')
+    raise UsageError(
+        f"the zero offset cannot be {value!r}", where=where, fix='give "report", "estimate" or a speed in m/s'
+    )

@@ -74,7 +74,7 @@ class Reading:
             raise InputError("columns of different lengths", fix="this is a defect of the format's reader")
 
     def take(self, rows: IntArray | BoolArray) -> Reading:
-        """The rows chosen, in the order given."""
+        """Returns the rows chosen, in the order given."""
         return replace(
             self,
             time=self.time[rows],
@@ -84,28 +84,28 @@ class Reading:
             host_time=None if self.host_time is None else self.host_time[rows],
         )
 
-    def with_findings(self, found: tuple[Finding, ...], *, flags: NDArray[np.uint16] | None = None) -> Reading:
-        """The same rows with findings added, and other flags."""
+    def with_findings(self, further: tuple[Finding, ...], *, flags: NDArray[np.uint16] | None = None) -> Reading:
+        """Returns the same rows with findings added, and other flags."""
         return replace(
-            self, findings=(*self.findings, *found), flags=self.flags if flags is None else flags.astype(np.uint16)
+            self, findings=(*self.findings, *further), flags=self.flags if flags is None else flags.astype(np.uint16)
         )
 
     def marked(
         self,
         rows: BoolArray,
         kind: str,
-        what: str,
+        text: str,
         *,
         flag: SampleFlag = SampleFlag.OK,
         severity: Severity = Severity.WARNING,
         value: float | None = None,
         fix: str | None = None,
     ) -> Reading:
-        """The same rows with a finding about some of them, at the first of these, and a flag at each.
+        """Returns the same rows with a finding about some of them, at the first of these, and a flag at each.
 
         Args:
             rows: (n,); where there are none, nothing is found.
-            what: the sentence, in which {n} stands for their number.
+            text: the sentence, in which {n} stands for their number.
         """
         if not rows.any():
             return self
@@ -117,7 +117,7 @@ class Reading:
             value=value,
             fix=fix,
             where=f"line {self.line[rows][0]}",
-            what=what.replace("{n}", str(count)),
+            what=text.replace("{n}", str(count)),
         )
         return self.with_findings((finding,), flags=np.where(rows, self.flags | flag, self.flags))
 
@@ -125,19 +125,19 @@ class Reading:
         self,
         rows: BoolArray,
         kind: str,
-        what: str,
+        text: str,
         *,
         severity: Severity = Severity.WARNING,
         value: float | None = None,
         fix: str | None = None,
     ) -> Reading:
-        """The other rows, with a finding about those left out; see `marked`."""
-        marked = self.marked(rows, kind, f"{what}; left out", severity=severity, value=value, fix=fix)
+        """Returns the other rows, with a finding about those left out; see `marked`."""
+        marked = self.marked(rows, kind, f"{text}; left out", severity=severity, value=value, fix=fix)
         return marked.take(~rows) if rows.any() else marked
 
 
 def described(by: str) -> Finding:
-    """The finding that a reader follows a description and was never tested on a real file."""
+    """Reports that a reader follows a description and was never tested on a real file."""
     return Finding.of(
         "read-by-description",
         f"read as {by} describes it; never tested on a real file",
@@ -158,24 +158,24 @@ def streams(channels: Mapping[str, Series]) -> tuple[tuple[tuple[str, ...], IntA
         (names, indices of rows) of each kind; a kind is one of wind, so temperatures between are none.
     """
     n = len(next(iter(channels.values()))) if channels else 0
-    known = {
+    present = {
         name: np.isfinite(values)
         for name, values in channels.items()
         if name in WIND_CHANNELS or name.endswith(("wind_direction", "wind_direction_magnetic"))
     }
     groups: list[tuple[set[str], BoolArray]] = []
-    for name, here in known.items():
-        if not here.any():
+    for name, rows_present in present.items():
+        if not rows_present.any():
             continue
-        names, rows = {name}, here.copy()
-        apart: list[tuple[set[str], BoolArray]] = []
-        for other, theirs in groups:
+        names, rows = {name}, rows_present.copy()
+        disjoint: list[tuple[set[str], BoolArray]] = []
+        for group_names, theirs in groups:
             if bool((theirs & rows).any()):
-                names |= other
+                names |= group_names
                 rows = rows | theirs
             else:
-                apart.append((other, theirs))
-        groups = [*apart, (names, rows)]
+                disjoint.append((group_names, theirs))
+        groups = [*disjoint, (names, rows)]
     groups = [(names, rows) for names, rows in groups if not WIND_CHANNELS.isdisjoint(names)]
     if len(groups) < 2:
         names = tuple(sorted(groups[0][0])) if groups else ()

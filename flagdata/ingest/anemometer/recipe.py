@@ -144,9 +144,9 @@ class ChannelLayout:
     def __post_init__(self) -> None:
         unit(self.unit, where=f"unit of column {self.column}")
         if self.gain == 0:
-            raise UsageError("a gain of 0", where=f"column {self.column}", fix="give the factor of the calibration")
+            raise UsageError("the gain is 0", where=f"column {self.column}", fix="give the factor of the calibration")
         if self.range is not None and not self.range[0] < self.range[1]:
-            raise UsageError("a range that is empty", where=f"column {self.column}", fix="give [lowest, highest]")
+            raise UsageError("the range is empty", where=f"column {self.column}", fix="give [lowest, highest]")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,9 +221,9 @@ class Recipe:
 
     def __post_init__(self) -> None:
         if not self.time.columns and not self.file.host:
-            raise UsageError("no time column", where="[time] columns", fix="name the column of the stamps")
+            raise UsageError("there is no time column", where="[time] columns", fix="name the column of the stamps")
         if not self.channels:
-            raise UsageError("no channels", where=self.name, fix="add a table [channels.wind_speed]")
+            raise UsageError("there are no channels", where=self.name, fix="add a table [channels.wind_speed]")
         for name, layout in self.channels.items():
             if name not in CHANNELS:
                 raise UnknownNameError.of("channel", name, CHANNELS, where=self.name)
@@ -233,9 +233,9 @@ class Recipe:
                     where=self.name,
                     fix="correct the unit or the channel",
                 )
-        named = [c.column for c in (*self.channels.values(), *self.checks)] + list(self.time.columns)
-        named += [self.rows.column] if self.rows is not None else []
-        if (self.file.header == 0 or self.file.host) and any(isinstance(column, str) for column in named):
+        columns_used = [c.column for c in (*self.channels.values(), *self.checks)] + list(self.time.columns)
+        columns_used += [self.rows.column] if self.rows is not None else []
+        if (self.file.header == 0 or self.file.host) and any(isinstance(column, str) for column in columns_used):
             raise UsageError("columns by name where no header names them", where=self.name, fix="give their numbers")
 
 
@@ -290,30 +290,30 @@ class OpenRecipe:
 
 
 def load(recipe: str) -> Recipe | OpenRecipe:
-    """The recipe called `recipe`, or in the TOML file of that path.
+    """Reads the recipe called `recipe`, or in the TOML file of that path.
 
     Raises:
         UnknownNameError: no such name, with the nearest.
         NotFoundError: no such file.
         InputError: not TOML; a key missing, unknown or of the wrong type.
     """
-    found = SENSORS.find(recipe)
-    data = parsed(found.text, where=found.where)
-    return _opened(data, where=found.where) if _is_open(data) else of_data(data, where=found.where)
+    file = SENSORS.find(recipe)
+    data = parsed(file.text, where=file.where)
+    return _opened(data, where=file.where) if _is_open(data) else of_data(data, where=file.where)
 
 
 def parse(text: str, *, where: str) -> Recipe:
-    """The complete recipe written in `text`; raises as `of_data`, and InputError for what is not TOML."""
+    """Reads the complete recipe written in `text`; raises as `of_data`, and InputError for what is not TOML."""
     return of_data(parsed(text, where=where), where=where)
 
 
 def parse_open(text: str, *, where: str) -> OpenRecipe:
-    """The open recipe written in `text`; raises as `parse`."""
+    """Reads the open recipe written in `text`; raises as `parse`."""
     return _opened(parsed(text, where=where), where=where)
 
 
 def of_data(data: Mapping[str, Any], *, where: str) -> Recipe:
-    """The recipe of these tables.
+    """Builds the recipe of these tables.
 
     Raises:
         InputError: a key missing or of the wrong type; values that do not fit together.
@@ -341,18 +341,19 @@ def of_data(data: Mapping[str, Any], *, where: str) -> Recipe:
 
 
 def _is_open(data: Mapping[str, Any]) -> bool:
-    """Whether a recipe leaves something to the heading of a file."""
+    """Checks whether a recipe leaves something to the heading of a file."""
     channels, time = data.get("channels", {}), data.get("time", {})
     layouts = channels.values() if isinstance(channels, Mapping) else ()
     listed = any(
-        isinstance(one, Mapping) and (isinstance(one.get("column"), list) or isinstance(one.get("unit"), Mapping))
-        for one in layouts
+        isinstance(layout, Mapping)
+        and (isinstance(layout.get("column"), list) or isinstance(layout.get("unit"), Mapping))
+        for layout in layouts
     )
     return listed or "match" in data or (isinstance(time, Mapping) and isinstance(time.get("format"), list))
 
 
 def _opened(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
-    """An open recipe, every key of which is checked, as far as it can be without a file."""
+    """Checks every key of an open recipe, as far as that is possible without a file, and returns the recipe."""
     tables.entries(
         {"header": tuple[str, ...], **dict.fromkeys(MATCH.split()[1:], Any)},
         data.get("match", {}),
@@ -360,17 +361,17 @@ def _opened(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
     )
     channels: dict[str, Any] = {}
     for name, layout in _table(data, "channels", where).items():
-        own = dict(layout) if isinstance(layout, Mapping) else {}
-        names, stated = own.get("column"), own.get("unit")
-        if isinstance(names, list) and names and all(isinstance(one, str) for one in names):
-            own["column"] = names[0]
-        if isinstance(stated, Mapping):
+        layout_keys = dict(layout) if isinstance(layout, Mapping) else {}
+        names, units = layout_keys.get("column"), layout_keys.get("unit")
+        if isinstance(names, list) and names and all(isinstance(name, str) for name in names):
+            layout_keys["column"] = names[0]
+        if isinstance(units, Mapping):
             inside = f"{where} [channels.{name}] unit"
-            tables.check_keys(stated, ("in", "else", "whole"), where=inside)
-            if stated.get("in") != "heading":
+            tables.check_keys(units, ("in", "else", "whole"), where=inside)
+            if units.get("in") != "heading":
                 raise InputError("the unit is in no heading", where=inside, fix='write { in = "heading" }')
-            own["unit"] = CHANNELS[name].unit if name in CHANNELS else "m/s"
-        channels[name] = own
+            layout_keys["unit"] = CHANNELS[name].unit if name in CHANNELS else "m/s"
+        channels[name] = layout_keys
     time, sensor = (_without_facts(_table(data, key, where)) for key in ("time", "sensor"))
     time["format"] = time["format"] if isinstance(time.get("format"), str) else "iso"
     closed = {key: data[key] for key in data.keys() - {"match", "facts", "described-by"}}
@@ -379,14 +380,14 @@ def _opened(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
 
 
 def _without_facts(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys whose texts occur nowhere in the file; a name counts as it is."""
+    """Removes the keys whose texts occur nowhere in the file; a name counts as it is."""
     return {
         key: value for key, value in table.items() if key == "name" or not (isinstance(value, str) and "{" in value)
     }
 
 
-def _inside(file: str, place: str | None) -> str:
-    return place if place is not None and place.startswith(file) else f"{file}: {place}" if place else file
+def _inside(file: str, key: str | None) -> str:
+    return key if key is not None and key.startswith(file) else f"{file}: {key}" if key else file
 
 
 def _table(data: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:

@@ -42,7 +42,7 @@ _CLOCK = "time (UTC), as given"
 
 
 def timed(source: TextFile, *, rate: float, start: int | None, columns: str | None = None) -> TextFile:
-    """The file with a time in every row.
+    """Puts a time in every row of a file.
 
     Args:
         rate: readings a second.
@@ -55,17 +55,17 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
     where = str(source.path)
     if start is None:
         fix = "give the instant of the first reading: --start 2026-05-01T12:00:00+02:00"
-        raise UsageError("a rate without a start", where=where, fix=fix)
+        raise UsageError("a rate is given without a start", where=where, fix=fix)
     if start < 0:
         raise UsageError(
-            f"a start at {iso(start)}, before 1970, which a recording cannot hold",
+            f"the start {iso(start)} is before 1970, which a recording cannot hold",
             where="--start",
             fix="give one from 1970 on that stands for it",
         )
     lines = source.head(HEAD_LINES)
     if columns is not None:
-        text, found = _table(source, rate, start, where)
-        return _counted(source, text, rate, start, found)
+        text, findings = _table(source, rate, start, where)
+        return _counted(source, text, rate, start, findings)
     if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
         _refuse_times(_runs(_all_lines(source)), where)
         text = [line for line in _sentences(source, rate, start) if _TIMED.search(line.partition(" ")[2]) is None]
@@ -73,25 +73,26 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
         _refuse_times(any(split_stamp(line)[0] for line in lines), where)
         stamped = list(_stamped(source, rate, start))
         if not of_an_instrument(stamped[:HEAD_LINES]):
-            text, found = _table(source, rate, start, where)
-            return _counted(source, text, rate, start, found)
+            text, findings = _table(source, rate, start, where)
+            return _counted(source, text, rate, start, findings)
         text = stamped
     return _counted(source, text, rate, start)
 
 
 def of_an_instrument(lines: Sequence[str]) -> bool:
-    """Whether stamped lines are those of an instrument whose format is known."""
+    """Checks whether stamped lines are those of an instrument whose format is known."""
     head = Head(lines=tuple(lines))
     for name, form in FORMATS.usable():
         reader: Format = form()
-        found = None if name in _TABLES else reader.recognise(head)
-        if found is not None and found.score >= SURE:
+        guess = None if name in _TABLES else reader.recognise(head)
+        if guess is not None and guess.score >= SURE:
             return True
     return False
 
 
 def clocked(source: TextFile) -> bool:
-    """Whether the lines are those of an instrument, each after a time of day without a date, and say no other time."""
+    """Checks whether the lines are those of an instrument, each after a time of day without a date, and say no other
+    time."""
     lines = [line for line in source.head(HEAD_LINES) if line.strip()]
     timed = [match for line in lines if (match := _CLOCK_BEFORE.match(line)) is not None]
     if not timed or 2 * len(timed) < len(lines) or any(_TIMED.search(match["rest"]) for match in timed):
@@ -100,15 +101,17 @@ def clocked(source: TextFile) -> bool:
 
 
 def year_alone(source: TextFile) -> str | None:
-    """The month and day of the first line, as 12-31, where the lines stand after dates without a year."""
-    match = next((found for line in source.head(HEAD_LINES) if (found := _CLOCK_BEFORE.match(line))), None)
+    """Finds the month and day of the first line, as 12-31, where the lines stand after dates without a year."""
+    match = next(
+        (match_of_clock for line in source.head(HEAD_LINES) if (match_of_clock := _CLOCK_BEFORE.match(line))), None
+    )
     if match is None or not match["month"] or match["month"].lower() not in ENGLISH:
         return None
     return f"{ENGLISH.index(match['month'].lower()) + 1:02d}-{int(match['day']):02d}"
 
 
 def _of_year(match: re.Match[str], before: dt.date, *, first: bool, where: str) -> dt.date:
-    """The date of a line that names its month and day.
+    """Completes the date of a line that names its month and day.
 
     Args:
         before: of the line before, or of the first line as the user gives it.
@@ -120,18 +123,18 @@ def _of_year(match: re.Match[str], before: dt.date, *, first: bool, where: str) 
     month = ENGLISH.index(name) + 1 if name in ENGLISH else 0
     year = before.year + (month < before.month - 6)
     try:
-        found = dt.date(year, month, int(match["day"]))
+        date = dt.date(year, month, int(match["day"]))
     except ValueError:
         message = f"{match['month']} {match['day']} is no day of {year}"
         raise TimeError(message, where=where, fix="give --date with the year in which the log began") from None
-    if first and found != before:
+    if first and date != before:
         message = f"the first line is of {match['month']} {match['day']}, not of {before.isoformat()}"
-        raise TimeError(message, where=where, fix=f"give its day with its year, such as --date {found.isoformat()}")
-    return found
+        raise TimeError(message, where=where, fix=f"give its day with its year, such as --date {date.isoformat()}")
+    return date
 
 
 def dated(source: TextFile, date: dt.date) -> TextFile:
-    """The lines of an instrument, each after a time of day, with the date before it.
+    """Puts the date before the lines of an instrument, each after a time of day.
 
     Args:
         date: of the first line; the next day begins where the time of day falls by half a day.
@@ -161,32 +164,34 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
     return TableText.of(source, text, [finding])
 
 
-def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, found: Sequence[Finding] = ()) -> TextFile:
-    """The file with these lines, and the finding that says whose clock they are on beside others."""
+def _counted(
+    source: TextFile, text: Sequence[str], rate: float, start: int, findings: Sequence[Finding] = ()
+) -> TextFile:
+    """Returns the file with these lines, and the finding that says whose clock they are on beside others."""
     often = f"at {rate:g} Hz" if rate >= 1 else f"every {1 / rate:g} s"
     message = (
         f"its rows carry no time: counted {often} from {iso(start)}, as given; rows that were lost are not noticed"
     )
-    return TableText.of(source, text, [Finding(kind=RATE_GIVEN, severity=Severity.WARNING, what=message), *found])
+    return TableText.of(source, text, [Finding(kind=RATE_GIVEN, severity=Severity.WARNING, what=message), *findings])
 
 
 def _runs(lines: Iterable[str]) -> bool:
-    """Whether lines of a stream state more than one time, as those of a clock do that does not stand still.
+    """Checks whether lines of a stream state more than one time, as those of a clock do that does not stand still.
 
     A line with a TAG block states a time of its own.
     """
     times: set[str] = set()
     for number, line in enumerate(lines):
-        found = _TIMED.search(line)
-        if found is not None:
-            times.add(found["time"] or f"line {number}")
+        timed = _TIMED.search(line)
+        if timed is not None:
+            times.add(timed["time"] or f"line {number}")
         if len(times) > 1:
             return True
     return False
 
 
-def _refuse_times(said: bool, where: str) -> None:
-    if said:
+def _refuse_times(has_times: bool, where: str) -> None:
+    if has_times:
         raise UsageError("the rows say when they were: --rate is not used", where=where, fix="leave it out")
 
 
@@ -208,7 +213,7 @@ def _sentences(source: TextFile, rate: float, start: int) -> Iterator[str]:
 
 
 def _key(text: str) -> str:
-    """Talker, sentence and reference of a wind sentence, without its angle."""
+    """Returns talker, sentence and reference of a wind sentence, without its angle."""
     return re.sub(r",[^,]*,", ",", text)
 
 
@@ -223,33 +228,34 @@ def _stamp(start: int, count: int, rate: float) -> str:
 
 
 def _table(source: TextFile, rate: float, start: int, where: str) -> tuple[list[str], list[Finding]]:
-    """A table with a column of instants behind its own, whose numbers stay what they are; and what is not of it."""
+    """Puts a column of instants behind a table's own, whose numbers stay what they are; also reports what is not of the
+    table."""
     layout = shape_of(source.head(HEAD_LINES))
     if layout is None:
         return _single(source, rate, start, where), []
     first = layout.lines[0]
     width = len(layout.names)
-    kept: list[list[str]] = []
-    others = 0
+    rows: list[list[str]] = []
+    left_out = 0
     for at, line in enumerate(_lines_from(source, first)):
         row = [cell.strip() for cell in cells_of_lines([line], layout.delimiter)[0]]
         if len(row) >= width and not any(row[width:]):
-            kept.append([*_points(row[:width], layout), _stamp(start, at, rate)])
+            rows.append([*_points(row[:width], layout), _stamp(start, at, rate)])
         else:
-            others += 1
+            left_out += 1
     findings: list[Finding] = []
-    if others:
-        message = f"{others} lines have another number of columns than the table; left out, each counted as a reading"
-        findings.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=others, what=message))
+    if left_out:
+        message = f"{left_out} lines have another number of columns than the table; left out, each counted as a reading"
+        findings.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=left_out, what=message))
     names = [
         f"{name} [{unit.strip('[]()')}]" if unit else name
         for name, unit in zip(layout.names, layout.units, strict=True)
     ]
-    return _written([*names, _CLOCK], kept), findings
+    return _written([*names, _CLOCK], rows), findings
 
 
 def _single(source: TextFile, rate: float, start: int, where: str) -> list[str]:
-    """A column of numbers and nothing else, below its heading if it has one."""
+    """Reads a column of numbers and nothing else, below its heading if it has one."""
     filled = [line.strip() for line in _all_lines(source) if line.strip()]
     heading = filled[0] if filled and not _NUMBER.fullmatch(filled[0]) else ""
     rows = filled[1:] if heading else filled

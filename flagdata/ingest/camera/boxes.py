@@ -46,7 +46,7 @@ class Edit:
 
 
 def is_mp4(path: Path) -> bool:
-    """Whether a file begins as an MP4 or MOV does."""
+    """Checks whether a file begins as an MP4 or MOV does."""
     with path.open("rb") as stream:
         return stream.read(8)[4:8] in _FIRST
 
@@ -68,47 +68,47 @@ def boxes(stream: BufferedIOBase, at: int, end: int) -> Iterator[Box]:
 
 
 def top(path: Path) -> tuple[list[Box], int]:
-    """The file's own boxes, but for its metadata's and fragments' content, and its length."""
+    """Lists the file's own boxes, but for its metadata's and fragments' content, and returns its length."""
     length = path.stat().st_size
     with path.open("rb") as stream:
         return list(islice(boxes(stream, 0, length), _MOST)), length
 
 
 def is_cut(path: Path) -> bool:
-    """Whether a file ends within one of its boxes, or behind a fragment's head without its frames."""
-    found, length = top(path)
-    return not found or found[-1].end != length or found[-1].kind == b"moof"
+    """Checks whether a file ends within one of its boxes, or behind a fragment's head without its frames."""
+    found_boxes, length = top(path)
+    return not found_boxes or found_boxes[-1].end != length or found_boxes[-1].kind == b"moof"
 
 
 def whole_part(path: Path) -> int | None:
-    """Where the whole boxes of a file end that is cut off within a further one other than its frames; else None.
+    """Finds where the whole boxes of a file end that is cut off within a further one other than its frames; else None.
 
     A reader that looks at the heads of all fragments first would give up the file for the last one. Of frames that are
     cut off, those before the cut can be read.
     """
     if not is_mp4(path):
         return None
-    found, length = top(path)
-    whole = [box for box in found if box.end <= length]
-    if not any(box.kind == b"moov" for box in whole):
+    found_boxes, length = top(path)
+    complete = [box for box in found_boxes if box.end <= length]
+    if not any(box.kind == b"moov" for box in complete):
         return None
-    cut_frames = found[-1].kind == b"mdat" and found[-1].end > length
-    return None if whole[-1].end == length or cut_frames else whole[-1].end
+    cut_frames = found_boxes[-1].kind == b"mdat" and found_boxes[-1].end > length
+    return None if complete[-1].end == length or cut_frames else complete[-1].end
 
 
 def edits(path: Path, track: int) -> list[Edit]:
-    """The edit list of a track by its number; empty where it has none, or the file is not an MP4 or MOV."""
+    """Reads the edit list of a track by its number; empty where it has none, or the file is not an MP4 or MOV."""
     if not is_mp4(path):
         return []
-    found, length = top(path)
+    found_boxes, length = top(path)
     with path.open("rb") as stream:
-        for movie in (box for box in found if box.kind == b"moov" and box.end <= length):
+        for movie in (box for box in found_boxes if box.kind == b"moov" and box.end <= length):
             scale = 0
             for box in islice(boxes(stream, movie.body, movie.end), _MOST):
                 if box.kind == b"mvhd":
                     scale = _number(stream, box, 12, 20)
                 elif box.kind == b"trak":
-                    inside = {one.kind: one for one in islice(boxes(stream, box.body, box.end), _MOST)}
+                    inside = {part.kind: part for part in islice(boxes(stream, box.body, box.end), _MOST)}
                     header, listed = inside.get(b"tkhd"), inside.get(b"edts")
                     if header is not None and listed is not None and _number(stream, header, 12, 20) == track:
                         return _entries(stream, listed, scale)
@@ -116,7 +116,7 @@ def edits(path: Path, track: int) -> list[Edit]:
 
 
 def _number(stream: BufferedIOBase, box: Box, plain: int, wide: int) -> int:
-    """A number of four bytes of a full box, which lies at `plain` in version 0 and at `wide` in version 1."""
+    """Reads a number of four bytes of a full box, which lies at `plain` in version 0 and at `wide` in version 1."""
     stream.seek(box.body)
     content = stream.read(wide + 4)
     at = wide if content[:1] == b"\1" else plain
@@ -124,14 +124,14 @@ def _number(stream: BufferedIOBase, box: Box, plain: int, wide: int) -> int:
 
 
 def _entries(stream: BufferedIOBase, listed: Box, scale: int) -> list[Edit]:
-    box = next((one for one in islice(boxes(stream, listed.body, listed.end), _MOST) if one.kind == b"elst"), None)
+    box = next((box for box in islice(boxes(stream, listed.body, listed.end), _MOST) if box.kind == b"elst"), None)
     if box is None:
         return []
     stream.seek(box.body)
     content = stream.read(min(box.end - box.body, 8 + 20 * _EDITS))
     layout = struct.Struct(">Qqi" if content[:1] == b"\1" else ">Iii")
-    stated = int.from_bytes(content[4:8], "big")
-    count = min(stated, (len(content) - 8) // layout.size) if len(content) >= 8 else 0
+    stated_count = int.from_bytes(content[4:8], "big")
+    count = min(stated_count, (len(content) - 8) // layout.size) if len(content) >= 8 else 0
     entries = (layout.unpack_from(content, 8 + layout.size * k) for k in range(count))
     return [
         Edit(duration=duration / max(1, scale), begins=begins, rate=rate / _NORMAL)
@@ -139,14 +139,15 @@ def _entries(stream: BufferedIOBase, listed: Box, scale: int) -> list[Edit]:
     ]
 
 
-def edited(found: Sequence[Edit]) -> str | None:
-    """How an edit list shows a medium otherwise than from one place on at its own pace; None where it does not."""
-    shown = [edit for edit in found if edit.begins >= 0]
-    speeds = sorted({edit.rate for edit in shown} - {1.0})
+def edited(edit_list: Sequence[Edit]) -> str | None:
+    """Describes how an edit list shows a medium otherwise than from one place on at its own pace; None where it does
+    not."""
+    parts = [edit for edit in edit_list if edit.begins >= 0]
+    speeds = sorted({edit.rate for edit in parts} - {1.0})
     if speeds:
         return "parts of it at another speed ({}): slow motion, as a phone shows it".format(
             ", ".join(f"{Fraction(speed).limit_denominator(1000)}" for speed in speeds)
         )
-    if len(shown) > 1:
-        return f"{len(shown)} parts of it, one after another"
+    if len(parts) > 1:
+        return f"{len(parts)} parts of it, one after another"
     return None

@@ -40,30 +40,33 @@ class Chapter:
 
 
 def chapter_of(path: Path) -> Chapter | None:
-    """Where a later chapter begins; None for any other file, and for a chapter that states its own creation time."""
+    """Finds where a later chapter begins; None for any other file, and for a chapter that states its own creation
+    time."""
     counted = _COUNTED.fullmatch(path.name)
-    own = _header(path) if counted is not None and not path.is_dir() else None
-    if counted is None or own is None or own[0] is None:
+    header = _header(path) if counted is not None and not path.is_dir() else None
+    if counted is None or header is None or header[0] is None:
         return None
     earlier = _earlier(path.name)
     if not earlier:
         number = counted["number"]
-        other = f"{counted['head']}{int(number) - 1:0{len(number)}}{counted['rest']}"
-        found = _header(path.with_name(other))
-        alike = f"{other} beside it states the same creation time: if both are of one recording, this one starts later"
-        return _not_placed(alike, fix="give --start") if found is not None and found[0] == own[0] else None
+        former = f"{counted['head']}{int(number) - 1:0{len(number)}}{counted['rest']}"
+        other_header = _header(path.with_name(former))
+        text = f"{former} beside it states the same creation time: if both are of one recording, this one starts later"
+        return (
+            _not_placed(text, fix="give --start") if other_header is not None and other_header[0] == header[0] else None
+        )
     before = Fraction(0)
     for name in earlier:
-        found = _header(path.with_name(name))
-        if found is None or found[1] is None:
+        other_header = _header(path.with_name(name))
+        if other_header is None or other_header[1] is None:
             message = (
                 f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it begins "
                 f"after the earlier chapters, of which {name} is not beside it or cannot be read"
             )
             return _not_placed(message, fix="put the earlier chapters into its folder, or give --start")
-        if found[0] != own[0]:
+        if other_header[0] != header[0]:
             return None
-        before += found[1]
+        before += other_header[1]
     placed = Finding.of(
         "chapter-placed",
         f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it begins "
@@ -73,12 +76,12 @@ def chapter_of(path: Path) -> Chapter | None:
     return Chapter(before=float(before), finding=placed)
 
 
-def _not_placed(what: str, *, fix: str) -> Chapter:
-    return Chapter(before=0.0, finding=Finding.of("chapter-not-placed", what, fix=fix))
+def _not_placed(text: str, *, fix: str) -> Chapter:
+    return Chapter(before=0.0, finding=Finding.of("chapter-not-placed", text, fix=fix))
 
 
 def place_by_name(name: str) -> tuple[str, int] | None:
-    """The recording that a GoPro's file name states, and its chapter from 1 on; None for any other name."""
+    """Reads the recording that a GoPro's file name states, and its chapter from 1 on; None for any other name."""
     if match := _NEW.fullmatch(name):
         return f"{match['head']}{match['file']}".upper(), int(match["chapter"])
     if match := _OLD.fullmatch(name):
@@ -100,7 +103,7 @@ def _earlier(name: str) -> list[str]:
 
 
 def _header(path: Path) -> tuple[str | None, Fraction | None] | None:
-    """Creation time and length [s] by the header of a file; None where there is none that can be read."""
+    """Reads creation time and length [s] from the header of a file; None where there is none that can be read."""
     if not path.is_file():
         return None
     try:

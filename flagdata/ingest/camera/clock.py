@@ -59,7 +59,7 @@ class Counter:
 
 
 def restart(stamps: IntArray, *, tick: Fraction) -> int | None:
-    """The first of some stamps whose clock started anew; None where it never did.
+    """Finds the first of some stamps whose clock started anew; None where it never did.
 
     A single stamp that is wrong, or a few, are no restart: the stamps around them agree with each other.
 
@@ -81,7 +81,7 @@ def restart(stamps: IntArray, *, tick: Fraction) -> int | None:
 
 
 def restarted(*, frame: int, after: float, count: int) -> Finding:
-    """The finding that the clock started anew.
+    """Reports that the clock started anew.
 
     Args:
         frame: number of the first frame that is left out.

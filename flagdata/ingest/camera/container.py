@@ -36,7 +36,8 @@ _EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"
 def truncation(
     path: Path, container: InputContainer, stream: VideoStream, timing: Timing, *, read: int
 ) -> list[Finding]:
-    """What betrays a file that is cut off: a box or transport packet that is not whole, missing frames, missing time.
+    """Finds what betrays a file that is cut off: a box or transport packet that is not whole, missing frames, missing
+    time.
 
     A transport stream cut between packets, and a fragmented MP4 cut between fragments, betray nothing.
 
@@ -69,12 +70,12 @@ def truncation(
     return []
 
 
-def cut_off(what: str, read: int, lost: int) -> Finding:
-    """The finding that `lost` frames, at least one, are not there after `read` of them."""
+def cut_off(text: str, read: int, lost: int) -> Finding:
+    """Reports that `lost` frames, at least one, are not there after `read` of them."""
     return Finding(
         kind="truncated",
         severity=Severity.ERROR,
-        what=what,
+        what=text,
         where=f"frame {read}",
         count=lost,
         fix="copy it from the camera again; what was read is kept",
@@ -84,8 +85,8 @@ def cut_off(what: str, read: int, lost: int) -> Finding:
 def _of_mp4(path: Path, stream: VideoStream, read: int) -> list[Finding]:
     missing = stream.frames - read
     if is_cut(path):
-        said = f"; {read} of {stream.frames} frames are there" if missing > 0 else ""
-        return [cut_off(f"the file ends inside one of its boxes: it is cut off{said}", read, max(1, missing))]
+        counted = f"; {read} of {stream.frames} frames are there" if missing > 0 else ""
+        return [cut_off(f"the file ends inside one of its boxes: it is cut off{counted}", read, max(1, missing))]
     if missing > 0:
         return [
             Finding.of(
@@ -98,15 +99,18 @@ def _of_mp4(path: Path, stream: VideoStream, read: int) -> list[Finding]:
 
 
 def _of_matroska(path: Path, container: InputContainer, timing: Timing, read: int) -> list[Finding]:
-    """By the stated duration, which is the longest stream's, where the video is alone; else by the stated length."""
+    """Compares with the stated duration, which is the longest stream's, where the video is alone; else with the stated
+    length."""
     if container.duration is not None and len(container.streams) == 1:
-        stated = Fraction(container.duration, 1_000_000)
-        held = (timing.span + timing.period) * timing.tick
+        stated_length = Fraction(container.duration, 1_000_000)
+        length = (timing.span + timing.period) * timing.tick
         # The last frame's own length is not known where the rate varies.
         step = timing.longest if timing.variable else timing.period
-        if stated - held > Fraction(3, 4) * step * timing.tick:
-            lost = max(1, round((stated - held) / (timing.period * timing.tick)))
-            return [cut_off(f"the file states {float(stated):.2f} s and holds {float(held):.2f} s", read, lost)]
+        if stated_length - length > Fraction(3, 4) * step * timing.tick:
+            lost = max(1, round((stated_length - length) / (timing.period * timing.tick)))
+            return [
+                cut_off(f"the file states {float(stated_length):.2f} s and holds {float(length):.2f} s", read, lost)
+            ]
     stated_end, end = _segment_end(path), path.stat().st_size
     if stated_end is None or stated_end <= end:
         return []
@@ -114,7 +118,7 @@ def _of_matroska(path: Path, container: InputContainer, timing: Timing, read: in
 
 
 def _segment_end(path: Path) -> int | None:
-    """Where a Matroska file ends by its own statement; None where it makes none, as of a live recording.
+    """Finds where a Matroska file ends by its own statement; None where it makes none, as of a live recording.
 
     Elements are an identifier and a length, each as long as the zeros before its first one bit say (RFC 8794, 4).
     """
@@ -179,7 +183,7 @@ def _reading(path: Path) -> Iterator[None]:
 
 
 def _advice(path: Path) -> str:
-    """What to do about a file that will not open; an unfinished MP4 is the common case."""
+    """Advises what to do about a file that will not open; an unfinished MP4 is the common case."""
     try:
         with path.open("rb") as stream:
             head = stream.read(12)
@@ -224,7 +228,7 @@ def _too_large(width: int, height: int, limits: Limits, path: Path) -> LimitErro
 def open_container(
     path: Path, limits: Limits, *, threads: int, wanted: int | None = None
 ) -> tuple[InputContainer, VideoStream]:
-    """The container and a video stream, ready to decode; nothing is decoded yet.
+    """Opens the container and a video stream, ready to decode; nothing is decoded yet.
 
     Args:
         wanted: number of the stream in the file; None for the first real one.
@@ -254,8 +258,8 @@ def open_container(
     return container, stream
 
 
-def _opened(path: Path, limits: Limits, **more: str) -> InputContainer:
-    """The container; of a file that is cut off, what is whole."""
+def _opened(path: Path, limits: Limits, **options: str) -> InputContainer:
+    """Opens the container; of a file that is cut off, what is whole."""
     with _reading(path):
         end = whole_part(path)
         part = "" if end is None else f"subfile,,start,0,end,{end},,:"
@@ -267,15 +271,16 @@ def _opened(path: Path, limits: Limits, **more: str) -> InputContainer:
                 "max_pixels": str(2 * limits.frame_pixels),
                 # Counters that pass their end are judged by `Counter`.
                 "correct_ts_overflow": "0",
-                **more,
+                **options,
             },
             metadata_errors="replace",
         )
 
 
 def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoStream:
-    """The stream of that number, or the first one, that is not a cover picture and that there is a decoder for."""
-    there = []
+    """Chooses the stream of that number, or the first one, that is not a cover picture and that there is a decoder
+    for."""
+    streams = []
     for stream in container.streams.video:
         if stream.disposition & av.stream.Disposition.attached_pic:
             continue
@@ -286,12 +291,12 @@ def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoS
         if stream.codec_context is not None:
             if wanted in (None, stream.index):
                 return stream
-            there.append(str(stream.index))
-    if there:
+            streams.append(str(stream.index))
+    if streams:
         raise UsageError(
             f"stream {wanted} is no video that can be decoded",
             where=str(path),
-            fix=f"give --stream {' or '.join(there)}",
+            fix=f"give --stream {' or '.join(streams)}",
         )
     kinds = sorted({stream.type for stream in container.streams if stream.type != "video"})
     raise InputError(
@@ -331,7 +336,7 @@ def _counter(container: InputContainer, stream: VideoStream) -> Counter:
 
 
 def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Finding]]:
-    """The timing of a file by its packets, without decoding, and whether it is cut off or its clock started anew.
+    """Reads the timing of a file by its packets, without decoding, and whether it is cut off or its clock started anew.
 
     Raises:
         InputError: not a video.
@@ -342,15 +347,15 @@ def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Findin
     container, stream = open_container(path, options.limits, threads=1, wanted=options.stream)
     with container:
         tally = _tally(container, stream, path, options.limits)
-        own = tally if container.format.name in UNTIMED else _before_restart(tally, tick=_tick(stream))
-        timing = replace(_timing(path, options, container, stream, own), end=own.end)
+        first_part = tally if container.format.name in UNTIMED else _before_restart(tally, tick=_tick(stream))
+        timing = replace(_timing(path, options, container, stream, first_part), end=first_part.end)
         passed_over = edited(edits(path, stream.id)) if stream.id else None
-        found = [tally.problem] if tally.problem is not None else []
-        if own.end is not None:
+        findings = [tally.problem] if tally.problem is not None else []
+        if first_part.end is not None:
             after = timing.duration + 1 / float(timing.rate)
-            found.append(restarted(frame=own.frames, after=after, count=tally.frames - own.frames))
-        found = found or truncation(path, container, stream, timing, read=tally.frames + tally.discarded)
-        return timing, found + ([_edit_list(passed_over)] if passed_over is not None else [])
+            findings.append(restarted(frame=first_part.frames, after=after, count=tally.frames - first_part.frames))
+        findings = findings or truncation(path, container, stream, timing, read=tally.frames + tally.discarded)
+        return timing, findings + ([_edit_list(passed_over)] if passed_over is not None else [])
 
 
 def _edit_list(shows: str) -> Finding:
@@ -392,7 +397,7 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
     pixels = max(1, stream.codec_context.width * stream.codec_context.height)
     counter = _counter(container, stream)
     try:
-        for place, packet in enumerate(container.demux(stream)):
+        for position, packet in enumerate(container.demux(stream)):
             counter.run_on(packet)
             stamp = packet.pts if packet.pts is not None else packet.dts
             if packet.size == 0 and stamp is None:
@@ -401,10 +406,10 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
                 tally.discarded += 1
                 continue
             if stamp is None:
-                tally.missing.append(place)
+                tally.missing.append(position)
             else:
                 tally.stamps.append(stamp)
-                tally.places.append(place)
+                tally.places.append(position)
             if tally.frames > limits.frames or tally.frames * pixels > limits.total_pixels:
                 raise LimitError(
                     f"{tally.frames} frames of {pixels} px and perhaps more are beyond the limit of {limits.frames} "
@@ -424,12 +429,12 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
 
 
 def _before_restart(tally: _Tally, *, tick: Fraction) -> _Tally:
-    """The packets up to where the clock starts anew; all where it never does."""
+    """Returns the packets up to where the clock starts anew; all where it never does."""
     index = restart(np.frombuffer(tally.stamps, dtype=np.int64), tick=tick)
     if index is None:
         return tally
     end = tally.places[index]
-    missing = array("q", (place for place in tally.missing if place < end))
+    missing = array("q", (position for position in tally.missing if position < end))
     return replace(tally, stamps=tally.stamps[:index], places=tally.places[:index], missing=missing, end=end)
 
 

@@ -32,10 +32,10 @@ class Damage:
             self.first_packet = packet
 
     def findings(self, *, expected: int) -> list[Finding]:
-        """What was lost, of `expected` frames that the file's packets announce."""
-        found = []
+        """Reports what was lost, of `expected` frames that the file's packets announce."""
+        findings = []
         if self.packets:
-            found.append(
+            findings.append(
                 Finding.of(
                     "corrupt-packets",
                     f"{self.packets} packets could not be decoded and were skipped",
@@ -45,7 +45,7 @@ class Damage:
                 )
             )
         if self.corrupt:
-            found.append(
+            findings.append(
                 Finding.of(
                     "corrupt-frames",
                     f"{self.corrupt} frames came out damaged and were left out",
@@ -54,28 +54,28 @@ class Damage:
                 )
             )
         if self.suspect:
-            found.append(
+            findings.append(
                 Finding.of(
                     "damaged-references",
                     f"{self.suspect} frames between damage and the next key frame may show traces of it",
                     count=self.suspect,
                 )
             )
-        found += resized(self.resized, fix="bring all frames to one size: ffmpeg -i IN -vf scale=WIDTH:HEIGHT OUT")
+        findings += resized(self.resized, fix="bring all frames to one size: ffmpeg -i IN -vf scale=WIDTH:HEIGHT OUT")
         missing = expected - self.packets - self.shown
         if missing > 0:
-            found.append(
+            findings.append(
                 Finding.of(
                     "frames-undecoded",
                     f"the file announces {expected} frames, the decoder gave {self.shown}",
                     count=missing,
                 )
             )
-        return found
+        return findings
 
 
 def undecoded(count: int, *, total: int, first: str | None = None) -> list[Finding]:
-    """Finding of frames whose bytes a source could not decode, empty where `count` is 0.
+    """Reports frames whose bytes a source could not decode; empty where `count` is 0.
 
     Args:
         count: how many of the source's `total` frames.
@@ -97,7 +97,7 @@ def undecoded(count: int, *, total: int, first: str | None = None) -> list[Findi
 def resized(
     count: int, *, than: str = "the first", fix: str = "ingest the frames of each size as a recording of their own"
 ) -> list[Finding]:
-    """Finding of frames of another size than the one that was kept, empty where `count` is 0.
+    """Reports frames of another size than the one that was kept; empty where `count` is 0.
 
     Args:
         than: the frames whose size was kept.

@@ -11,12 +11,12 @@ WHITE = float(2 ** _DEPTHS[-1] - 1)
 
 
 def fills(brightest: int) -> bool:
-    """Whether a gray shows that all 16 bits are used: no brighter one can change what `white` says."""
+    """Checks whether a gray shows that all 16 bits are used: no brighter one can change what `white` says."""
     return brightest >> _DEPTHS[-2] > 0
 
 
 def white(brightest: int, *, which: str, otherwise: str = "") -> tuple[float, tuple[Finding, ...]]:
-    """The gray that counts as white, and a finding where it is not that of 16 bits.
+    """Finds the gray that counts as white, and reports it where it is not that of 16 bits.
 
     Args:
         brightest: gray of the pictures that were looked at.

@@ -41,7 +41,7 @@ class Orientation:
         return 180 if self.flip_y else 0
 
     def apply(self, image: UInt8Array) -> UInt8Array:
-        """The upright picture of a stored one, (height, width) → (height, width) or (width, height)."""
+        """Turns a stored picture upright, (height, width) → (height, width) or (width, height)."""
         upright = image.T if self.transpose else image
         if self.flip_x:
             upright = upright[:, ::-1]
@@ -52,18 +52,18 @@ class Orientation:
         return _turned(image, self._steps)
 
     def stored(self, image: Image.Image) -> Image.Image:
-        """The stored picture of an upright one: undoes `upright`."""
+        """Turns an upright picture back to the stored one: undoes `upright`."""
         return _turned(image, self._steps[::-1])
 
     @property
     def _steps(self) -> tuple[Image.Transpose, ...]:
         chosen = (self.transpose, self.flip_x, self.flip_y)
         steps = (Image.Transpose.TRANSPOSE, Image.Transpose.FLIP_LEFT_RIGHT, Image.Transpose.FLIP_TOP_BOTTOM)
-        return tuple(step for step, there in zip(steps, chosen, strict=True) if there)
+        return tuple(step for step, is_chosen in zip(steps, chosen, strict=True) if is_chosen)
 
     @classmethod
     def of_display_matrix(cls, matrix: Sequence[int]) -> Orientation:
-        """The orientation by the nine numbers a, b, u, c, d, v, x, y, w of a container's display matrix.
+        """Reads the orientation from the nine numbers a, b, u, c, d, v, x, y, w of a container's display matrix.
 
         A stored pixel (p, q) is shown at (a p + c q, b p + d q), y down (ISO/IEC 14496-12, 8.3.2 and 6.2.2).
         """
@@ -75,7 +75,8 @@ class Orientation:
 
     @classmethod
     def of_exif(cls, value: int) -> Orientation:
-        """The orientation by the Exif tag Orientation, 1 to 8 (CIPA DC-008, 4.6.4 A); other values are upright."""
+        """Reads the orientation from the Exif tag Orientation, 1 to 8 (CIPA DC-008, 4.6.4 A); other values are
+        upright."""
         table = {2: (0, 1, 0), 3: (0, 1, 1), 4: (0, 0, 1), 5: (1, 0, 0), 6: (1, 1, 0), 7: (1, 1, 1), 8: (1, 0, 1)}
         transpose, flip_x, flip_y = table.get(value, (0, 0, 0))
         return cls(transpose=bool(transpose), flip_x=bool(flip_x), flip_y=bool(flip_y))
@@ -136,7 +137,7 @@ class Geometry:
         return (left * self.width, top * self.height, min(right, 1.0) * self.width, min(bottom, 1.0) * self.height)
 
     def render(self, luma: Image.Image, *, black: float, white: float) -> UInt8Array:
-        """The output square of one stored luma picture; (size, size) uint8.
+        """Renders the output square of one stored luma picture; (size, size) uint8.
 
         Scaling is a separable convolution with the Hamming-windowed kernel, widened when it shrinks: it averages over
         the area an output pixel covers, so nothing aliases, and it has no negative lobes, so a flag's edge does not
@@ -175,13 +176,14 @@ def _turned(image: Image.Image, steps: Sequence[Image.Transpose]) -> Image.Image
 
 
 def upright_size(width: int, height: int, aspect: Fraction, orientation: Orientation) -> tuple[int, int]:
-    """Width and height of the upright image with square pixels; the stored height is kept."""
+    """Computes width and height of the upright image with square pixels; the stored height is kept."""
     wide = max(1, round(width * aspect))
     return (height, wide) if orientation.transpose else (wide, height)
 
 
 def settle_crop(crop: Crop, *, width: int, height: int) -> CropBox:
-    """The box that `crop` means in an upright image of `width` × `height`; "auto" must have been resolved before.
+    """Computes the box that `crop` means in an upright image of `width` × `height`; "auto" must have been resolved
+    before.
 
     Raises:
         UsageError: the box reaches beyond the image.

@@ -48,7 +48,7 @@ class GpsTimes:
     length: float
 
     def start(self, scale: float) -> tuple[int, float]:
-        """When the first frame was taken [UTC ns], and its standard uncertainty [s].
+        """Computes when the first frame was taken [UTC ns], and its standard uncertainty [s].
 
         The median over payloads of the instant less the time since the first frame. At which moment of its payload a
         time was taken, nothing states: it is taken as the begin, and the uncertainty is the root mean square for any
@@ -66,22 +66,24 @@ class GpsTimes:
 
 
 def telemetry_of(container: InputContainer) -> DataStream | None:
-    """The track with GPMF, if there is one."""
-    named = (stream for stream in container.streams.data if stream.metadata.get("handler_name", "").strip() == _HANDLER)
-    return next(named, None)
+    """Finds the track with GPMF, if there is one."""
+    streams = (
+        stream for stream in container.streams.data if stream.metadata.get("handler_name", "").strip() == _HANDLER
+    )
+    return next(streams, None)
 
 
 def gps_times(container: InputContainer, stream: DataStream, *, origin: Fraction) -> GpsTimes | None:
-    """The times of the first payloads with a fix; None if no payload has one that can be read.
+    """Reads the times of the first payloads with a fix; None if no payload has one that can be read.
 
     Args:
         container: at its begin; it is read on.
         origin: time of the first frame by the container's clock [s].
     """
-    found = list(islice(_timed(container, stream), _ENOUGH))
-    if not found:
+    timed = list(islice(_timed(container, stream), _ENOUGH))
+    if not timed:
         return None
-    instants, begins, lengths = zip(*found, strict=True)
+    instants, begins, lengths = zip(*timed, strict=True)
     return GpsTimes(
         instants=instants,
         after=tuple(float(begin - origin) for begin in begins),
@@ -90,7 +92,7 @@ def gps_times(container: InputContainer, stream: DataStream, *, origin: Fraction
 
 
 def _timed(container: InputContainer, stream: DataStream) -> Iterator[tuple[int, Fraction, Fraction]]:
-    """(instant, begin, length) of each payload with a fix; damage of the container ends them."""
+    """Yields (instant, begin, length) of each payload with a fix; damage of the container ends them."""
     try:
         for packet in container.demux(stream):
             if packet.pts is None or packet.time_base is None or not packet.size:
@@ -103,21 +105,21 @@ def _timed(container: InputContainer, stream: DataStream) -> Iterator[tuple[int,
 
 
 def _instant(payload: bytes) -> int | None:
-    """The first time that a payload states with a fix [UTC ns]."""
+    """Reads the first time that a payload states with a fix [UTC ns]."""
     for device in _within(_records(payload), b"DEVC"):
         for stream in _within(_records(device), b"STRM"):
-            stated = {key: content for key, kind, content in _records(stream) if kind != _NESTED}
-            if b"GPS9" in stated and stated.get(b"TYPE", b"")[: len(_ROW_TYPE)] == _ROW_TYPE:
-                found = _row_instant(stated[b"GPS9"])
+            records = {key: content for key, kind, content in _records(stream) if kind != _NESTED}
+            if b"GPS9" in records and records.get(b"TYPE", b"")[: len(_ROW_TYPE)] == _ROW_TYPE:
+                instant = _row_instant(records[b"GPS9"])
             else:
-                found = _text_instant(stated.get(b"GPSU", b""), stated.get(b"GPSF", b""))
-            if found is not None:
-                return found
+                instant = _text_instant(records.get(b"GPSU", b""), records.get(b"GPSF", b""))
+            if instant is not None:
+                return instant
     return None
 
 
 def _row_instant(rows: bytes) -> int | None:
-    """Of the first row of `GPS9`, where it has a fix."""
+    """Reads the instant of the first row of `GPS9`, where it has a fix."""
     if len(rows) < _ROW.size:
         return None
     *_, days, milliseconds, _, fix = _ROW.unpack_from(rows)
@@ -127,7 +129,7 @@ def _row_instant(rows: bytes) -> int | None:
 
 
 def _text_instant(text: bytes, fix: bytes) -> int | None:
-    """Of `GPSU`, where `GPSF` states a fix."""
+    """Reads the instant of `GPSU`, where `GPSF` states a fix."""
     if len(fix) < 4 or int.from_bytes(fix[:4], "big") not in _FIXED:
         return None
     try:
@@ -141,13 +143,13 @@ def _within(records: Iterable[tuple[bytes, bytes, bytes]], key: bytes) -> Iterat
 
 
 def _records(data: bytes) -> Iterator[tuple[bytes, bytes, bytes]]:
-    """(key, type, content) of successive records; one that is longer than its payload ends them."""
-    place = 0
-    while place + _HEAD.size <= len(data):
-        key, kind, size, count = _HEAD.unpack_from(data, place)
-        place += _HEAD.size
-        end = place + size * count
+    """Yields (key, type, content) of successive records; one that is longer than its payload ends them."""
+    position = 0
+    while position + _HEAD.size <= len(data):
+        key, kind, size, count = _HEAD.unpack_from(data, position)
+        position += _HEAD.size
+        end = position + size * count
         if end > len(data):
             return
-        yield key, kind, data[place:end]
-        place = end + -end % 4
+        yield key, kind, data[position:end]
+        position = end + -end % 4

@@ -87,7 +87,7 @@ class EveryFrame(Generic[T]):
         self.report = GridReport()
 
     def push(self, stamp: int, source: T) -> Iterator[Pick[T]]:
-        """The source frame itself."""
+        """Yields the source frame itself."""
         report = self.report
         step = 0 if self._last is None else stamp - self._last
         if step > self._slack * self._period:
@@ -103,7 +103,7 @@ class EveryFrame(Generic[T]):
         yield Pick(time=stamp, source=source, error=0)
 
     def finish(self) -> Iterator[Pick[T]]:
-        """Nothing is held back."""
+        """Yields nothing: no frame is held back."""
         yield from ()
 
 
@@ -132,12 +132,12 @@ class Resampler(Generic[T]):
         self.report = GridReport()
 
     def instant(self, index: int) -> int:
-        """Instant of grid point `index` [ns], rounded to the nearest nanosecond, half up."""
+        """Computes the instant of grid point `index` [ns], rounded to the nearest nanosecond, half up."""
         twice = 2 * index * NANOSECONDS * self.rate.denominator
         return self._start + (twice + self.rate.numerator) // (2 * self.rate.numerator)
 
     def push(self, stamp: int, source: T) -> Iterator[Pick[T]]:
-        """Offer the next source frame; yields the output frames that are settled by it.
+        """Offers the next source frame; yields the output frames that are settled by it.
 
         Raises:
             UsageError: `stamp` is not after the one before.
@@ -149,10 +149,10 @@ class Resampler(Generic[T]):
                 self.report.gaps += 1
                 self.report.longest_gap = stamp - self._start
             return
-        held_stamp, held = self._held
+        held_stamp, held_frame = self._held
         if stamp <= held_stamp:
             raise UsageError("source stamps must increase", fix="repair them before resampling")
-        yield from self._settle(held_stamp, held, until=(held_stamp + stamp) // 2)
+        yield from self._settle(held_stamp, held_frame, until=(held_stamp + stamp) // 2)
         if self._skip_before(stamp - self._tolerance):
             self.report.gaps += 1
             self.report.longest_gap = max(self.report.longest_gap, stamp - held_stamp)
@@ -168,18 +168,18 @@ class Resampler(Generic[T]):
     def _settle(self, stamp: int, source: T, *, until: int) -> Iterator[Pick[T]]:
         """Instants up to and with `until` that `source` is near enough to."""
         until = min(until, stamp + self._tolerance)
-        shown = False
+        is_used = False
         while (time := self.instant(self._next)) <= until:
             error = abs(time - stamp)
             self._next += 1
             self.report.picks += 1
             self.report.worst_error = max(self.report.worst_error, error)
-            shown = True
+            is_used = True
             yield Pick(time=time, source=source, error=error)
-        self.report.used += shown
+        self.report.used += is_used
 
     def _skip_before(self, time: int) -> int:
-        """Leave out the instants before `time`, without walking over them; returns how many."""
+        """Leaves out the instants before `time`, without walking over them; returns how many."""
         index = self._next
         # Largest step that surely stays at or before `time`, then at most a few single ones for the rounding.
         index = max(index, int(Fraction(time - self._start, NANOSECONDS) * self.rate) - 1)

@@ -48,9 +48,9 @@ def in_order(paths: Sequence[Path]) -> tuple[Path, ...]:
         raise UsageError("a file is named twice", where="--join", fix="name each chapter once")
 
     def key(path: Path) -> tuple[object, ...]:
-        named = place_by_name(path.name)
-        if named is not None:
-            return (0, named)
+        recording = place_by_name(path.name)
+        if recording is not None:
+            return (0, recording)
         parts = _DIGITS.split(path.name)
         return (1, *(int(part) if part.isdigit() else part.lower() for part in parts))
 
@@ -94,32 +94,32 @@ class JoinedSource:
         try:
             for path in paths:
                 self._parts.append(VideoSource(path, options))
-            found = self._check()
+            findings = self._check()
             self._offsets = _offsets([part.facts.timing for part in self._parts])
-            self.facts = self._describe(found)
+            self.facts = self._describe(findings)
         except BaseException:
             self.close()
             raise
 
     def _check(self) -> list[Finding]:
-        """Whether the files are of one recording, and what to report of it."""
+        """Checks whether the files are of one recording, and returns what to report of it."""
         first = self._parts[0].facts
         for path, part in zip(self._paths[1:], self._parts[1:], strict=True):
             if not _of_one_rate(part.facts.timing, first.timing):
-                rates = (f"{float(one.timing.rate):.5g} Hz" for one in (part.facts, first))
-                raise self._apart(path, "frame rate", *rates)
+                rates = (f"{float(facts.timing.rate):.5g} Hz" for facts in (part.facts, first))
+                raise self._differing(path, "frame rate", *rates)
         for path, part in zip(self._paths[1:], self._parts[1:], strict=True):
-            own = part.facts
-            for message, mine, theirs in (
-                ("size of the pictures", f"{own.width} × {own.height}", f"{first.width} × {first.height}"),
-                ("shape of a pixel", own.aspect, first.aspect),
-                ("coding", own.codec, first.codec),
-                ("pixel format", own.pixel_format, first.pixel_format),
-                ("orientation", own.orientation, first.orientation),
-                ("unit of time stamps", own.timing.tick, first.timing.tick),
+            facts = part.facts
+            for noun, mine, theirs in (
+                ("size of the pictures", f"{facts.width} × {facts.height}", f"{first.width} × {first.height}"),
+                ("shape of a pixel", facts.aspect, first.aspect),
+                ("coding", facts.codec, first.codec),
+                ("pixel format", facts.pixel_format, first.pixel_format),
+                ("orientation", facts.orientation, first.orientation),
+                ("unit of time stamps", facts.timing.tick, first.timing.tick),
             ):
                 if mine != theirs:
-                    raise self._apart(path, message, mine, theirs)
+                    raise self._differing(path, noun, mine, theirs)
         for path, part in zip(self._paths, self._parts, strict=True):
             if part.facts.timing.end is not None or part.facts.sequence:
                 raise InputError(
@@ -129,9 +129,9 @@ class JoinedSource:
                 )
         return self._follow()
 
-    def _apart(self, path: Path, what: str, mine: object, theirs: object) -> UsageError:
+    def _differing(self, path: Path, noun: str, mine: object, theirs: object) -> UsageError:
         return UsageError(
-            f"the {what} differs from that of {self._paths[0].name}: {mine} and {theirs}; they are not one recording",
+            f"the {noun} differs from that of {self._paths[0].name}: {mine} and {theirs}; they are not one recording",
             where=str(path),
             fix="ingest it by itself, without --join",
         )
@@ -142,7 +142,7 @@ class JoinedSource:
         Returns:
             what to report: how they were joined, and a warning where nothing states that they follow one another.
         """
-        stated = [_created(part.facts) for part in self._parts]
+        created = [_created(part.facts) for part in self._parts]
         lengths = [_length(part.facts.timing) for part in self._parts]
         names = ", ".join(path.name for path in self._paths)
         by_name = [place_by_name(path.name) for path in self._paths]
@@ -151,28 +151,30 @@ class JoinedSource:
             f"{len(self._paths)} chapters of one recording were joined: {names}",
             count=len(self._paths),
         )
-        known = [one for one in by_name if one is not None]
-        if len(known) == len(by_name) and len(set(stated)) == 1 and stated[0] is not None:
-            chapters = [chapter for _, chapter in known]
-            if len({recording for recording, _ in known}) > 1 or chapters != list(range(chapters[0], chapters[-1] + 1)):
+        chapters_by_name = [chapter for chapter in by_name if chapter is not None]
+        if len(chapters_by_name) == len(by_name) and len(set(created)) == 1 and created[0] is not None:
+            chapters = [chapter for _, chapter in chapters_by_name]
+            if len({recording for recording, _ in chapters_by_name}) > 1 or chapters != list(
+                range(chapters[0], chapters[-1] + 1)
+            ):
                 raise UsageError(
                     f"by their names {names} are not successive chapters of one recording",
                     where="--join",
                     fix="name all chapters of one recording, and no others",
                 )
             return [joined]
-        for place, (before, after) in enumerate(pairwise(stated)):
+        for index, (before, after) in enumerate(pairwise(created)):
             if before is None or after is None:
                 continue
-            between = (after - before) / NANOSECONDS - float(lengths[place])
+            between = (after - before) / NANOSECONDS - float(lengths[index])
             if abs(between) > _ROUNDED:
                 raise UsageError(
                     f"by its creation time it begins {abs(between):.1f} s {'after' if between > 0 else 'before'} the "
-                    f"end of {self._paths[place].name}",
-                    where=str(self._paths[place + 1]),
+                    f"end of {self._paths[index].name}",
+                    where=str(self._paths[index + 1]),
                     fix="name chapters that follow one another, or leave out --join",
                 )
-        if None in stated:
+        if None in created:
             return [
                 joined,
                 Finding.of(
@@ -182,7 +184,7 @@ class JoinedSource:
             ]
         return [joined]
 
-    def _describe(self, found: list[Finding]) -> SourceFacts:
+    def _describe(self, joining: list[Finding]) -> SourceFacts:
         timings = [part.facts.timing for part in self._parts]
         first, last = timings[0], timings[-1]
         span = self._offsets[-1] + last.span
@@ -196,17 +198,17 @@ class JoinedSource:
             period=first.period if variable or not steps else mean,
             variable=variable,
             span=span,
-            shortest=min(one.shortest for one in timings),
-            longest=max(one.longest for one in timings),
+            shortest=min(timing.shortest for timing in timings),
+            longest=max(timing.longest for timing in timings),
             count=count,
-            missing=sum(one.missing for one in timings),
+            missing=sum(timing.missing for timing in timings),
         )
         findings = [
-            replace(one, where=path.name if one.where is None else f"{path.name}, {one.where}")
+            replace(finding, where=path.name if finding.where is None else f"{path.name}, {finding.where}")
             for path, part in zip(self._paths, self._parts, strict=True)
-            for one in part.facts.findings
+            for finding in part.facts.findings
         ]
-        return replace(self._parts[0].facts, timing=timing, findings=(*found, *findings))
+        return replace(self._parts[0].facts, timing=timing, findings=(*joining, *findings))
 
     def pictures(self) -> Iterator[Picture]:
         for part, offset in zip(self._parts, self._offsets, strict=True):
@@ -225,9 +227,9 @@ class JoinedSource:
 
     def damage(self) -> list[Finding]:
         return [
-            replace(one, where=path.name if one.where is None else f"{path.name}, {one.where}")
+            replace(finding, where=path.name if finding.where is None else f"{path.name}, {finding.where}")
             for path, part in zip(self._paths, self._parts, strict=True)
-            for one in part.damage()
+            for finding in part.damage()
         ]
 
     def close(self) -> None:
@@ -237,25 +239,25 @@ class JoinedSource:
 
 def _offsets(timings: Sequence[Timing]) -> list[int]:
     """Stamps of the chapters' first frames [ticks]."""
-    found = [0]
+    offsets = [0]
     for timing in timings[:-1]:
-        found.append(found[-1] + timing.span + round(timing.period))
-    return found
+        offsets.append(offsets[-1] + timing.span + round(timing.period))
+    return offsets
 
 
-def _of_one_rate(one: Timing, other: Timing) -> bool:
-    """Whether two files may be of one recording by their rates, of which a varying one states its median."""
-    apart = abs(one.period * one.tick / (other.period * other.tick) - 1)
-    return apart <= (_VARIES if one.variable or other.variable else _RATE)
+def _of_one_rate(first: Timing, second: Timing) -> bool:
+    """Checks whether two files may be of one recording by their rates, of which a varying one states its median."""
+    difference = abs(first.period * first.tick / (second.period * second.tick) - 1)
+    return difference <= (_VARIES if first.variable or second.variable else _RATE)
 
 
 def _length(timing: Timing) -> Fraction:
-    """From the first frame to the end of the last [s]."""
+    """Computes the time from the first frame to the end of the last [s]."""
     return (timing.span + timing.period) * timing.tick
 
 
 def _created(facts: SourceFacts) -> int | None:
-    """Its creation time [UTC ns]; None where it states none that can be read."""
+    """Reads a file's creation time [UTC ns]; None where it states none that can be read."""
     text = facts.metadata.get("creation_time")
     try:
         return None if text is None else parse(text)

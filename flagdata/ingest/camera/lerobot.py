@@ -51,7 +51,7 @@ T = TypeVar("T")
 
 
 def described(folder: Path) -> Mapping[str, Any]:
-    """What meta/info.json states of a data set.
+    """Reads what meta/info.json states of a data set.
 
     Raises:
         CorruptError: it cannot be read, or lacks what each has.
@@ -67,16 +67,18 @@ def described(folder: Path) -> Mapping[str, Any]:
         fix = "write it as Parquet and MP4 by LeRobot's own tools"
         raise InputError(f"a LeRobot data set stored as {stored}", where=str(where), fix=fix)
     fps = info.get("fps")
-    known = isinstance(info.get("features"), dict) and isinstance(info.get("data_path"), str)
-    if not known or not isinstance(fps, int | float) or fps <= 0:
+    is_complete = isinstance(info.get("features"), dict) and isinstance(info.get("data_path"), str)
+    if not is_complete or not isinstance(fps, int | float) or fps <= 0:
         message = "LeRobot's description lacks its features, paths or frame rate"
         raise CorruptError(message, where=str(where), fix="copy it again")
     return info
 
 
 def cameras(info: Mapping[str, Any]) -> dict[str, str]:
-    """Feature → "video" or "image", of those that are pictures."""
-    kinds = {name: str(one.get("dtype")) for name, one in info["features"].items() if isinstance(one, Mapping)}
+    """Lists the features that are pictures: name → "video" or "image"."""
+    kinds = {
+        name: str(feature.get("dtype")) for name, feature in info["features"].items() if isinstance(feature, Mapping)
+    }
     return {name: kind for name, kind in kinds.items() if kind in ("video", "image")}
 
 
@@ -101,7 +103,7 @@ class EpisodeSource:
         data = folder / _path(info["data_path"], row, "data", self._where)
         columns = ["timestamp", *([TIME] if TIME in info["features"] else [])]
         columns += [self._camera] if self._kind == "image" else []
-        table = _table(data, columns, round(_stated(row, "episode_index", self._where)))
+        table = _table(data, columns, round(_number(row, "episode_index", self._where)))
         if table.num_rows > options.limits.frames:
             raise LimitError(
                 f"{table.num_rows} frames are beyond the limit of {options.limits.frames}",
@@ -117,7 +119,7 @@ class EpisodeSource:
         if self._kind == "video":
             of_film = f"videos/{self._camera}"
             path = folder / _path(str(info.get("video_path")), row, of_film, self._where, video_key=self._camera)
-            begin, end = (_stated(row, f"{of_film}/{part}_timestamp", self._where) for part in ("from", "to"))
+            begin, end = (_number(row, f"{of_film}/{part}_timestamp", self._where) for part in ("from", "to"))
             if not 0 <= begin < end:
                 raise CorruptError(f"its film lasts from {begin} s to {end} s", where=self._where, fix="copy it again")
             self._film = (path, begin, end)
@@ -152,11 +154,11 @@ class EpisodeSource:
         )
 
     def pictures(self) -> Iterator[Picture]:
-        shown = 0
+        count = 0
         for picture in self._decoded():
-            shown += 1
+            count += 1
             yield picture
-        self._broken = len(self._stamps) - shown
+        self._broken = len(self._stamps) - count
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
         length = len(self._stamps)
@@ -180,11 +182,11 @@ class EpisodeSource:
             return
         pictures = self._pictures if self._pictures is not None else pa.chunked_array([], pa.binary())
         for stamp, cell in zip(self._stamps[start:].tolist(), pictures.slice(start), strict=True):
-            held = cell.as_py()
-            stored = held.get("bytes") if isinstance(held, Mapping) else held
+            value = cell.as_py()
+            stored = value.get("bytes") if isinstance(value, Mapping) else value
             try:
                 if not stored:
-                    stored = (self._folder / _inside(str(held["path"]), self._where)).read_bytes()
+                    stored = (self._folder / _inside(str(value["path"]), self._where)).read_bytes()
                 image = Image.open(io.BytesIO(stored), formats=STILLS)
                 if image.width * image.height > self._limits.frame_pixels:
                     raise LimitError("a picture beyond the limit of pixels", where=self._where, fix="raise the limit")
@@ -218,16 +220,16 @@ class EpisodeSource:
 
 
 def _path(template: str, row: Mapping[str, Any], prefix: str, where: str, **names: str) -> str:
-    """Where the description has a file of an episode, from the data set's folder on.
+    """Builds the path where the description has a file of an episode, from the data set's folder on.
 
     Raises:
         CorruptError: outside that folder, or not by the fields that LeRobot has.
     """
-    numbers = {part: round(_stated(row, f"{prefix}/{part}", where)) for part in ("chunk_index", "file_index")}
+    numbers = {part: round(_number(row, f"{prefix}/{part}", where)) for part in ("chunk_index", "file_index")}
 
     def filled(match: re.Match[str]) -> str:
-        known = {**numbers, **names}
-        return str(known[match[1]]).zfill(int(match[2] or 0)) if match[1] in known else match[0]
+        values = {**numbers, **names}
+        return str(values[match[1]]).zfill(int(match[2] or 0)) if match[1] in values else match[0]
 
     text = _FIELD.sub(filled, template)
     if "{" in text:
@@ -236,7 +238,7 @@ def _path(template: str, row: Mapping[str, Any], prefix: str, where: str, **name
 
 
 def _inside(text: str, where: str) -> str:
-    """A path within a data set.
+    """Checks a path within a data set.
 
     Raises:
         CorruptError: it leads out of it.
@@ -246,8 +248,8 @@ def _inside(text: str, where: str) -> str:
     return text
 
 
-def _stated(row: Mapping[str, Any], name: str, where: str) -> float:
-    """A number of a row of the table of episodes.
+def _number(row: Mapping[str, Any], name: str, where: str) -> float:
+    """Reads a number of a row of the table of episodes.
 
     Raises:
         CorruptError: it is not there, or no finite number.
@@ -259,7 +261,7 @@ def _stated(row: Mapping[str, Any], name: str, where: str) -> float:
 
 
 def stamps_of(table: pa.Table, where: str) -> IntArray:
-    """(n,) instants of frames [UTC ns], or nanoseconds from the episode's start where the table has no `TIME`.
+    """Reads (n,) instants of frames [UTC ns], or nanoseconds from the episode's start where the table has no `TIME`.
 
     Raises:
         CorruptError: a column of another type, or with values that are no instants.
@@ -272,15 +274,15 @@ def stamps_of(table: pa.Table, where: str) -> IntArray:
     return values if name == TIME else np.rint(values.astype(np.float64) * 1e9).astype(np.int64)
 
 
-def _chosen(found: Mapping[str, str], wanted: str | None, where: str) -> tuple[str, str]:
+def _chosen(streams: Mapping[str, str], wanted: str | None, where: str) -> tuple[str, str]:
     if wanted is not None:
-        if wanted not in found:
-            raise UnknownNameError.of("camera", wanted, found, where=where)
-        return wanted, found[wanted]
-    if len(found) != 1:
-        message = f"{len(found)} cameras: {', '.join(found)}" if found else "a LeRobot data set without a camera"
-        raise InputError(message, where=where, fix="choose one: --topic NAME" if found else "there is no film in it")
-    return next(iter(found.items()))
+        if wanted not in streams:
+            raise UnknownNameError.of("camera", wanted, streams, where=where)
+        return wanted, streams[wanted]
+    if len(streams) != 1:
+        message = f"{len(streams)} cameras: {', '.join(streams)}" if streams else "a LeRobot data set without a camera"
+        raise InputError(message, where=where, fix="choose one: --topic NAME" if streams else "there is no film in it")
+    return next(iter(streams.items()))
 
 
 def _episode(folder: Path, wanted: int | None) -> dict[str, Any]:
@@ -304,7 +306,7 @@ def _episode(folder: Path, wanted: int | None) -> dict[str, Any]:
 
 
 def tables(folder: Path) -> list[Path]:
-    """The tables of a part of a data set, in order; not what an operating system put beside them."""
+    """Lists the tables of a part of a data set, in order; not what an operating system put beside them."""
     return sorted(path for path in folder.glob("*/*.parquet") if not is_beside(path.name))
 
 

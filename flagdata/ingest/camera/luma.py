@@ -48,7 +48,7 @@ class Luma:
 
 
 def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
-    """The luma of a frame: a Y'CbCr stream's own Y', whatever matrix (Rec. 601, 709, 2020) it was made with.
+    """Extracts the luma of a frame: a Y'CbCr stream's own Y', whatever matrix (Rec. 601, 709, 2020) it was made with.
 
     A stream of RGB has none: Rec. 601 weights make it (0.299, 0.587, 0.114), as JPEG (ITU-T T.871) does, so that the
     same picture as PNG and as JPEG gives the same gray. The range is what the stream says; where it says nothing,
@@ -99,14 +99,14 @@ def luma_of_image(image: Image.Image) -> Luma:
 
 
 def _converted(frame: av.VideoFrame, pixel_format: str) -> av.VideoFrame:
-    """The same picture in another layout, by one thread: with several, swscale mixed up bands of rows."""
+    """Converts a picture to another layout, by one thread: with several, swscale mixed up bands of rows."""
     return frame.reformat(format=pixel_format, threads=1)
 
 
 def _is_full(frame: av.VideoFrame, name: str, codec: str) -> bool:
     if name.startswith("yuvj"):
         return True
-    stated = int(frame.color_range)
-    if stated in (_FULL, _LIMITED):
-        return stated == _FULL
+    color_range = int(frame.color_range)
+    if color_range in (_FULL, _LIMITED):
+        return color_range == _FULL
     return codec in _STILL_CODECS

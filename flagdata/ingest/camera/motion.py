@@ -59,7 +59,7 @@ class CropProposal:
 
 
 def propose(source: Source, *, rate: float, where: str) -> CropProposal:
-    """The crop that the motion in `source` suggests.
+    """Proposes the crop that the motion in `source` suggests.
 
     Args:
         rate: true frame rate of the source [Hz].
@@ -69,18 +69,18 @@ def propose(source: Source, *, rate: float, where: str) -> CropProposal:
     """
     facts = source.facts
     wide, high = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)
-    whole = settle_crop("whole", width=wide, height=high)
+    uncropped = settle_crop("whole", width=wide, height=high)
     maps: list[Float32Array] = []
-    shown: UInt8Array | None = None
+    first_picture: UInt8Array | None = None
     stride = min(8, max(1, round(_STEP * rate)))
     for pictures in source.samples(_RUNS, _PER_RUN, stride):
         if len(pictures) < 3:
             continue
-        frames = np.stack([_small(picture, source, whole, _WORK) for picture in pictures])
+        frames = np.stack([_small(picture, source, uncropped, _WORK) for picture in pictures])
         maps.append(_deviation(frames))
-        if shown is None:
-            shown = _small(pictures[0], source, whole, _SHOW)
-    if not maps or shown is None:
+        if first_picture is None:
+            first_picture = _small(pictures[0], source, uncropped, _SHOW)
+    if not maps or first_picture is None:
         raise RefusedError(
             "too few frames to see motion in", where=where, fix="give the crop as x,y,width,height, or take it whole"
         )
@@ -99,12 +99,13 @@ def propose(source: Source, *, rate: float, where: str) -> CropProposal:
         moving=_extent_box(region, wide=wide, high=high),
         share=share,
         runs=len(maps),
-        picture=_draw(shown, motion, box, wide=wide),
+        picture=_draw(first_picture, motion, box, wide=wide),
     )
 
 
 def cut_off(crop: CropBox, proposal: CropProposal, *, wide: int) -> dict[str, int]:
-    """By how many pixels what moves reaches beyond each edge of a crop, where it is partly inside; none elsewhere.
+    """Measures by how many pixels what moves reaches beyond each edge of a crop, where it is partly inside; none
+    elsewhere.
 
     Args:
         wide: width of the upright image; the motion is known to `_EDGE` pixels of the images that were compared.
@@ -124,15 +125,15 @@ def cut_off(crop: CropBox, proposal: CropProposal, *, wide: int) -> dict[str, in
     return {edge: pixels for edge, pixels in beyond.items() if pixels > least}
 
 
-def _small(picture: Picture, source: Source, whole: CropBox, size: int) -> UInt8Array:
-    """The whole upright picture with its longer side scaled to `size`, without padding."""
+def _small(picture: Picture, source: Source, uncropped: CropBox, size: int) -> UInt8Array:
+    """Scales the whole upright picture to `size` along its longer side, without padding."""
     facts, luma = source.facts, picture.luma()
     geometry = Geometry(
         width=facts.width,
         height=facts.height,
         aspect=facts.aspect,
         orientation=facts.orientation,
-        crop=whole,
+        crop=uncropped,
         size=size,
     )
     top, left, high, wide = geometry.placement
@@ -140,7 +141,8 @@ def _small(picture: Picture, source: Source, whole: CropBox, size: int) -> UInt8
 
 
 def _deviation(frames: UInt8Array) -> Float32Array:
-    """Temporal standard deviation of each pixel, global changes of gain and offset taken out; (n, h, w) → (h, w)."""
+    """Computes the temporal standard deviation of each pixel, global changes of gain and offset taken out; (n, h, w) →
+    (h, w)."""
     stack = frames.astype(np.float32)
     reference = np.median(stack, axis=0)
     spread = stack.std(axis=0)
@@ -159,7 +161,7 @@ def _deviation(frames: UInt8Array) -> Float32Array:
 
 
 def _region(maps: Float32Array, motion: Float32Array, *, where: str) -> tuple[BoolArray, float]:
-    """The connected region with most of the motion's energy in the median run, and its share of it.
+    """Finds the connected region with most of the motion's energy in the median run, and its share of it.
 
     Args:
         maps: (run, height, width) deviation in each run.
@@ -196,7 +198,7 @@ def _region(maps: Float32Array, motion: Float32Array, *, where: str) -> tuple[Bo
 
 
 def _with_tip(region: BoolArray, maps: Float32Array) -> BoolArray:
-    """The region with what moves in any run and touches it; without, where that is much larger than the region."""
+    """Adds to a region what moves in any run and touches it; without, where that is much larger than the region."""
     from scipy import ndimage  # only now: ingesting a log needs none of it
 
     moving = np.zeros_like(region)
@@ -218,7 +220,7 @@ def _extent(region: BoolArray) -> int:
 
 
 def _extent_box(region: BoolArray, *, wide: int, high: int) -> CropBox:
-    """The box just around `region`, in pixels of the upright image."""
+    """Returns the box just around `region`, in pixels of the upright image."""
     rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
     scale = wide / region.shape[1]
     x, y = round(columns[0] * scale), round(rows[0] * scale)
@@ -227,29 +229,30 @@ def _extent_box(region: BoolArray, *, wide: int, high: int) -> CropBox:
 
 
 def _box_around(region: BoolArray, *, wide: int, high: int) -> CropBox:
-    """The padded square around `region`, in pixels of the upright image, moved inside it and cut where it is larger."""
+    """Returns the padded square around `region`, in pixels of the upright image, moved inside it and cut where it is
+    larger."""
     rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
     scale = wide / region.shape[1]
-    left, right = columns[0] * scale, (columns[-1] + 1) * scale
+    left_edge, right = columns[0] * scale, (columns[-1] + 1) * scale
     top, bottom = rows[0] * scale, (rows[-1] + 1) * scale
-    extent = max(right - left, bottom - top)
+    extent = max(right - left_edge, bottom - top)
     # The padding never makes a box oblong; only motion longer than the image's shorter side does.
     side = min(extent * (1 + 2 * _PAD), max(extent, min(wide, high)))
     width, height = min(wide, round(side)), min(high, round(side))
-    x = min(max(0, round((left + right - width) / 2)), wide - width)
+    x = min(max(0, round((left_edge + right - width) / 2)), wide - width)
     y = min(max(0, round((top + bottom - height) / 2)), high - height)
     return CropBox(x=x, y=y, width=width, height=height)
 
 
-def _draw(shown: UInt8Array, motion: NDArray[np.floating], box: CropBox, *, wide: int) -> bytes:
+def _draw(image: UInt8Array, motion: NDArray[np.floating], box: CropBox, *, wide: int) -> bytes:
     heat = Image.fromarray(motion.astype(np.float32)).resize(
-        (shown.shape[1], shown.shape[0]), Image.Resampling.BILINEAR
+        (image.shape[1], image.shape[0]), Image.Resampling.BILINEAR
     )
     strength = np.clip(np.asarray(heat) / max(float(np.percentile(motion, 99.5)), 1e-6), 0.0, 1.0)
-    dim = shown * 0.75
+    dim = image * 0.75
     rgb = np.stack([dim + (255 - dim) * strength, dim * (1 - strength), dim * (1 - strength)], axis=-1)
     picture = Image.fromarray(np.rint(rgb).astype(np.uint8), mode="RGB")
-    scale = shown.shape[1] / wide
+    scale = image.shape[1] / wide
     corners = _scaled(box, scale)
     pen = ImageDraw.Draw(picture)
     pen.rectangle(corners, outline=(255, 220, 0), width=3)

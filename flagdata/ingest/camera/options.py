@@ -40,7 +40,7 @@ Crop = CropBox | Literal["whole", "square", "auto"]
 
 
 def parse_crop(text: str) -> Crop:
-    """The crop that `text` names: "x,y,width,height" in pixels of the upright image, "whole", "square" or "auto".
+    """Reads the crop that `text` names: "x,y,width,height" in pixels of the upright image, "whole", "square" or "auto".
 
     Raises:
         UsageError: anything else.
@@ -144,8 +144,8 @@ class CameraOptions:
             zone(self.zone, where="zone")
 
     def recipe(self) -> dict[str, Any]:
-        """All options that shape the frames or their times, as JSON values; threads and limits do not. Chapters are a
-        part of the source.
+        """Returns all options that shape the frames or their times, as JSON values; threads and limits do not. Chapters
+        are a part of the source.
 
         A topic, an episode and a stream are there only where they are given, so that older artifacts keep their hash.
         """
@@ -165,14 +165,14 @@ class CameraOptions:
 
 
 def exact(rate: float) -> Fraction:
-    """The rate that a user's decimal number means: 25.0 is 25, and 29.97 is 30000/1001 as in television.
+    """Finds the rate that a user's decimal number means: 25.0 is 25, and 29.97 is 30000/1001 as in television.
 
     NTSC rates are 1000/1001 of a whole number (SMPTE 170M); their decimal forms (23.98, 29.97, 59.94, 119.88) are
     rounded names.
     """
     plain = Fraction(str(rate))
-    for whole in (24, 30, 48, 60, 120, 240):
-        ntsc = Fraction(whole * 1000, 1001)
+    for frames in (24, 30, 48, 60, 120, 240):
+        ntsc = Fraction(frames * 1000, 1001)
         if plain.denominator > 1 and abs(plain - ntsc) <= Fraction(1, 200):
             return ntsc
     return plain

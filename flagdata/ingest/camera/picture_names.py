@@ -60,40 +60,40 @@ class Clock:
 
 
 def clock_of(stems: Sequence[str]) -> Clock | None:
-    """The clock in names of one text; None where there is none, or it stands still.
+    """Reads the clock in names of one text; None where there is none, or it stands still.
 
     Six digits without a day are taken for a time of day where none is of the first hour: smaller numbers count.
     """
-    found = [match for stem in stems if (match := _CLOCK.search(stem)) is not None]
-    if len(found) < len(stems):
+    matches = [match for stem in stems if (match := _CLOCK.search(stem)) is not None]
+    if len(matches) < len(stems):
         return None
-    places = {(len(_CLOCK_NUMBER.findall(m.string[: m.start()])), len(_CLOCK_NUMBER.findall(m[0]))) for m in found}
-    dated = {match["date"] is not None for match in found}
+    places = {(len(_CLOCK_NUMBER.findall(m.string[: m.start()])), len(_CLOCK_NUMBER.findall(m[0]))) for m in matches}
+    dated = {match["date"] is not None for match in matches}
     if len(places) > 1 or len(dated) > 1:
         return None
-    hours = {int(match["h"] or match["hh"]) for match in found}
-    plain = not all(dated) and found[0]["h"] is not None
-    if plain and ((0 in hours and 23 not in hours) or any(match["attached"] for match in found)):
+    hours = {int(match["h"] or match["hh"]) for match in matches}
+    plain = not all(dated) and matches[0]["h"] is not None
+    if plain and ((0 in hours and 23 not in hours) or any(match["attached"] for match in matches)):
         return None
     try:
-        seconds = [_seconds(match) for match in found]
+        seconds = [_seconds(match) for match in matches]
     except ValueError:  # no such day
         return None
     if len(set(seconds)) == 1:
         return None
-    parts = [(match["attached"] or "") + (match["behind"] or "") for match in found]
+    parts = [(match["attached"] or "") + (match["behind"] or "") for match in matches]
     widths = {len(part) for part in parts}
     exact = len(widths) == 1 and min(widths) >= _FRACTION
     fractions = [int(part[:9].ljust(9, "0")) if exact else 0 for part in parts]
     first, count = places.pop()
     return Clock(
-        times=tuple(one * NANOSECONDS + part for one, part in zip(seconds, fractions, strict=True)),
+        times=tuple(second * NANOSECONDS + part for second, part in zip(seconds, fractions, strict=True)),
         counts=tuple(0 if exact or not part else int(part) for part in parts),
         first=first,
         last=first + count,
         dated=all(dated),
         resolution=10 ** max(0, 9 - min(widths)) if exact else NANOSECONDS,
-        problem=_problem(overnight=not all(dated) and {0, 23} <= hours, loose=len(widths) > 1, mark=found[0]["mark"]),
+        problem=_problem(overnight=not all(dated) and {0, 23} <= hours, loose=len(widths) > 1, mark=matches[0]["mark"]),
     )
 
 
@@ -227,18 +227,18 @@ def ordered(names: Sequence[str], *, rate: Fraction, where: str) -> Ordered:
 
 
 def _with_copies(stems: list[str]) -> list[str]:
-    """The names with the "(1)" of a further picture of one name on all of them, where it is on some."""
-    found = [_COPY.search(stem) for stem in stems]
-    if all(found) or not any(found):
+    """Returns the names with the "(1)" of a further picture of one name on all of them, where it is on some."""
+    copies = [_COPY.search(stem) for stem in stems]
+    if all(copies) or not any(copies):
         return stems
     return [
         f"{stem[: match.start()]} ({match[1]})" if match else f"{stem} (0)"
-        for stem, match in zip(stems, found, strict=True)
+        for stem, match in zip(stems, copies, strict=True)
     ]
 
 
 def _columns(stems: Sequence[str], names: Sequence[str], where: str) -> list[_Column]:
-    """The numbers of all names, one column each.
+    """Cuts the numbers of all names into columns.
 
     Raises:
         InputError: names whose text differs, or a minus that may be a dash.
@@ -287,20 +287,20 @@ def _epoch(values: Sequence[int]) -> Fraction | None:
 
 
 def _with_fractions(columns: list[_Column]) -> list[_Column]:
-    """The columns, a number and the fraction behind its point as one: seconds as 0.04, or since 1970."""
-    for k, (whole, part) in enumerate(pairwise(columns)):
+    """Joins a number and the fraction behind its point to one column: seconds as 0.04, or since 1970."""
+    for k, (column, part) in enumerate(pairwise(columns)):
         zeros = any(text[0] == "0" for text in part.digits)
-        point = part.before == "." and (whole.varies or (zeros and not part.padded))
-        seconds = whole.tick == 1 and whole.varies and part.before in ("-", "_", ".")
+        point = part.before == "." and (column.varies or (zeros and not part.padded))
+        seconds = column.tick == 1 and column.varies and part.before in ("-", "_", ".")
         if not part.varies or not (point or seconds):
             continue
         width = max(map(len, part.digits))
         padded = [text.ljust(width, "0") for text in part.digits]
         if seconds and part.before != "." and not part.padded:  # nanoseconds, written without their zeros
             width, padded = 9, [text.rjust(9, "0") for text in part.digits]
-        values = tuple(one * 10**width + int(text) for one, text in zip(whole.values, padded, strict=True))
+        values = tuple(integer * 10**width + int(text) for integer, text in zip(column.values, padded, strict=True))
         tick = Fraction(1, 10**width) if seconds else None
-        merged = _Column(before=whole.before, values=values, digits=part.digits, tick=tick)
+        merged = _Column(before=column.before, values=values, digits=part.digits, tick=tick)
         even = _spaced(sorted(values)) if merged.distinguishes else None
         if seconds or (even is not None and even.places[-1] < 2 * len(values)):
             return [*columns[:k], merged, *columns[k + 2 :]]
@@ -309,13 +309,13 @@ def _with_fractions(columns: list[_Column]) -> list[_Column]:
 
 def _by_number(columns: Sequence[_Column], names: Sequence[str], rate: Fraction, where: str) -> Ordered:
     varying = [column for column in columns if column.varies]
-    telling = [column for column in varying if column.distinguishes]
-    if not telling:
+    ordering = [column for column in varying if column.distinguishes]
+    if not ordering:
         raise _undecided(columns, names, where)
-    order = sorted(range(len(names)), key=telling[0].values.__getitem__)
+    order = sorted(range(len(names)), key=ordering[0].values.__getitem__)
     _check_rising(varying, order, names, where)
     readings = []
-    for column in telling:
+    for column in ordering:
         values = [column.values[i] for i in order]
         reading = _spaced(values)
         instants = None if column.tick is None else [round(v * column.tick * NANOSECONDS) for v in values]
@@ -331,17 +331,17 @@ def _by_number(columns: Sequence[_Column], names: Sequence[str], rate: Fraction,
             where=where,
             fix="number the pictures by frames, 1, 2, 3, …; a number that is left out is a missing frame",
         )
-    reading, column, instants = min(readings, key=lambda one: one[0].places[-1])
+    reading, column, instants = min(readings, key=lambda candidate: candidate[0].places[-1])
     _check_passed_end(column, reading, names, where)
     return Ordered(order=tuple(order), places=reading.places, findings=tuple(_findings(reading, instants, rate)))
 
 
 def _by_clock(clock: Clock, columns: Sequence[_Column], names: Sequence[str], rate: Fraction, where: str) -> Ordered:
     later = [column for column in columns[clock.last :] if column.varies]
-    others = [column for column in columns[: clock.first] if column.varies]
+    other_columns = [column for column in columns[: clock.first] if column.varies]
     keys = [(clock.times[i], clock.counts[i]) for i in range(len(names))]
     if len(set(keys)) == len(keys):
-        others += later
+        other_columns += later
         later = []
     elif any(re.search(r"[^\W_]", column.before.replace("burst", "")) for column in later):
         raise _open_order(names, where)
@@ -351,10 +351,10 @@ def _by_clock(clock: Clock, columns: Sequence[_Column], names: Sequence[str], ra
     if clock.problem is not None:
         raise InputError(clock.problem[0], where=where, fix=clock.problem[1])
     order = sorted(range(len(names)), key=full.__getitem__)
-    _check_rising(others, order, names, where)
+    _check_rising(other_columns, order, names, where)
     instants = [clock.times[i] for i in order]
-    apart = len(set(instants)) == len(instants)
-    timed = _spaced(instants, clock=True) if apart else None
+    distinct = len(set(instants)) == len(instants)
+    timed = _spaced(instants, clock=True) if distinct else None
     counted = [
         (reading, column.values[order[0]])
         for column in columns
@@ -366,14 +366,14 @@ def _by_clock(clock: Clock, columns: Sequence[_Column], names: Sequence[str], ra
     readings += [reading for reading, least in counted if least > 1]
     by_rank = _Reading(places=tuple(range(len(order))), clock=True, ranked=True)
     if readings:
-        reading = min(readings, key=lambda one: one.places[-1])
+        reading = min(readings, key=lambda candidate: candidate.places[-1])
     else:
-        reading = (_at_rate(instants, rate) if apart else None) or by_rank
-    stated = instants if clock.dated and reading.clock else None
+        reading = (_at_rate(instants, rate) if distinct else None) or by_rank
+    instants_or_none = instants if clock.dated and reading.clock else None
     return Ordered(
         order=tuple(order),
         places=reading.places,
-        findings=tuple(_findings(reading, stated, rate, resolution=clock.resolution)),
+        findings=tuple(_findings(reading, instants_or_none, rate, resolution=clock.resolution)),
     )
 
 
@@ -384,20 +384,20 @@ def _spaced(values: Sequence[int], *, clock: bool = False) -> _Reading | None:
     if min(steps) == common or middle <= _COUNTS * common:
         places = tuple((value - values[0]) // common for value in values)
         return _Reading(places=places, steps=str(common) if common > 1 else "", clock=clock)
-    whole = [round(step / middle) for step in steps]
+    counts = [round(step / middle) for step in steps]
     slack = max(common, _JITTER * middle)
-    if any(abs(step - number * middle) > slack for step, number in zip(steps, whole, strict=True)):
+    if any(abs(step - number * middle) > slack for step, number in zip(steps, counts, strict=True)):
         return None
-    single = [step for step, number in zip(steps, whole, strict=True) if number == 1]
-    if not single or min(whole) < 1:
+    single = [step for step, number in zip(steps, counts, strict=True) if number == 1]
+    if not single or min(counts) < 1:
         return None
     steps_of = f"about {middle:g} ({min(single)} to {max(single)})"
-    return _Reading(places=tuple(accumulate(whole, initial=0)), steps=steps_of, clock=clock)
+    return _Reading(places=tuple(accumulate(counts, initial=0)), steps=steps_of, clock=clock)
 
 
 def _at_rate(instants: Sequence[int], rate: Fraction) -> _Reading | None:
     """Frames of the rate that are nearest to instants [ns]; None where two of these are of one frame."""
-    places = tuple(round((one - instants[0]) * rate / NANOSECONDS) for one in instants)
+    places = tuple(round((instant - instants[0]) * rate / NANOSECONDS) for instant in instants)
     return _Reading(places=places, clock=True) if len(set(places)) == len(places) else None
 
 
@@ -433,7 +433,8 @@ def _open_order(names: Sequence[str], where: str) -> InputError:
 
 
 def _undecided(columns: Sequence[_Column], names: Sequence[str], where: str) -> InputError:
-    """The error of pictures that no number distinguishes: all numbers of two are alike, or several numbers vary."""
+    """Returns the error of pictures that no number distinguishes: all numbers of two are alike, or several numbers
+    vary."""
     first: dict[tuple[int, ...], str] = {}
     for key, name in zip(zip(*(column.values for column in columns), strict=True), names, strict=True):
         if key in first:
@@ -446,7 +447,7 @@ def _undecided(columns: Sequence[_Column], names: Sequence[str], where: str) -> 
 def _findings(
     reading: _Reading, instants: Sequence[int] | None, rate: Fraction, *, resolution: int = 1
 ) -> Iterator[Finding]:
-    """What to report of a reading.
+    """Reports what is odd of a reading.
 
     Args:
         instants: that the names state [ns], to `resolution`; None where they state none.
@@ -466,12 +467,12 @@ def _findings(
         )
     if instants is None:
         return
-    stated, taken = instants[-1] - instants[0], reading.places[-1] / rate * NANOSECONDS
-    if stated > 0 and abs(stated - taken) > _PACE * max(stated, taken) + resolution:
+    stated_span, taken = instants[-1] - instants[0], reading.places[-1] / rate * NANOSECONDS
+    if stated_span > 0 and abs(stated_span - taken) > _PACE * max(stated_span, taken) + resolution:
         yield Finding.of(
             "rate-unlike-names",
-            f"by the times in their names the pictures span {stated / NANOSECONDS:.6g} s, at the rate that was "
+            f"by the times in their names the pictures span {stated_span / NANOSECONDS:.6g} s, at the rate that was "
             f"given {float(taken) / NANOSECONDS:.6g} s",
-            value=stated / NANOSECONDS,
-            fix=f"if the times are right, the rate is {reading.places[-1] / stated * NANOSECONDS:.4g} Hz",
+            value=stated_span / NANOSECONDS,
+            fix=f"if the times are right, the rate is {reading.places[-1] / stated_span * NANOSECONDS:.4g} Hz",
         )

@@ -110,7 +110,7 @@ def probe(path: Path | str, options: CameraOptions | None = None) -> CameraProbe
                 options.start,
                 facts.metadata,
                 recorded=facts.recorded,
-                place=options.zone,
+                zone_name=options.zone,
                 duration=timing.duration,
                 where=str(path),
                 chapter=chapter_of(path),

@@ -66,7 +66,7 @@ class Head:
 
 
 def open_picture(path: Path, limits: Limits) -> Image.Image:
-    """The picture with its head read, its pixels not yet.
+    """Opens a picture with its head read, its pixels not yet.
 
     Raises:
         LimitError: its head states a size beyond the limit.
@@ -92,13 +92,13 @@ def open_picture(path: Path, limits: Limits) -> Image.Image:
 
 
 def heads(paths: Sequence[Path], limits: Limits) -> list[Head | None]:
-    """The heads of pictures; None of those that are damaged.
+    """Reads the heads of pictures; None of those that are damaged.
 
     Raises:
         LimitError: one is larger than the limits.
     """
-    alike: dict[Head, Head] = {}
-    found: list[Head | None] = []
+    known_heads: dict[Head, Head] = {}
+    heads_read: list[Head | None] = []
     for path in paths:
         try:
             with warnings.catch_warnings(), open_picture(path, limits) as image:
@@ -113,22 +113,22 @@ def heads(paths: Sequence[Path], limits: Limits) -> list[Head | None]:
                     several=image.format not in ("JPEG", "MPO") and getattr(image, "n_frames", 1) > 1,
                 )
         except BROKEN:
-            found.append(None)
+            heads_read.append(None)
         else:
-            found.append(alike.setdefault(head, head))
-    return found
+            heads_read.append(known_heads.setdefault(head, head))
+    return heads_read
 
 
-def size_of_most(found: Sequence[Head | None], *, where: str) -> tuple[int, int]:
-    """Width and height that most pictures have once they are upright.
+def size_of_most(heads_read: Sequence[Head | None], *, where: str) -> tuple[int, int]:
+    """Finds width and height that most pictures have once they are upright.
 
     Raises:
         InputError: no size is that of more pictures than any other, or all are damaged.
     """
-    counts = Counter(head.upright for head in found if head is not None).most_common(2)
+    counts = Counter(head.upright for head in heads_read if head is not None).most_common(2)
     if not counts:
         raise InputError(
-            f"not one of {len(found)} images can be read", where=where, fix="copy them from the camera again"
+            f"not one of {len(heads_read)} images can be read", where=where, fix="copy them from the camera again"
         )
     if len(counts) > 1 and counts[0][1] == counts[1][1]:
         sizes = " and ".join(f"{wide} × {high}" for (wide, high), _ in sorted(counts))
@@ -141,14 +141,14 @@ def size_of_most(found: Sequence[Head | None], *, where: str) -> tuple[int, int]
 
 
 def taken(image: Image.Image) -> str | None:
-    """ISO 8601 text of Exif's DateTimeOriginal, its fraction and its zone, the last two where it has them."""
+    """Reads ISO 8601 text of Exif's DateTimeOriginal, its fraction and its zone, the last two where it has them."""
     exif = image.getexif().get_ifd(_EXIF)
     date, _, clock = str(exif.get(_TAKEN, "")).partition(" ")
     if not clock:
         return None
     part = str(exif.get(_TAKEN_PART, "")).strip()
-    place = str(exif.get(_TAKEN_ZONE, "")).strip()
-    return f"{date.replace(':', '-')}T{clock.strip()}{'.' + part if part.isdigit() else ''}{place}"
+    zone_text = str(exif.get(_TAKEN_ZONE, "")).strip()
+    return f"{date.replace(':', '-')}T{clock.strip()}{'.' + part if part.isdigit() else ''}{zone_text}"
 
 
 class SequenceSource:
@@ -167,23 +167,25 @@ class SequenceSource:
     def __init__(self, folder: Path, options: CameraOptions) -> None:
         self._limits = options.limits
         self._where = str(folder)
-        paths, others = self._files(folder)
+        paths, findings_of_folder = self._files(folder)
         if options.sequence_fps is None:
             raise TimeError(
                 "images have no time stamps", where=self._where, fix="give the camera's frame rate: --sequence-fps HZ"
             )
         rate = exact(options.sequence_fps)
-        found = ordered([path.name for path in paths], rate=rate, where=self._where)
-        self._paths = [paths[i] for i in found.order]
-        self._stamps = found.places
+        order = ordered([path.name for path in paths], rate=rate, where=self._where)
+        self._paths = [paths[i] for i in order.order]
+        self._stamps = order.places
         self._broken: list[str] = []
         self._heads = heads(self._paths, self._limits)
         self._size = size_of_most(self._heads, where=self._where)
-        kept = [head for head in self._heads if head is not None and head.upright == self._size]
-        self._resized = sum(head is not None for head in self._heads) - len(kept)
-        self._orientation = Counter(head.orientation for head in kept).most_common(1)[0][0]
+        heads_kept = [head for head in self._heads if head is not None and head.upright == self._size]
+        self._resized = sum(head is not None for head in self._heads) - len(heads_kept)
+        self._orientation = Counter(head.orientation for head in heads_kept).most_common(1)[0][0]
         self._white, depths = self._depth()
-        self.facts = self._describe(rate, [*others, *found.findings, *depths, *_shown_otherwise(kept)])
+        self.facts = self._describe(
+            rate, [*findings_of_folder, *order.findings, *depths, *_shown_otherwise(heads_kept)]
+        )
         pixels = self.facts.width * self.facts.height * len(paths)
         if pixels > options.limits.total_pixels:
             raise LimitError(
@@ -193,18 +195,21 @@ class SequenceSource:
             )
 
     def _files(self, folder: Path) -> tuple[list[Path], list[Finding]]:
-        """Its images by name, and a note of what else is in it."""
+        """Lists the folder's images by name, with a note of what else is in it."""
         try:
             files = sorted(path for path in folder.iterdir() if not is_beside(path.name) and path.is_file())
         except OSError as error:
             message = f"the folder cannot be read ({error.strerror})"
             raise InputError(message, where=self._where, fix="check its rights") from error
         paths = [path for path in files if path.suffix.lower() in PICTURES]
-        others = Counter(path.suffix.lower() or "no ending" for path in files if path.suffix.lower() not in PICTURES)
-        beside = ", ".join(f"{count} of {ending}" for ending, count in others.most_common(5))
+        other_files = Counter(
+            path.suffix.lower() or "no ending" for path in files if path.suffix.lower() not in PICTURES
+        )
+        listed = ", ".join(f"{count} of {ending}" for ending, count in other_files.most_common(5))
         if not paths:
             raise InputError(
-                "the folder holds no PNG, JPEG, TIFF, BMP or WebP image" + (f", but files: {beside}" if others else ""),
+                "the folder holds no PNG, JPEG, TIFF, BMP or WebP image"
+                + (f", but files: {listed}" if other_files else ""),
                 where=self._where,
                 fix="give the folder of the images; convert those of other formats to PNG",
             )
@@ -221,18 +226,18 @@ class SequenceSource:
                 where=self._where,
                 fix="split the folder, or raise the limit",
             )
-        if not others:
+        if not other_files:
             return paths, []
         return paths, [
             Finding.of(
                 "files-not-read",
-                f"{others.total()} files beside the images were not read: {beside}",
-                count=others.total(),
+                f"{other_files.total()} files beside the images were not read: {listed}",
+                count=other_files.total(),
             )
         ]
 
     def _depth(self) -> tuple[float, tuple[Finding, ...]]:
-        """The white of images of 16 bits by the brightest gray of all."""
+        """Finds the white of images of 16 bits by the brightest gray of all."""
         brightest = 0
         for path, head in zip(self._paths, self._heads, strict=True):
             if head is None or not head.mode.startswith(DEEP) or depth.fills(brightest):
@@ -283,12 +288,12 @@ class SequenceSource:
         )
 
     def _is_kept(self, index: int) -> bool:
-        """Whether an image has the size of most; one whose head is damaged has none."""
+        """Checks whether an image has the size of most; one whose head is damaged has none."""
         head = self._heads[index]
         return head is not None and head.upright == self._size
 
     def _luma(self, image: Image.Image, index: int) -> Luma:
-        """The luma of an open image, turned as most of them are stored."""
+        """Extracts the luma of an open image, turned as most of them are stored."""
         luma = luma_of_image(image)
         if image.mode.startswith(DEEP):
             luma = replace(luma, white=self._white)
@@ -298,7 +303,7 @@ class SequenceSource:
         return replace(luma, image=self._orientation.stored(head.orientation.upright(luma.image)))
 
     def _picture(self, index: int) -> Picture | None:
-        """The image at a place in the order; None where it cannot be decoded."""
+        """Decodes the image at a place in the order; None where it cannot be decoded."""
         try:
             with open_picture(self._paths[index], self._limits) as image:
                 luma = self._luma(image, index)
@@ -321,8 +326,8 @@ class SequenceSource:
             start = max(first, length * run // runs)
             chosen = range(start, min(start + count * stride, length), stride)
             first = chosen.stop
-            found = [self._picture(index) for index in chosen if self._is_kept(index)]
-            pictures = [picture for picture in found if picture is not None]
+            decoded = [self._picture(index) for index in chosen if self._is_kept(index)]
+            pictures = [picture for picture in decoded if picture is not None]
             if pictures:
                 yield pictures
 
@@ -331,13 +336,13 @@ class SequenceSource:
         return undecoded(len(self._broken), total=len(self._paths), first=first) + resized(self._resized, than="most")
 
     def close(self) -> None:
-        """Nothing stays open between images."""
+        """Closes nothing: no file stays open between images."""
 
 
-def _shown_otherwise(found: Sequence[Head]) -> list[Finding]:
-    """What in the images is not shown as their files say: transparency, further pages, turns that differ."""
-    alpha, pages = sum(head.alpha for head in found), sum(head.several for head in found)
-    turned = len(found) - max(Counter(head.orientation for head in found).values())
+def _shown_otherwise(heads_read: Sequence[Head]) -> list[Finding]:
+    """Reports what in the images is not shown as their files say: transparency, further pages, turns that differ."""
+    alpha, pages = sum(head.alpha for head in heads_read), sum(head.several for head in heads_read)
+    turned = len(heads_read) - max(Counter(head.orientation for head in heads_read).values())
     findings = []
     if alpha:
         findings.append(

@@ -67,15 +67,16 @@ class Source(Protocol):
     def facts(self) -> SourceFacts: ...
 
     def pictures(self) -> Iterator[Picture]:
-        """Decoded pictures in order of presentation; once."""
+        """Yields decoded pictures in order of presentation; once."""
         ...
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
-        """At most `runs` runs of at most `count` pictures, every `stride`-th, spread over it; any number of times."""
+        """Yields at most `runs` runs of at most `count` pictures, every `stride`-th, spread over it; any number of
+        times."""
         ...
 
     def damage(self) -> list[Finding]:
-        """What could not be decoded; complete when `pictures` has ended."""
+        """Reports what could not be decoded; complete when `pictures` has ended."""
         ...
 
     def close(self) -> None: ...

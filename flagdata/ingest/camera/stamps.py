@@ -64,7 +64,7 @@ def survey(
     fallback_rate: Fraction | None,
     where: str | None = None,
 ) -> Timing:
-    """What the stamps say, (n,) in the order of the file.
+    """Reads what the stamps say, (n,) in the order of the file.
 
     The period of a constant-rate file is the mean step, steps over missing frames left aside: exact where single steps
     are rounded to the container's ticks (33 or 34 ms in Matroska).
@@ -94,8 +94,8 @@ def survey(
             missing=missing,
         )
     median = float(np.median(steps))
-    whole = np.maximum(np.rint(steps / median), 1)
-    mean = Fraction(int(steps[whole == 1].sum()), int((whole == 1).sum()))
+    counts = np.maximum(np.rint(steps / median), 1)
+    mean = Fraction(int(steps[counts == 1].sum()), int((counts == 1).sum()))
     off = np.abs(steps - np.rint(steps / float(mean)) * float(mean))
     # Two stamps, each rounded to a tick, put a step off by less than a whole one.
     allowed = max(1.0, 0.01 * float(mean))
@@ -138,7 +138,7 @@ class StampRepair(Generic[T]):
         self._counts: dict[str, int] = {}
 
     def push(self, stamp: int | None, item: T) -> Iterator[tuple[int, T]]:
-        """Offer the next decoded frame; yields the frame before it once its stamp is settled."""
+        """Offers the next decoded frame; yields the frame before it once its stamp is settled."""
         index = self._seen
         self._seen += 1
         if self._held is None:
@@ -147,14 +147,14 @@ class StampRepair(Generic[T]):
                 stamp = 0 if self._last is None else self._last + self._period
             self._held = (stamp, item)
             return
-        held, _ = self._held
+        held_stamp, _ = self._held
         if stamp is None:
             self._note("stamps-missing", index)
-            stamp = held + self._period
-        if stamp > held:
+            stamp = held_stamp + self._period
+        if stamp > held_stamp:
             yield from self.finish()
             self._held = (stamp, item)
-        elif stamp == held:
+        elif stamp == held_stamp:
             self._note("stamps-duplicate", index)
         elif self._held_is_the_odd_one(stamp):
             self._note("stamps-disordered", index - 1)
@@ -207,6 +207,6 @@ class StampRepair(Generic[T]):
 
 
 def nanoseconds(ticks: int, *, tick: Fraction, scale: Fraction) -> int:
-    """`ticks` × `tick` × `scale` in nanoseconds, rounded to the nearest, half up."""
+    """Converts `ticks` × `tick` × `scale` to nanoseconds, rounded to the nearest, half up."""
     factor = tick * scale * NANOSECONDS
     return (2 * ticks * factor.numerator + factor.denominator) // (2 * factor.denominator)

@@ -42,24 +42,24 @@ def find_start(
     metadata: Mapping[str, str],
     *,
     recorded: str | None,
-    place: str | None,
+    zone_name: str | None,
     duration: float,
     where: str,
     chapter: Chapter | None = None,
     stamped: int | None = None,
     gps: tuple[int, float] | None = None,
 ) -> Start:
-    """The start of a recording.
+    """Finds the start of a recording.
 
     In order: `option`; `stamped`; `gps`; `com.apple.quicktime.creationdate`, which names its zone and means the start;
-    the wall-clock time that AVCHD cameras write into the video itself, with their zone or `place`; `creation_time`,
+    the wall-clock time that AVCHD cameras write into the video itself, with their zone or `zone_name`; `creation_time`,
     which should be UTC (ISO/IEC 14496-12, 8.2.2) and the start, but some cameras write local time and some phones the
     recording's end, and cameras that split a recording into chapters stamp them all with its creation time.
     Neither the file's name nor its modification time is used.
 
     Args:
         recorded: ISO 8601 wall-clock time from within the video stream, with a zone or without.
-        place: zone of the camera's clock, for times without one.
+        zone_name: zone of the camera's clock, for times without one.
         duration: of the file [s].
         stamped: instant of the first frame, where the frames' own stamps state the day and the time [UTC ns].
         gps: instant of the first frame by the GPS in the camera's telemetry [UTC ns], and its standard uncertainty [s].
@@ -82,7 +82,7 @@ def find_start(
             return _checked(stamped, "stamps of the frames", 0.0)
         except TimeError as error:
             raise TimeError(f"the frames' stamps begin at {error.what}", where=where, fix=error.fix) from None
-    default = zone(place, where="zone") if place else None
+    default = zone(zone_name, where="zone") if zone_name else None
     if gps is not None:
         return _from_gps(*gps, created=metadata.get("creation_time"), default=default)
     passed_over: list[Finding] = []
@@ -95,20 +95,20 @@ def find_start(
             continue
         try:
             if key == "creation_time":
-                found = _from_creation_time(text, default=default, duration=duration, where=where, chapter=chapter)
+                start = _from_creation_time(text, default=default, duration=duration, where=where, chapter=chapter)
             else:
-                found = _checked(parse(text, default=default, where=where), key, _WHOLE_SECOND)
+                start = _checked(parse(text, default=default, where=where), key, _WHOLE_SECOND)
         except TimeError as error:
             message = f"{key} {text!r} is unusable ({error.what})"
             passed_over.append(Finding.of("start-passed-over", message))
             continue
-        return replace(found, findings=(*passed_over, *found.findings))
+        return replace(start, findings=(*passed_over, *start.findings))
     tried = "; ".join(finding.what for finding in passed_over) or "its metadata name none"
     raise TimeError(
         f"nothing says when the recording began: {tried}",
         where=where,
         fix="give --start with a zone, e.g. --start 2026-05-01T12:00:00+02:00"
-        + (", or --zone, the zone of the camera's clock" if recorded and place is None else ""),
+        + (", or --zone, the zone of the camera's clock" if recorded and zone_name is None else ""),
     )
 
 
@@ -116,9 +116,9 @@ def _from_gps(instant: int, sigma: float, *, created: str | None, default: tzinf
     message = "the start is by the GPS time in the camera's telemetry"
     if created:
         with suppress(TimeError):  # it is not used
-            beside = (parse(created, default=default) - instant) / NANOSECONDS
-            message += f"; the camera's own clock, creation_time {created}, is {abs(beside):.1f} s "
-            message += "ahead" if beside > 0 else "behind"
+            difference = (parse(created, default=default) - instant) / NANOSECONDS
+            message += f"; the camera's own clock, creation_time {created}, is {abs(difference):.1f} s "
+            message += "ahead" if difference > 0 else "behind"
     finding = Finding.of("start-by-gps", message, value=sigma)
     return Start(instant=instant, source="telemetry: GPS", sigma=sigma, findings=(finding,))
 

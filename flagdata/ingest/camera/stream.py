@@ -67,7 +67,7 @@ class CameraStream:
             options.start,
             facts.metadata,
             recorded=facts.recorded,
-            place=options.zone,
+            zone_name=options.zone,
             duration=duration,
             where=str(path),
             chapter=chapter,
@@ -112,7 +112,7 @@ class CameraStream:
             self._opening += self._cut_off(crop, str(path))
 
     def _cut_off(self, crop: CropBox, where: str) -> list[Finding]:
-        """A finding where the crop that was chosen cuts through what moves."""
+        """Reports where the crop that was chosen cuts through what moves."""
         try:
             proposal = propose(self._source, rate=float(self.info.true_rate), where=where)
         except RefusedError:
@@ -164,7 +164,7 @@ class CameraStream:
         self._source.close()
 
     def unpadded(self, image: UInt8Array) -> UInt8Array:
-        """The crop in a frame's image (size, size), without the padding about it; (height, width) uint8."""
+        """Returns the crop in a frame's image (size, size), without the padding about it; (height, width) uint8."""
         top, left, high, wide = self._geometry.placement
         return image[top : top + high, left : left + wide]
 
@@ -196,12 +196,16 @@ class CameraStream:
         grid_period = Fraction(NANOSECONDS) / rate
         # A source slower than a quarter of the grid is a series of stills: most instants have no frame.
         period = min(Fraction(self._period), 4 * grid_period)
-        given = self._options.tolerance
-        tolerance = max(grid_period / 2, Fraction(3, 4) * period) if given is None else Fraction(given) * NANOSECONDS
+        tolerance_given = self._options.tolerance
+        tolerance = (
+            max(grid_period / 2, Fraction(3, 4) * period)
+            if tolerance_given is None
+            else Fraction(tolerance_given) * NANOSECONDS
+        )
         return Resampler(start=0, rate=rate, tolerance=int(tolerance), tail=int(period / 2))
 
     def _repaired(self, repair: StampRepair[Picture]) -> Iterator[tuple[int, Picture]]:
-        """Source pictures with strictly increasing instants, counted from the start [ns]."""
+        """Yields source pictures with strictly increasing instants, counted from the start [ns]."""
         timing = self._source.facts.timing
         for picture in self._source.pictures():
             stamp = None
@@ -217,10 +221,10 @@ class CameraStream:
         return Frame(time=time, image=image, stamp_error=pick.error / NANOSECONDS)
 
     def _standing_findings(self) -> list[Finding]:
-        found = []
+        findings = []
         if self._geometry.padded:
             chosen = self._options.crop != "whole"
-            found.append(
+            findings.append(
                 Finding(
                     kind="letterboxed",
                     severity=Severity.NOTE if chosen else Severity.WARNING,
@@ -231,7 +235,7 @@ class CameraStream:
             )
         enlarged = self._options.size / max(self.info.crop[2:])
         if enlarged > 1:
-            found.append(
+            findings.append(
                 Finding(
                     kind="enlarged",
                     severity=Severity.WARNING if enlarged > 2 else Severity.NOTE,
@@ -242,7 +246,7 @@ class CameraStream:
             )
         if self._options.exposure is None:
             half = self._period / 2 / NANOSECONDS
-            found.append(
+            findings.append(
                 Finding.of(
                     "exposure-unknown",
                     f"the exposure time is unknown: stamps count as mid-exposure, to within {half * 1e3:.3g} ms",
@@ -252,7 +256,7 @@ class CameraStream:
         if self.info.variable_rate:
             timing = self._source.facts.timing
             tick = float(timing.tick * self._scale) * 1e3
-            found.append(
+            findings.append(
                 Finding.of(
                     "variable-rate",
                     f"the frame rate varies: {timing.shortest * tick:.3g} to {timing.longest * tick:.3g} ms from "
@@ -260,7 +264,7 @@ class CameraStream:
                     value=float(timing.longest * timing.tick * self._scale),
                 )
             )
-        return found
+        return findings
 
 
 def _proposed(proposal: CropProposal) -> Finding:
@@ -386,7 +390,7 @@ def _no_stream(path: Path, options: CameraOptions) -> None:
 
 
 def propose_crop(path: Path | str, options: CameraOptions | None = None) -> CropProposal:
-    """The crop that the motion in a camera file suggests, with a picture of it; needs no start time.
+    """Proposes the crop that the motion in a camera file suggests, with a picture of it; needs no start time.
 
     Raises:
         RefusedError: nothing moves, or motion is all over the image.

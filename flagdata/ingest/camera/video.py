@@ -74,7 +74,7 @@ def delays(path: Path) -> list[int]:
 
 
 def check(path: Path, timing: Timing, *, true_fps: float | None) -> list[Finding]:
-    """What is open about the rate of a GIF with `timing`; nothing where the user named the camera's.
+    """Reports what is open about the rate of a GIF with `timing`; nothing where the user named the camera's.
 
     Raises:
         TimeError: its delays say nothing, and no rate was named.
@@ -82,10 +82,10 @@ def check(path: Path, timing: Timing, *, true_fps: float | None) -> list[Finding
     if true_fps is not None:
         return []
     period = timing.period * timing.tick
-    stated = delays(path)
-    if stated and float(np.median(stated)) < SHORTEST:
+    waits = delays(path)
+    if waits and float(np.median(waits)) < SHORTEST:
         raise TimeError(
-            f'the GIF states delays of {float(np.median(stated)):g} hundredths of a second, which stands for "as fast '
+            f'the GIF states delays of {float(np.median(waits)):g} hundredths of a second, which stands for "as fast '
             "as possible\": the camera's rate is not known",
             where=str(path),
             fix="give the rate at which the camera ran, --true-fps HZ, or the film that the GIF was made of",
@@ -108,7 +108,8 @@ _IDENTIFIER = bytes.fromhex("17ee8c60f84d11d98cd60800200c9a66") + b"MDPM"
 
 
 def recording_time(message: bytes) -> str | None:
-    """ISO 8601 wall-clock time, to the second and without a zone, of one user-data message; `None` if it has none."""
+    """Reads ISO 8601 wall-clock time, to the second and without a zone, of one user-data message; `None` if it has
+    none."""
     if not message.startswith(_IDENTIFIER):
         return None
     body = message[len(_IDENTIFIER) :]
@@ -160,7 +161,7 @@ class VideoSource:
             raise
 
     def _frameless(self) -> InputError:
-        """The error of a file of which no frame came."""
+        """Returns the error of a file of which no frame came."""
         packets_there, damaged = self._timing.count + self._timing.missing, "copy it from the camera again"
         if packets_there:
             message = f"not one frame could be decoded of {packets_there} packets"
@@ -204,15 +205,15 @@ class VideoSource:
         )
 
     def _metadata(self) -> dict[str, str]:
-        """What the container and the stream state, keys lower-cased; the stream's win."""
+        """Returns what the container and the stream state, keys lower-cased; the stream's win."""
         return {k.lower(): v for k, v in {**self._container.metadata, **self._stream.metadata}.items()}
 
     def _stream_findings(self, first: av.VideoFrame) -> list[Finding]:
-        found = []
+        findings = []
         if self._container.format.name == CONTAINER:
-            found += check(self._path, self._timing, true_fps=self._options.true_fps)
+            findings += check(self._path, self._timing, true_fps=self._options.true_fps)
         if first.interlaced_frame:
-            found.append(
+            findings.append(
                 Finding.of(
                     "interlaced",
                     "the video is interlaced: each frame mixes two instants, half a frame period apart; it was "
@@ -220,35 +221,35 @@ class VideoSource:
                 )
             )
         if _orientation(first).mirrored:
-            found.append(Finding.of("mirrored", "the file asks to be shown mirrored"))
+            findings.append(Finding.of("mirrored", "the file asks to be shown mirrored"))
         if not _orientation(first).exact:
-            found.append(
+            findings.append(
                 Finding.of(
                     "odd-rotation",
                     "the file asks for a rotation that is not a multiple of 90°; the nearest one was taken",
                 )
             )
         if int(first.color_trc) in (16, 18):
-            found.append(
+            findings.append(
                 Finding.of(
                     "hdr-transfer", "the video is HDR (PQ or HLG): its grays are not those of an ordinary camera"
                 )
             )
         if _has_alpha(first) or self._metadata().get("alpha_mode") == "1":  # VP8 and VP9 code it beside
-            found.append(Finding.of("alpha-ignored", "transparency was left aside: the picture below it is read"))
-        found += self._capture_findings()
-        others = len(self._container.streams.video) - 1
-        if others:
-            found.append(
+            findings.append(Finding.of("alpha-ignored", "transparency was left aside: the picture below it is read"))
+        findings += self._capture_findings()
+        further_streams = len(self._container.streams.video) - 1
+        if further_streams:
+            findings.append(
                 Finding.of(
                     "more-video-streams",
-                    f"stream {self._stream.index} was taken, {others} other video streams were not",
-                    count=others,
+                    f"stream {self._stream.index} was taken, {further_streams} other video streams were not",
+                    count=further_streams,
                     fix="choose another with --stream",
                 )
             )
         if self._options.start is None and telemetry_of(self._container) is not None and self._gps is None:
-            found.append(
+            findings.append(
                 Finding.of(
                     "telemetry-without-time",
                     "the telemetry in the file (GPMF) states no GPS time with a fix; the start is the camera's own"
@@ -256,24 +257,24 @@ class VideoSource:
                     fix="if that clock was not set, give --start",
                 )
             )
-        return found
+        return findings
 
     def _capture_findings(self) -> list[Finding]:
-        """A phone's statement of the rate at which it took the frames, where it is not that of the stamps."""
+        """Reports a phone's statement of the rate at which it took the frames, where it is not that of the stamps."""
         if self._options.true_fps is not None:
             return []
         try:
             taken = float(self._metadata().get(_CAPTURE_RATE, "nan"))
         except ValueError:
             return []
-        stated = float(self._timing.rate)
-        if not math.isfinite(taken) or taken <= 0 or abs(taken / stated - 1) <= _RATES_AGREE:
+        stamp_rate = float(self._timing.rate)
+        if not math.isfinite(taken) or taken <= 0 or abs(taken / stamp_rate - 1) <= _RATES_AGREE:
             return []
         return [
             Finding.of(
                 "capture-rate",
-                f"the file says that the camera took {taken:g} frames a second, its time stamps say {stated:.4g}: "
-                f"time runs {taken / stated:.3g} times too slow in it",
+                f"the file says that the camera took {taken:g} frames a second, its time stamps say {stamp_rate:.4g}: "
+                f"time runs {taken / stamp_rate:.3g} times too slow in it",
                 value=taken,
                 fix=f"give the camera's rate: --true-fps {taken:g}",
             )
@@ -315,11 +316,11 @@ class VideoSource:
     def _seekable(self) -> bool:
         """Whether the file has stamps, and they increase all through it."""
         length = COUNTERS.get(self.facts.container, math.inf)
-        whole = self._timing.end is None and self._timing.origin + self._timing.span < length
-        return whole and not self.facts.sequence
+        is_complete = self._timing.end is None and self._timing.origin + self._timing.span < length
+        return is_complete and not self.facts.sequence
 
     def _decode(self) -> Iterator[tuple[int | None, av.VideoFrame]]:
-        """(stamp, frame) in order of presentation."""
+        """Yields (stamp, frame) in order of presentation."""
         form = self._container.format.name
         ordered = _DecodeOrderStamps(self._timing) if form in BY_DECODE_ORDER else None
         damaged = False
@@ -348,17 +349,17 @@ class VideoSource:
             for frame in frames:
                 if not isinstance(frame, av.VideoFrame):
                     continue
-                own = frame.pts if frame.pts is not None else frame.dts
-                shown = ordered.shown(own) if ordered is not None else own
+                packet_stamp = frame.pts if frame.pts is not None else frame.dts
+                presented = ordered.shown(packet_stamp) if ordered is not None else packet_stamp
                 if form in UNTIMED:  # FFmpeg's numbers are at its own rate, or none
-                    shown = self._damage.shown + self._damage.packets
+                    presented = self._damage.shown + self._damage.packets
                 self._damage.shown += 1
-                if frame.is_corrupt or (flagged and own in flagged):
+                if frame.is_corrupt or (flagged and packet_stamp in flagged):
                     self._damage.corrupt += 1
                     continue
                 damaged = damaged and not frame.key_frame
                 self._damage.suspect += damaged
-                yield shown, frame
+                yield presented, frame
 
     def damage(self) -> list[Finding]:
         return self._damage.findings(expected=self._timing.count + self._timing.missing)
@@ -370,7 +371,7 @@ class VideoSource:
 def _run(
     frames: Iterator[av.VideoFrame], keys: set[int | None], *, target: int, stride: int
 ) -> Iterator[av.VideoFrame]:
-    """Every `stride`-th of the frames after a seek, from the key frame it landed on.
+    """Yields every `stride`-th of the frames after a seek, from the key frame it landed on.
 
     Where an earlier run began with that frame, from `target` on. Adds the first frame's stamp to `keys`.
     """
@@ -397,20 +398,21 @@ class _DecodeOrderStamps:
             heapq.heappush(self._waiting, stamp)
 
     def lost(self, stamp: int | None) -> None:
-        """The packet with `stamp` gives no frame."""
+        """Notes that the packet with `stamp` gives no frame."""
         if stamp in self._waiting:
             self._waiting.remove(stamp)
             heapq.heapify(self._waiting)
 
-    def shown(self, own: int | None) -> int | None:
-        """The stamp of the frame shown next, whose packet carried `own`; those of frames that never came go."""
-        while self._waiting and own is not None and self._waiting[0] < own - self._reach:
+    def shown(self, packet_stamp: int | None) -> int | None:
+        """Returns the stamp of the frame shown next, whose packet carried `packet_stamp`; drops those of lost
+        frames."""
+        while self._waiting and packet_stamp is not None and self._waiting[0] < packet_stamp - self._reach:
             heapq.heappop(self._waiting)
-        return heapq.heappop(self._waiting) if self._waiting else own
+        return heapq.heappop(self._waiting) if self._waiting else packet_stamp
 
 
 def _has_alpha(frame: av.VideoFrame) -> bool:
-    """Whether a frame states transparency: in a component of its own, or in its palette."""
+    """Checks whether a frame states transparency: in a component of its own, or in its palette."""
     if frame.format.has_palette and len(frame.planes) > 1:
         return bool((np.frombuffer(memoryview(frame.planes[1]), dtype=np.uint8)[3::4] < 255).any())
     return any(component.is_alpha for component in frame.format.components)

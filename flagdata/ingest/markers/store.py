@@ -42,27 +42,27 @@ def ingest_markers(
     source = Source.of(path)
     recordings = read_table(path, options)
     source.check_unchanged()
-    named: dict[str, Labels] = {}
-    made: dict[str, tuple[Artifact, dict[str, Any]]] = {}
+    labels_of: dict[str, Labels] = {}
+    new: dict[str, tuple[Artifact, dict[str, Any]]] = {}
     present: dict[str, IngestResult] = {}
     with lake.transaction(f"ingest markers {source.name}", branch=branch) as transaction:
         for name, sequence in recordings.items():
             stem = labels.name or source.stem
-            named[name] = Labels(name=f"{stem} {name}".strip(), session=labels.session)
+            labels_of[name] = Labels(name=f"{stem} {name}".strip(), session=labels.session)
             recipe = {"ingest": "markers", "recording": name, **options.recipe()}
-            asked = named[name] if labels.name is not None else Labels(session=labels.session)
-            there = find(lake, Kind.MARKERS, source, recipe, asked, branch=branch).whole
-            if there is not None:
-                present[name] = kept(there)
+            asked = labels_of[name] if labels.name is not None else Labels(session=labels.session)
+            artifact_in_lake = find(lake, Kind.MARKERS, source, recipe, asked, branch=branch).whole
+            if artifact_in_lake is not None:
+                present[name] = kept(artifact_in_lake)
                 continue
-            found = _findings(sequence)
-            report = _report(sequence, found, reasons)
+            findings = _findings(sequence)
+            report = _report(sequence, findings, reasons)
             staged = transaction.staging(".zarr")
             with disk_errors("writing markers", staged):
                 write_markers(staged, sequence)
             artifact = Artifact(
                 kind=Kind.MARKERS,
-                name=named[name].name or source.stem,
+                name=labels_of[name].name or source.stem,
                 object=transaction.put(staged),
                 source_hash=source.hash,
                 source_name=source.name,
@@ -70,13 +70,13 @@ def ingest_markers(
                 session=labels.session,
                 frame_count=len(sequence.time),
                 rate=report["rate"],
-                quality=quality_flags(found),
+                quality=quality_flags(findings),
                 report=json.dumps(report, allow_nan=False, ensure_ascii=False),
             )
             transaction.add(artifact)
-            made[name] = (artifact, report)
+            new[name] = (artifact, report)
     return tuple(
-        present[name] if name in present else result_of(transaction, *made[name], named[name]) for name in recordings
+        present[name] if name in present else result_of(transaction, *new[name], labels_of[name]) for name in recordings
     )
 
 
@@ -92,7 +92,7 @@ def _findings(sequence: MarkerSequence) -> tuple[Finding, ...]:
     )
 
 
-def _report(sequence: MarkerSequence, found: Sequence[Finding], reasons: Sequence[str]) -> dict[str, Any]:
+def _report(sequence: MarkerSequence, findings: Sequence[Finding], reasons: Sequence[str]) -> dict[str, Any]:
     span = int(sequence.time[-1]) / NANOSECONDS
     return {
         "schema": REPORT_SCHEMA,
@@ -104,5 +104,5 @@ def _report(sequence: MarkerSequence, found: Sequence[Finding], reasons: Sequenc
         "rate": (len(sequence.time) - 1) / span if span else None,
         "markers": len(sequence.names),
         "tracked": sequence.tracked,
-        "findings": [finding.as_dict() for finding in found],
+        "findings": [finding.as_dict() for finding in findings],
     }

@@ -72,7 +72,7 @@ class MarkerOptions:
 
 
 def is_marker_table(path: Path) -> bool:
-    """Whether a file's header is that of a marker table."""
+    """Checks whether a file's header is that of a marker table."""
     try:
         columns = set(_columns(path))
     except (InputError, OSError, pa.ArrowException):
@@ -81,7 +81,7 @@ def is_marker_table(path: Path) -> bool:
 
 
 def read_table(path: Path, options: MarkerOptions | None = None) -> Mapping[str, MarkerSequence]:
-    """The recordings of a table by name; one without a column `recording` is called "".
+    """Reads the recordings of a table by name; one without a column `recording` is called "".
 
     Args:
         path: CSV (comma, semicolon or tab; decimal points) or Parquet.
@@ -106,11 +106,11 @@ def read_table(path: Path, options: MarkerOptions | None = None) -> Mapping[str,
     column = table["recording"]
     if column.null_count:
         raise InputError("a row names no recording", where=str(path), fix="fill the column, or leave it out")
-    found: dict[str, MarkerSequence] = {}
+    sequences: dict[str, MarkerSequence] = {}
     of = column.to_numpy()
     for name in column.unique().to_pylist():
-        found[name] = _sequence(table.filter(pa.array(of == name)), options, f"{path}, recording {name!r}")
-    return found
+        sequences[name] = _sequence(table.filter(pa.array(of == name)), options, f"{path}, recording {name!r}")
+    return sequences
 
 
 def _is_parquet(path: Path) -> bool:
@@ -141,7 +141,7 @@ def _check_columns(names: list[str], options: MarkerOptions, where: str) -> None
 
 
 def _rows(path: Path, names: list[str]) -> pa.Table:
-    """The table with its numbers as float64 and its names as text."""
+    """Reads the table with its numbers as float64 and its names as text."""
     texts = ("marker", "recording")
     wanted = pa.schema([(name, pa.string() if name in texts else pa.float64()) for name in names])
     try:
@@ -174,7 +174,7 @@ def _rows(path: Path, names: list[str]) -> pa.Table:
 
 
 def _parquet(path: Path) -> pyarrow.parquet.ParquetFile:
-    """A Parquet file whose pages' checksums are compared, where it has any.
+    """Opens a Parquet file whose pages' checksums are compared, where it has any.
 
     Raises:
         LimitError: it says that it unpacks to more than `SIZE_LIMIT`, or has more rows than `POSITIONS_LIMIT`.
@@ -198,13 +198,13 @@ def _parquet(path: Path) -> pyarrow.parquet.ParquetFile:
 
 @contextmanager
 def _table_errors(path: Path) -> Iterator[None]:
-    """Whatever a damaged Parquet file makes its reader raise becomes one error."""
+    """Turns whatever a damaged Parquet file makes its reader raise into one error."""
     try:
         yield
     except (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError, KeyError) as error:
-        message = (str(error).splitlines() or [type(error).__name__])[0]
+        first_line = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(
-            f"the Parquet file cannot be read: {message}", where=str(path), fix="export the table again"
+            f"the Parquet file cannot be read: {first_line}", where=str(path), fix="export the table again"
         ) from None
 
 
@@ -246,7 +246,7 @@ def _sequence(table: pa.Table, options: MarkerOptions, where: str) -> MarkerSequ
 
 
 def _frames(table: pa.Table, options: MarkerOptions, where: str) -> tuple[IntArray, IntArray]:
-    """(n,) instants of the frames from 0 [ns], and (row,) the frame each row is of."""
+    """Computes (n,) instants of the frames from 0 [ns], and (row,) the frame each row is of."""
     column = "time" if "time" in table.column_names else "frame"
     values = _numbers(table, column)
     if not np.isfinite(values).all():
@@ -260,18 +260,18 @@ def _frames(table: pa.Table, options: MarkerOptions, where: str) -> tuple[IntArr
 
 
 def _seats(table: pa.Table, axis: str, marker: IntArray, names: AnyArray, where: str) -> FloatArray:
-    """(marker,) the one value of u or v that each marker's rows give."""
+    """Finds (marker,) the one value of u or v that each marker's rows give."""
     values = _numbers(table, axis)
-    given = np.isfinite(values)
+    is_given = np.isfinite(values)
     low, high = np.full(len(names), np.inf), np.full(len(names), -np.inf)
-    np.minimum.at(low, marker[given], values[given])
-    np.maximum.at(high, marker[given], values[given])
+    np.minimum.at(low, marker[is_given], values[is_given])
+    np.maximum.at(high, marker[is_given], values[is_given])
     if (low > high).any():
         lost = names[int(np.flatnonzero(low > high)[0])]
         raise InputError(
             f"marker {lost!r} has no {axis}", where=where, fix="say where each marker is on the flat cloth"
         )
-    moved = high - low > _SAME * max(float(np.ptp(values[given])), 1e-30)
+    moved = high - low > _SAME * max(float(np.ptp(values[is_given])), 1e-30)
     if moved.any():
         strange = int(np.flatnonzero(moved)[0])
         raise InputError(

@@ -25,17 +25,17 @@ _DIGITS = re.compile(r"(\d+)")
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is an MCAP file, a folder of such files, or any folder that `ros2 bag record` wrote."""
+    """Checks whether a path is an MCAP file, a folder of such files, or any folder that `ros2 bag record` wrote."""
     return is_mcap(path) or (is_folder(path) and (is_described(path) or any(map(is_mcap, _files(path)))))
 
 
 def is_described(path: Path) -> bool:
-    """Whether a path is a folder whose description names its parts, which follow one another then."""
+    """Checks whether a path is a folder whose description names its parts, which follow one another then."""
     return _description(path) is not None
 
 
 def parts_of(path: Path) -> tuple[Path, ...]:
-    """The MCAP files of a recording: of a folder its parts in order, of a file the file itself.
+    """Lists the MCAP files of a recording: of a folder its parts in order, of a file the file itself.
 
     Raises:
         InputError: a part that the folder's description names is not there, or is no MCAP file.
@@ -44,24 +44,25 @@ def parts_of(path: Path) -> tuple[Path, ...]:
         return (path,)
     listed = _LIST.search(_description(path) or "")
     names = _ITEM.findall(listed[1]) if listed else []
-    found = [path / Path(name).name for name in names] or _files(path)
-    for one in found:
-        if not one.is_file():
+    parts = [path / Path(name).name for name in names] or _files(path)
+    for part in parts:
+        if not part.is_file():
             raise InputError(
-                f"the bag's {_DESCRIPTION} names {one.name}, which is not there",
+                f"the bag's {_DESCRIPTION} names {part.name}, which is not there",
                 where=str(path),
                 fix=f"copy it again; or read the parts that are there: rm {path / _DESCRIPTION}",
             )
-        if not is_mcap(one):
-            message, fix = other_bag(one) or (f"{one.name} is no MCAP file", "copy it again")
-            raise InputError(f"a part of the bag is not read: {message}", where=str(one), fix=fix)
-    if not found:
+        if not is_mcap(part):
+            reason, fix = other_bag(part) or (f"{part.name} is no MCAP file", "copy it again")
+            raise InputError(f"a part of the bag is not read: {reason}", where=str(part), fix=fix)
+    if not parts:
         raise InputError("the bag's folder has no part", where=str(path), fix="copy it again")
-    return tuple(found)
+    return tuple(parts)
 
 
 def other_bag(path: Path) -> tuple[str, str] | None:
-    """What a file is, of the kinds of bags that are not read, and what to do with it; `None` for anything else."""
+    """Names what a file is, of the kinds of bags that are not read, and what to do with it; `None` for anything
+    else."""
     try:
         with open_regular(path) as stream:
             head = stream.read(_HEAD)
@@ -85,9 +86,9 @@ def other_bag(path: Path) -> tuple[str, str] | None:
 
 
 def to_join(paths: Sequence[Path]) -> str:
-    """What to do with MCAP files that are the parts of one recording: a folder of them alone is read as one."""
-    (folder, *others) = {path.parent for path in paths}
-    if not others and is_described(folder):
+    """Advises on MCAP files that are the parts of one recording: a folder of them alone is read as one."""
+    (folder, *other_folders) = {path.parent for path in paths}
+    if not other_folders and is_described(folder):
         return f"the folder of the parts is read as one recording: flagdata ingest {folder}"
     names = " ".join(map(str, paths))
     return f"a folder of the parts alone is read as one recording: mkdir whole; mv {names} whole; flagdata ingest whole"
@@ -104,7 +105,7 @@ def by_number(paths: Sequence[Path]) -> list[Path]:
 
 
 def _description(path: Path) -> str | None:
-    """The text of a bag's description; `None` where a path is no folder that has one."""
+    """Reads the text of a bag's description; `None` where a path is no folder that has one."""
     where = path / _DESCRIPTION
     if not is_folder(path) or not where.is_file():
         return None
@@ -114,7 +115,7 @@ def _description(path: Path) -> str | None:
 
 
 def _files(folder: Path) -> list[Path]:
-    return by_number([one for one in folder.glob("*.mcap") if not is_beside(one.name)])
+    return by_number([file for file in folder.glob("*.mcap") if not is_beside(file.name)])
 
 
 def _inside_zstd(head: bytes) -> bytes:

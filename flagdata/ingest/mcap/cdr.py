@@ -61,7 +61,7 @@ class _Field:
 
 
 def decoder(name: str, definition: str, *, ros1: bool = False) -> Callable[[bytes], Mapping[str, Any]]:
-    """What decodes messages of a type: to field → number, text, bytes (of uint8 arrays), list or mapping.
+    """Builds what decodes messages of a type: to field → number, text, bytes (of uint8 arrays), list or mapping.
 
     Args:
         name: of the type, as "sensor_msgs/msg/Image".
@@ -71,26 +71,30 @@ def decoder(name: str, definition: str, *, ros1: bool = False) -> Callable[[byte
     Raises:
         InputError: a definition that cannot be read, or one that uses a type which it does not define.
     """
-    first, *others = re.split(r"^=+\s*$", definition, flags=re.MULTILINE)
+    first, *further = re.split(r"^=+\s*$", definition, flags=re.MULTILINE)
     texts = {**_BUILT_IN, **(_ROS_1 if ros1 else {})}
-    for other in others:
-        head, _, text = other.strip().partition("\n")
+    for section in further:
+        head, _, text = section.strip().partition("\n")
         texts[_plain(head.removeprefix("MSG:").strip())] = text
     root = _plain(name)
     texts[root] = first
     types: dict[str, list[_Field]] = {}
     waiting = [root]
     while waiting:
-        one = waiting.pop()
-        if one not in types:
-            if one not in texts:
-                raise InputError(f"the definition of {name} uses {one} and does not define it", fix="record it anew")
-            types[one] = _fields(texts[one], package=one.rpartition("/")[0])
-            if ros1 and not types[one]:  # lists of messages of no bytes could be without end
+        kind_name = waiting.pop()
+        if kind_name not in types:
+            if kind_name not in texts:
                 raise InputError(
-                    f"the definition of {name} has a part {one} without fields", fix="choose another topic"
+                    f"the definition of {name} uses {kind_name} and does not define it", fix="record it anew"
                 )
-            waiting += [field.type for field in types[one] if field.type not in _NUMBERS and field.type != "string"]
+            types[kind_name] = _fields(texts[kind_name], package=kind_name.rpartition("/")[0])
+            if ros1 and not types[kind_name]:  # lists of messages of no bytes could be without end
+                raise InputError(
+                    f"the definition of {name} has a part {kind_name} without fields", fix="choose another topic"
+                )
+            waiting += [
+                field.type for field in types[kind_name] if field.type not in _NUMBERS and field.type != "string"
+            ]
     return lambda data: _Reader(data, types, name, ros1=ros1).whole(root)
 
 
@@ -99,7 +103,7 @@ def _plain(name: str) -> str:
 
 
 def _fields(text: str, *, package: str) -> list[_Field]:
-    found: list[_Field] = []
+    fields: list[_Field] = []
     for line in text.splitlines():
         line = line.partition("#")[0].strip()
         if not line or _CONSTANT.match(line):
@@ -113,8 +117,8 @@ def _fields(text: str, *, package: str) -> list[_Field]:
             kind = f"builtin_interfaces/{kind}" if kind in _TIMES else kind
             kind = kind if "/" in kind else f"{package}/{kind}"
         count = None if brackets is None else -1 if brackets == "[]" or "<" in brackets else int(brackets[1:-1])
-        found.append(_Field(name=match[3], type=kind, count=count))
-    return found
+        fields.append(_Field(name=match[3], type=kind, count=count))
+    return fields
 
 
 class _Reader:
@@ -145,8 +149,8 @@ class _Reader:
 
     def _field(self, field: _Field, depth: int) -> Any:
         if field.count is None:
-            return self._one(field.type, depth)
-        count = self._one("uint32", depth) if field.count < 0 else field.count
+            return self._value(field.type, depth)
+        count = self._value("uint32", depth) if field.count < 0 else field.count
         if field.type in _BYTES:
             return bytes(self._take(count))
         if field.type in _NUMBERS:
@@ -156,15 +160,15 @@ class _Reader:
             return np.frombuffer(self._take(count * kind.itemsize), kind).tolist()
         if count > len(self._data):
             raise self._cut_off()
-        return [self._one(field.type, depth) for _ in range(count)]
+        return [self._value(field.type, depth) for _ in range(count)]
 
-    def _one(self, kind: str, depth: int) -> Any:
+    def _value(self, kind: str, depth: int) -> Any:
         if kind in _NUMBERS:
             code = struct.Struct(self._order + _NUMBERS[kind])
             self._align(code.size)
             return code.unpack(self._take(code.size))[0]
         if kind == "string":
-            text = bytes(self._take(self._one("uint32", depth)))
+            text = bytes(self._take(self._value("uint32", depth)))
             return text.rstrip(b"\0").decode(errors="replace")
         return self.whole(kind, depth + 1)
 

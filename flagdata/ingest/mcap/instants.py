@@ -44,25 +44,25 @@ class Stamp:
 
 
 def stamp_of(values: Mapping[str, Any]) -> Stamp:
-    """What a message of these fields says of its instant: in `timestamp` or `stamp`, of its own or of its header.
+    """Reads what a message of these fields says of its instant: in `timestamp` or `stamp`, of its own or of its header.
 
     Raises:
         CorruptError: an instant beyond those that 64 bits hold.
     """
     header = values.get("header")
-    named = False
+    has_field = False
     for holder in (values, header if isinstance(header, Mapping) else {}):
         for name in _NAMES:
             if name in holder:
-                named = True
+                has_field = True
                 instant = _instant(holder[name])
                 if instant:
                     return Stamp(instant=checked(instant), field=True)
-    return Stamp(instant=None, field=named)
+    return Stamp(instant=None, field=has_field)
 
 
 def checked(instant: int) -> int:
-    """An instant, unless 64 bits do not hold it.
+    """Returns an instant, unless 64 bits do not hold it.
 
     Raises:
         CorruptError: they do not.
@@ -73,7 +73,7 @@ def checked(instant: int) -> int:
 
 
 def _instant(stamp: object) -> int | None:
-    """UTC nanoseconds of a time as protobuf, ROS, Foxglove's JSON, a number since 1970 or ISO 8601 state it."""
+    """Reads UTC nanoseconds of a time as protobuf, ROS, Foxglove's JSON, a number since 1970 or ISO 8601 state it."""
     if isinstance(stamp, Mapping):
         seconds = stamp.get("seconds", stamp.get("sec", stamp.get("secs")))
         part = stamp.get("nanos", stamp.get("nanosec", stamp.get("nsec", stamp.get("nsecs", 0))))
@@ -112,14 +112,14 @@ class Order:
 
 
 def few_without_date(stamps: IntArray, logged: IntArray) -> BoolArray:
-    """(n,) which messages have a stamp before 1980 or after 2100, as of a clock that was not set yet, where most have a
-    date and the log has one for these."""
+    """Finds (n,) messages that have a stamp before 1980 or after 2100, as of a clock that was not set yet, where most
+    have a date and the log has one for these."""
     odd = (stamps < _FROM) | (stamps >= _TO)
     return odd & (logged >= _FROM) & (logged < _TO) & (2 * int(odd.sum()) < len(stamps))
 
 
 def order_of(stamps: IntArray, logged: IntArray, *, sort: bool, where: str) -> Order:
-    """The order of messages by their instants.
+    """Orders messages by their instants.
 
     Args:
         stamps, logged: (n,) instants and times of logging [UTC ns], in the order of the file.
@@ -129,18 +129,18 @@ def order_of(stamps: IntArray, logged: IntArray, *, sort: bool, where: str) -> O
     rows = np.arange(len(stamps))
     by_log = np.argsort(logged, kind="stable")
     if not _late(stamps):
-        in_time, found = True, ()
+        in_time, findings = True, ()
     elif not _late(stamps[by_log]):
-        in_time, found, rows = True, (_disordered(stamps, logged, where),), by_log
+        in_time, findings, rows = True, (_disordered(stamps, logged, where),), by_log
     else:
-        in_time, found = False, ()
+        in_time, findings = False, ()
     if in_time and sort:
         rows = rows[np.argsort(stamps[rows], kind="stable")]
-    return Order(rows=rows, in_time=in_time, findings=found)
+    return Order(rows=rows, in_time=in_time, findings=findings)
 
 
 def _late(stamps: IntArray) -> bool:
-    """Whether some come after others by more than a slip."""
+    """Checks whether some come after others by more than a slip."""
     return bool(np.any(np.maximum.accumulate(stamps) - stamps > SLIP)) if len(stamps) else False
 
 
@@ -159,7 +159,7 @@ def _disordered(stamps: IntArray, logged: IntArray, where: str) -> Finding:
 
 
 def clock_findings(stamps: IntArray, logged: IntArray, *, unset: int, unstated: int, where: str) -> Iterator[Finding]:
-    """What to report of the clocks of messages.
+    """Reports what is odd of the clocks of messages.
 
     Args:
         unset: messages whose field for an instant is zero, or holds no date.
@@ -182,12 +182,12 @@ def clock_findings(stamps: IntArray, logged: IntArray, *, unset: int, unstated: 
         yield Finding(kind="dated-by-log", severity=Severity.NOTE, where=where, count=count, what=message)
     if not count:
         return
-    apart = float(np.abs(stamps.astype(float) - logged).max()) / NANOSECONDS
-    if apart > APART:
+    most = float(np.abs(stamps.astype(float) - logged).max()) / NANOSECONDS
+    if most > APART:
         yield Finding.of(
             "clocks-apart",
-            f"the stamps of its messages lie up to {apart:.3f} s from when they were logged: a delay, or another clock",
+            f"the stamps of its messages lie up to {most:.3f} s from when they were logged: a delay, or another clock",
             where=where,
-            value=apart,
+            value=most,
             fix="compare it with another topic; align it after it is ingested",
         )

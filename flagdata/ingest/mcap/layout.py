@@ -78,10 +78,10 @@ class Layout:
 
     def missing(self, channels: Collection[int]) -> int:
         """Messages of some channels that the summary states and the file does not have."""
-        return sum(max(0, self.stated.get(one, 0) - self.counts.get(one, 0)) for one in channels)
+        return sum(max(0, self.stated.get(channel, 0) - self.counts.get(channel, 0)) for channel in channels)
 
     def undefined(self) -> tuple[Finding, ...]:
-        """The finding of messages whose channel the file does not define; empty where there are none."""
+        """Reports messages whose channel the file does not define; empty where there are none."""
         lost = sum(count for channel, count in self.counts.items() if channel not in self.channels)
         if not lost:
             return ()
@@ -114,7 +114,7 @@ class Message:
 
 
 def layout_of(path: Path) -> Layout:
-    """What a file has, and where; of a file that has not changed since it was last asked for, from memory.
+    """Reads what a file has, and where; of a file that has not changed since it was last asked for, from memory.
 
     Raises:
         NotFoundError, InputError: there is no such file, or it is empty.
@@ -185,7 +185,7 @@ class _Scan:
         return _HEAD.unpack(head)
 
     def _loose(self, start: int, length: int) -> None:
-        """A message outside chunks."""
+        """Takes a message outside chunks."""
         if length < _MESSAGE.size - RECORD_HEAD:
             raise self._damaged(f"a message of {length} bytes at byte {start}")
         if length > CHUNK_LIMIT:
@@ -206,8 +206,8 @@ class _Scan:
     def _chunk(self, start: int, length: int) -> None:
         if length < CHUNK_HEAD - RECORD_HEAD:
             raise self._damaged(f"a chunk of {length} bytes at byte {start}")
-        *_, size, _, named = _CHUNK.unpack(self.stream.read(_CHUNK.size))
-        if named:
+        *_, size, _, compression = _CHUNK.unpack(self.stream.read(_CHUNK.size))
+        if compression:
             check_stated(size, where=str(self.path))
         if max(length, size) > CHUNK_LIMIT:
             fix = f"at most {CHUNK_LIMIT} are read at once: write smaller chunks"
@@ -215,7 +215,7 @@ class _Scan:
         self.blocks.append(Block(at=start, length=RECORD_HEAD + length, chunk=True, counts=None))
 
     def _index(self, length: int) -> None:
-        """The index of one channel's messages in the chunk before."""
+        """Takes the index of one channel's messages in the chunk before."""
         if length < _INDEX.size or not self.blocks or not self.blocks[-1].chunk:
             return
         channel, entries = _INDEX.unpack(self.stream.read(_INDEX.size))
@@ -241,15 +241,18 @@ class _Scan:
         where = str(self.path)
         if opcode == Opcode.SCHEMA:
             schema = parse(Schema.read, bytes(record), where=where)
-            known = self.schemas.setdefault(schema.id, schema)
-            same, message = (known.name, known.data) == (schema.name, schema.data), f"schema {schema.id}"
+            first_schema = self.schemas.setdefault(schema.id, schema)
+            same, noun = (first_schema.name, first_schema.data) == (schema.name, schema.data), f"schema {schema.id}"
         else:
             channel = parse(Channel.read, bytes(record), where=where)
-            one = self.channels.setdefault(channel.id, channel)
-            same, message = (one.topic, one.schema_id) == (channel.topic, channel.schema_id), f"channel {channel.id}"
+            first_channel = self.channels.setdefault(channel.id, channel)
+            same, noun = (
+                (first_channel.topic, first_channel.schema_id) == (channel.topic, channel.schema_id),
+                f"channel {channel.id}",
+            )
         if not same:
             raise CorruptError(
-                f"{message} is defined twice, as different things",
+                f"{noun} is defined twice, as different things",
                 where=where,
                 fix="write the files that it was made of again, each by itself, or merge them: mcap merge",
             )
@@ -273,11 +276,11 @@ class _Scan:
 
     def _described(self) -> Layout:
         counts: Counter[int] = Counter()
-        known = True
+        counted = True
         for block in self.blocks:
             counts.update(block.counts or {})
-            known &= block.counts is not None
-        if not known or counts.keys() - self.channels.keys():
+            counted &= block.counts is not None
+        if not counted or counts.keys() - self.channels.keys():
             counts = self._counted()
         return Layout(
             path=self.path,
@@ -290,30 +293,30 @@ class _Scan:
         )
 
     def _counted(self) -> Counter[int]:
-        """The messages by channel, counted one by one; definitions that stand only in chunks are taken on the way."""
+        """Counts the messages by channel, one by one; definitions that stand only in chunks are taken on the way."""
         total: Counter[int] = Counter()
         for number, block in enumerate(self.blocks):
-            own: Counter[int] = Counter()
+            of_block: Counter[int] = Counter()
             for opcode, _, record in split(read_block(self.stream, block, where=str(self.path)), where=str(self.path)):
                 if opcode in _DEFINED:
                     self._define(opcode, record)
                 elif opcode == Opcode.MESSAGE:
-                    own[int.from_bytes(record[:2], "little")] += 1
-            self.blocks[number] = Block(at=block.at, length=block.length, chunk=block.chunk, counts=dict(own))
-            total += own
+                    of_block[int.from_bytes(record[:2], "little")] += 1
+            self.blocks[number] = Block(at=block.at, length=block.length, chunk=block.chunk, counts=dict(of_block))
+            total += of_block
         return total
 
-    def _cut_off(self, what: str) -> CorruptError:
+    def _cut_off(self, noun: str) -> CorruptError:
         return CorruptError(
-            f"the MCAP file is damaged or cut off: it ends before the end of {what}", where=str(self.path), fix=_RECOVER
+            f"the MCAP file is damaged or cut off: it ends before the end of {noun}", where=str(self.path), fix=_RECOVER
         )
 
-    def _damaged(self, what: str) -> CorruptError:
-        return CorruptError(f"the MCAP file is damaged: {what}", where=str(self.path), fix=_RECOVER)
+    def _damaged(self, noun: str) -> CorruptError:
+        return CorruptError(f"the MCAP file is damaged: {noun}", where=str(self.path), fix=_RECOVER)
 
 
 def read_block(stream: BinaryIO, block: Block, *, where: str) -> memoryview:
-    """The records of a block, unpacked.
+    """Reads the records of a block, unpacked.
 
     Raises:
         CorruptError: the file ends before, or the chunk does not unpack to what it states.
@@ -329,7 +332,7 @@ def read_block(stream: BinaryIO, block: Block, *, where: str) -> memoryview:
 
 
 def split(records: memoryview, *, where: str) -> Iterator[tuple[int, int, memoryview]]:
-    """Opcode, offset and content of each of some records.
+    """Yields opcode, offset and content of each of some records.
 
     Raises:
         CorruptError: one reaches beyond their end.
@@ -355,20 +358,20 @@ class Messages:
         self._unpacked: OrderedDict[int, memoryview] = OrderedDict()
 
     def of(self, channels: Collection[int]) -> Iterator[Message]:
-        """The messages of some channels, in the order of the file.
+        """Yields the messages of some channels, in the order of the file.
 
         Raises:
             CorruptError: a chunk or record that is damaged; messages before it have been given.
         """
         for number, block in enumerate(self._layout.blocks):
-            if block.counts is not None and not any(block.counts.get(one) for one in channels):
+            if block.counts is not None and not any(block.counts.get(channel) for channel in channels):
                 continue
             for opcode, at, record in split(self._block(number), where=self._where):
                 if opcode == Opcode.MESSAGE and int.from_bytes(record[:2], "little") in channels:
                     yield self._message(number, at)
 
     def at(self, block: int, offset: int) -> Message:
-        """The message at a place."""
+        """Reads the message at a place."""
         return self._message(block, offset)
 
     def _message(self, block: int, offset: int) -> Message:

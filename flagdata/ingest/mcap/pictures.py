@@ -63,9 +63,9 @@ _LOOKED = (5, 4, 1)
 _BYTES_OF = {"L": 1, "RGB": 3, "BGR": 3, "RGBX": 4, "BGRX": 4}
 
 
-def of_pictures(found: Sequence[Topic]) -> tuple[Topic, ...]:
-    """Those topics that hold pictures."""
-    return tuple(topic for topic in found if topic.pictures)
+def of_pictures(present: Sequence[Topic]) -> tuple[Topic, ...]:
+    """Selects the topics that hold pictures."""
+    return tuple(topic for topic in present if topic.pictures)
 
 
 class TopicSource:
@@ -91,23 +91,23 @@ class TopicSource:
             raise TimeError("pictures of a topic have stamps of their own", where=where, fix="leave out --sequence-fps")
         self._kind = self._topic.pictures
         self._broken = self._resized = 0
-        found = index(self._path, self._topic.name, limit=self._limits.frames, sort=self._kind != MOVING)
-        if not len(found.stamps):
+        messages_index = index(self._path, self._topic.name, limit=self._limits.frames, sort=self._kind != MOVING)
+        if not len(messages_index.stamps):
             raise InputError(f"{self._topic.name} has no messages", where=where, fix="choose another topic")
-        findings = [*_others(present, self._topic), *_joined(parts_of(path)), *found.findings]
-        end = None if found.in_time else restart(found.stamps, tick=_NANOSECOND)
+        findings = [*_other_topics(present, self._topic), *_joined(parts_of(path)), *messages_index.findings]
+        end = None if messages_index.in_time else restart(messages_index.stamps, tick=_NANOSECOND)
         if end is not None:
-            after = int(found.stamps[end - 1] - found.stamps[0]) / NANOSECONDS
-            findings.append(restarted(frame=end, after=after, count=len(found.stamps) - end))
-        self._index = found = found.part(0, end)
+            after = int(messages_index.stamps[end - 1] - messages_index.stamps[0]) / NANOSECONDS
+            findings.append(restarted(frame=end, after=after, count=len(messages_index.stamps) - end))
+        self._index = messages_index = messages_index.part(0, end)
         timing = survey(
-            np.sort(found.stamps) if found.in_time else found.stamps,
+            np.sort(messages_index.stamps) if messages_index.in_time else messages_index.stamps,
             tick=_NANOSECOND,
             missing=0,
             fallback_rate=Fraction(1),
             where=where,
         )
-        decoded = self._decoded(messages(self._path, self._topic.name, found=found))
+        decoded = self._decoded(messages(self._path, self._topic.name, picked=messages_index))
         first = next(decoded, None)
         if first is None:
             raise InputError(
@@ -139,38 +139,38 @@ class TopicSource:
         )
 
     def _depth(self, pixel_format: str) -> tuple[Finding, ...]:
-        """Settle the white of pictures of 16 bits by the brightest gray of those looked at.
+        """Settles the white of pictures of 16 bits by the brightest gray of those looked at.
 
         Raises:
             InputError: they are of fewer bits, but of a form whose white cannot be set.
         """
         if "16" not in pixel_format:
             return ()
-        looked = [picture.luma() for run in self.samples(*_LOOKED) for picture in run]
-        brightest = max((int(np.asarray(one.image).max()) for one in looked), default=0)
-        which = f"the {len(looked)} pictures looked at"
-        white, found = depth.white(brightest, which=which, otherwise="; if they are depths, choose another topic")
-        if found and not pixel_format.startswith(DEEP):
+        lumas = [picture.luma() for run in self.samples(*_LOOKED) for picture in run]
+        brightest = max((int(np.asarray(luma.image).max()) for luma in lumas), default=0)
+        which = f"the {len(lumas)} pictures looked at"
+        white, findings = depth.white(brightest, which=which, otherwise="; if they are depths, choose another topic")
+        if findings and not pixel_format.startswith(DEEP):
             message = f"{which} are of 16 bits, and none of their pixels is brighter than {brightest}"
             raise InputError(
                 f"{message}: they would be next to black", where=self._where, fix="write them with 8 bits a colour"
             )
-        self._white = white if found else None
-        return found
+        self._white = white if findings else None
+        return findings
 
-    def _picture(self, one: _Shown) -> Picture:
+    def _picture(self, picture: _Shown) -> Picture:
         if self._white is None:
-            return Picture(stamp=one[0], luma=one[5])
+            return Picture(stamp=picture[0], luma=picture[5])
         white = self._white
-        return Picture(stamp=one[0], luma=lambda: replace(one[5](), white=white))
+        return Picture(stamp=picture[0], luma=lambda: replace(picture[5](), white=white))
 
     def pictures(self) -> Iterator[Picture]:
         yield self._picture(self._head)
-        for one in self._pictures:
-            if one[1:3] != self._size:
+        for picture in self._pictures:
+            if picture[1:3] != self._size:
                 self._resized += 1
                 continue
-            yield self._picture(one)
+            yield self._picture(picture)
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
         length = len(self._index.stamps)
@@ -180,9 +180,9 @@ class TopicSource:
             first = min(start + count * stride, length)
             if start >= length:
                 return
-            part = messages(self._path, self._topic.name, found=self._index.part(start))
-            sound = (one for one in self._decoded(part, tally=False) if one[1:3] == self._size)
-            pictures = [self._picture(one) for one in islice(sound, 0, count * stride, stride)]
+            part = messages(self._path, self._topic.name, picked=self._index.part(start))
+            sound = (picture for picture in self._decoded(part, tally=False) if picture[1:3] == self._size)
+            pictures = [self._picture(picture) for picture in islice(sound, 0, count * stride, stride)]
             if pictures:
                 yield pictures
 
@@ -190,34 +190,34 @@ class TopicSource:
         return undecoded(self._broken, total=len(self._index.stamps)) + resized(self._resized)
 
     def close(self) -> None:
-        """The file is open only while pictures are read."""
+        """Closes nothing: the file is open only while pictures are read."""
 
-    def _decoded(self, found: Iterator[Decoded], *, tally: bool = True) -> Iterator[_Shown]:
+    def _decoded(self, decoded: Iterator[Decoded], *, tally: bool = True) -> Iterator[_Shown]:
         decode = {STILL: self._stills, MOVING: self._moving, RAW: self._plain}[str(self._kind)]
-        for one in decode(found):
-            if one is None:
+        for frame in decode(decoded):
+            if frame is None:
                 self._broken += tally
                 continue
-            if one[1] * one[2] > self._limits.frame_pixels:
+            if frame[1] * frame[2] > self._limits.frame_pixels:
                 raise LimitError(
-                    f"a picture of {one[1]} × {one[2]} px is beyond the limit of {self._limits.frame_pixels} px",
+                    f"a picture of {frame[1]} × {frame[2]} px is beyond the limit of {self._limits.frame_pixels} px",
                     where=self._where,
                     fix="raise the limit if the file is to be trusted",
                 )
-            yield one
+            yield frame
 
-    def _stills(self, found: Iterator[Decoded]) -> Iterator[_Shown | None]:
-        for one in found:
-            self._check_no_depth(str(one.values.get("format", "")))
+    def _stills(self, decoded: Iterator[Decoded]) -> Iterator[_Shown | None]:
+        for message in decoded:
+            self._check_no_depth(str(message.values.get("format", "")))
             try:
-                image = Image.open(io.BytesIO(_data(one.values) or b""), formats=STILLS)
+                image = Image.open(io.BytesIO(_data(message.values) or b""), formats=STILLS)
                 if image.width * image.height <= self._limits.frame_pixels:
                     image.load()
             except BROKEN:
                 yield None
                 continue
             yield (
-                one.stamp,
+                message.stamp,
                 image.width,
                 image.height,
                 str(image.format).lower(),
@@ -225,18 +225,18 @@ class TopicSource:
                 partial(luma_of_image, image),
             )
 
-    def _check_no_depth(self, stated: str) -> None:
+    def _check_no_depth(self, format_stated: str) -> None:
         """Refuse pictures whose format says that their values are distances, as image_transport writes it."""
-        if _DEPTH.search(stated):
+        if _DEPTH.search(format_stated):
             raise InputError(
-                f"pictures of the format {stated!r} are depths, not grays",
+                f"pictures of the format {format_stated!r} are depths, not grays",
                 where=f"{self._where}, {self._topic.name}",
                 fix="choose a topic of grays or colours: --topic NAME",
             )
 
-    def _plain(self, found: Iterator[Decoded]) -> Iterator[_Shown | None]:
-        for one in found:
-            values = one.values
+    def _plain(self, decoded: Iterator[Decoded]) -> Iterator[_Shown | None]:
+        for message in decoded:
+            values = message.values
             encoding = str(values.get("encoding", "")).lower()
             if encoding not in _PLAIN:
                 raise InputError(
@@ -255,30 +255,30 @@ class TopicSource:
                 yield None
                 continue
             image = Image.frombytes(mode, (width, height), data[: step * height], "raw", layout, step, 1)
-            yield one.stamp, width, height, "raw", encoding, partial(luma_of_image, image)
+            yield message.stamp, width, height, "raw", encoding, partial(luma_of_image, image)
 
-    def _moving(self, found: Iterator[Decoded]) -> Iterator[_Shown | None]:
+    def _moving(self, decoded: Iterator[Decoded]) -> Iterator[_Shown | None]:
         """Frames of a video, each by the stamp of the message that it came in; there are no B-frames."""
         context: Any = None
         stamps: dict[int, int] = {}
         name = ""
-        for number, one in enumerate(found):
+        for number, message in enumerate(decoded):
             if context is None:
-                name = _VIDEO.get(str(one.values.get("format", "")).lower(), "")
+                name = _VIDEO.get(str(message.values.get("format", "")).lower(), "")
                 if not name:
                     raise InputError(
-                        f"video of the format {one.values.get('format')!r} is not read",
+                        f"video of the format {message.values.get('format')!r} is not read",
                         where=f"{self._where}, {self._topic.name}",
                         fix=f"record one of {', '.join(_VIDEO)}",
                     )
                 context = av.CodecContext.create(name, "r")
                 context.thread_count, context.flags = 1, context.flags | 0x00080000  # low delay
                 context.options = {"max_pixels": str(2 * self._limits.frame_pixels)}
-            data = _data(one.values)
+            data = _data(message.values)
             if data is None:
                 yield None
                 continue
-            stamps[number] = one.stamp
+            stamps[number] = message.stamp
             packet = av.Packet(data)
             packet.pts = packet.dts = number
             yield from self._frames(context, packet, stamps, name)
@@ -326,18 +326,18 @@ def _joined(files: Sequence[Path]) -> Iterator[Finding]:
     if len(files) > 1:
         yield Finding.of(
             "chapters-joined",
-            f"{len(files)} parts of one recording were joined: {', '.join(one.name for one in files[:8])}"
+            f"{len(files)} parts of one recording were joined: {', '.join(part.name for part in files[:8])}"
             + (", …" if len(files) > 8 else ""),
             count=len(files),
         )
 
 
-def _others(present: tuple[Topic, ...], chosen: Topic) -> Iterator[Finding]:
-    others = [topic for topic in present if topic.name != chosen.name]
-    if others:
+def _other_topics(present: tuple[Topic, ...], chosen: Topic) -> Iterator[Finding]:
+    unread = [topic for topic in present if topic.name != chosen.name]
+    if unread:
         yield Finding.of(
             "topics-not-read",
-            f"{chosen.name} was read, {len(others)} other topics were not: {', '.join(map(str, others[:8]))}",
-            count=len(others),
+            f"{chosen.name} was read, {len(unread)} other topics were not: {', '.join(map(str, unread[:8]))}",
+            count=len(unread),
             fix="ingest the file again with --topic NAME for another",
         )

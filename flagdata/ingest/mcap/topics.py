@@ -120,8 +120,8 @@ class Decoded:
         """
         if self.dated is not None:
             return self.dated
-        said = self.said.instant
-        return checked(self.log_time) if said is None else said
+        instant = self.said.instant
+        return checked(self.log_time) if instant is None else instant
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +144,7 @@ class Index:
     findings: tuple[Finding, ...]
 
     def part(self, first: int, end: int | None = None) -> Index:
-        """The messages from one place on, or up to another."""
+        """Returns the messages from one place on, or up to another."""
         rows = slice(first, end)
         return replace(
             self, rows=self.rows[rows], places=self.places[rows], stamps=self.stamps[rows], logged=self.logged[rows]
@@ -152,7 +152,7 @@ class Index:
 
 
 def profile(path: Path) -> str:
-    """What the header of an MCAP file, or of a folder's first, says its content is: "flagdata", "ros2", "" …
+    """Reads what the header of an MCAP file, or of a folder's first, says its content is: "flagdata", "ros2", "" …
 
     Raises:
         CorruptError: it cannot be read.
@@ -161,14 +161,14 @@ def profile(path: Path) -> str:
 
 
 def topics(path: Path) -> tuple[Topic, ...]:
-    """The topics that have messages, by name, of an MCAP file or of the parts of a folder.
+    """Lists the topics that have messages, by name, of an MCAP file or of the parts of a folder.
 
     Raises:
         CorruptError: a file that was cut off or is damaged.
         LimitError: a chunk that would unpack to more than the limit.
     """
     layouts = _layouts(path)
-    found: dict[tuple[str, str], dict[tuple[int, int], int]] = {}
+    channels_by_topic: dict[tuple[str, str], dict[tuple[int, int], int]] = {}
     encodings: dict[tuple[str, str], str] = {}
     for part, layout in enumerate(layouts):
         for number, channel in layout.channels.items():
@@ -177,9 +177,9 @@ def topics(path: Path) -> tuple[Topic, ...]:
                 continue
             schema = layout.schemas.get(channel.schema_id)
             key = (channel.topic, schema.name if schema is not None else "")
-            found.setdefault(key, {})[part, number] = count
+            channels_by_topic.setdefault(key, {})[part, number] = count
             encodings[key] = channel.message_encoding
-    types = [plain for plain, _ in found]
+    types = [plain for plain, _ in channels_by_topic]
     return tuple(
         Topic(
             name=plain if types.count(plain) == 1 else f"{plain}:{schema or encodings[plain, schema]}",
@@ -189,12 +189,12 @@ def topics(path: Path) -> tuple[Topic, ...]:
             count=sum(channels.values()),
             channels=frozenset(channels),
         )
-        for (plain, schema), channels in sorted(found.items())
+        for (plain, schema), channels in sorted(channels_by_topic.items())
     )
 
 
-def choose(found: Sequence[Topic], wanted: str | None, *, where: str, noun: str) -> Topic:
-    """The topic of a name, or the only one.
+def choose(candidates: Sequence[Topic], wanted: str | None, *, where: str, noun: str) -> Topic:
+    """Chooses the topic of a name, or the only one.
 
     Args:
         noun: what they hold ("pictures"), for messages.
@@ -204,34 +204,34 @@ def choose(found: Sequence[Topic], wanted: str | None, *, where: str, noun: str)
         InputError: none, or several and none is named; or messages of several types on the topic.
     """
     if wanted is not None:
-        for topic in found:
+        for topic in candidates:
             if topic.name == wanted:
                 return topic
-        typed = [topic for topic in found if topic.plain == wanted]
+        typed = [topic for topic in candidates if topic.plain == wanted]
         if not typed:
-            raise UnknownNameError.of(f"topic of {noun}", wanted, [topic.name for topic in found], where=where)
+            raise UnknownNameError.of(f"topic of {noun}", wanted, [topic.name for topic in candidates], where=where)
         message = f"messages of several types are on {wanted}, which are no one series: {', '.join(map(str, typed))}"
         raise InputError(message, where=where, fix=f"choose one by its type: --topic {typed[0].name}")
-    if len(found) == 1:
-        return found[0]
-    listed = ", ".join(map(str, found))
-    message = f"{len(found)} topics hold {noun}: {listed}" if found else f"no topic holds {noun}"
-    raise InputError(message, where=where, fix="choose one: --topic NAME" if found else "see flagdata doctor FILE")
+    if len(candidates) == 1:
+        return candidates[0]
+    listed = ", ".join(map(str, candidates))
+    message = f"{len(candidates)} topics hold {noun}: {listed}" if candidates else f"no topic holds {noun}"
+    raise InputError(message, where=where, fix="choose one: --topic NAME" if candidates else "see flagdata doctor FILE")
 
 
-def messages(path: Path, topic: str, *, found: Index | None = None) -> Iterator[Decoded]:
-    """The messages of a topic in the order of the file, or those of an index in its.
+def messages(path: Path, topic: str, *, picked: Index | None = None) -> Iterator[Decoded]:
+    """Yields the messages of a topic in the order of the file, or those of an index in its.
 
     Args:
         topic: its name, as `topics` gives it.
-        found: the index; `None` for all.
+        picked: the index; `None` for all.
 
     Raises:
         InputError: an encoding that is not read.
         CorruptError: a chunk or message that is damaged; those before it have been given.
     """
     layouts = _layouts(path)
-    channels = {channel for one in topics(path) if one.name == topic for channel in one.channels}
+    channels = {channel for present in topics(path) if present.name == topic for channel in present.channels}
     with ExitStack() as stack:
         opened = [stack.enter_context(closing(Messages(layout))) for layout in layouts]
         decoders: dict[tuple[int, int], Callable[[bytes], Mapping[str, Any]]] = {}
@@ -241,24 +241,24 @@ def messages(path: Path, topic: str, *, found: Index | None = None) -> Iterator[
             if key not in decoders:
                 channel = layouts[part].channels[message.channel]
                 decoders[key] = _decoder(layouts[part].schemas.get(channel.schema_id), channel)
-            place = (part, message.block, message.offset)
-            return Decoded(place=place, log_time=message.log_time, values=decoders[key](message.data))
+            position = (part, message.block, message.offset)
+            return Decoded(place=position, log_time=message.log_time, values=decoders[key](message.data))
 
-        if found is not None:
-            for (part, block, offset), dated in zip(found.places.tolist(), found.stamps.tolist(), strict=True):
+        if picked is not None:
+            for (part, block, offset), dated in zip(picked.places.tolist(), picked.stamps.tolist(), strict=True):
                 with _readable(layouts[part].path):
-                    one = decoded(part, opened[part].at(block, offset))
-                yield replace(one, dated=dated)
+                    read_message = decoded(part, opened[part].at(block, offset))
+                yield replace(read_message, dated=dated)
             return
         for part, file in enumerate(opened):
             walk = file.of({number for of_part, number in channels if of_part == part})
             while True:
                 with _readable(layouts[part].path):
                     message = next(walk, None)
-                    one = None if message is None else decoded(part, message)
-                if one is None:
+                    read_message = None if message is None else decoded(part, message)
+                if read_message is None:
                     break
-                yield one
+                yield read_message
 
 
 def index(
@@ -267,40 +267,40 @@ def index(
     *,
     limit: int | None = None,
     sort: bool = True,
-    each: Callable[[Decoded], object] | None = None,
+    visit: Callable[[Decoded], object] | None = None,
 ) -> Index:
-    """The messages of a topic in the order of their instants.
+    """Indexes the messages of a topic in the order of their instants.
 
     Args:
         sort: whether to put messages in order that are a slip late; else they stay in that of the file or the log.
-        each: called with every message, in the order of the file.
+        visit: called with every message, in the order of the file.
 
     Raises:
         LimitError: more messages than `limit`, whatever the file's summary states.
         InputError, CorruptError: as `messages`; or an instant beyond those that 64 bits hold.
     """
     numbers = array("q")
-    stated, named = bytearray(), bytearray()
-    for one in messages(path, topic):
-        if len(stated) == limit:
+    states_instant, has_field = bytearray(), bytearray()
+    for message in messages(path, topic):
+        if len(states_instant) == limit:
             raise LimitError(
                 f"more than {limit} messages in {topic}", where=str(path), fix="cut the file, or raise the limit"
             )
-        said, logged = one.said, checked(one.log_time)
-        stated.append(said.instant is not None)
-        named.append(said.field)
-        numbers.extend((*one.place, logged if said.instant is None else said.instant, logged))
-        if each is not None:
-            each(one)
+        stamp, logged = message.said, checked(message.log_time)
+        states_instant.append(stamp.instant is not None)
+        has_field.append(stamp.field)
+        numbers.extend((*message.place, logged if stamp.instant is None else stamp.instant, logged))
+        if visit is not None:
+            visit(message)
     table = np.array(numbers, dtype=np.int64).reshape(-1, 5)
     places, stamps, logged = table[:, :3], table[:, 3], table[:, 4]
     if not is_described(path):
         _check_successive(path, topic, places, logged)
-    with_field = np.frombuffer(named, dtype=bool)
-    by_log = ~np.frombuffer(stated, dtype=bool) | few_without_date(stamps, logged)
+    with_field = np.frombuffer(has_field, dtype=bool)
+    by_log = ~np.frombuffer(states_instant, dtype=bool) | few_without_date(stamps, logged)
     stamps[by_log] = logged[by_log]
     order = order_of(stamps, logged, sort=sort, where=topic)
-    found = clock_findings(
+    findings = clock_findings(
         stamps, logged, unset=int((by_log & with_field).sum()), unstated=int((~with_field).sum()), where=topic
     )
     return Index(
@@ -309,7 +309,7 @@ def index(
         stamps=stamps[order.rows],
         logged=logged[order.rows],
         in_time=order.in_time,
-        findings=(*_missing(path, topic), *order.findings, *found),
+        findings=(*_missing(path, topic), *order.findings, *findings),
     )
 
 
@@ -322,9 +322,9 @@ def _check_successive(path: Path, topic: str, places: IntArray, logged: IntArray
     parts = parts_of(path)
     spans = []
     for part in range(len(parts)):
-        own = logged[places[:, 0] == part]
-        if len(own):
-            spans.append((int(own.min()), int(own.max()), part))
+        instants = logged[places[:, 0] == part]
+        if len(instants):
+            spans.append((int(instants.min()), int(instants.max()), part))
     for before, after in pairwise(sorted(spans)):
         overlap = (before[1] - after[0]) / NANOSECONDS
         if overlap > _OVERLAP:
@@ -339,7 +339,7 @@ def _check_successive(path: Path, topic: str, places: IntArray, logged: IntArray
 def _missing(path: Path, topic: str) -> Iterator[Finding]:
     """Findings of messages that are not where files say that they are."""
     layouts = _layouts(path)
-    chosen = next((one.channels for one in topics(path) if one.name == topic), frozenset())
+    chosen = next((present.channels for present in topics(path) if present.name == topic), frozenset())
     lost = sum(layouts[part].missing([number]) for part, number in chosen)
     if lost:
         count = sum(layouts[part].counts.get(number, 0) for part, number in chosen)
@@ -355,11 +355,11 @@ def _missing(path: Path, topic: str) -> Iterator[Finding]:
 
 
 def _layouts(path: Path) -> list[Layout]:
-    found: list[Layout] = []
+    layouts: list[Layout] = []
     for part in parts_of(path):
         with _readable(part):
-            found.append(layout_of(part))
-    return found
+            layouts.append(layout_of(part))
+    return layouts
 
 
 @contextmanager
@@ -379,9 +379,9 @@ def _readable(path: Path) -> Iterator[None]:
 def _decoder(schema: Schema | None, channel: Channel) -> Callable[[bytes], Mapping[str, Any]]:
     encoding = channel.message_encoding
     if encoding == "protobuf" and schema is not None:
-        made = DecoderFactory().decoder_for(encoding, schema)
-        if made is not None:
-            return lambda data: _values(made(data))
+        decode = DecoderFactory().decoder_for(encoding, schema)
+        if decode is not None:
+            return lambda data: _values(decode(data))
     if encoding == "json":
         return _from_json
     if schema is not None and (encoding, schema.encoding) in (("cdr", "ros2msg"), ("ros1", "ros1msg")):
@@ -400,17 +400,17 @@ def _from_json(data: bytes) -> Mapping[str, Any]:
 
 
 def _values(message: protobuf.Message) -> dict[str, Any]:
-    """The fields of a protobuf message; those that may be absent and are, are not there."""
-    found: dict[str, Any] = {}
-    for one in message.DESCRIPTOR.fields:
-        value = getattr(message, one.name)
-        if one.message_type is not None and one.message_type.GetOptions().map_entry:
+    """Returns the fields of a protobuf message; those that may be absent and are, are not there."""
+    values: dict[str, Any] = {}
+    for descriptor in message.DESCRIPTOR.fields:
+        value = getattr(message, descriptor.name)
+        if descriptor.message_type is not None and descriptor.message_type.GetOptions().map_entry:
             continue
         if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-            found[one.name] = [_values(part) if isinstance(part, protobuf.Message) else part for part in value]
+            values[descriptor.name] = [_values(part) if isinstance(part, protobuf.Message) else part for part in value]
         elif isinstance(value, protobuf.Message):
-            if message.HasField(one.name):
-                found[one.name] = _values(value)
-        elif not one.has_presence or message.HasField(one.name):
-            found[one.name] = value
-    return found
+            if message.HasField(descriptor.name):
+                values[descriptor.name] = _values(value)
+        elif not descriptor.has_presence or message.HasField(descriptor.name):
+            values[descriptor.name] = value
+    return values

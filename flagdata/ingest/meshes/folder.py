@@ -26,7 +26,7 @@ _CONFIGURATION = "conf.json"
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """A JSON object with `//` comments, as ArcSim's files have.
+    """Reads a JSON object with `//` comments, as ArcSim's files have.
 
     Raises:
         NotFoundError: no such file.
@@ -49,7 +49,7 @@ def read_json(path: Path) -> dict[str, Any]:
 def read_folder(
     path: Path, *, rate: float | None = None, metre: float = 1.0, progress: Callable[[int], object] | None = None
 ) -> MeshSequence | RaggedMeshSequence:
-    """A sequence of one cloth; ragged if the topology changes. Frame n is at n frame times from 0.
+    """Reads a sequence of one cloth; ragged if the topology changes. Frame n is at n frame times from 0.
 
     The frames are the files `NNNN_00.obj`; in a folder without such, all `.obj` files, which must then differ in one
     number only ("flag_001.obj"). The rest shape is their texture coordinates, in metres.
@@ -90,7 +90,7 @@ def read_folder(
 
 
 def frame_files(path: Path) -> list[tuple[int, Path]]:
-    """The frames of a folder with their numbers, in order.
+    """Lists the frames of a folder with their numbers, in order.
 
     Raises:
         NotFoundError: there are none.
@@ -98,19 +98,19 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
         LimitError: more than `FRAME_LIMIT`.
     """
     entries = sorted(entry for entry in path.iterdir() if entry.is_file() and not is_beside(entry.name))
-    found = [(int(m[1]), int(m[2]), entry) for entry in entries if (m := _FRAME.fullmatch(entry.name))]
-    if not found:
-        found = _numbered([entry for entry in entries if entry.suffix.lower() == ".obj"], path)
-    if len(found) > FRAME_LIMIT:
-        raise LimitError(f"{len(found)} frames", where=str(path), fix=f"at most {FRAME_LIMIT} are read")
-    cloths = {cloth for _, cloth, _ in found}
+    frames_of_cloths = [(int(m[1]), int(m[2]), entry) for entry in entries if (m := _FRAME.fullmatch(entry.name))]
+    if not frames_of_cloths:
+        frames_of_cloths = _numbered([entry for entry in entries if entry.suffix.lower() == ".obj"], path)
+    if len(frames_of_cloths) > FRAME_LIMIT:
+        raise LimitError(f"{len(frames_of_cloths)} frames", where=str(path), fix=f"at most {FRAME_LIMIT} are read")
+    cloths = {cloth for _, cloth, _ in frames_of_cloths}
     if cloths != {0}:
         raise InputError(
             f"{len(cloths)} cloths, numbered {', '.join(f'{c:02d}' for c in sorted(cloths))}",
             where=str(path),
             fix="keep one cloth's files, NNNN_00.obj, in a folder",
         )
-    frames = sorted((number, entry) for number, _, entry in found)
+    frames = sorted((number, entry) for number, _, entry in frames_of_cloths)
     numbers = [number for number, _ in frames]
     missing = sorted(set(range(numbers[0], numbers[-1] + 1)) - set(numbers))
     if missing:

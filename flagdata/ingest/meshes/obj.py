@@ -43,7 +43,7 @@ def fans(sizes: IntArray) -> tuple[Triples, IntArray]:
 
 
 def convex(points: Points) -> BoolArray:
-    """(polygon,) which of some polygons of equally many corners, (polygon, corner, 2), are strictly convex."""
+    """Checks (polygon,) which of some polygons of equally many corners, (polygon, corner, 2), are strictly convex."""
     ahead = np.roll(points, -1, axis=1) - points
     after = np.roll(ahead, -1, axis=1)
     turn = _cross(ahead, after)
@@ -54,7 +54,7 @@ def convex(points: Points) -> BoolArray:
 
 
 def in_plane(points: Points) -> Points:
-    """(corner, 2) of the corners of a polygon in space, (corner, 3), in the plane of its vector area."""
+    """Projects the corners of a polygon in space, (corner, 3), on the plane of its vector area, (corner, 2)."""
     spokes = points - points.mean(axis=0)
     normal = np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0)
     length = float(np.linalg.norm(normal))
@@ -67,7 +67,7 @@ def in_plane(points: Points) -> Points:
 
 
 def ears(points: Points) -> Triples:
-    """A simple polygon, (corner, 2), as (corner − 2, 3) triangles with its orientation, of all its corners.
+    """Cuts a simple polygon, (corner, 2), into (corner − 2, 3) triangles with its orientation, of all its corners.
 
     Raises:
         ValueError: more corners than `CORNERS`, no area, or edges that cross or touch each other; the text says which.
@@ -78,36 +78,36 @@ def ears(points: Points) -> Triples:
     doubled = float(_cross(points, np.roll(points, -1, axis=0)).sum())
     flat = _FLAT * float(_extent(points[None])[0])
     if abs(doubled) <= flat:
-        raise ValueError("without area")
+        raise ValueError("that has no area")
     if _crosses(points):
         raise ValueError("whose edges cross or touch each other")
     sign = np.sign(doubled)
-    left, found, at = list(range(count)), [], 1
-    while len(left) > 3:
-        for step in range(len(left)):
-            place = (at + step) % len(left)
-            corners = [left[place - 1], left[place], left[(place + 1) % len(left)]]
-            if _is_ear(points, corners, left, sign=sign, flat=flat):
+    rest, triangles, at = list(range(count)), [], 1
+    while len(rest) > 3:
+        for step in range(len(rest)):
+            corner = (at + step) % len(rest)
+            corners = [rest[corner - 1], rest[corner], rest[(corner + 1) % len(rest)]]
+            if _is_ear(points, corners, rest, sign=sign, flat=flat):
                 break
         else:
             raise ValueError("with corners too close to a line to be split")
-        found.append(corners)
-        left.pop(place)
-        at = place
-    return np.array([*found, left], dtype=np.int64)
+        triangles.append(corners)
+        rest.pop(corner)
+        at = corner
+    return np.array([*triangles, rest], dtype=np.int64)
 
 
-def _is_ear(points: Points, corners: list[int], left: list[int], *, sign: float, flat: float) -> bool:
+def _is_ear(points: Points, corners: list[int], rest: list[int], *, sign: float, flat: float) -> bool:
     a, b, c = points[corners]
     if sign * float(_cross(b - a, c - a)) <= flat:
         return False
-    others = points[[corner for corner in left if corner not in corners]]
-    sides = [sign * _cross(end - start, others - start) for start, end in ((a, b), (b, c), (c, a))]
+    other_points = points[[corner for corner in rest if corner not in corners]]
+    sides = [sign * _cross(end - start, other_points - start) for start, end in ((a, b), (b, c), (c, a))]
     return not (np.stack(sides) >= -flat).all(axis=0).any()
 
 
 def _crosses(points: Points) -> bool:
-    """Whether two edges of a polygon have a point in common, beside the corner that neighbours share."""
+    """Checks whether two edges of a polygon have a point in common, beside the corner that neighbours share."""
     count = len(points)
     start, end = points, np.roll(points, -1, axis=0)
     along = end - start
@@ -138,7 +138,7 @@ def _cross(a: Points, b: Points) -> Points:
 
 
 def _extent(points: Points) -> Points:
-    """(polygon,) squared diagonal of the box around each."""
+    """Computes (polygon,) the squared diagonal of the box around each."""
     return (np.ptp(points, axis=1) ** 2).sum(axis=-1)
 
 
@@ -232,7 +232,7 @@ def _numbers(values: list[str], count: int, where: str) -> list[float]:
 
 
 def _corner(word: str, vertices: int, textures: int, where: str) -> tuple[int, int]:
-    """Vertex and texture index of a face's corner, from 1; 0 where there is no texture index.
+    """Reads vertex and texture index of a face's corner, from 1; 0 where there is no texture index.
 
     Indices below zero count back from the last vertex before the line; those that lead nowhere are returned as -1.
     """
@@ -264,7 +264,7 @@ class _Faces:
     sizes: IntArray
     lines: IntArray
 
-    def refuse(self, corners: BoolArray, what: str, *, fix: str) -> None:
+    def refuse(self, corners: BoolArray, text: str, *, fix: str) -> None:
         """Refuse the first face that has one of some corners.
 
         Raises:
@@ -272,10 +272,11 @@ class _Faces:
         """
         if corners.any():
             face = int(np.repeat(np.arange(len(self.sizes)), self.sizes)[int(corners.argmax())])
-            raise InputError(what, where=f"{self.path}, line {self.lines[face]}", fix=fix)
+            raise InputError(text, where=f"{self.path}, line {self.lines[face]}", fix=fix)
 
     def triangles(self, points: FloatArray) -> IntArray:
-        """(triangle, 3) places of corners: each face split in the plane of its corners, (corner, 2) or (corner, 3).
+        """Splits each face in the plane of its corners, (corner, 2) or (corner, 3), into triangles: (triangle, 3)
+        places of corners.
 
         Raises:
             InputError: a face of four corners or more has no area there, or edges that cross.
@@ -339,7 +340,7 @@ def write_obj(path: Path, mesh: Obj) -> None:
 
 
 def obj_text(mesh: Obj) -> str:
-    """A mesh as ArcSim writes it: all `vt`, each `v` with its `nv` where there are velocities, `f` as v/vt.
+    """Writes a mesh as ArcSim does: all `vt`, each `v` with its `nv` where there are velocities, `f` as v/vt.
 
     Nine significant digits: float32 values come back exactly.
     """

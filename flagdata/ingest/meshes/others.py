@@ -46,4 +46,4 @@ FIX = (
 def format_of(name: str, head: bytes = b"") -> str | None:
     """Return the format of a mesh file that is not OBJ, by its name or its first bytes; None of any other file."""
     by_name = _NAMES.get(PurePath(name).suffix.lower())
-    return by_name or next((known for begin, known in _HEADS.items() if head.startswith(begin)), None)
+    return by_name or next((format_name for begin, format_name in _HEADS.items() if head.startswith(begin)), None)

@@ -25,7 +25,7 @@ _NEXT = 1e-2
 def welded(
     sequence: MeshSequence | RaggedMeshSequence,
 ) -> tuple[MeshSequence | RaggedMeshSequence, tuple[Finding, ...]]:
-    """The sequence with vertices merged whose material coordinates and whole trajectories agree to the bit.
+    """Merges vertices whose material coordinates and whole trajectories agree to the bit.
 
     As it is, without a finding, where there are none; where merging leaves no surface (a face with one corner twice, an
     edge of more than two faces, as of cloth exported with a front and a back); and where the sequence's own scene names
@@ -35,38 +35,38 @@ def welded(
         return sequence, ()
     twin = _twins(sequence)
     faces = twin[sequence.faces]
-    kept = twin == np.arange(len(twin))
-    if kept.all() or not _is_surface(faces):
+    stays = twin == np.arange(len(twin))
+    if stays.all() or not _is_surface(faces):
         return sequence, ()
-    number = np.cumsum(kept) - 1
+    number = np.cumsum(stays) - 1
     merged = replace(
         sequence,
-        positions=np.ascontiguousarray(sequence.positions[:, kept]),
-        rest=sequence.rest[kept],
+        positions=np.ascontiguousarray(sequence.positions[:, stays]),
+        rest=sequence.rest[stays],
         faces=number[faces].astype(np.int32),
     )
-    gone = int((~kept).sum())
+    gone = int((~stays).sum())
     return merged, (
         Finding.of(
             "vertices-merged",
-            f"{gone} of {len(kept)} vertices have the texture coordinates of another one and its place in every "
-            f"frame, and were merged with it; the {int(kept.sum())} that stay are numbered anew, in their order",
+            f"{gone} of {len(stays)} vertices have the texture coordinates of another one and its place in every "
+            f"frame, and were merged with it; the {int(stays.sum())} that stay are numbered anew, in their order",
             count=gone,
         ),
     )
 
 
 def in_pieces(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
-    """A finding where the cloth is in several pieces in some frame, of the frame with most of them."""
+    """Reports that the cloth is in several pieces in some frame, of the frame with most of them."""
     frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
     pieces = [len(np.unique(_piece(sequence.frame(index))[sequence.frame(index).faces])) for index in frames]
     worst = int(np.argmax(pieces))
     if pieces[worst] < 2:
         return ()
     mesh = sequence.frame(worst)
-    touching, alike = _touching(mesh), _touching(mesh, texture=True)
+    touching, in_texture = _touching(mesh), _touching(mesh, texture=True)
     between = (
-        f"; {touching} of its vertices lie where a vertex of another piece lies, {alike} of these with the same "
+        f"; {touching} of its vertices lie where a vertex of another piece lies, {in_texture} of these with the same "
         "texture coordinates"
     )
     return (
@@ -81,21 +81,21 @@ def in_pieces(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...
 
 
 def slits(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
-    """A finding where vertices of one piece lie at or next to others that no edge joins them to, of the frame with most
-    of them: a slit, or a seam that an exporter left open."""
+    """Reports vertices of one piece that lie at or next to others that no edge joins them to, of the frame with most of
+    them: a slit, or a seam that an exporter left open."""
     frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
     open_vertices = [_unjoined(sequence.frame(index)) for index in frames]
     worst = max(frames, key=lambda index: len(open_vertices[index]))
-    found = open_vertices[worst]
-    if not len(found):
+    vertices = open_vertices[worst]
+    if not len(vertices):
         return ()
     return (
         Finding.of(
             "cloth-slit",
-            f"{len(found)} vertices lie within {100 * _NEXT:g} % of an edge's length of another one that they "
-            f"are not joined to, in the material or in space (the first is vertex {found[0]}): the cloth has a slit "
+            f"{len(vertices)} vertices lie within {100 * _NEXT:g} % of an edge's length of another one that they "
+            f"are not joined to, in the material or in space (the first is vertex {vertices[0]}): the cloth has a slit "
             "there, or a seam that is not closed",
-            count=len(found),
+            count=len(vertices),
             where=f"frame {worst}",
             fix="if it is a seam, merge its vertices by distance before the export; a slit may stay",
         ),
@@ -110,36 +110,37 @@ def _unjoined(mesh: Mesh) -> IntArray:
     if not len(border):
         return border
     piece, joined = _piece(mesh), {tuple(edge) for edge in edges.tolist()}
-    found: set[int] = set()
+    vertices: set[int] = set()
     for points in (mesh.rest.astype(np.float64), mesh.positions.astype(np.float64)):
         lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
-        near = KDTree(points[border]).query_pairs(_NEXT * float(np.median(lengths)), output_type="ndarray")
-        pairs = np.sort(border[near].reshape(-1, 2), axis=1)
+        close = KDTree(points[border]).query_pairs(_NEXT * float(np.median(lengths)), output_type="ndarray")
+        pairs = np.sort(border[close].reshape(-1, 2), axis=1)
         pairs = pairs[piece[pairs[:, 0]] == piece[pairs[:, 1]]]
-        found.update(vertex for pair in pairs.tolist() if tuple(pair) not in joined for vertex in pair)
-    return np.array(sorted(found), dtype=np.int64)
+        vertices.update(vertex for pair in pairs.tolist() if tuple(pair) not in joined for vertex in pair)
+    return np.array(sorted(vertices), dtype=np.int64)
 
 
 def _piece(mesh: Mesh) -> IntArray:
-    """(vertex,) label of the connected piece of each vertex."""
+    """Labels (vertex,) the connected piece of each vertex."""
     rows, columns = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     graph = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(len(mesh.rest), len(mesh.rest)))
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _touching(mesh: Mesh, *, texture: bool = False) -> int:
-    """How many vertices of faces lie exactly at one of another piece in space, and in the texture as well if asked."""
+    """Counts vertices of faces that lie exactly at one of another piece in space, and in the texture as well if
+    asked."""
     used = np.unique(mesh.faces)
     piece = _piece(mesh)[used]
-    place = np.concatenate([mesh.positions, mesh.rest], axis=1) if texture else mesh.positions
-    group = np.unique(place[used], axis=0, return_inverse=True)[1].ravel()
-    both = np.unique(np.stack([group, piece], axis=1), axis=0)
-    return int((np.bincount(both[:, 0])[group] > 1).sum())
+    positions = np.concatenate([mesh.positions, mesh.rest], axis=1) if texture else mesh.positions
+    group = np.unique(positions[used], axis=0, return_inverse=True)[1].ravel()
+    group_and_piece = np.unique(np.stack([group, piece], axis=1), axis=0)
+    return int((np.bincount(group_and_piece[:, 0])[group] > 1).sum())
 
 
 def _twins(sequence: MeshSequence) -> IntArray:
-    """(vertex,) the first vertex of the faces that is the same throughout; a vertex by itself is its own."""
-    own = np.arange(len(sequence.rest))
+    """Finds (vertex,) the first vertex of the faces that is the same throughout; a vertex by itself is its own."""
+    twins = np.arange(len(sequence.rest))
     used = np.unique(sequence.faces)
     start = np.concatenate([sequence.rest, sequence.positions[0]], axis=1)[used]
     _, group, size = np.unique(start, axis=0, return_inverse=True, return_counts=True)
@@ -148,8 +149,8 @@ def _twins(sequence: MeshSequence) -> IntArray:
     for index in np.flatnonzero(size[group] > 1).tolist():
         # The sum makes zeros of both signs one.
         course = blake2b((sequence.positions[:, used[index]] + np.float32(0)).tobytes(), digest_size=16).digest()
-        own[used[index]] = first.setdefault((int(group[index]), course), int(used[index]))
-    return own
+        twins[used[index]] = first.setdefault((int(group[index]), course), int(used[index]))
+    return twins
 
 
 def _is_surface(faces: IntArray) -> bool:

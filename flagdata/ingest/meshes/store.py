@@ -92,17 +92,17 @@ def ingest_meshes(
     options, labels = options or MeshIngest(), labels or Labels()
     source = Source.of(path)
     recipe = options.recipe()
-    there = find(lake, Kind.MESHES, source, recipe, labels, branch=branch).whole
-    if there is not None:
-        return kept(there)
+    artifact_in_lake = find(lake, Kind.MESHES, source, recipe, labels, branch=branch).whole
+    if artifact_in_lake is not None:
+        return kept(artifact_in_lake)
     metre = float(unit(options.unit).to_si(1.0))
     sequence = read_folder(path, rate=options.rate, metre=metre, progress=progress)
     check_units(sequence, where=str(path))
     sequence, merged = welded(sequence)
-    found = (*merged, *findings(sequence))
+    all_findings = (*merged, *findings(sequence))
     source.check_unchanged()
     parameters = scene_wind(sequence.attributes.get("scene"))
-    report = _report(sequence, found, reasons)
+    report = _report(sequence, all_findings, reasons)
     with lake.transaction(f"ingest meshes {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".zarr")
         with disk_errors("writing meshes", staged):
@@ -119,7 +119,7 @@ def ingest_meshes(
             rate=report["rate"],
             wind=math.hypot(parameters["wind_x"], parameters["wind_y"]) if parameters else None,
             parameters=canonical(parameters) if parameters else None,
-            quality=quality_flags(found),
+            quality=quality_flags(all_findings),
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
         )
         transaction.add(artifact)
@@ -127,7 +127,8 @@ def ingest_meshes(
 
 
 def scene_wind(scene: Any) -> dict[str, float] | None:
-    """The wind of an ArcSim scene, where the air goes to [m/s]; None where the scene gives none that can be read."""
+    """Reads the wind of an ArcSim scene, where the air goes to [m/s]; None where the scene gives none that can be
+    read."""
     wind = scene.get("wind") if isinstance(scene, Mapping) else None
     velocity = wind.get("velocity") if isinstance(wind, Mapping) else None
     if not isinstance(velocity, list) or len(velocity) != 3:
@@ -138,7 +139,7 @@ def scene_wind(scene: Any) -> dict[str, float] | None:
 
 
 def _report(
-    sequence: MeshSequence | RaggedMeshSequence, found: Sequence[Finding], reasons: Sequence[str]
+    sequence: MeshSequence | RaggedMeshSequence, all_findings: Sequence[Finding], reasons: Sequence[str]
 ) -> dict[str, Any]:
     """Counts, times since the start of the simulation, and findings."""
     if isinstance(sequence, MeshSequence):
@@ -158,7 +159,7 @@ def _report(
         "topology": "fixed" if isinstance(sequence, MeshSequence) else "remeshed",
         "vertices": [int(vertices.min()), int(vertices.max())],
         "faces": [int(faces.min()), int(faces.max())],
-        "findings": [finding.as_dict() for finding in found],
+        "findings": [finding.as_dict() for finding in all_findings],
     }
 
 
@@ -230,7 +231,7 @@ def _changes(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
         return
     vertices, faces = np.diff(sequence.vertex_offset), np.diff(sequence.face_offset)
     frames = [sequence.frame(index) for index in range(len(sequence))]
-    other = [
+    changed = [
         index
         for index in range(1, len(frames))
         if not (
@@ -240,10 +241,10 @@ def _changes(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
     ]
     yield Finding.of(
         "topology-changes",
-        f"the mesh changes at {len(other)} of {len(frames) - 1} frames: {vertices.min()} to {vertices.max()} "
+        f"the mesh changes at {len(changed)} of {len(frames) - 1} frames: {vertices.min()} to {vertices.max()} "
         f"vertices, {faces.min()} to {faces.max()} faces",
-        count=len(other),
-        where=f"frame {other[0]}",
+        count=len(changed),
+        where=f"frame {changed[0]}",
         fix="none needed, if the simulator remeshes; else export all frames with one mesh",
     )
 
@@ -254,7 +255,7 @@ _WITHIN = 1e-2  # from an edge's ends, in edge lengths
 
 
 def t_joints(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
-    """A finding where vertices lie on open edges of other faces, of the frame with most of them."""
+    """Reports vertices that lie on open edges of other faces, of the frame with most of them."""
     frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
     joints = [_joints(sequence.frame(index)) for index in frames]
     worst = max(frames, key=lambda index: len(joints[index]), default=0)
@@ -284,21 +285,22 @@ def _joints(mesh: Mesh) -> IntArray:
     rest, space = mesh.rest.astype(np.float64), mesh.positions.astype(np.float64)
     ends = rest[border]
     half = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2
-    beside = KDTree(rest[corners]).query_ball_point(ends.mean(axis=1), half)
-    number = np.repeat(np.arange(len(border)), [len(found) for found in beside])
-    vertex = corners[np.concatenate([np.asarray(found, dtype=np.int64) for found in beside])]
+    neighbours = KDTree(rest[corners]).query_ball_point(ends.mean(axis=1), half)
+    number = np.repeat(np.arange(len(border)), [len(of_edge) for of_edge in neighbours])
+    vertex = corners[np.concatenate([np.asarray(of_edge, dtype=np.int64) for of_edge in neighbours])]
     first, last = border[number].astype(np.int64).T
-    along, off = _beside(rest, vertex, first, last)
-    along_in_space, off_in_space = _beside(space, vertex, first, last)
+    along, off = _along(rest, vertex, first, last)
+    along_in_space, off_in_space = _along(space, vertex, first, last)
     inside = (off < _ON_THE_LINE) & (off_in_space < _NEAR) & (np.abs(along_in_space - along) < _NEAR)
     for share in (along, along_in_space):
         inside &= (share > _WITHIN) & (share < 1 - _WITHIN)
     return np.unique(vertex[inside])
 
 
-def _beside(place: FloatArray, vertex: IntArray, first: IntArray, last: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Where vertices lie along edges, 0 at the first end and 1 at the last, and how far beside, in edge lengths."""
-    edge, arm = place[last] - place[first], place[vertex] - place[first]
+def _along(positions: FloatArray, vertex: IntArray, first: IntArray, last: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Computes where vertices lie along edges, 0 at the first end and 1 at the last, and how far beside, in edge
+    lengths."""
+    edge, arm = positions[last] - positions[first], positions[vertex] - positions[first]
     square = np.maximum((edge**2).sum(axis=1), np.finfo(np.float64).tiny)
     along = (edge * arm).sum(axis=1) / square
     return along, np.linalg.norm(arm - along[:, None] * edge, axis=1) / np.sqrt(square)
@@ -338,8 +340,8 @@ def check_units(sequence: MeshSequence | RaggedMeshSequence, *, where: str) -> N
 
 
 def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
-    """What is odd and was kept: faces turned over or without area in the material, vertices of no face, vertices that
-    change places, pieces and slits."""
+    """Reports what is odd and was kept: faces turned over or without area in the material, vertices of no face,
+    vertices that change places, pieces and slits."""
     flipped = degenerate = loose = 0
     first: dict[str, int] = {}
     frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
@@ -383,8 +385,8 @@ def _edge_ratio(mesh: Mesh) -> float:
     edges = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
     space = np.linalg.norm(np.diff(mesh.positions[edges].astype(np.float64), axis=1)[:, 0], axis=1)
     rest = np.linalg.norm(np.diff(mesh.rest[edges].astype(np.float64), axis=1)[:, 0], axis=1)
-    there = rest > 0
-    return float(np.median(space[there] / rest[there])) if there.any() else float("inf")
+    has_length = rest > 0
+    return float(np.median(space[has_length] / rest[has_length])) if has_length.any() else float("inf")
 
 
 def _likely(ratio: float) -> str:

@@ -47,7 +47,7 @@ def test_a_recording_is_brought_in_aligned_tagged_and_exported(
 def test_options_that_contradict_each_other_are_refused_in_calls_as_in_commands(lake: Lake, wind_log: Path) -> None:
     with pytest.raises(UsageError, match="without a NAME"):
         flagdata.tag(lake=lake, at="main")
-    with pytest.raises(UsageError, match="--salt without --split"):
+    with pytest.raises(UsageError, match="--salt needs --split"):
         flagdata.export("csv", lake=lake, to="out", salt="x")
     with pytest.raises(UsageError, match="--crop means nothing for an anemometer log"):
         flagdata.ingest(wind_log, lake=lake, crop="auto")

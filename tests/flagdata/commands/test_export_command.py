@@ -53,7 +53,7 @@ MISTAKES: list[tuple[list[str], int, str]] = [
     (["parquet", "--to", "{out}", "--at", "nowhere"], 1, "nowhere"),
     (["parquet"], 2, "--to"),
     (["parquet", "--to", "{lake}/lake.json/out"], 1, "this is no folder"),
-    (["parquet", "--to", "{out}", "--salt", "x"], 2, "--salt without --split"),
+    (["parquet", "--to", "{out}", "--salt", "x"], 2, "--salt needs --split"),
 ]
 
 

@@ -164,7 +164,7 @@ MISUSED = [
     (["{log}", "--zone", "Qwxzy"], "give a name such as Europe/Amsterdam"),
     (["{video}", "{video}", "--start", "2026-05-01T10:00:00Z"], "--start with 2 sources"),
     (["{video}", "{log}", "--name", "a"], "--name with 2 sources"),
-    (["{video}", "--crop-picture", "{video}.png"], "--crop-picture without --crop auto"),
+    (["{video}", "--crop-picture", "{video}.png"], "--crop-picture needs --crop auto"),
     (["{video}", "--crop", "1,2,3"], "not a crop"),
     (["{video}", "--rate", "fast"], "not a number"),
     (["{video}", "--exposure", "5"], "an exposure of 5 s is longer than the 0.02 s from frame to frame"),

@@ -37,7 +37,7 @@ def kept(lake: Lake, row: Artifact, *, branch: str = "main") -> Placed:
         lambda staged: (staged.mkdir(), (staged / "x").write_text(str(row.report))),
         "infer",
         branch=branch,
-        left=lambda one: [replace(one, kind=Kind.MODEL, name="flag-base", object=None, parents=[one.id])],
+        derived=lambda one: [replace(one, kind=Kind.MODEL, name="flag-base", object=None, parents=[one.id])],
     )
 
 

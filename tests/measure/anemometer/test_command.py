@@ -110,8 +110,8 @@ def test_a_model_whose_network_has_changed_is_refused(lake: Path, monkeypatch: p
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (("--only", "anemometer", "--azimuth", "70±7"), "--azimuth with --only anemometer"),
-        (("--only", "weight", "--name", "garden"), "--name with --only weight"),
+        (("--only", "anemometer", "--azimuth", "70±7"), "--azimuth cannot be combined with --only anemometer"),
+        (("--only", "weight", "--name", "garden"), "--name cannot be combined with --only weight"),
     ],
 )
 def test_options_of_what_is_not_done_are_refused(lake: Path, given: tuple[str, ...], said: str) -> None:

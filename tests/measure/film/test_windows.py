@@ -139,7 +139,7 @@ def test_the_error_of_too_short_a_film_states_the_length_needed() -> None:
 
 @pytest.mark.parametrize("part", [(3.0, 2.0), (9.0, None), (-1.0, 2.0)])
 def test_a_part_that_the_film_does_not_have_is_refused(part: tuple[float, float | None]) -> None:
-    with pytest.raises(UsageError, match="of a film of 4"):
+    with pytest.raises(UsageError, match="which lasts 4"):
         lay_out(frames=5, spacings=(0.04,), rate=25.0, duration=4.0, step=None, first=part[0], last=part[1])
 
 

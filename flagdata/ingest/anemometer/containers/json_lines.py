@@ -14,7 +14,7 @@ _NAMES = 2000
 
 
 def as_table(source: TextFile) -> TableText:
-    """The objects as rows; the first names the columns, lines that are none are left out.
+    """Converts JSON objects to rows of a table; the first object names the columns, other lines are left out.
 
     Raises:
         InputError: objects that hold others, or no row.

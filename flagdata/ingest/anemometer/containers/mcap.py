@@ -35,10 +35,10 @@ _HEADINGS: dict[str, dict[str, str]] = {
 """Type of messages, as ROS 1 names it → field → heading."""
 
 
-def of_numbers(path: Path, found: Sequence[Topic]) -> tuple[Topic, ...]:
-    """Those topics, not of pictures, whose first message can be read and holds a number beside its time."""
-    kept: list[Topic] = []
-    for topic in found:
+def of_numbers(path: Path, present: Sequence[Topic]) -> tuple[Topic, ...]:
+    """Selects the topics, not of pictures, whose first message can be read and holds a number beside its time."""
+    of_numbers: list[Topic] = []
+    for topic in present:
         if topic.pictures:
             continue
         try:
@@ -46,12 +46,12 @@ def of_numbers(path: Path, found: Sequence[Topic]) -> tuple[Topic, ...]:
         except Exception:  # noqa: BLE001 - a damaged or foreign message is no number; it is named where it is chosen
             continue
         if first is not None and any(True for _ in _numbers(first.values)):
-            kept.append(topic)
-    return tuple(kept)
+            of_numbers.append(topic)
+    return tuple(of_numbers)
 
 
 def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
-    """The numbers of a topic over time.
+    """Reads the numbers of a topic over time.
 
     Args:
         name: of the topic; `None` takes the only one.
@@ -70,22 +70,24 @@ def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
 
     def add(message: Decoded) -> None:
         row = dict(_numbers(message.values))
-        for one in row:
-            if one not in names and len(names) < _WIDEST:
-                names[one] = len(names)
+        for field in row:
+            if field not in names and len(names) < _WIDEST:
+                names[field] = len(names)
         rows.append(row)
 
-    found = index(path, topic.name, limit=limits.rows, each=add)
-    timed = zip(found.stamps.tolist(), (rows[number] for number in found.rows.tolist()), strict=True)
-    lines = [",".join(["time", *(headings.get(one, one) for one in names)])]
-    lines += [",".join([iso(stamp), *(row.get(one, "") for one in names)]) for stamp, row in timed]
+    messages = index(path, topic.name, limit=limits.rows, visit=add)
+    timed = zip(messages.stamps.tolist(), (rows[number] for number in messages.rows.tolist()), strict=True)
+    lines = [",".join(["time", *(headings.get(field, field) for field in names)])]
+    lines += [",".join([iso(stamp), *(row.get(field, "") for field in names)]) for stamp, row in timed]
     message = f"the topic {topic.name}: {len(rows)} messages of {topic.schema or topic.encoding}, a row each"
     read = Finding.of("topic-read", message, count=len(rows))
-    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=(read, *found.findings), text=tuple(lines))
+    return TableText(
+        path=path, encoding="utf-8", lines=len(lines), findings=(read, *messages.findings), text=tuple(lines)
+    )
 
 
 def _numbers(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
-    """Path and text of each number, those within messages and short lists too; times apart."""
+    """Yields path and text of each number, those within messages and short lists too, but no times."""
     for name, value in values.items():
         if not before and name in _TIMES:
             continue

@@ -76,12 +76,12 @@ class Since:
 
 
 def is_time(attributes: Mapping[str, Any]) -> bool:
-    """Whether a variable's units are those of a time since a date."""
+    """Checks whether a variable's units are those of a time since a date."""
     return _SINCE.fullmatch(str(attributes.get("units", ""))) is not None
 
 
 def since(attributes: Mapping[str, Any], *, where: str) -> Since:
-    """What the units and the calendar of a time say.
+    """Reads the units and the calendar of a time.
 
     Raises:
         TimeError: a calendar that is not the one of clocks, a unit of no fixed length, or a date that cannot be read.
@@ -128,16 +128,18 @@ def instants(values: AnyArray, attributes: Mapping[str, Any], *, where: str) -> 
     with np.errstate(invalid="ignore", over="ignore"):
         about = numbers.astype(np.float64) * count.unit + count.zero
         absent |= ~((about > _FIRST) & (about < _END))
-        kept = np.where(absent, 0, numbers)
-        whole = np.floor(kept).astype(np.int64)
-        rest = np.zeros(len(values)) if kept.dtype.kind in "iu" else np.round((kept - whole) * float(count.unit))
+        counts = np.where(absent, 0, numbers)
+        floors = np.floor(counts).astype(np.int64)
+        rest = np.zeros(len(values)) if counts.dtype.kind in "iu" else np.round((counts - floors) * float(count.unit))
         units, further = divmod(count.zero, count.unit)  # the nanoseconds from year 1 do not fit into 64 bits
-        time = (whole + units) * count.unit + further + rest.astype(np.int64)
+        time = (floors + units) * count.unit + further + rest.astype(np.int64)
     findings: tuple[Finding, ...] = ()
-    step = float(np.spacing(np.abs(kept).max(initial=0))) * count.unit if kept.dtype.kind == "f" else 0.0
+    step = float(np.spacing(np.abs(counts).max(initial=0))) * count.unit if counts.dtype.kind == "f" else 0.0
     time = snapped(time, 1_000_000, round(step)) if step <= 1_000 else time
     if step > NANOSECONDS / 1000:
-        message = f"the times are numbers of {8 * kept.dtype.itemsize} bits, which are {step / NANOSECONDS:.3g} s apart"
+        message = (
+            f"the times are numbers of {8 * counts.dtype.itemsize} bits, which are {step / NANOSECONDS:.3g} s apart"
+        )
         fix = "write them as numbers of 64 bits"
         findings = (Finding.of("coarse-stamps", message, value=step / NANOSECONDS, fix=fix),)
     return np.where(absent, NOT_A_TIME, time), findings
@@ -158,7 +160,7 @@ _STANDARD = {
 
 
 def open_dataset(path: Path, *, limits: Limits) -> TableText:
-    """The variables of one point over time that have standard names of wind.
+    """Reads the variables of one point over time that have standard names of wind.
 
     Raises:
         InputError: no time, no wind, several points, or a file that xarray cannot read.
@@ -183,7 +185,7 @@ def open_dataset(path: Path, *, limits: Limits) -> TableText:
 
 
 def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
-    """The lines of a data set; the times of `raw`, as they are stored."""
+    """Converts a data set to the lines of a table; the times are those of `raw`, as they are stored."""
     where = str(path)
     time = next((name for name, axis in data.coords.items() if axis.ndim == 1 and is_time(raw[name].attrs)), None)
     if time is None:
@@ -191,12 +193,12 @@ def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
     if data.sizes[time] > limits.rows:
         raise LimitError(f"more than {limits.rows} instants", where=where, fix="split the file")
     columns: dict[str, Any] = {}
-    left: list[str] = []
+    unread: list[str] = []
     for variable in data.data_vars.values():
         standard = variable.attrs.get("standard_name", "")
         channel, unit = _STANDARD.get(standard), spelled(variable.attrs.get("units", ""))
         if channel is None or unit is None or variable.dims != (time,):
-            left.append(repr(variable.name))
+            unread.append(repr(variable.name))
             continue
         heading = f"{channel} ({unit})"
         if heading in columns:
@@ -207,7 +209,7 @@ def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
         columns[heading] = (values + half) % (2 * half) if half else values
     if not any("wind" in heading for heading in columns):
         fix = "give the variables of wind their standard names and one dimension, time; or export them as CSV"
-        raise InputError("no variable of wind along time alone", where=where, fix=fix)
+        raise InputError("the file has no variable of wind along time alone", where=where, fix=fix)
     stamps, findings = instants(raw[time].squeeze().values, raw[time].attrs, where=f"{where}, variable {time}")
     rows = zip(stamps.tolist(), *(values.tolist() for values in columns.values()), strict=True)
     lines = [",".join(["time", *columns])]
@@ -215,6 +217,6 @@ def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
         ",".join(["" if stamp == NOT_A_TIME else iso(stamp), *("" if value != value else repr(value) for value in row)])
         for stamp, *row in rows
     ]
-    message = f"variables that are not read: {', '.join(left)}"
-    findings = (*findings, Finding.of("columns-not-read", message)) if left else findings
+    message = f"variables that are not read: {', '.join(unread)}"
+    findings = (*findings, Finding.of("columns-not-read", message)) if unread else findings
     return TableText(path=path, encoding="utf-8", lines=len(lines), findings=findings, text=tuple(lines))

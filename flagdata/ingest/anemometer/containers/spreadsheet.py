@@ -26,7 +26,7 @@ _FIX = "delete what lies far from the table, or save the sheet as CSV"
 
 
 def open_sheet(path: Path, *, limits: Limits) -> TableText:
-    """The first sheet of a workbook that holds a table.
+    """Reads the first sheet of a workbook that holds a table.
 
     Raises:
         InputError: python-calamine is missing, the workbook is damaged, or no sheet holds two rows.

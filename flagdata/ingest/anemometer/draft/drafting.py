@@ -54,7 +54,7 @@ def recipe_text(
     label: str,
     missing: Sequence[str],
 ) -> str:
-    """The recipe of a table."""
+    """Writes the recipe of a table."""
     delimiter = next(name for name, character in DELIMITERS.items() if character == shape.delimiter)
     lines = [
         'name = "drafted"',
@@ -80,12 +80,12 @@ def recipe_text(
 
 
 def quoted(text: str) -> str:
-    """A text as TOML writes it."""
+    """Quotes a text for TOML."""
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t") + '"'
 
 
 def reference(column: str | int) -> str:
-    """A column as TOML writes it: its heading, or its number."""
+    """Writes a column for TOML: its heading, or its number."""
     return str(column) if isinstance(column, int) else quoted(column)
 
 
@@ -181,7 +181,7 @@ class _Parts:
 def draft(
     lines: Sequence[str], options: WindOptions, *, serial_days: str = "excel-days", counted: bool = False
 ) -> Draft | None:
-    """The draft of the table that a file begins with; `None` where it holds none.
+    """Drafts a recipe for the table that a file begins with; `None` where it holds none.
 
     Args:
         serial_days: the form that "excel-days" are in this file.
@@ -194,23 +194,25 @@ def draft(
     if shape is None:
         return None
     meanings = [meaning(name, below) for name, below in zip(shape.names, shape.units, strict=True)]
-    given = given_columns(options.columns, shape) if options.columns is not None else None
-    if given is not None and given.form == "excel-days":
-        given = replace(given, form=serial_days)
+    user_columns = given_columns(options.columns, shape) if options.columns is not None else None
+    if user_columns is not None and user_columns.form == "excel-days":
+        user_columns = replace(user_columns, form=serial_days)
     parts = _Parts()
     winds, of_earth = (
-        _of_wind(parts, shape, meanings, options) if given is None else (_given(parts, shape, given), False)
+        _of_wind(parts, shape, meanings, options)
+        if user_columns is None
+        else (_of_user(parts, shape, user_columns), False)
     )
-    time = _time(parts, shape, meanings, given, options, counted=counted)
-    if given is None and not winds and time is None:
+    time = _time(parts, shape, meanings, user_columns, options, counted=counted)
+    if user_columns is None and not winds and time is None:
         return None
-    if given is None:
+    if user_columns is None:
         _mixed(parts, shape, meanings)
     parts.facts.insert(0, _cutting(shape, lines))
     label = options.wind or (winds[0] if winds else "anemometer")
-    left = [i for i in range(len(shape.names)) if i not in parts.used and shape.names[i]]
-    unused = tuple(shape.shown(i) for i in left)
-    rivals = tuple(shape.label(i) for i in left if meanings[i].kind in _OF_WIND)
+    unused_columns = [i for i in range(len(shape.names)) if i not in parts.used and shape.names[i]]
+    unused = tuple(shape.shown(i) for i in unused_columns)
+    rivals = tuple(shape.label(i) for i in unused_columns if meanings[i].kind in _OF_WIND)
     return Draft(
         facts=tuple(parts.facts),
         open=tuple(parts.open),
@@ -231,11 +233,11 @@ def draft(
 
 
 def _mixed(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
-    """Ask where a column names several sites or units, whose rows must not be mixed."""
-    for index, one in enumerate(meanings):
+    """Asks where a column names several sites or units, whose rows must not be mixed."""
+    for index, heading in enumerate(meanings):
         values = sorted(set(shape.column(index)) - {""})
         of_units = bool(values) and all(fits("wind_speed", spelled(value) or "") for value in values)
-        if (one.kind == "site" or of_units) and index not in parts.used and 1 < len(values) < len(shape.rows):
+        if (heading.kind == "site" or of_units) and index not in parts.used and 1 < len(values) < len(shape.rows):
             several = f"{len(values)} {'units' if of_units else 'sites'}"
             question = f"rows are of {several} by {shape.shown(index)}: {', '.join(values[:_LISTED])}; which one?"
             lines = f"[rows]\ncolumn = {reference(shape.reference(index))}\nvalue = {quoted(values[0])}"
@@ -243,8 +245,8 @@ def _mixed(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
 
 
 def _cutting(shape: Shape, lines: Sequence[str]) -> Fact:
-    named = {" ": "blanks", "\t": "tabs"}.get(shape.delimiter, repr(shape.delimiter))
-    value = f"divided by {named}, decimal {shape.decimal!r}"
+    delimiter = {" ": "blanks", "\t": "tabs"}.get(shape.delimiter, repr(shape.delimiter))
+    value = f"divided by {delimiter}, decimal {shape.decimal!r}"
     plain = shape.delimiter in ",\t" and shape.decimal == "." and shape.preamble == 0 and shape.header == 1
     where = f"line {shape.preamble + 1} names the columns" if shape.header else "no line names the columns"
     if shape.preamble:
@@ -257,14 +259,14 @@ def _time(
     parts: _Parts,
     shape: Shape,
     meanings: Sequence[Meaning],
-    given: GivenColumns | None,
+    user_columns: GivenColumns | None,
     options: WindOptions,
     *,
     counted: bool,
 ) -> TimeFields | None:
-    if given is not None:
-        columns = given.time or ((len(shape.names) - 1,) if counted else ())
-        time = of_columns(shape, columns, options.date_order, given.form or None) if columns else None
+    if user_columns is not None:
+        columns = user_columns.time or ((len(shape.names) - 1,) if counted else ())
+        time = of_columns(shape, columns, options.date_order, user_columns.form or None) if columns else None
     else:
         time = find_time(shape, meanings, options.date_order)
     if time is None:
@@ -273,10 +275,10 @@ def _time(
         parts.open.append(Open(key="columns", question=question, example=example))
         return None
     parts.used.update(time.columns)
-    shown = " + ".join(shape.shown(i) for i in time.columns)
+    names = " + ".join(shape.shown(i) for i in time.columns)
     if time.form is None:
         first = shape.rows[0][time.columns[0]]
-        question = f"{shown}: {first!r} reads as {' and as '.join(time.forms)}: which is right?"
+        question = f"{names}: {first!r} reads as {' and as '.join(time.forms)}: which is right?"
         question += f" (It would be {counts_of(first)})" if set(time.forms) & set(EPOCH) else ""
         orders = {form.replace("%d", "%m") for form in time.forms}
         if len(orders) == 1:
@@ -285,11 +287,11 @@ def _time(
             example = f"'{shape.reference(time.columns[0])}=time[FORMAT], and all other columns'"
             parts.open.append(Open(key="columns", question=question, example=example))
         return time
-    if given is None and of_another_origin(time, meanings):
-        question = f"{shown} reads as {time.form}, and its heading speaks of another origin than 1970: which is right?"
+    if user_columns is None and of_another_origin(time, meanings):
+        question = f"{names} reads as {time.form}, and its heading speaks of another origin than 1970: which is right?"
         example = f"'{shape.reference(time.columns[0])}=time[FORMAT], and all other columns'"
         parts.open.append(Open(key="columns", question=question, example=example))
-    if given is not None and given.form:
+    if user_columns is not None and user_columns.form:
         origin: Origin = "given"
     elif time.form == "iso" and all(meanings[i].kind == "time" for i in time.columns):
         origin = "stated"
@@ -298,22 +300,22 @@ def _time(
     parts.facts.append(
         Fact(
             what="time",
-            value=f"{shown} as {_WRITINGS.get(time.form, time.form)}",
+            value=f"{names} as {_WRITINGS.get(time.form, time.form)}",
             origin=origin,
             evidence=time.evidence,
         )
     )
     if dates.is_elapsed(time.form):
         if options.start is None:
-            question = f"{shown} counts from a start: at what instant was the first row?"
+            question = f"{names} counts from a start: at what instant was the first row?"
             parts.open.append(Open(key="start", question=question, example="TIME (as 2026-05-01T12:00:00+02:00)"))
         return time
     if dates.needs_date(time.form) and options.date is None:
-        question = f"{shown} has no whole date: of what day is the first row?"
+        question = f"{names} has no whole date: of what day is the first row?"
         parts.open.append(Open(key="date", question=question, example="DATE (as 2026-05-01)"))
     if time.zoned:
-        stated = f"UTC, as {time.form}" if time.form in EPOCH else "in the stamps"
-        parts.facts.append(Fact(what="zone", value=stated, origin="stated"))
+        zone = f"UTC, as {time.form}" if time.form in EPOCH else "in the stamps"
+        parts.facts.append(Fact(what="zone", value=zone, origin="stated"))
     elif options.zone is not None:
         parts.facts.append(Fact(what="zone", value=options.zone, origin="given"))
     elif time.utc:
@@ -323,13 +325,13 @@ def _time(
     return time
 
 
-def _given(parts: _Parts, shape: Shape, given: GivenColumns) -> tuple[str, ...]:
-    for channel, (index, unit) in given.channels.items():
-        towards = channel == "wind_direction" and given.towards
+def _of_user(parts: _Parts, shape: Shape, user_columns: GivenColumns) -> tuple[str, ...]:
+    for channel, (index, unit) in user_columns.channels.items():
+        towards = channel == "wind_direction" and user_columns.towards
         parts.used.add(index)
         parts.channels[channel] = ChannelText(column=shape.reference(index), unit=unit, towards=towards)
         parts.facts.append(Fact(what=channel, value=f"{shape.shown(index)} in {unit}", origin="given"))
-    first = next(iter(given.channels.values()))[0]
+    first = next(iter(user_columns.channels.values()))[0]
     return (shape.label(first),)
 
 
@@ -338,24 +340,30 @@ def _of_wind(
 ) -> tuple[tuple[str, ...], bool]:
     """Labels of the anemometers; the facts of the one that is read are added to `parts`."""
     numeric = {i for i in range(len(meanings)) if _numeric(shape.column(i))}
-    speeds = [i for i, one in enumerate(meanings) if one.kind == "speed" and not one.against and i in numeric]
-    moves = any(set(one.against) & MOVING for one in meanings)
+    speeds = [
+        i for i, heading in enumerate(meanings) if heading.kind == "speed" and not heading.against and i in numeric
+    ]
+    moves = any(set(heading.against) & MOVING for heading in meanings)
     if moves or any(meanings[i].named for i in speeds):
         speeds = [i for i in speeds if meanings[i].named]
     labels = {shape.label(i): i for i in speeds}
     chosen = labels.get(options.wind or "", speeds[0] if len(speeds) == 1 else None)
-    given = options.wind is not None and not (len(labels) > 1 and options.wind in labels)
+    is_given = options.wind is not None and not (len(labels) > 1 and options.wind in labels)
     if options.wind is not None and options.wind not in labels:
-        every = {shape.label(i): i for i in range(len(shape.names))}
-        chosen = every.get(options.wind)
+        columns = {shape.label(i): i for i in range(len(shape.names))}
+        chosen = columns.get(options.wind)
         labels = {options.wind: chosen} if chosen is not None else labels
-    axes = {one.kind: i for i, one in reversed(list(enumerate(meanings))) if one.kind in _AXES and not one.against}
+    axes = {
+        heading.kind: i
+        for i, heading in reversed(list(enumerate(meanings)))
+        if heading.kind in _AXES and not heading.against
+    }
     components = {_AXES[kind]: axes[kind] for kind in ("x", "y", "z") if kind in axes and axes[kind] in numeric}
     if chosen is None and not speeds and {"wind_x", "wind_y"} <= set(components):
         for channel, index in components.items():
-            _measured(parts, shape, meanings, channel, index, options, given=False)
+            _measured(parts, shape, meanings, channel, index, options, is_given=False)
         earth = any(word in shape.names[components["wind_x"]].lower() for word in ("east", "u10"))
-        _beside(parts, shape, meanings)
+        _other_quantities(parts, shape, meanings)
         return (shape.label(components["wind_x"]),), earth
     if chosen is None:
         listed = ", ".join(labels) or ", ".join(shape.shown(i) for i in range(len(shape.names)))
@@ -364,7 +372,9 @@ def _of_wind(
         return tuple(labels), False
     against = meanings[chosen].against
     moving = [
-        shape.names[i] for i, one in enumerate(meanings) if set(one.against) & MOVING or (i == chosen and against)
+        shape.names[i]
+        for i, heading in enumerate(meanings)
+        if set(heading.against) & MOVING or (i == chosen and against)
     ]
     if moving and options.platform is None:
         question = (
@@ -372,14 +382,14 @@ def _of_wind(
             "moving (the wind is apparent), or corrected (the wind is over ground)?"
         )
         parts.open.append(Open(key="platform", question=question, example="PLATFORM"))
-    _measured(parts, shape, meanings, "wind_speed", chosen, options, given=given)
+    _measured(parts, shape, meanings, "wind_speed", chosen, options, is_given=is_given)
     direction = _direction(parts, shape, meanings, chosen)
     doubts = [gust_factor(shape, meanings, chosen)]
     if direction is not None and {"wind_x", "wind_y"} <= set(components):
-        beside = (components["wind_x"], components["wind_y"])
-        doubts.append(contradicted(shape, beside, direction, parts.channels["wind_direction"].unit))
-    parts.open += [one for one in doubts if one is not None and one.example not in options.expect]
-    _beside(parts, shape, meanings)
+        axes_columns = (components["wind_x"], components["wind_y"])
+        doubts.append(contradicted(shape, axes_columns, direction, parts.channels["wind_direction"].unit))
+    parts.open += [doubt for doubt in doubts if doubt is not None and doubt.example not in options.expect]
+    _other_quantities(parts, shape, meanings)
     return tuple(labels), False
 
 
@@ -391,23 +401,24 @@ def _measured(
     index: int,
     options: WindOptions,
     *,
-    given: bool,
+    is_given: bool,
 ) -> None:
-    """A column of wind with its unit; `given` where the user named it, and it is not one of several by its heading."""
-    own = meanings[index]
+    """Adds a column of wind with its unit; `is_given` where the user named it, and it is not one of several by its
+    heading."""
+    meaning = meanings[index]
     parts.used.add(index)
-    unit, origin, evidence = own.unit, _STATED, "the heading"
+    unit, origin, evidence = meaning.unit, _STATED, "the heading"
     if options.unit is not None:
         unit, origin, evidence = canonical(options.unit), _GIVEN, "--unit"
-        if own.unit not in (None, unit):
-            evidence = f"--unit; the heading says {own.unit}"
+        if meaning.unit not in (None, unit):
+            evidence = f"--unit; the heading says {meaning.unit}"
     if unit is None or not fits(channel, unit):
         question = f"what is the unit of {shape.shown(index)} (m/s, km/h, mph, kn)?"
         parts.open.append(Open(key="unit", question=question, example="UNIT"))
         unit = "?"
-    if own.plain not in _PLAIN[channel]:
-        origin = "given" if given else "inferred"
-        evidence += "" if own.named else "; it does not name the wind"
+    if meaning.plain not in _PLAIN[channel]:
+        origin = "given" if is_given else "inferred"
+        evidence += "" if meaning.named else "; it does not name the wind"
     parts.channels[channel] = ChannelText(column=shape.reference(index), unit=unit)
     parts.facts.append(Fact(what=channel, value=f"{shape.shown(index)} in {unit}", origin=origin, evidence=evidence))
 
@@ -417,19 +428,24 @@ _GIVEN: Origin = "given"
 
 
 def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: int) -> int | None:
-    """The direction that belongs to a speed: of the same height, the only one of the table; its column, if numeric."""
-    near = [
+    """Finds the direction that belongs to a speed: of the same height, the only one of the table; its column, if
+    numeric."""
+    candidates = [
         i
-        for i, one in enumerate(meanings)
-        if one.kind == "direction"
-        and not set(one.against) - {"to", "toward", "towards", "going"}
-        and meanings[speed].height in (None, one.height)
+        for i, meaning in enumerate(meanings)
+        if meaning.kind == "direction"
+        and not set(meaning.against) - {"to", "toward", "towards", "going"}
+        and meanings[speed].height in (None, meaning.height)
     ]
-    if len(near) != 1:
+    if len(candidates) != 1:
         return None
-    index = near[0]
-    own = meanings[index]
-    unit, origin, evidence = own.unit, _STATED, "the heading; from true north, clockwise, is the convention"
+    index = candidates[0]
+    meaning_of_direction = meanings[index]
+    unit, origin, evidence = (
+        meaning_of_direction.unit,
+        _STATED,
+        "the heading; from true north, clockwise, is the convention",
+    )
     points = _compass(shape.column(index))
     if points == "?":
         question = f"{shape.shown(index)} has points of the compass whose O may be east or west: of which language?"
@@ -444,9 +460,9 @@ def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: 
         unit, origin, evidence = "deg", "assumed", "no unit is stated"
     elif not fits("wind_direction", unit):
         return None
-    elif own.plain not in _PLAIN["wind_direction"]:
+    elif meaning_of_direction.plain not in _PLAIN["wind_direction"]:
         origin = "inferred"
-    if own.against:
+    if meaning_of_direction.against:
         question = f"does {shape.shown(index)} say where the wind comes from, or where it blows to?"
         example = f"'{shape.reference(index)}=wind_direction[{unit}] (or wind_direction_to), and all other columns'"
         parts.open.append(Open(key="columns", question=question, example=example))
@@ -457,17 +473,17 @@ def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: 
     return index if points is None else None
 
 
-def _beside(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
-    """Temperature, humidity and pressure whose unit is stated."""
-    for index, one in enumerate(meanings):
-        channel = _BESIDE.get(one.kind)
-        if channel is None or channel in parts.channels or one.against or not _numeric(shape.column(index)):
+def _other_quantities(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
+    """Adds temperature, humidity and pressure whose unit is stated."""
+    for index, heading in enumerate(meanings):
+        channel = _BESIDE.get(heading.kind)
+        if channel is None or channel in parts.channels or heading.against or not _numeric(shape.column(index)):
             continue
-        if one.unit is not None and fits(channel, one.unit):
+        if heading.unit is not None and fits(channel, heading.unit):
             parts.used.add(index)
-            parts.channels[channel] = ChannelText(column=shape.reference(index), unit=one.unit)
-            value = f"{shape.shown(index)} in {one.unit}"
-            origin: Origin = "stated" if one.plain in _PLAIN[channel] else "inferred"
+            parts.channels[channel] = ChannelText(column=shape.reference(index), unit=heading.unit)
+            value = f"{shape.shown(index)} in {heading.unit}"
+            origin: Origin = "stated" if heading.plain in _PLAIN[channel] else "inferred"
             parts.facts.append(Fact(what=channel, value=value, origin=origin, evidence="the heading"))
 
 
@@ -477,15 +493,15 @@ def _numeric(cells: Sequence[str]) -> bool:
 
 
 def _compass(cells: Sequence[str]) -> str | None:
-    """The unit of points of the compass that a column's cells are; `None` for none, "?" where languages differ."""
+    """Names the unit of the compass points in a column's cells; `None` for none, "?" where languages differ."""
     filled = {cell.upper() for cell in cells if not is_missing(cell)}
     tables: Mapping[str, Mapping[str, float]] = compass.BY_UNIT
-    known = [name for name, points in tables.items() if filled and filled <= {*points, *compass.CALM}]
-    if not known or not any(cell.isalpha() for cell in filled):
+    fitting = [name for name, points in tables.items() if filled and filled <= {*points, *compass.CALM}]
+    if not fitting or not any(cell.isalpha() for cell in filled):
         return None
-    first = tables[known[0]]
-    same = all(tables[name].get(cell) == first.get(cell) for name in known for cell in filled)
-    return known[0] if same else "?"
+    first = tables[fitting[0]]
+    same = all(tables[name].get(cell) == first.get(cell) for name in fitting for cell in filled)
+    return fitting[0] if same else "?"
 
 
 _FACTORS = (1.0, 3.2)
@@ -495,18 +511,24 @@ _APART, _TOGETHER, _LEAST = 30.0, 0.9, 5
 
 
 def gust_factor(shape: Shape, meanings: Sequence[Meaning], speed: int) -> Open | None:
-    """The question about a speed whose gusts are no gusts of it; `None` where there are none, or they are."""
-    own = meanings[speed]
-    for index, one in enumerate(meanings):
-        of_speed = one.unit is None or fits("wind_speed", one.unit)
-        if index == speed or not (set(one.against) & GUSTS and of_speed and named_alike(one, own)):
+    """Asks about a speed whose gusts are no gusts of it; `None` where there are none, or they are."""
+    speed_heading = meanings[speed]
+    for index, gust_heading in enumerate(meanings):
+        of_speed = gust_heading.unit is None or fits("wind_speed", gust_heading.unit)
+        if index == speed or not (
+            set(gust_heading.against) & GUSTS and of_speed and named_alike(gust_heading, speed_heading)
+        ):
             continue
         mean, gust = _numbers(shape, speed), _numbers(shape, index)
-        both = np.isfinite(mean) & np.isfinite(gust)
-        if both.sum() < _LEAST or mean[both].sum() <= 0:
+        present = np.isfinite(mean) & np.isfinite(gust)
+        if present.sum() < _LEAST or mean[present].sum() <= 0:
             continue
-        scale = UNITS[one.unit or "m/s"].scale / UNITS[own.unit or "m/s"].scale if one.unit and own.unit else 1.0
-        factor = float(scale * gust[both].sum() / mean[both].sum())
+        scale = (
+            UNITS[gust_heading.unit or "m/s"].scale / UNITS[speed_heading.unit or "m/s"].scale
+            if gust_heading.unit and speed_heading.unit
+            else 1.0
+        )
+        factor = float(scale * gust[present].sum() / mean[present].sum())
         if not _FACTORS[0] <= factor <= _FACTORS[1]:
             question = (
                 f"{shape.shown(index)} is {factor:.2g} times {shape.shown(speed)} in the mean; gusts are "
@@ -517,28 +539,28 @@ def gust_factor(shape: Shape, meanings: Sequence[Meaning], speed: int) -> Open |
 
 
 def contradicted(shape: Shape, axes: tuple[int, int], direction: int, unit: str) -> Open | None:
-    """The question about a direction that components towards east and north beside it contradict.
+    """Asks about a direction that components towards east and north beside it contradict.
 
     Args:
         axes: columns of the components.
         unit: of the direction, "deg" or "rad".
     """
     x, y, away = (_numbers(shape, index) for index in (*axes, direction))
-    known = np.isfinite(x) & np.isfinite(y) & np.isfinite(away) & (np.hypot(x, y) > 0)
-    if known.sum() < _LEAST:
+    present = np.isfinite(x) & np.isfinite(y) & np.isfinite(away) & (np.hypot(x, y) > 0)
+    if present.sum() < _LEAST:
         return None
-    from_components = np.arctan2(-x[known], -y[known])
-    apart = np.exp(1j * (UNITS[unit].scale * away[known] - from_components)).mean()
-    degrees = float(np.rad2deg(np.angle(apart)))
-    if abs(apart) >= _TOGETHER and abs(degrees) <= _APART:
+    from_components = np.arctan2(-x[present], -y[present])
+    mean_turn = np.exp(1j * (UNITS[unit].scale * away[present] - from_components)).mean()
+    degrees = float(np.rad2deg(np.angle(mean_turn)))
+    if abs(mean_turn) >= _TOGETHER and abs(degrees) <= _APART:
         return None
-    named = f"{shape.shown(direction)} and the components {', '.join(map(shape.shown, axes))}"
-    how = f"differ by {degrees:.0f}\N{DEGREE SIGN}" if abs(apart) >= _TOGETHER else "do not turn together"
-    question = f"{named} {how}. Does {shape.shown(direction)} say where the wind comes from?"
+    columns = f"{shape.shown(direction)} and the components {', '.join(map(shape.shown, axes))}"
+    how = f"differ by {degrees:.0f}\N{DEGREE SIGN}" if abs(mean_turn) >= _TOGETHER else "do not turn together"
+    question = f"{columns} {how}. Does {shape.shown(direction)} say where the wind comes from?"
     return Open(key="expect", question=question, example="components")
 
 
 def _numbers(shape: Shape, index: int) -> Series:
-    """(n,) the cells of a column in the first rows; NaN where one is no number."""
+    """Reads (n,) cells of a column in the first rows as numbers; NaN where one is no number."""
     cells = (cell.replace(",", ".") for cell in shape.column(index))
     return np.array([float(cell) if is_number(cell) else np.nan for cell in cells])

@@ -55,7 +55,7 @@ class GivenColumns:
 
 
 def given_columns(text: str, shape: Shape) -> GivenColumns:
-    """The columns of a table as one line gives them.
+    """Reads the columns of a table as one line gives them.
 
     Raises:
         UsageError, UnknownNameError: an entry that cannot be read, a name or a unit that is not known.
@@ -97,7 +97,7 @@ def given_columns(text: str, shape: Shape) -> GivenColumns:
 
 
 def _form(times: list[tuple[int, str, str]]) -> str:
-    """The format as far as the entries give it; "" leaves it to the stamps."""
+    """Returns the format as far as the entries give it; "" leaves it to the stamps."""
     if any(name in PARTS for _, name, _ in times):
         return " ".join(PARTS.get(name) or detail for _, name, detail in times)
     details = [_COUNTS.get(detail, detail) for _, _, detail in times]

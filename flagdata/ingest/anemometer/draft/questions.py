@@ -25,7 +25,7 @@ class Open:
     lines: str = ""
 
     def fix(self) -> str:
-        """The option that answers it."""
+        """Returns the option that answers the question."""
         if self.lines:
             return (
                 "save the recipe that flagdata ingest --sniff prints as FILE.toml, replace each ? in it, and add"
@@ -50,11 +50,11 @@ class OpenFactsError(RefusedError):
 
     @classmethod
     def of(cls, questions: Sequence[Open], *, where: str) -> OpenFactsError:
-        """The error for some questions, which names what answers each."""
-        recipes = [one.fix() for one in questions if one.lines]
-        options = f"answer by {' '.join(one.fix() for one in questions)}; or describe the file by a recipe: "
+        """Returns the error for some questions, which names what answers each."""
+        recipes = [question.fix() for question in questions if question.lines]
+        options = f"answer by {' '.join(question.fix() for question in questions)}; or describe the file by a recipe: "
         return cls(
-            f"the file leaves this open: {'; '.join(one.question for one in questions)}",
+            f"the file leaves this open: {'; '.join(question.question for question in questions)}",
             where=where,
             questions=tuple(questions),
             fix="; ".join(recipes) or f"{options}--sensor FILE.toml",

@@ -52,23 +52,24 @@ class Shape:
     lines: tuple[int, ...]
 
     def column(self, index: int) -> list[str]:
-        """The cells of a column."""
+        """Returns the cells of a column."""
         return [row[index] for row in self.rows]
 
     def label(self, index: int) -> str:
-        """What the user calls a column: its heading, with its number where others have the same or it has none."""
+        """Returns what the user calls a column: its heading, with its number where others have the same or it has
+        none."""
         name, number = self.names[index], f"column {index + 1}"
         return number if not name else name if self.names.count(name) == 1 else f"{name} ({number})"
 
     def shown(self, index: int) -> str:
-        """What messages call a column."""
+        """Returns what messages call a column."""
         name = self.names[index]
         if not name:
             return f"number {index + 1}"
         return repr(name) if self.names.count(name) == 1 else f"{name!r} (number {index + 1})"
 
     def reference(self, index: int) -> str | int:
-        """What a recipe calls a column: its heading where that is its own, else its number."""
+        """Returns what a recipe calls a column: its heading where that is its own, else its number."""
         name = self.names[index]
         return name if self.header and name and self.names.count(name) == 1 else index + 1
 
@@ -78,12 +79,12 @@ def is_number(cell: str) -> bool:
 
 
 def is_missing(cell: str) -> bool:
-    """Whether a cell spells "no value" as every recipe knows it."""
+    """Checks whether a cell spells "no value" as every recipe knows it."""
     return cell.lower() in MISSING or _SIGNS.fullmatch(cell) is not None
 
 
 def shape_of(lines: Sequence[str]) -> Shape | None:
-    """The table that the first lines of a file hold; `None` where they hold none of two columns."""
+    """Finds the table that the first lines of a file hold; `None` where they hold none of two columns."""
     filled = [(number, line) for number, line in enumerate(lines, start=1) if line.strip(" \t\x00\x1a")]
     tail = [line for _, line in filled[len(filled) // 2 :]][-_TAIL:]
     delimiter = _delimiter(tail)
@@ -96,8 +97,8 @@ def shape_of(lines: Sequence[str]) -> Shape | None:
     if width < 2 or not numeric or not any(is_row):
         return None
     first = is_row.index(True)
-    rows = [tuple(row) for row, kept in zip(cut[first:], is_row[first:], strict=True) if kept]
-    numbers = [number for (number, _), kept in zip(filled[first:], is_row[first:], strict=True) if kept]
+    rows = [tuple(row) for row, is_data in zip(cut[first:], is_row[first:], strict=True) if is_data]
+    numbers = [number for (number, _), is_data in zip(filled[first:], is_row[first:], strict=True) if is_data]
     names, units, preamble = _heading([line for line, _ in filled[:first]], cut[:first], width)
     header = numbers[0] - 1 - preamble if names else 0
     return Shape(
@@ -118,15 +119,15 @@ def _delimiter(lines: Sequence[str]) -> str | None:
         count, often = counts.most_common(1)[0] if counts else (0, 0)
         if count and often >= _AGREE * len(lines):
             return sign
-    found = _sniffed(lines)
-    if found is not None:
-        return found
+    delimiter = _sniffed(lines)
+    if delimiter is not None:
+        return delimiter
     count, often = Counter(len(line.split()) for line in lines).most_common(1)[0] if lines else (0, 0)
     return " " if count > 1 and often >= _AGREE * len(lines) else None
 
 
 def _sniffed(lines: Sequence[str]) -> str | None:
-    """The delimiter that DuckDB finds, where it cuts most lines alike."""
+    """Asks DuckDB for the delimiter, and takes it where it cuts most lines into equally many cells."""
     import duckdb  # costs a tenth of a second, and readers of records need none
 
     with tempfile.NamedTemporaryFile("w", suffix=".csv", encoding="utf-8") as file:
@@ -146,13 +147,13 @@ def _sniffed(lines: Sequence[str]) -> str | None:
 def _numeric(rows: Sequence[Sequence[str]], width: int) -> frozenset[int]:
     """Columns that hold numbers in most rows."""
     full = [row for row in rows if len(row) == width]
-    found = (
+    columns = (
         index
         for index in range(width)
         if sum(is_number(row[index]) or is_missing(row[index]) for row in full) >= _AGREE * len(full)
         and any(is_number(row[index]) for row in full)
     )
-    return frozenset(found)
+    return frozenset(columns)
 
 
 def _is_row(row: Sequence[str], numeric: frozenset[int]) -> bool:

@@ -70,85 +70,87 @@ class TimeFields:
 
 
 def find_time(shape: Shape, meanings: Sequence[Meaning], order: str | None) -> TimeFields | None:
-    """The time of a table, by its headings and its cells; `None` where no column reads as one.
+    """Finds the time of a table, by its headings and its cells; `None` where no column reads as one.
 
     A time of day is none beside a date that does not read: its days would be lost.
 
     Args:
         order: of dates of numbers alone, as the user gives it.
     """
-    dates = [i for i, one in enumerate(meanings) if one.kind == "date"]
-    times = [i for i, one in enumerate(meanings) if one.kind == "time"]
-    unnamed = [i for i, one in enumerate(meanings) if one.kind == "other" and not shape.names[i]][:2]
+    dates = [i for i, meaning in enumerate(meanings) if meaning.kind == "date"]
+    times = [i for i, meaning in enumerate(meanings) if meaning.kind == "time"]
+    unnamed = [i for i, meaning in enumerate(meanings) if meaning.kind == "other" and not shape.names[i]][:2]
     choices = [(d, t) for d in dates for t in times] + [(i,) for i in (*times, *dates, *unnamed)]
     choices += [(i, i + 1) for i in unnamed if i + 1 in unnamed]
     for columns in choices:
-        found = of_columns(shape, columns, order)
+        time = of_columns(shape, columns, order)
         dated = not dates or any(i in dates for i in columns)
-        if found is not None and (dated or not any(map(is_time_of_day, found.forms))):
+        if time is not None and (dated or not any(map(is_time_of_day, time.forms))):
             utc = any(meanings[i].utc for i in columns)
-            return TimeFields(columns=columns, forms=found.forms, zoned=found.zoned, utc=utc, evidence=found.evidence)
+            return TimeFields(columns=columns, forms=time.forms, zoned=time.zoned, utc=utc, evidence=time.evidence)
     return None
 
 
 def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: str | None = None) -> TimeFields | None:
-    """These columns as a time, in `form` or in all forms that fit; `None` where none does."""
+    """Reads these columns as a time, in `form` or in all forms that fit; `None` where none does."""
     texts = [" ".join(row[i] for i in columns) for row in shape.rows]
     texts = [text for text in texts if text.strip()]
     forms = [form] if form is not None else _candidates(texts, columns)
-    forms = [one for one in forms if form is not None or _reads_any(texts[:_LOOK], one)]
-    fitting = [one for one in forms if _reads(texts, one) and _ordered(one, order)]
+    forms = [candidate for candidate in forms if form is not None or _reads_any(texts[:_LOOK], candidate)]
+    fitting = [candidate for candidate in forms if _reads(texts, candidate) and _ordered(candidate, order)]
     if not fitting:
         return None
-    kept = _distinct(fitting, texts)
-    read = parse(texts, kept[0])[0]
+    distinct = _distinct(fitting, texts)
+    read = parse(texts, distinct[0])[0]
     evidence = f"the first is {texts[0]!r}"
-    swapped = [one for one in forms if _same_but_order(one, kept[0]) and one not in fitting]
-    if len(kept) == 1 and order is not None:
+    swapped = [candidate for candidate in forms if _same_but_order(candidate, distinct[0]) and candidate not in fitting]
+    if len(distinct) == 1 and order is not None:
         evidence = f"the order {order} was given"
-    elif len(kept) == 1 and swapped:
+    elif len(distinct) == 1 and swapped:
         bad = next(text for text in texts if not _reads([text], swapped[0]))
         evidence = f"{bad!r} is a date in this order alone"
-    return TimeFields(columns=columns, forms=kept, zoned=bool(read.utc[read.valid].all()), evidence=evidence)
+    return TimeFields(columns=columns, forms=distinct, zoned=bool(read.utc[read.valid].all()), evidence=evidence)
 
 
 def of_another_origin(time: TimeFields, meanings: Sequence[Meaning]) -> bool:
-    """Whether a count of Unix time stands below a heading that speaks of another origin."""
+    """Checks whether a count of Unix time stands below a heading that speaks of another origin."""
     words = {word for i in time.columns for word in meanings[i].plain.split()}
     return time.form in stamps.EPOCH and time.form not in words and bool(words & _OTHER_ORIGINS)
 
 
 def counts_of(text: str) -> str:
-    """The date that a number is by each count since an origin that reads it, for people; "" where none does."""
+    """Writes the date that a number is by each count since an origin that reads it; "" where none does."""
     read = {form: parse([text], form)[0] for form in (*stamps.EPOCH, *stamps.SERIAL)}
-    found = [f"{iso(int(one.ns[0])).removesuffix('Z')} as {form}" for form, one in read.items() if one.valid[0]]
-    return " or ".join(found)
+    dates = [
+        f"{iso(int(stamps.ns[0])).removesuffix('Z')} as {form}" for form, stamps in read.items() if stamps.valid[0]
+    ]
+    return " or ".join(dates)
 
 
 def unread_count(shape: Shape, meanings: Sequence[Meaning]) -> str:
-    """What the first number may be that stands below the heading of a time and that no form reads, for people."""
-    for index, one in enumerate(meanings):
+    """Describes what the first number may be that stands below the heading of a time and that no form reads."""
+    for index, meaning in enumerate(meanings):
         cell = shape.rows[0][index]
-        if one.kind not in ("time", "date") or not is_number(cell):
+        if meaning.kind not in ("time", "date") or not is_number(cell):
             continue
         if re.fullmatch(stamps.EXPONENT, cell):
             return f"; {shape.shown(index)} begins with {cell!r}, which was rounded: export it with all its digits"
-        if found := counts_of(cell):
-            return f"; {shape.shown(index)} begins with {cell!r}, which would be {found}"
+        if dates := counts_of(cell):
+            return f"; {shape.shown(index)} begins with {cell!r}, which would be {dates}"
     return ""
 
 
 def _candidates(texts: Sequence[str], columns: tuple[int, ...]) -> list[str]:
     first = texts[0] if texts else ""
     if _UNITS_OF_A_COUNT.fullmatch(first):
-        return [*stamps.EPOCH, *(one for one in _WHOLE if one != "iso")]
+        return [*stamps.EPOCH, *(form for form in _WHOLE if form != "iso")]
     dated = [f"{date} {clock}" for date in _DATES for clock in _CLOCKS]
     dated += _CLOCKS if len(columns) == 1 else ()
     return [*_WHOLE, *dated] if len(columns) > 1 or _CLOCK.search(first) else [*_WHOLE, *dated, *_DATES]
 
 
 def _reads_any(texts: Sequence[str], form: str) -> bool:
-    """Whether a form fits one of the first stamps by its letters, so that all are worth a look."""
+    """Checks whether a form fits one of the first stamps by its letters, so that all are worth a look."""
     if "%" not in form:
         return bool(parse(list(texts), form)[0].valid.any())
     day = "%Y-%m-%d " if is_time_of_day(form) else ""
@@ -157,8 +159,8 @@ def _reads_any(texts: Sequence[str], form: str) -> bool:
 
 
 def _reads(texts: Sequence[str], form: str) -> bool:
-    found = parse(list(texts), form)[0]
-    return bool(len(texts)) and float(found.valid.mean()) >= _FITS
+    stamps = parse(list(texts), form)[0]
+    return bool(len(texts)) and float(stamps.valid.mean()) >= _FITS
 
 
 def _letters(form: str) -> str:
@@ -166,30 +168,30 @@ def _letters(form: str) -> str:
 
 
 def _ordered(form: str, order: str | None) -> bool:
-    """Whether a form has the order that the user gave; one without numbers of day and month has any."""
+    """Checks whether a form has the order that the user gave; one without numbers of day and month has any."""
     letters = _letters(form)
     return order is None or len(letters) < 3 or letters == order
 
 
-def _same_but_order(one: str, other: str) -> bool:
+def _same_but_order(form: str, other_form: str) -> bool:
     return (
-        one != other
-        and sorted(_letters(one)) == sorted(_letters(other))
-        and _letters(one) != _letters(other)
-        and (re.sub(r"%[dmYy]", "", one) == re.sub(r"%[dmYy]", "", other))
+        form != other_form
+        and sorted(_letters(form)) == sorted(_letters(other_form))
+        and _letters(form) != _letters(other_form)
+        and (re.sub(r"%[dmYy]", "", form) == re.sub(r"%[dmYy]", "", other_form))
     )
 
 
 def _distinct(forms: Sequence[str], texts: Sequence[str]) -> tuple[str, ...]:
-    """The forms but for those that read the same instants as one before, where both read any."""
-    kept: dict[str, Stamps] = {}
+    """Drops the forms that read the same instants as one before, where both read any."""
+    distinct: dict[str, Stamps] = {}
     for form in forms:
         read = parse(list(texts), form)[0]
-        if not any(_alike(read, other) for other in kept.values()):
-            kept[form] = read
-    return tuple(kept)
+        if not any(_same_instants(read, earlier) for earlier in distinct.values()):
+            distinct[form] = read
+    return tuple(distinct)
 
 
-def _alike(one: Stamps, other: Stamps) -> bool:
-    both = one.valid & other.valid
-    return bool(both.any()) and bool((one.ns[both] == other.ns[both]).all())
+def _same_instants(first: Stamps, second: Stamps) -> bool:
+    valid = first.valid & second.valid
+    return bool(valid.any()) and bool((first.ns[valid] == second.ns[valid]).all())

@@ -20,7 +20,7 @@ Kind = Literal[
 
 
 def words_of(text: str) -> frozenset[str]:
-    """The words of a text, which stand between blanks."""
+    """Splits a text at blanks into its words."""
     return frozenset(text.split())
 
 
@@ -90,7 +90,7 @@ class Meaning:
 
 
 def meaning(name: str, below: str = "") -> Meaning:
-    """What a heading says, with the unit that may stand below it."""
+    """Reads what a heading says, with the unit that may stand below it."""
     bare, unit = _with_unit(name, below)
     split = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare).lower().replace("é", "e").replace("à", "a").replace("ó", "o")
     words = _WORD.findall(split.replace("_", " "))
@@ -111,13 +111,14 @@ def meaning(name: str, below: str = "") -> Meaning:
 
 
 def fits(channel: str, unit: str) -> bool:
-    """Whether a unit is one of a channel's."""
+    """Checks whether a unit is one of a channel's."""
     return unit in UNITS and UNITS[unit].si == CHANNELS[channel].unit
 
 
-def named_alike(one: Meaning, other: Meaning) -> bool:
-    """Whether a gust has the name of a speed: its words, but those of gusts and speeds, are among the other's."""
-    left, right = (set(a.plain.split()) - _EXTREME - _SPEED - {"mean", "avg", "average"} for a in (one, other))
+def named_alike(gust: Meaning, speed: Meaning) -> bool:
+    """Checks whether a gust has the name of a speed: its words, but those of gusts and speeds, are among the
+    other's."""
+    left, right = (set(a.plain.split()) - _EXTREME - _SPEED - {"mean", "avg", "average"} for a in (gust, speed))
     return left <= right
 
 
@@ -130,7 +131,7 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
         return "direction"
     if joined & _SPEED:
         return "speed"
-    axes: list[Kind] = [axis for word in words for axis, known in _AXES if word in known]
+    axes: list[Kind] = [axis for word in words for axis, vocabulary in _AXES if word in vocabulary]
     if axes and len(words) <= 3 and (unit is None or UNITS[unit].si == "m/s"):
         return axes[0]
     if joined & _WIND and (UNITS[unit].si == "m/s" if unit is not None else set(words) <= _WIND):
@@ -144,14 +145,14 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
         (_TIME, "time"),
         (_DATE, "date"),
     )
-    for known, kind in ordinary:
-        if joined & known:
+    for vocabulary, kind in ordinary:
+        if joined & vocabulary:
             return kind
     return "other"
 
 
 def _with_unit(name: str, below: str) -> tuple[str, str | None]:
-    """A heading without its unit, and the unit: in brackets, behind a comma or blank, or in the line below."""
+    """Splits a heading into name and unit, which stands in brackets, behind a comma or blank, or in the line below."""
     if (alone := spelled(name[:40])) is not None:
         return "", alone
     match = _BRACKET.match(name[:200])

@@ -94,7 +94,7 @@ class Canboat:
         return Guess(format=self.name, score=0.96 if wind else 0.3, reasons=reasons)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
-        """Read the wind messages of one device."""
+        """Reads the wind messages of one device."""
         where = str(source.path)
         network = _Network(options.talker)
         instrument = Instrument(
@@ -112,15 +112,15 @@ class Canboat:
                 where=where,
                 fix=f"choose one by its address, e.g. --talker {min(network.devices, key=int)}",
             )
-        found = tuple(finding for finding in reading.findings if finding.kind != "non-data-lines")
+        kept_findings = tuple(finding for finding in reading.findings if finding.kind != "non-data-lines")
         knots = [speed / UNITS["kn"].scale for speed in network.speeds]
         channels, about = settled(reading.channels, options, speeds=knots, source=f"PGN {_WIND}", where=where)
         sensor = Sensor(name=f"NMEA 2000 device {next(iter(network.devices))}", resolution=0.01)
-        return replace(reading, channels=channels, sensor=sensor, findings=(*found, about))
+        return replace(reading, channels=channels, sensor=sensor, findings=(*kept_findings, about))
 
 
 def split(line: str) -> tuple[str, str]:
-    """The stamp of a message, as ISO 8601, and the rest; JSON stays whole."""
+    """Splits a message into its stamp, as ISO 8601, and the rest; JSON stays whole."""
     text = line.strip()
     if text.startswith("{"):
         match = re.search(r"\"timestamp\"\s*:\s*\"" + _STAMP + r"\"", text[:400])
@@ -138,7 +138,7 @@ def split(line: str) -> tuple[str, str]:
 
 
 def _message(frame: re.Match[str]) -> str:
-    """A frame as canboat's raw line without its stamp."""
+    """Writes a frame as canboat's raw line without its stamp."""
     identifier, data = int(frame["id"], 16), bytes.fromhex(frame["bytes"].replace(" ", ""))
     number = (identifier >> 8) & 0x1FFFF
     # Below 240 the second byte is the address the message is sent to, and no part of its number.
@@ -238,12 +238,12 @@ class _Network:
 
 
 def _word(data: bytes, at: int, scale: float) -> float:
-    """An unsigned 16-bit field; NaN for the three numbers that mean no value."""
+    """Reads an unsigned 16-bit field; NaN for the three numbers that mean no value."""
     number = int.from_bytes(data[at : at + 2], "little")
     return number * scale if number < 0xFFFD else math.nan
 
 
 def _number(value: object) -> float:
-    """A number, alone or before its unit; NaN where there is none."""
+    """Reads a number, alone or before its unit; NaN where there is none."""
     match = re.match(r"-?\d+(?:\.\d+)?", str(value).strip())
     return float(match[0]) if match else math.nan

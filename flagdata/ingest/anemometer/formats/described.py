@@ -92,14 +92,14 @@ class Described:
         self.name = name
         self.text, self.open = opened(name)
         self.about: str = self.open.data["about"]
-        self.uses = frozenset({"zone", "date_order", *(["unit"] if self._whole() else [])})
+        self.uses = frozenset({"zone", "date_order", *(["unit"] if self._whole_in() else [])})
 
     def recognise(self, head: Head) -> Guess | None:
-        """The heading and the mark that the maker writes."""
-        found = find(self.open.data, head.lines)
-        if found is None:
+        """Recognises the heading and the mark that the maker writes."""
+        heading = find(self.open.data, head.lines)
+        if heading is None:
             return None
-        reason = f"line {found.at + 1} is as in every {self.about}: {head.lines[found.at].strip()[:100]}"
+        reason = f"line {heading.at + 1} is as in every {self.about}: {head.lines[heading.at].strip()[:100]}"
         return Guess(format=self.name, score=0.96, reasons=(reason,))
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
@@ -108,50 +108,55 @@ class Described:
         return self.finished(self.table(source, done, options).reading, done, options, where=str(source.path))
 
     def completed(self, source: TextFile, options: WindOptions) -> Completed:
-        """What the heading of a file states."""
-        return complete(self.open, source.head(_LINES), options, where=str(source.path), named=self.named)
+        """Reads what the heading of a file states."""
+        return complete(self.open, source.head(_LINES), options, where=str(source.path), rename=self.named)
 
     def named(self, heading: Heading, lines: Sequence[str]) -> Heading:
-        """The heading with the names by which the recipe knows its columns."""
+        """Returns the heading with the names by which the recipe knows its columns."""
         return heading
 
     def table(self, source: TextFile, done: Completed, options: WindOptions, extra: Sequence[str] = ()) -> Table:
-        """The rows below the heading, and further columns by their names."""
+        """Reads the rows below the heading, and further columns by their names."""
         rows, where = RowReader(source, done.recipe.file), str(source.path)
         return read_table(
-            rows, done.recipe, where=where, zone_name=options.zone, given=Given(clock=options.clock), extra=extra
+            rows,
+            done.recipe,
+            where=where,
+            zone_name=options.zone,
+            stamp_options=Given(clock=options.clock),
+            extra=extra,
         )
 
     def finished(self, reading: Reading, done: Completed, options: WindOptions, *, where: str) -> Reading:
-        """The reading with what the format states of averages, and what is reported of other columns."""
-        found = [*done.findings, *column_findings(done)]
+        """Adds to a reading what the format states of averages, and what is reported of other columns."""
+        findings = [*done.findings, *column_findings(done)]
         if done.averaged and len(reading.time) > 1:
             period = float(np.median(np.abs(np.diff(reading.time)))) / NANOSECONDS
             reading = replace(reading, sensor=replace(reading.sensor, averaging=period))
         if done.starts and reading.sensor.averaging:
             text = f"stamps are of the beginning of averages over {reading.sensor.averaging:g} s; kept as written"
-            found.append(Finding.of("stamps-at-start", text))
+            findings.append(Finding.of("stamps-at-start", text))
         if "described-by" in self.open.data:
-            found.append(described(self.open.data["described-by"]))
-        reading = with_horizontal(reading.with_findings(tuple(found)), options.azimuth, where=where)
+            findings.append(described(self.open.data["described-by"]))
+        reading = with_horizontal(reading.with_findings(tuple(findings)), options.azimuth, where=where)
         if not done.inferred:
             return replace(reading, described=self.text)
         return replace(reading, drafted=to_toml(done.data), understood=(self.about, done.inferred))
 
-    def _whole(self) -> bool:
+    def _whole_in(self) -> bool:
         layouts = self.open.data["channels"].values()
         return any("whole" in layout["unit"] for layout in layouts if isinstance(layout["unit"], Mapping))
 
 
 def complete(
-    open_recipe: OpenRecipe, lines: Sequence[str], options: WindOptions, *, where: str, named: Any = None
+    open_recipe: OpenRecipe, lines: Sequence[str], options: WindOptions, *, where: str, rename: Any = None
 ) -> Completed:
     """Complete a recipe by the heading of a file.
 
     Args:
         lines: the first lines of the file.
         options: `date_order` and `unit` count where the recipe and the heading state neither.
-        named: (heading, lines) → the heading with other names of its columns.
+        rename: (heading, lines) → the heading with other names of its columns.
 
     Raises:
         InputError: no such heading, no rows, a column that is not there or whose unit is not known.
@@ -161,13 +166,13 @@ def complete(
     heading = find(data, lines)
     if heading is None:
         fix = "export it again, or name another --as or --sensor"
-        raise InputError(f"no heading of a {data['about']}", where=f"{where}, line 1", fix=fix)
-    heading = named(heading, lines) if named is not None else heading
+        raise InputError(f"the file has no heading of a {data['about']}", where=f"{where}, line 1", fix=fix)
+    heading = rename(heading, lines) if rename is not None else heading
     rows = [row for row in cells_of_lines(lines[heading.rows :], heading.delimiter) if any(map(str.strip, row))]
     at_rows = f"{where}, line {heading.rows + 1}"
     facts = _facts(data, lines[: heading.rows + 1])
     stamped, zone = _stamped(data["time"], heading, facts, at_rows)
-    columns, found = _with_units(data, heading, rows, facts, stamped, options, where)
+    columns, units = _with_units(data, heading, rows, facts, stamped, options, where)
     taken, unread, rivals = _assigned(data["channels"], columns, where=where, heading=heading)
     if not rows:
         raise InputError("no rows below the heading", where=at_rows, fix="export again")
@@ -197,8 +202,8 @@ def complete(
         channels=taken,
         unread=unread,
         rivals=rivals,
-        findings=(*about_time, *found.notes),
-        inferred=found.inferred,
+        findings=(*about_time, *units.notes),
+        inferred=units.inferred,
         averaged=match.get("averaged", True),
         starts=begins,
     )
@@ -206,15 +211,15 @@ def complete(
 
 @cache
 def opened(name: str) -> tuple[str, OpenRecipe]:
-    """The text of a format of the catalog, and the recipe that it is."""
+    """Reads the text of a format of the catalog, and the recipe that it is."""
     text = _SHELF.named(name).text
     return text, recipes.parse_open(text, where=f"table format {name!r}")
 
 
 def _facts(data: Mapping[str, Any], lines: Sequence[str]) -> defaultdict[str, str]:
     text = "\n".join(lines).lstrip("\ufeff")
-    found = ((name, re.search(pattern, text, re.MULTILINE)) for name, pattern in data.get("facts", {}).items())
-    return defaultdict(str, {name: match[1].strip() for name, match in found if match})
+    matches = ((name, re.search(pattern, text, re.MULTILINE)) for name, pattern in data.get("facts", {}).items())
+    return defaultdict(str, {name: match[1].strip() for name, match in matches if match})
 
 
 def _file(
@@ -222,28 +227,28 @@ def _file(
 ) -> dict[str, Any]:
     commas = heading.delimiter != "," and any("," in row[at] for row in rows for at in read if at < len(row))
     # A line of units that names columns of its own leaves the heading no right count of cells.
-    named = bool(heading.cells) and not any(heading.below[len(heading.cells) :]) and heading.delimiter != " "
+    has_names = bool(heading.cells) and not any(heading.below[len(heading.cells) :]) and heading.delimiter != " "
     return {
         "decimal": "," if commas else ".",
         **file,
         "delimiter": heading.delimiter,
-        "preamble": heading.at if named else heading.rows,
-        "header": heading.rows - heading.at if named else 0,
+        "preamble": heading.at if has_names else heading.rows,
+        "header": heading.rows - heading.at if has_names else 0,
     }
 
 
 def _stamped(
     time: Mapping[str, Any], heading: Heading, facts: Mapping[str, str], where: str
 ) -> tuple[list[int], str | None]:
-    """The numbers of the columns of time, and the zone that the recipe or the file states."""
+    """Finds the columns of time, and the zone that the recipe or the file states."""
     columns: list[int] = []
     zone: str | None = time.get("zone", "").format_map(facts) or None
     for wanted in time["columns"]:
         if isinstance(wanted, int):
             columns.append(wanted)
             continue
-        named = ((at, match) for at, cell in enumerate(heading.cells, start=1) if (match := fits(wanted, cell)))
-        for at, match in islice(named, 1):
+        matching = ((at, match) for at, cell in enumerate(heading.cells, start=1) if (match := fits(wanted, cell)))
+        for at, match in islice(matching, 1):
             columns.append(at)
             zone = match.groupdict().get("zone") or zone
     if not columns:
@@ -260,7 +265,8 @@ def _format(
     options: WindOptions,
     where: str,
 ) -> tuple[str, tuple[Finding, ...]]:
-    """The format of stamps: the recipe's, the first of its formats that most fit, or that of the stamps themselves."""
+    """Chooses the format of stamps: the recipe's, the first of its formats that most fit, or that of the stamps
+    themselves."""
     forms = time.get("format", [])
     if isinstance(forms, str):
         return forms, ()
@@ -280,18 +286,18 @@ class _Units:
     inferred: str = ""
 
 
-def _known(text: str) -> str | None:
-    """The unit that an export spells as `text`; `None` where it is not known. Inches are of mercury here."""
+def _unit_of(text: str) -> str | None:
+    """Names the unit that an export spells as `text`; `None` where it is unknown. Inches are of mercury here."""
     bare = re.sub(r"^\s*[\[(](.*)[\])]\s*$", r"\1", text).strip()
     return "inHg" if bare.lower() in ("in", "inches") else spelled(bare)
 
 
 def _channel(channels: Mapping[str, Mapping[str, Any]], column: Column) -> str | None:
-    """The channel of a column by its name, or its number where the recipe gives one."""
+    """Finds the channel of a column by its name, or its number where the recipe gives one."""
     for name, layout in channels.items():
         wanted = layout["column"]
         names = wanted if isinstance(wanted, list) else [wanted]
-        if column.number in names or any(isinstance(one, str) and fits(one, column.name) for one in names):
+        if column.number in names or any(isinstance(name, str) and fits(name, column.name) for name in names):
             return name
     return None
 
@@ -305,10 +311,10 @@ def _with_units(
     options: WindOptions,
     where: str,
 ) -> tuple[list[Column], _Units]:
-    """The columns but those of time, with the units that they are read in."""
+    """Reads the units of all columns but those of time."""
     channels: Mapping[str, Mapping[str, Any]] = data["channels"]
     if not heading.cells:
-        columns = [Column(number=one["column"], name=name, unit=one["unit"]) for name, one in channels.items()]
+        columns = [Column(number=layout["column"], name=name, unit=layout["unit"]) for name, layout in channels.items()]
         return columns, _Units(notes=())
     columns, always = [], [f"{at}={heading.cells[at - 1]}" for at in stamped]
     strange, repaired, borrowed, inferred = [], [], "", ""
@@ -317,39 +323,41 @@ def _with_units(
         if column.number in stamped or channel is None:
             columns.extend([] if column.number in stamped else [column])
             continue
-        stated: str | Mapping[str, str] = channels[channel]["unit"]
-        if isinstance(stated, str):
-            columns.append(replace(column, unit=stated))
+        of_recipe: str | Mapping[str, str] = channels[channel]["unit"]
+        if isinstance(of_recipe, str):
+            columns.append(replace(column, unit=of_recipe))
             continue
         cells = [row[column.number - 1] for row in rows if len(row) >= column.number]
-        other, written = stated.get("else", ""), column.unit
+        otherwise, written = of_recipe.get("else", ""), column.unit
         text, bare = written, written.encode("ascii", "ignore").decode().strip()
-        if _known(written) is None and bare != written and (_known(bare) or not bare):
-            text = bare or other
-            repaired.append(f"{column.name}: {written!r} is read as {_known(text)}")
-        text = text or other.format_map(facts)
-        if other == text == "points" and not any(any(map(str.isalpha, cell)) for cell in cells):
+        if _unit_of(written) is None and bare != written and (_unit_of(bare) or not bare):
+            text = bare or otherwise
+            repaired.append(f"{column.name}: {written!r} is read as {_unit_of(text)}")
+        text = text or otherwise.format_map(facts)
+        if otherwise == text == "points" and not any(any(map(str.isalpha, cell)) for cell in cells):
             text = "deg"
-        if not text and "whole" in stated:
-            others = [one.number - 1 for one in heading.columns if "speed" in one.name.lower()]
-            speeds = [row[at] for row in rows for at in others if at < len(row)]
-            shown = _whole(cells, stated["whole"]) or _whole(speeds, stated["whole"])
-            text = options.unit or shown or ""
+        if not text and "whole" in of_recipe:
+            speed_cells = [
+                other_column.number - 1 for other_column in heading.columns if "speed" in other_column.name.lower()
+            ]
+            speeds = [row[at] for row in rows for at in speed_cells if at < len(row)]
+            inferred_unit = _whole_in(cells, of_recipe["whole"]) or _whole_in(speeds, of_recipe["whole"])
+            text = options.unit or inferred_unit or ""
             if not text:
                 message = f"the file states no unit of {column.name!r}, and its values do not show one"
                 fix = "give the one that was set: --unit m/s (or km/h, mph, kn)"
                 raise InputError(message, where=f"{where}, line {heading.at + 1}", fix=fix)
             if options.unit is None:
-                inferred = f"{column.name!r} in {text}: inferred, its values are whole {stated['whole']} converted"
-        borrowed = borrowed or (text if not written and "{" in other else "")
-        if other and heading.below:
-            always.append(f"{column.number}={channel}[{other}]")
-            known = _known(text)
-            right = known is not None and unit(known).si == CHANNELS[channel].unit
+                inferred = f"{column.name!r} in {text}: inferred, its values are whole {of_recipe['whole']} converted"
+        borrowed = borrowed or (text if not written and "{" in otherwise else "")
+        if otherwise and heading.below:
+            always.append(f"{column.number}={channel}[{otherwise}]")
+            unit_name = _unit_of(text)
+            right = unit_name is not None and unit(unit_name).si == CHANNELS[channel].unit
             strange.extend([] if right else [f"{column.name} in {written}"])
         columns.append(replace(column, unit=text))
     short = len(heading.cells) - len(heading.below)
-    if strange and (short > 0 or any("wind" in one for one in strange)):
+    if strange and (short > 0 or any("wind" in strange_text for strange_text in strange)):
         fewer = f", {short} fewer of them," if short > 0 else ""
         message = f"the units{fewer} do not stand below their names: {', '.join(strange[:3])}"
         fix = f'mend the line of units; or, since they are the same in every such file: --columns "{",".join(always)}"'
@@ -364,8 +372,9 @@ def _with_units(
     return columns, _Units(notes=tuple(notes), inferred=inferred)
 
 
-def _whole(cells: Iterable[str], counted: str) -> str | None:
-    """The unit in which all speeds are whole ones of `counted`, to one decimal; `None` unless there is just one."""
+def _whole_in(cells: Iterable[str], counted: str) -> str | None:
+    """Infers the unit in which all speeds are whole ones of `counted`, to one decimal; `None` unless there is just
+    one."""
     texts = {cell.strip().replace(",", ".") for cell in cells}
     speeds = {float(text) for text in texts if re.fullmatch(r"\d{1,3}(\.\d)?", text)} - {0.0}
     steps = {name: UNITS[counted].scale / UNITS[name].scale for name in _WINDS}
@@ -380,7 +389,7 @@ def _whole(cells: Iterable[str], counted: str) -> str | None:
 def _assigned(
     channels: Mapping[str, Mapping[str, Any]], columns: Sequence[Column], *, where: str, heading: Heading
 ) -> tuple[dict[str, Column], tuple[Column, ...], tuple[Column, ...]]:
-    """The column of each channel, those that are not read, and further ones of speed.
+    """Assigns a column to each channel; also returns the columns that are not read, and further ones of speed.
 
     Raises:
         InputError: a column that the recipe needs is not there, or its unit is not known.
@@ -395,7 +404,7 @@ def _assigned(
             rival = channel is not None and channel.startswith("wind_") and CHANNELS[channel].unit == "m/s"
             (rivals if rival else unread).extend([column] if column.name else [])
             continue
-        name = _known(column.unit)
+        name = _unit_of(column.unit)
         if name is None or unit(name).si != CHANNELS[channel].unit:
             if channel.startswith("wind_") or not channels[channel].get("optional"):
                 message = f"{column.name!r} is {channel}, but its unit is {column.unit!r}"
@@ -415,24 +424,24 @@ def _assigned(
 
 
 def _sensor(sensor: Mapping[str, Any], facts: Mapping[str, str]) -> dict[str, Any]:
-    """The sensor's keys with facts in their texts; a height that the file does not state is left out."""
+    """Fills facts into the texts of the sensor's keys; a height that the file does not state is left out."""
     texts = {key: value.format_map(facts).strip() for key, value in sensor.items() if isinstance(value, str)}
     height = {"height": float(texts.pop("height"))} if texts.get("height") else {}
     return {**sensor, **{key: value for key, value in texts.items() if key != "height"}, **height}
 
 
 def _checks(checks: Sequence[Mapping[str, Any]], heading: Heading) -> list[dict[str, Any]]:
-    """The checks of columns that the file has."""
-    found: list[dict[str, Any]] = []
-    for one in checks:
-        column = one["column"]
+    """Selects the checks of columns that the file has."""
+    present: list[dict[str, Any]] = []
+    for check in checks:
+        column = check["column"]
         column = heading.cells.index(column) + 1 if column in heading.cells else column
-        found.extend([{**one, "column": column}] if isinstance(column, int) else [])
-    return found
+        present.extend([{**check, "column": column}] if isinstance(column, int) else [])
+    return present
 
 
 def column_findings(done: Completed) -> tuple[Finding, ...]:
-    """What is to be said of the columns that are not read, anemometers first."""
+    """Reports the columns that are not read, anemometers first."""
     findings: list[Finding] = []
     if done.rivals:
         used = next(done.channels[name].name for name in ("wind_speed", "wind_x") if name in done.channels)
@@ -450,8 +459,8 @@ def column_findings(done: Completed) -> tuple[Finding, ...]:
     if done.unread:
         # Columns that speak of the wind come first, so that none of them is lost among a hundred others.
         names = sorted((column.name for column in done.unread), key=lambda name: "wind" not in name.lower())
-        more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-        message = ", ".join(name[:_WIDE] for name in names[:_NAMED]) + more
+        further = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+        message = ", ".join(name[:_WIDE] for name in names[:_NAMED]) + further
         findings.append(Finding.of("columns-not-read", message, count=len(names)))
     return tuple(findings)
 

@@ -38,7 +38,8 @@ class HostStamped:
     uses = frozenset({"zone", "azimuth"})
 
     def recognise(self, head: Head) -> Guess | None:
-        """Below a header that speaks of raw lines, the recipe whose fields most lines have, within its ranges."""
+        """Recognises raw lines below a header that speaks of them: by the recipe whose fields most lines have, within
+        its ranges."""
         lines = [line for line in head.lines if _STAMP.match(line)]
         first = head.lines[0] if head.lines else ""
         if len(lines) < max(1, len(head.lines) // 2) or lines[0] == first or not _RAW.search(first.partition(",")[2]):
@@ -74,21 +75,21 @@ class HostStamped:
         rows = HostRows(source, recipe)
         where = str(source.path)
         reading = read_table(
-            rows, recipe, where=where, zone_name=options.zone, given=Given(clock=options.clock)
+            rows, recipe, where=where, zone_name=options.zone, stamp_options=Given(clock=options.clock)
         ).reading
         return with_horizontal(reading, options.azimuth, where=where)
 
 
 def _shape(recipe: Recipe) -> re.Pattern[str]:
-    """What a raw line of data looks like: numbers in the columns of channels and time, anything in others.
+    """Builds the pattern of a raw line of data: numbers in the columns of channels and time, anything in others.
 
     A recipe that uses every column up to its last takes lines of that many fields alone; one that leaves columns out
     takes longer lines too.
     """
     numeric = {int(c.column) for c in recipe.channels.values()} | {int(c) for c in recipe.time.columns}
     last = max(numeric | {int(c.column) for c in recipe.checks})
-    between, one = re.escape(recipe.file.delimiter), _FIELD.format(mark=re.escape(recipe.file.decimal))
-    fields = [one if column in numeric else f"[^{between}]*+" for column in range(1, last + 1)]
+    between, number = re.escape(recipe.file.delimiter), _FIELD.format(mark=re.escape(recipe.file.decimal))
+    fields = [number if column in numeric else f"[^{between}]*+" for column in range(1, last + 1)]
     rest = "" if len(numeric) == last else f"(?:{between}.*)?"
     return re.compile(f"^{between.join(fields)}{rest}$")
 
@@ -133,7 +134,7 @@ class HostRows:
         self.first_line = recipe.file.header + 1
 
     def blocks(self, width: int) -> Iterator[tuple[IntArray, list[list[str]]]]:
-        """Line numbers and rows of `width` cells."""
+        """Yields line numbers and rows of `width` cells."""
         delimiter = self._layout.delimiter
         for first, lines in self._source.blocks():
             numbers: list[int] = []
@@ -159,20 +160,20 @@ class HostRows:
         Raises:
             InputError: hardly any line is data.
         """
-        other = len(self._other)
-        if not other:
+        left_out = len(self._other)
+        if not left_out:
             return ()
-        if self._read < LEAST * (self._read + other):
+        if self._read < LEAST * (self._read + left_out):
             raise InputError(
-                f"{other} of {other + self._read} lines do not have the fields of the recipe",
+                f"{left_out} of {left_out + self._read} lines do not have the fields of the recipe",
                 where=f"{self._source.path}, line {self._other[0]}",
                 fix="check the recipe, or the device's settings",
             )
         return (
             Finding.of(
                 "non-data-lines",
-                f"{other} lines without the fields of a reading (counters, menus, fragments); left out",
-                count=other,
+                f"{left_out} lines without the fields of a reading (counters, menus, fragments); left out",
+                count=left_out,
                 where=f"line {self._other[0]}",
             ),
         )

@@ -153,16 +153,16 @@ class Telegrams:
             texts = {key: (text, letter) for key, text, letter in pairs[:: -1 if maker.first_counts else 1]}
         if self._lacks(texts):
             return Defect[maker.lacking]
-        stated = maker.stated_units.get(groups.get("unit") or "", self._unit)
-        if maker.stated_units and stated is None:
+        stated_unit = maker.stated_units.get(groups.get("unit") or "", self._unit)
+        if maker.stated_units and stated_unit is None:
             return Defect.UNIT
         sound = not maker.right or groups.get("status") in (None, *maker.right)
         values: dict[str, float] = {}
         for key in texts.keys() & maker.fields.keys():
-            (text, letter), known = texts[key], maker.fields[key]
-            unit = known.unit or (known.units.get(letter) if known.units else stated)
+            (text, letter), field = texts[key], maker.fields[key]
+            unit = field.unit or (field.units.get(letter) if field.units else stated_unit)
             if unit is not None:
-                values[key] = self._si(text, unit, known.factor, pairs="pairs" in groups)
+                values[key] = self._si(text, unit, field.factor, pairs="pairs" in groups)
             elif any(key in names for names in self._needs):
                 if letter != maker.invalid:
                     return Defect.CUT
@@ -174,8 +174,8 @@ class Telegrams:
 
     def _lacks(self, texts: Mapping[str, object]) -> bool:
         maker = self._maker
-        whole = not self._needs or any(names <= texts.keys() for names in self._needs)
-        return not whole or len(texts) < maker.fewest or bool(maker.unread and texts.keys() - self._names)
+        complete = not self._needs or any(names <= texts.keys() for names in self._needs)
+        return not complete or len(texts) < maker.fewest or bool(maker.unread and texts.keys() - self._names)
 
     def _si(self, text: str, unit: str, factor: float, *, pairs: bool) -> float:
         if self._missing.fullmatch(text):

@@ -45,7 +45,7 @@ class Bursts:
     ends: int = 0
 
     def sentence(self, kind: str, line: int) -> None:
-        """A sentence, in the order of the lines."""
+        """Adds a sentence, in the order of the lines."""
         if not self.first:
             self.first, self.begins = kind, line
         self.ends = line
@@ -61,21 +61,22 @@ class Bursts:
             at: (m,) lines of the marks.
             marks: (m,) their instants, rising.
         """
-        if len(marks) < _MARKS or not _apart(lines, winds, at, marks):
+        if len(marks) < _MARKS or not _are_bursts(lines, winds, at, marks):
             return None
         edges = self._edges(at)
         # Of the burst before the first mark only the end may be there.
-        known = np.concatenate(([marks[0] - int(np.median(np.diff(marks)))], marks)).astype(np.int64)
+        starts_of_bursts = np.concatenate(([marks[0] - int(np.median(np.diff(marks)))], marks)).astype(np.int64)
         burst = np.searchsorted(edges, lines, side="right")
-        each = np.unique(np.stack([burst, _numbered(winds)]), axis=1).shape[1] == len(lines)
-        if not each or at[0] - self.begins > 2 * np.median(np.diff(at)):
+        distinct = np.unique(np.stack([burst, _numbered(winds)]), axis=1).shape[1] == len(lines)
+        if not distinct or at[0] - self.begins > 2 * np.median(np.diff(at)):
             return None
-        time = known[burst]
+        time = starts_of_bursts[burst]
         first = np.searchsorted(burst, burst)
         return time + (np.arange(len(lines)) - first) * _ORDER
 
     def _edges(self, at: IntArray) -> IntArray:
-        """(m,) the first line of each burst: that of its mark, or the first after the last mark that begins a burst.
+        """Finds (m,) the first line of each burst: that of its mark, or the first after the last mark that begins a
+        burst.
 
         The stream is taken to begin with a whole burst, unless it ends with as many lines behind its last mark as
         there are between marks: then a burst begins with its mark.
@@ -85,9 +86,9 @@ class Bursts:
             return at
         starts = np.array(self.starts, dtype=np.int64)
         after = np.concatenate(([self.begins], at[:-1] + 1))
-        place = np.searchsorted(starts, after)
-        found = np.where(place < len(starts), starts[np.minimum(place, len(starts) - 1)], at)
-        return np.where(found <= at, found, at)
+        indices = np.searchsorted(starts, after)
+        first_lines = np.where(indices < len(starts), starts[np.minimum(indices, len(starts) - 1)], at)
+        return np.where(first_lines <= at, first_lines, at)
 
 
 def _numbered(winds: Sequence[Hashable]) -> IntArray:
@@ -95,8 +96,8 @@ def _numbered(winds: Sequence[Hashable]) -> IntArray:
     return np.array([kinds[kind] for kind in winds], dtype=np.int64)
 
 
-def _apart(lines: IntArray, winds: Sequence[Hashable], at: IntArray, marks: Instants) -> bool:
-    """Whether marks are far apart for the lines between them, and each kind of wind comes once between them."""
+def _are_bursts(lines: IntArray, winds: Sequence[Hashable], at: IntArray, marks: Instants) -> bool:
+    """Checks whether marks are far apart for the lines between them, and each kind of wind comes once between them."""
     spacing, between = float(np.median(np.diff(marks))), float(np.median(np.diff(at)))
     if spacing < max(_LEAST, _SILENT * between * SENTENCE):
         return False
@@ -153,7 +154,7 @@ class TimeLine:
     """First date the stream states: its line, time of day [ns] and date."""
 
     def add(self, kind: str, line: int, mark: TimeMark) -> None:
-        """A time sentence. Dates that no calendar has are left out."""
+        """Adds a time sentence. Dates that no calendar has are left out."""
         self.line.setdefault(kind, []).append(line)
         self.clock.setdefault(kind, []).append(mark.clock)
         if mark.date is not None and self.dated is None:
@@ -224,13 +225,13 @@ class TimeLine:
         )
 
     def _single(self) -> str | None:
-        """The kind of the one mark of the stream; `None` where there are more or none."""
+        """Returns the kind of the one mark of the stream; `None` where there are more or none."""
         if any(len(lines) > 1 for lines in self.line.values()):
             return None
         return next((kind for kind in _TRUST if kind in self.line), None)
 
     def _of_one(self, kind: str, lines: IntArray, *, date: dt.date | None, where: str) -> Placed:
-        """Instants of a few lines about one mark: within the second before or behind it, in their order."""
+        """Dates a few lines about one mark: within the second before or behind it, in their order."""
         at = np.array(self.line[kind], dtype=np.int64)
         clock = np.array(self.clock[kind], dtype=np.int64)
         mark = self._start(at, clock, np.zeros(1, dtype=np.int64), date, where) * DAY + int(clock[0])
@@ -260,11 +261,11 @@ class TimeLine:
                     fix="give the date (UTC) of its first sentence: --date 2026-05-01",
                 )
             return date.toordinal() - epoch
-        line, time, stated = self.dated
+        line, time, date_of_mark = self.dated
         nearest = int(np.argmin(np.abs(at - line)))
         # The dated sentence may lie across midnight from its nearest mark.
         across = round((int(clock[nearest]) - time) / DAY)
-        start = stated.toordinal() - epoch - int(day[nearest]) - across
+        start = date_of_mark.toordinal() - epoch - int(day[nearest]) - across
         if date is not None and date.toordinal() - epoch != start:
             raise UsageError(
                 f"the date {date} was given, but the stream begins on {dt.date.fromordinal(start + epoch)}",
@@ -275,7 +276,7 @@ class TimeLine:
 
 
 def _reach(lines: IntArray, mark: int) -> int:
-    """How many lines the farthest of `lines` is from a mark."""
+    """Counts how many lines the farthest of `lines` is from a mark."""
     return int(np.abs(lines - mark).max()) if len(lines) else 0
 
 
@@ -288,12 +289,12 @@ def _one_clock(marks: Instants, at: IntArray, choice: ClockChoice | None) -> tup
     jumps = jumps if len(jumps) <= clocks.MOST else ()
     out = marks.copy()
     out[settled], _ = clocks.continued(marks[settled], jumps, choice)
-    found = clocks.report(marks[settled], jumps, at[settled], choice)
+    findings = clocks.report(marks[settled], jumps, at[settled], choice)
     if stray.any():
         out[stray] = out[settled[np.maximum(np.searchsorted(settled, np.flatnonzero(stray)) - 1, 0)]]
         message = f"{int(stray.sum())} times of the stream leave its course and come back to it; not used"
-        found = (*found, _backwards(int(stray.sum()), f"line {at[stray][0]}", message))
-    return out, found
+        findings = (*findings, _backwards(int(stray.sum()), f"line {at[stray][0]}", message))
+    return out, findings
 
 
 def _backwards(count: int, where: str, what: str) -> Finding:
@@ -305,8 +306,8 @@ def _interpolate(lines: IntArray, at: IntArray, marks: IntArray) -> Instants:
     base = int(marks[0])
     relative = (marks - base).astype(np.float64)
     pace = float(np.median(np.diff(relative) / np.diff(at)))
-    place = lines.astype(np.float64)
-    out = np.interp(place, at.astype(np.float64), relative)
-    out = np.where(lines < at[0], (place - at[0]) * pace, out)
-    out = np.where(lines > at[-1], relative[-1] + (place - at[-1]) * pace, out)
+    position = lines.astype(np.float64)
+    out = np.interp(position, at.astype(np.float64), relative)
+    out = np.where(lines < at[0], (position - at[0]) * pace, out)
+    out = np.where(lines > at[-1], relative[-1] + (position - at[-1]) * pace, out)
     return base + np.round(out).astype(np.int64)

@@ -26,7 +26,7 @@ import numpy as np
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.formats.marks import NO_TIME, NO_TIME_FIX, Placed, TimeLine
+from flagdata.ingest.anemometer.formats.marks import NO_TIME_FIX, Placed, TimeLine
 from flagdata.ingest.anemometer.formats.sentences import (
     SPEED_UNITS,
     ChecksumError,
@@ -127,9 +127,9 @@ class Nmea:
         if right < max(1, len(head.lines) // 2):
             return None
         sure = " with right checksums" if checked == right else f", {checked or 'none'} of them with a checksum"
-        more = f"; {wrong} more have a wrong one" if wrong or checked else ""
+        wrong_ones = f"; {wrong} more have a wrong one" if wrong or checked else ""
         reasons = (
-            f"{right} of the first {len(head.lines)} lines are NMEA 0183 sentences{sure}{more}",
+            f"{right} of the first {len(head.lines)} lines are NMEA 0183 sentences{sure}{wrong_ones}",
             f"{wind} of them are wind ({', '.join(WINDS)})",
         )
         fix = None if wind else no_wind(head.lines, self.name)
@@ -151,7 +151,7 @@ class Nmea:
 def gathered(
     source: TextFile, options: WindOptions, divide: Callable[[int, str], str], *, timed: bool = False
 ) -> Stream:
-    """The wind sentences of one talker.
+    """Gathers the wind sentences of one talker.
 
     Args:
         divide: number and text of a line → the sentence in it.
@@ -178,7 +178,7 @@ def gathered(
         message = f"several talkers send wind: {', '.join(sorted(talkers))}; they are different instruments"
         fix = f"choose one, e.g. --talker {talkers.most_common(1)[0][0]}"
         if not timed and not stream.times.line:
-            raise InputError(f"{message}, and {NO_TIME}", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
+            raise InputError(f"{message}, and the lines have no time", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
         raise InputError(message, where=where, fix=fix)
     if options.clock == "sort":
         fix = "give --clock first or --clock last, or leave it out"
@@ -187,7 +187,7 @@ def gathered(
 
 
 def reading_of(stream: Stream, time: Instants, options: WindOptions, *, where: str) -> Reading:
-    """The sentences of a stream at these instants (n,).
+    """Builds the reading of a stream's sentences at these instants (n,).
 
     Raises:
         InputError: all are empty, or a platform that was given as fixed moves.
@@ -252,11 +252,11 @@ def _take(stream: Stream, line: str, at: int, talker: str | None) -> None:
 
 def _take_others(stream: Stream) -> None:
     """Sentences of older kinds, of each wind that the stream holds in no other."""
-    known = {name for row in stream.values for name in row}
+    channels = {name for row in stream.values for name in row}
     added = False
     for sentence, at in stream.others:
         kind = _OTHERS[sentence.kind]
-        if f"{kind}_speed" in known:
+        if f"{kind}_speed" in channels:
             stream.beside[sentence.kind] += 1
             continue
         added = True
@@ -266,7 +266,7 @@ def _take_others(stream: Stream) -> None:
 
 
 def _leave_silent(stream: Stream) -> None:
-    """Leave out the sentences of talkers whose wind is empty in all of them, where another talker has one."""
+    """Leaves out the sentences of talkers whose wind is empty in all of them, where another talker has one."""
     speaking = {talker for talker, row in zip(stream.talkers, stream.values, strict=True) if row}
     if speaking:
         stream.silent = Counter(talker for talker in stream.talkers if talker not in speaking)
@@ -281,7 +281,7 @@ def keep(stream: Stream, order: Sequence[int]) -> None:
 
 
 def _wind(stream: Stream, sentence: Sentence, at: int) -> None:
-    """The wind of one sentence.
+    """Reads the wind of one sentence.
 
     MWV: the angle from the bow, R or T, the speed, its unit, a status. MWD: the direction true and magnetic, the speed
     in knots and m/s. VWR and VWT: the angle to the left or right of the bow, the speed in knots, m/s and km/h. MDA: of
@@ -318,18 +318,18 @@ def _wind(stream: Stream, sentence: Sentence, at: int) -> None:
 
 
 def _speed(fields: Sequence[str]) -> float | None:
-    """The speed that pairs of a value and a letter hold [m/s], by the one that is written most finely."""
-    known: list[tuple[float, float]] = []
+    """Reads the speed that pairs of a value and a letter hold [m/s], by the one that is written most finely."""
+    speeds: list[tuple[float, float]] = []
     for text, letter in zip(fields[0::2], fields[1::2], strict=False):
         value, unit = number(text), SPEED_UNITS.get(letter)
         if value is not None and unit is not None:
             scale = UNITS[unit].scale
-            known.append((scale * 10.0 ** -len(text.strip().partition(".")[2]), value * scale))
-    return min(known)[1] if known else None
+            speeds.append((scale * 10.0 ** -len(text.strip().partition(".")[2]), value * scale))
+    return min(speeds)[1] if speeds else None
 
 
 def _kinds(stream: Stream, time: Instants) -> tuple[Finding, ...]:
-    """How many sentences of each kind of wind there are, and how far apart, where a stream holds several kinds."""
+    """Counts the sentences of each kind of wind, and how far apart they are, where a stream holds several kinds."""
     parts: list[str] = []
     for prefix, kind in (("apparent_wind", "relative"), ("theoretical_wind", "theoretical"), ("wind", "over ground")):
         name = f"{kind} ({_sources(stream, prefix)})"
@@ -345,12 +345,12 @@ def _kinds(stream: Stream, time: Instants) -> tuple[Finding, ...]:
 
 
 def _sources(stream: Stream, wind: str) -> str:
-    """The sentences that a wind was read from."""
+    """Names the sentences that a wind was read from."""
     return " and ".join(sorted(stream.sources[wind]))
 
 
 def no_wind(lines: Sequence[str], format_name: str) -> str:
-    """What to do with a log of which no sentence in these first lines is of wind."""
+    """Explains what to do with a log of which no sentence in these first lines is of wind."""
     kinds: Counter[str] = Counter()
     for line in lines:
         with suppress(ChecksumError):
@@ -368,7 +368,7 @@ def _others_seen(kinds: Counter[str]) -> str:
 
 
 def _placed(count: int, placed: Placed) -> tuple[Finding, ...]:
-    """Finding on sentences that have their time from others."""
+    """Reports sentences that have their time from others."""
     if placed.marks < 2:
         return placed.findings
     kind, message = (
@@ -461,13 +461,15 @@ class StampedNmea:
             stamp, raw = split_stamp(line)
             if stamp and raw.startswith(("$", "!")):
                 texts[number] = stamp
-                said = _mark(raw)
-                marks.update({} if said is None else {number: said})
+                instant = _mark(raw)
+                marks.update({} if instant is None else {number: instant})
             return raw
 
         stream = gathered(source, options, divide, timed=True)
         if not texts:
-            raise InputError("no NMEA 0183 sentence after a stamp", where=where, fix="name another format by --as")
+            raise InputError(
+                "no line has an NMEA 0183 sentence after a stamp", where=where, fix="name another format by --as"
+            )
         stamps = stamps_of(list(texts.values()))
         line = np.array(list(texts), dtype=np.int64)[stamps.valid]
         time, findings = instants(
@@ -486,23 +488,23 @@ class StampedNmea:
 
 
 def _mark(text: str) -> int | None:
-    """The instant [UTC ns] that a sentence states; `None` for one without a date, and for a damaged one."""
+    """Reads the instant [UTC ns] that a sentence states; `None` for one without a date, and for a damaged one."""
     if not text[3:7].startswith(("ZDA,", "RMC,")):
         return None
     try:
         sentence = split(text)
     except ChecksumError:
         return None
-    said = None if sentence is None else time_mark(sentence)
-    if said is None or said.date is None:
+    mark = None if sentence is None else time_mark(sentence)
+    if mark is None or mark.date is None:
         return None
-    day = np.datetime64("-".join(f"{part:02d}" for part in said.date), "D").astype(np.int64)
-    return int(day) * 86_400 * NANOSECONDS + said.clock
+    day = np.datetime64("-".join(f"{part:02d}" for part in mark.date), "D").astype(np.int64)
+    return int(day) * 86_400 * NANOSECONDS + mark.clock
 
 
 def _receiver(stamps: Mapping[int, int], marks: Mapping[int, int]) -> tuple[Finding, ...]:
-    """The finding about a satellite receiver whose time is another than that of the stamps; none where they agree."""
-    off = [(at, (said - stamps[at]) / NANOSECONDS) for at, said in marks.items() if at in stamps]
+    """Reports a satellite receiver whose time is another than that of the stamps; nothing where they agree."""
+    off = [(at, (mark - stamps[at]) / NANOSECONDS) for at, mark in marks.items() if at in stamps]
     median = float(np.median([seconds for _, seconds in off])) if off else 0.0
     if abs(median) < _REPORTED:
         return ()

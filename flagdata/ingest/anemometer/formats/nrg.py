@@ -58,19 +58,19 @@ class Nrg(Described):
 
 def _history(lines: Sequence[str]) -> Mapping[str, Mapping[str, str]]:
     """Facts of each channel by its number; the latest where there are several."""
-    found: dict[str, dict[str, str]] = {}
+    facts: dict[str, dict[str, str]] = {}
     channel: dict[str, str] = {}
     for line in lines:
         key, _, value = (part.strip() for part in line.partition(":"))
         if key.lower() == "channel":
-            channel = found[value] = {}
+            channel = facts[value] = {}
         elif value:
             channel[key.lower()] = value
-    return found
+    return facts
 
 
 def _column(column: Column, history: Mapping[str, Mapping[str, str]]) -> Column:
-    """A column called by what its channel is and measures; a statistic other than the mean keeps its own name."""
+    """Names a column by what its channel is and measures; a statistic other than the mean keeps its own name."""
     match = _NAME.fullmatch(column.name[:200])
     if match is None:
         return column

@@ -31,11 +31,11 @@ class Format(Protocol):
     uses: frozenset[str]
 
     def recognise(self, head: Head) -> Guess | None:
-        """Whether the first lines look like this format, and why; `None` where nothing does."""
+        """Checks whether the first lines look like this format, and says why; `None` where nothing does."""
         ...
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
-        """All rows in the order of the file, in SI, instants in UTC nanoseconds. Raises FlagdataError only."""
+        """Reads all rows in the order of the file, in SI, instants in UTC nanoseconds. Raises FlagdataError only."""
         ...
 
 
@@ -43,7 +43,7 @@ _CONTRACT = ("name", "about", "uses", "recognise", "read")
 
 
 def _class(entry: object) -> object:
-    """What makes the reader: an entry is a class, or a class with arguments."""
+    """Returns what makes the reader: an entry is a class, or a class with arguments."""
     return entry.func if isinstance(entry, partial) else entry
 
 

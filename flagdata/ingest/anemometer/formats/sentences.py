@@ -42,12 +42,12 @@ class ChecksumError(ValueError):
 
 
 def checksum(text: str) -> int:
-    """XOR of all characters between "$" and "*"."""
+    """Computes the XOR of all characters between "$" and "*"."""
     return reduce(xor, text.encode("latin-1", "replace"), 0)
 
 
 def split(line: str) -> Sentence | None:
-    """The sentence that ends a line, whatever stands before it; `None` where there is none.
+    """Finds the sentence that ends a line, whatever stands before it; `None` where there is none.
 
     Raises:
         ChecksumError: its checksum does not match.
@@ -56,23 +56,23 @@ def split(line: str) -> Sentence | None:
     match = _SENTENCE.match(line, start) if start >= 0 else None
     if match is None:
         return None
-    talker, kind, fields, stated = match.groups()
-    if stated is not None and checksum(f"{talker}{kind}{fields}") != int(stated, 16):
+    talker, kind, fields, stated_checksum = match.groups()
+    if stated_checksum is not None and checksum(f"{talker}{kind}{fields}") != int(stated_checksum, 16):
         raise ChecksumError(line)
-    return Sentence(talker=talker, kind=kind, fields=tuple(fields.split(",")[1:]), checked=stated is not None)
+    return Sentence(talker=talker, kind=kind, fields=tuple(fields.split(",")[1:]), checked=stated_checksum is not None)
 
 
 def tag_time(line: str) -> int | None:
-    """Unix milliseconds of a TAG block before the sentence, `None` where there is none that is whole."""
+    """Reads Unix milliseconds of a TAG block before the sentence, `None` where there is none that is whole."""
     match = _TAG.match(line)
     if match is None or checksum(match[1]) != int(match[2], 16):
         return None
-    found = _TAG_TIME.search(match[1])
-    return None if found is None else int(found[1]) * 1000 + int(found[2] or 0)
+    time = _TAG_TIME.search(match[1])
+    return None if time is None else int(time[1]) * 1000 + int(time[2] or 0)
 
 
 def number(text: str) -> float | None:
-    """A decimal field, `None` where it is empty or no number."""
+    """Reads a decimal field, `None` where it is empty or no number."""
     return float(text) if _NUMBER.match(text.strip()) else None
 
 
@@ -99,7 +99,7 @@ class TimeMark:
 
 
 def time_mark(sentence: Sentence) -> TimeMark | None:
-    """The time in a ZDA, RMC, GGA or GLL sentence, `None` where it has none."""
+    """Reads the time in a ZDA, RMC, GGA or GLL sentence, `None` where it has none."""
     read = _TIMES.get(sentence.kind)
     return None if read is None else read(sentence.fields)
 
@@ -143,7 +143,7 @@ _TIMES: Mapping[str, Callable[[tuple[str, ...]], TimeMark | None]] = {
 
 
 def speed_over_ground(sentence: Sentence) -> float | None:
-    """Speed over ground [kn] in VTG or RMC, `None` where there is none."""
+    """Reads the speed over ground [kn] in VTG or RMC, `None` where there is none."""
     if sentence.kind == "VTG":
         fields = sentence.fields
         for at in range(len(fields) - 1):

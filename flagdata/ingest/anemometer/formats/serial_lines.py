@@ -137,7 +137,8 @@ class _Gathered:
 
 @lru_cache(maxsize=2048)
 def split_stamp(line: str) -> tuple[str, str]:
-    """The stamp that a computer wrote before a line ("" where there is none), and the line, out of its quotes.
+    """Splits a line into the stamp that a computer wrote before it ("" where there is none) and the rest, out of its
+    quotes.
 
     The stamp of an NMEA sentence may stand anywhere in its line.
     """
@@ -162,16 +163,16 @@ def split_stamp(line: str) -> tuple[str, str]:
     match = _EPOCH.match(line)
     if match is not None:
         return match["epoch"], _unquoted(match["raw"])
-    found = _SENTENCE.findall(line)
-    if len(found) == 1:
+    sentences = _SENTENCE.findall(line)
+    if len(sentences) == 1:
         stamp = _stamp_of(_SENTENCE.sub(" ", line))
         if stamp:
-            return stamp, found[0]
+            return stamp, sentences[0]
     return "", _unquoted(line)
 
 
 def _stamp_of(text: str) -> str:
-    """The stamp in a line without its sentence; "" where there is none."""
+    """Returns the stamp in a line without its sentence; "" where there is none."""
     if (match := _ANYWHERE.search(text)) is not None:
         zone = "Z" if match["zone"] == "UTC" else match["zone"] or ""
         return f"{match['date'].replace('/', '-')}T{match['time'].replace(',', '.')}{zone}"
@@ -181,7 +182,7 @@ def _stamp_of(text: str) -> str:
 
 
 def most_stamped(head: Head) -> bool:
-    """Whether most lines are an NMEA 0183 sentence after a computer's stamp."""
+    """Checks whether most lines are an NMEA 0183 sentence after a computer's stamp."""
     lines = without_comments(head.lines)
     split = [split_stamp(line) for line in lines]
     stamped = sum(bool(stamp) and raw.startswith(("$", "!")) for stamp, raw in split)
@@ -189,12 +190,12 @@ def most_stamped(head: Head) -> bool:
 
 
 def without_comments(lines: Sequence[str]) -> list[str]:
-    """The lines without those that a program marked as its own, by "#"."""
+    """Returns the lines without those that a program marked as its own, by "#"."""
     return [line for line in lines if not is_comment(line)]
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is marked by "#" as a program's own."""
+    """Checks whether a line is marked by "#" as a program's own."""
     return line.lstrip().startswith("#")
 
 
@@ -232,7 +233,7 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
     stamps = stamps_of(gathered.stamps)
     line = np.array(gathered.line, dtype=np.int64)
     keep = stamps.valid
-    time, found = instants(stamps.ns[keep], stamps.utc[keep], line=line[keep], zone_name=zone_name, where=where)
+    time, findings = instants(stamps.ns[keep], stamps.utc[keep], line=line[keep], zone_name=zone_name, where=where)
     flags = np.array(gathered.flags, dtype=np.uint16)[keep]
     channels, about = _channels(gathered, line, keep)
     if not channels:
@@ -247,7 +248,7 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
         line=line[keep],
         sensor=instrument.sensor,
         step=stamps.step,
-        findings=(*found, *_findings(gathered, instrument, flags, line[keep], int((~keep).sum())), *about),
+        findings=(*findings, *_findings(gathered, instrument, flags, line[keep], int((~keep).sum())), *about),
     )
 
 
@@ -327,13 +328,13 @@ def _channels(gathered: _Gathered, line: IntArray, keep: BoolArray) -> tuple[dic
 
 
 def _missing(channels: dict[str, FloatArray]) -> NDArray[np.uint16]:
-    """The flag MISSING where there is neither a speed nor a pair of horizontal components."""
+    """Returns the flag MISSING where there is neither a speed nor a pair of horizontal components."""
     speeds = [values for name, values in channels.items() if name.endswith("wind_speed")]
     pair = [channels[name] for name in ("wind_x", "wind_y") if name in channels]
-    known = [np.isfinite(values) for values in speeds]
+    is_finite = [np.isfinite(values) for values in speeds]
     if len(pair) == 2 and not speeds:
-        known.append(np.isfinite(pair[0]) & np.isfinite(pair[1]))
-    present = np.any(known, axis=0) if known else np.array(False)
+        is_finite.append(np.isfinite(pair[0]) & np.isfinite(pair[1]))
+    present = np.any(is_finite, axis=0) if is_finite else np.array(False)
     return np.where(present, np.uint16(0), np.uint16(SampleFlag.MISSING)).astype(np.uint16)
 
 

@@ -39,9 +39,9 @@ class Toa5(Described):
         self.uses = self.uses | {"azimuth"}
 
     def recognise(self, head: Head) -> Guess | None:
-        """The first line begins with the format's name."""
-        found = super().recognise(head)
-        return None if found is None else replace(found, score=NAMED)
+        """Recognises a first line that begins with the format's name."""
+        guess = super().recognise(head)
+        return None if guess is None else replace(guess, score=NAMED)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read a table whose header names wind speed or wind components."""
@@ -90,7 +90,8 @@ def _header(source: TextFile) -> list[list[str]]:
 
 
 def _averaging(processing: str, time: Instants) -> float | None:
-    """Length of the logger's own averaging [s] by the header's fourth line: "Smp" a sample, "Avg" or "WVc" a mean."""
+    """Reads the length of the logger's own averaging [s] from the header's fourth line: "Smp" a sample, "Avg" or "WVc"
+    a mean."""
     kind = processing.strip().lower()
     if kind == "smp":
         return 0.0
@@ -100,10 +101,10 @@ def _averaging(processing: str, time: Instants) -> float | None:
 
 
 def _mean_of_angles(name: str, names: Sequence[str]) -> Finding:
-    """Finding on a direction that the logger averaged as a number: 350° and 10° make 180° then."""
-    vectors = [other for other in names if other.endswith("WVc(2)")]  # the second of its numbers is the direction
-    beside = f"; {', '.join(repr(other) for other in vectors)} may be the mean of vectors" if vectors else ""
-    message = f"{name!r} is the mean of a vane's readings as numbers, which is wrong where they pass north{beside}"
+    """Reports a direction that the logger averaged as a number: 350° and 10° make 180° then."""
+    vectors = [column for column in names if column.endswith("WVc(2)")]  # the second of its numbers is the direction
+    alternative = f"; {', '.join(repr(column) for column in vectors)} may be the mean of vectors" if vectors else ""
+    message = f"{name!r} is the mean of a vane's readings as numbers, which is wrong where they pass north{alternative}"
     fix = "have the program average the wind as a vector (WindVector), or read that column: --as delimited --columns"
     return Finding.of("direction-mean-of-numbers", message, fix=fix)
 
@@ -122,7 +123,7 @@ def _continuity(record: FloatArray, line: IntArray) -> tuple[Finding, ...]:
 
 
 def _report(kind: str, rows: BoolArray, line: IntArray, what: str, *, count: int | None = None) -> tuple[Finding, ...]:
-    """The warning about some rows, with their number and the first of them; none where there are none."""
+    """Warns of some rows, with their number and the first of them; nothing where there are none."""
     if not rows.any():
         return ()
     count = int(rows.sum()) if count is None else count
@@ -132,7 +133,7 @@ def _report(kind: str, rows: BoolArray, line: IntArray, what: str, *, count: int
 
 def _faults(values: FloatArray) -> BoolArray:
     """Rows whose diagnostic word reports a fault: a warning bit, or, where it does not count measurements, not 0."""
-    known = np.isfinite(values) & (np.abs(values) < 2**31)
-    word = np.where(known, values, 0).astype(np.int64)
+    fits_word = np.isfinite(values) & (np.abs(values) < 2**31)
+    word = np.where(fits_word, values, 0).astype(np.int64)
     counting = len(word) > 2 and float((np.diff(word) % 64 == 1).mean()) > 0.5
     return ((word & _WARNINGS) != 0) if counting else (word != 0)

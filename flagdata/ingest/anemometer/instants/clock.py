@@ -57,25 +57,26 @@ class Jump:
     whole: bool
 
     def text(self) -> str:
-        """ "set back 1 h", "set on 30 min"."""
+        """Writes the jump in words: "set back 1 h", "set on 30 min"."""
         return f"set {'back' if self.size < 0 else 'on'} {span(abs(self.size))}"
 
 
 def usual(time: Instants) -> int:
-    """The median of the steps forward [ns]; 0 where there are none."""
+    """Computes the median of the steps forward [ns]; 0 where there are none."""
     steps = np.diff(time)
     forward = steps[steps > 0]
     return int(np.median(forward)) if len(forward) else 0
 
 
 def set_back(time: Instants) -> tuple[Jump, ...]:
-    """Every step back by more than `JITTER`, as a jump; (n,) instants in the order of the rows."""
+    """Finds every step back by more than `JITTER`, as a jump; (n,) instants in the order of the rows."""
     steps, step = np.diff(time), usual(time)
     return tuple(_jump(row + 1, int(steps[row]), step) for row in np.flatnonzero(steps < -JITTER).tolist())
 
 
 def _jump(row: int, step: int, usual_step: int) -> Jump:
-    """The jump that a step amounts to: the multiple of a quarter of an hour that leaves most nearly the usual step."""
+    """Finds the jump that a step amounts to: the multiple of a quarter of an hour that leaves most nearly the usual
+    step."""
     sizes = [round((step - usual_step) / unit) * unit for unit in (HOUR, HOUR // 2, HOUR // 4)]
     most = max(3 * usual_step, 60 * NANOSECONDS)
     fitting = [size for size in sizes if size and usual_step // 2 <= step - size <= most]
@@ -96,29 +97,29 @@ def set_back_a_little(time: Instants, choice: ClockChoice | None) -> tuple[Jump,
     if choice is not None and len(time) - len(rows) <= MOST and step >= NANOSECONDS:
         rows = np.arange(len(time))
     steps = np.diff(time[rows])
-    near = np.abs(steps - step) <= step / 2
-    found: list[Jump] = []
+    steady = np.abs(steps - step) <= step / 2
+    jumps: list[Jump] = []
     for at in np.flatnonzero((steps <= 0) & (steps >= -JITTER)).tolist():
-        before = _length(near[max(0, at - _AROUND) : at][::-1])
-        after = _length(near[at + 1 : at + 1 + _AROUND])
+        before = _length(steady[max(0, at - _AROUND) : at][::-1])
+        after = _length(steady[at + 1 : at + 1 + _AROUND])
         if min(before, after) < _LEAST:
             continue
-        place = np.arange(-before, after + 2.0)
+        position = np.arange(-before, after + 2.0)
         clock = (time[rows[at - before : at + after + 2]] - time[rows[at]]).astype(np.float64)
         # One step for both sides, by least squares, and the jump between them.
-        sides = np.stack([place, np.ones(len(place)), place > 0], axis=1)
+        sides = np.stack([position, np.ones(len(position)), position > 0], axis=1)
         solved = np.linalg.lstsq(sides, clock, rcond=None)[0]
         shift, behind = round(float(solved[2])), at + 1 + after
         undone = behind < len(steps) and abs(int(steps[behind]) - step + shift) <= _APART * abs(shift)
         if shift < 0 and not undone and float(np.abs(clock - sides @ solved).max()) <= _APART * abs(shift):
-            found.append(Jump(row=int(rows[at + 1]), size=shift, whole=False))
-        if len(found) > MOST:
+            jumps.append(Jump(row=int(rows[at + 1]), size=shift, whole=False))
+        if len(jumps) > MOST:
             return ()
-    return tuple(found)
+    return tuple(jumps)
 
 
 def _length(steady: BoolArray) -> int:
-    """How many of the first are true."""
+    """Counts how many of the first are true."""
     return len(steady) if steady.all() else int(np.argmin(steady))
 
 
@@ -136,21 +137,21 @@ def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
         return ()
     undone = {-jump.size for jump in returns}
     wide = int((steps > 1.5 * step).sum())
-    found: list[Jump] = []
+    jumps: list[Jump] = []
     for row in np.flatnonzero(steps > HOUR // 2).tolist():
         jump = _jump(row + 1, int(steps[row]), step)
-        left = int(steps[row]) - jump.size
+        rest = int(steps[row]) - jump.size
         by_chance = wide * step / HOUR * (1 if jump.size == HOUR else 5)
-        by_hours = jump.whole and step // 2 <= left <= step + max(step // 2, JITTER // 2)
+        by_hours = jump.whole and step // 2 <= rest <= step + max(step // 2, JITTER // 2)
         if steps[row] > _NEVER_SET:
-            found.append(Jump(row=row + 1, size=int(steps[row]) - step, whole=False))
+            jumps.append(Jump(row=row + 1, size=int(steps[row]) - step, whole=False))
         elif (
             by_hours
             and steps[row] <= _FARTHEST + 2 * step
             and (jump.size in undone or (jump.size % HOUR == 0 and by_chance <= _CHANCE))
         ):
-            found.append(jump)
-    return tuple(found)
+            jumps.append(jump)
+    return tuple(jumps)
 
 
 def excursions(time: Instants, *, most: int) -> BoolArray:
@@ -186,18 +187,18 @@ def longest_rise(time: Instants) -> IntArray:
     heads: list[int] = []
     previous = np.full(len(time), -1, dtype=np.int64)
     for index, value in enumerate(time.tolist()):
-        place = bisect_right(tops, value)
-        previous[index] = heads[place - 1] if place else -1
-        tops[place : place + 1], heads[place : place + 1] = [value], [index]
+        pile = bisect_right(tops, value)
+        previous[index] = heads[pile - 1] if pile else -1
+        tops[pile : pile + 1], heads[pile : pile + 1] = [value], [index]
     chain = np.empty(len(tops), dtype=np.int64)
     at = heads[-1]
-    for place in range(len(tops) - 1, -1, -1):
-        chain[place], at = at, int(previous[at])
+    for pile in range(len(tops) - 1, -1, -1):
+        chain[pile], at = at, int(previous[at])
     return chain
 
 
 def disordered(time: Instants) -> bool:
-    """Whether rows that run back fill, once sorted, the intervals that they left: fewer steps are then unusual.
+    """Checks whether rows that run back fill, once sorted, the intervals that they left: fewer steps are then unusual.
 
     Of a clock that was set back the sorted rows share stamps, or lie closer than the log's step.
     """
@@ -208,7 +209,7 @@ def disordered(time: Instants) -> bool:
 
 
 def sorted_as_given(time: Instants, line: IntArray, choice: ClockChoice | None) -> tuple[IntArray, Finding] | None:
-    """The order of rows that the user says to be out of order, and its finding; `None` where there is none.
+    """Sorts rows that the user says to be out of order, with a finding; `None` where there are none.
 
     Rows of one stamp stay in the file's order.
     """
@@ -224,7 +225,7 @@ def sorted_as_given(time: Instants, line: IntArray, choice: ClockChoice | None) 
 
 
 def continued(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None) -> tuple[Instants, BoolArray]:
-    """One clock through all jumps, and which rows were shifted for it: (n,) both.
+    """Puts all rows on one clock through all jumps; also says which rows were shifted for it: (n,) both.
 
     Args:
         choice: whose stamps stay; `None` those of the first rows.
@@ -243,14 +244,14 @@ def report(
     line: IntArray,
     choice: ClockChoice | None,
     *,
-    kept: bool = False,
+    stamps_stay: bool = False,
     sortable: bool = False,
 ) -> tuple[Finding, ...]:
-    """Finding on clocks that were set anew and continued: the jump, its line, and what remains uncertain.
+    """Reports clocks that were set anew and continued: the jump, its line, and what remains uncertain.
 
     Args:
         time: (n,) as the clock showed it.
-        kept: whether the stamps stay as they are, since so many rows may be missing instead.
+        stamps_stay: whether the stamps stay as they are, since so many rows may be missing instead.
         sortable: whether rows have stamps of their own, so that they may be sorted.
     """
     findings: list[Finding] = []
@@ -259,9 +260,9 @@ def report(
         follow = f"{iso(int(time[jump.row - 1]))} is followed by {iso(int(time[jump.row]))}"
         rows = len(time) - jump.row
         message = f"clock {jump.text()} at line {at}: {follow}; "
-        if kept and jump.size > _NEVER_SET:
+        if stamps_stay and jump.size > _NEVER_SET:
             message = f"the clock of the {jump.row} rows before line {at} was not set yet: {follow}"
-        elif kept:
+        elif stamps_stay:
             message = (
                 f"an interval is longer than usual by {span(jump.size)}: either the clock was {jump.text()} at line "
             )
@@ -286,7 +287,7 @@ def report(
                 value=jump.size / NANOSECONDS,
                 where=f"line {at}",
                 severity=Severity.WARNING if choice is None else Severity.NOTE,
-                count=1 if kept else rows,
+                count=1 if stamps_stay else rows,
                 what=message,
                 fix=fix if choice is None else None,
             )
@@ -295,7 +296,7 @@ def report(
 
 
 def span(length: int) -> str:
-    """A length of time [ns] in words: "1 h", "1 h 30 min", "37.2 s", "9618 days"."""
+    """Writes a length of time [ns] in words: "1 h", "1 h 30 min", "37.2 s", "9618 days"."""
     if length > 100 * DAY:
         return f"{length / DAY:.0f} days"
     if length % (60 * NANOSECONDS) == 0 and length:

@@ -37,27 +37,27 @@ def _letters(form: str) -> set[str]:
 
 
 def is_elapsed(form: str) -> bool:
-    """Whether a format counts from a start that the file does not state."""
+    """Checks whether a format counts from a start that the file does not state."""
     return form in stamps.ELAPSED
 
 
 def is_time_of_day(form: str) -> bool:
-    """Whether a format has directives of the time of day alone."""
+    """Checks whether a format has directives of the time of day alone."""
     return bool(_letters(form) & set("HI")) and not _letters(form) & set("YymdjbBhe")
 
 
 def is_yearless(form: str) -> bool:
-    """Whether a format has a date in it but no year."""
+    """Checks whether a format has a date in it but no year."""
     return bool(_letters(form) & set("mdjbBhe")) and not _letters(form) & set("Yy")
 
 
 def needs_date(form: str) -> bool:
-    """Whether a format lacks the date, or the year of one, so that the user gives that of the first row."""
+    """Checks whether a format lacks the date, or the year of one, so that the user gives that of the first row."""
     return is_time_of_day(form) or is_yearless(form)
 
 
-def _whole(form: str) -> tuple[str, str]:
-    """A format with the date that it lacks, and that date in text."""
+def _with_date(form: str) -> tuple[str, str]:
+    """Completes a format with the date that it lacks, and returns that date as text."""
     if is_time_of_day(form):
         return f"%Y-%m-%d {form}", "1970-01-01"
     return (f"%Y {form}", _LEAP) if is_yearless(form) else (form, "")
@@ -70,24 +70,23 @@ def check(form: str) -> None:
         UsageError: see `stamps.pattern`.
     """
     if form not in stamps.NAMED:
-        stamps.pattern(_whole(form)[0])
+        stamps.pattern(_with_date(form)[0])
 
 
 def parse(texts: Sequence[str] | pa.StringArray, form: str) -> tuple[Stamps, int]:
-    """Stamps of any format, as `stamps.parse_mixed` reads them: times of day as of 1970-01-01, dates without a year as
-    of 2000."""
-    whole, before = _whole(form)
-    return stamps.parse_mixed(texts, whole, before=before)
+    """Parses stamps as `stamps.parse_mixed` does: times of day as of 1970-01-01, dates without a year as of 2000."""
+    dated_form, before = _with_date(form)
+    return stamps.parse_mixed(texts, dated_form, before=before)
 
 
-def date_form(texts: Sequence[str], *, given: Order | None, where: str) -> tuple[str, Order, str]:
-    """The date at the start of texts as directives, the order of its numbers, and what decides it.
+def date_form(texts: Sequence[str], *, given_order: Order | None, where: str) -> tuple[str, Order, str]:
+    """Finds the date at the start of texts as directives, the order of its numbers, and what decides it.
 
     A number above 12 is a day, one above 31 a year; points stand between numbers of which the first is the day (every
     locale of the Unicode CLDR that writes them so). Nothing else decides.
 
     Args:
-        given: by the user; refused when a date contradicts it.
+        given_order: by the user; refused when a date contradicts it.
 
     Raises:
         TimeError: no date, none that fits the order, or several orders that all fit.
@@ -100,23 +99,32 @@ def date_form(texts: Sequence[str], *, given: Order | None, where: str) -> tuple
     widths = [len(dated[0][group]) for group in (1, 3, 4)]
     numbers = np.array([[int(match[group]) for group in (1, 3, 4)] for match in dated])
     orders: tuple[Order, ...] = ("ymd",) if widths[0] == 4 else ("dmy", "mdy")
-    if 4 not in widths and (sign == "-" or given == "ymd"):
+    if 4 not in widths and (sign == "-" or given_order == "ymd"):
         orders = (*orders, "ymd")
     highest = {"d": 31, "m": 12, "y": 9999}
-    fit: list[Order] = [one for one in orders if bool((numbers <= [highest[letter] for letter in one]).all())]
-    chosen: list[Order] = fit if given is None else [one for one in fit if one == given]
+    fit: list[Order] = [
+        order_of_date
+        for order_of_date in orders
+        if bool((numbers <= [highest[letter] for letter in order_of_date]).all())
+    ]
+    chosen: list[Order] = (
+        fit if given_order is None else [order_of_date for order_of_date in fit if order_of_date == given_order]
+    )
     points = len(chosen) > 1 and sign == "." and not any(map(_TWELVE.search, filled))
     if not fit:
         raise TimeError("the dates are in no one order", where=where, fix="the file mixes several orders: split it")
     if not chosen:
         fix = f"leave out --date-order, it is {' or '.join(fit)}"
-        raise TimeError(f"dates are not {given}, as {first} and the others show", where=where, fix=fix)
+        raise TimeError(f"dates are not {given_order}, as {first} and the others show", where=where, fix=fix)
     if len(chosen) > 1 and not points:
-        message = f"{first} may be {' or '.join(_WORDS[one] for one in chosen)}, and nothing in the log decides it"
+        readings = " or ".join(_WORDS[order_of_date] for order_of_date in chosen)
+        message = f"{first} may be {readings}, and nothing in the log decides it"
         raise TimeError(message, where=where, fix=f"give --date-order {' or '.join(chosen)}")
     reason = f"no other order fits the first {len(dated)} dates"
-    if given is not None or points:
-        reason = f"the order {given} was given" if given else "dates with points are written with the day first"
+    if given_order is not None or points:
+        reason = (
+            f"the order {given_order} was given" if given_order else "dates with points are written with the day first"
+        )
     parts = {"y": "%Y" if 4 in widths else "%y", "m": "%m", "d": "%d"}
     return sign.join(parts[letter] for letter in chosen[0]), chosen[0], reason
 
@@ -150,7 +158,7 @@ def refuse_twelve(wall: IntArray, *, line: IntArray, where: str) -> None:
 def completed(
     wall: IntArray, form: str, *, date: dt.date | None, line: IntArray, where: str
 ) -> tuple[IntArray, tuple[Finding, ...]]:
-    """Wall-clock nanoseconds of stamps without a date or a year that `parse` has read, in the order of time.
+    """Completes wall-clock nanoseconds of stamps without a date or a year that `parse` has read, in the order of time.
 
     Args:
         wall: (n,) as read; n > 0.
@@ -159,11 +167,11 @@ def completed(
     Raises:
         TimeError: no date is given, the first row's is another, or a year has no such day.
     """
-    place = f"{where}, line {line[0]}"
+    where_first = f"{where}, line {line[0]}"
     if is_time_of_day(form):
         if date is None:
             fix = "give the day of the first row: --date 2026-05-01"
-            raise TimeError("the stamps are times of day without a date", where=place, fix=fix)
+            raise TimeError("the stamps are times of day without a date", where=where_first, fix=fix)
         midnight = np.concatenate(([False], np.diff(wall) < -DAY // 2))
         time = wall + ((date - dt.date(1970, 1, 1)).days + np.cumsum(midnight)) * DAY
         return time, _date_given("times of day", date, f"{int(midnight.sum())} midnights")
@@ -172,7 +180,7 @@ def completed(
     if date is None:
         fix = "give the day of the first row with its year: --date YYYY-"
         fix += "MM-DD" if "%j" in form else f"{month_and_day}, the year in place of YYYY"
-        raise TimeError("the stamps have no year", where=place, fix=fix)
+        raise TimeError("the stamps have no year", where=where_first, fix=fix)
     passed = np.concatenate(([False], np.diff(wall) < -183 * DAY))
     start = (date.year + np.cumsum(passed) - 1970).astype("datetime64[Y]")
     month = day.astype("datetime64[D]").astype("datetime64[M]")
@@ -188,11 +196,11 @@ def completed(
         fix = "give --date with the year in which the log began"
         raise TimeError(message, where=f"{where}, line {line[lost[0]]}", fix=fix)
     time = (first.astype("datetime64[D]").astype(np.int64) + into) * DAY + wall % DAY
-    given = (date - dt.date(1970, 1, 1)).days * DAY
-    if not given <= int(time[0]) <= given + DAY:  # 24:00 is of the day that ends
-        shown = np.datetime64(int(time[0]), "ns").astype("datetime64[D]")
-        message = f"the first row is of {shown}, if of {date.year}, and not of {date.isoformat()}"
-        raise TimeError(message, where=place, fix=f"give its day with its year, such as --date {shown}")
+    given_day = (date - dt.date(1970, 1, 1)).days * DAY
+    if not given_day <= int(time[0]) <= given_day + DAY:  # 24:00 is of the day that ends
+        date_of_first = np.datetime64(int(time[0]), "ns").astype("datetime64[D]")
+        message = f"the first row is of {date_of_first}, if of {date.year}, and not of {date.isoformat()}"
+        raise TimeError(message, where=where_first, fix=f"give its day with its year, such as --date {date_of_first}")
     return time, _date_given("stamps without a year", date, f"{int(passed.sum())} new years")
 
 
@@ -204,7 +212,7 @@ def _date_given(what: str, date: dt.date, follow: str) -> tuple[Finding, ...]:
 def since_start(
     count: IntArray, form: str, *, start: int | None, line: IntArray, where: str
 ) -> tuple[IntArray, tuple[Finding, ...]]:
-    """UTC nanoseconds of counts since a start; `start` is the instant of the first row.
+    """Converts counts since a start to UTC nanoseconds; `start` is the instant of the first row.
 
     Raises:
         TimeError: no start is given, or the count starts again: the file does not say when its second stretch began.

@@ -181,13 +181,13 @@ class Stamps:
 
 
 def whole_year(year: int) -> int:
-    """The year of which `year` is the last two digits: 1970 to 2069."""
+    """Returns the year of which `year` is the last two digits: 1970 to 2069."""
     return year + (2000 if year < _CENTURY else 1900)
 
 
 @functools.cache
 def pattern(form: str) -> str:
-    """The regular expression of a format.
+    """Builds the regular expression of a format.
 
     Raises:
         UsageError: an unknown directive, one given twice, hours of 1 to 12 without their half of the day, or no whole
@@ -205,9 +205,9 @@ def pattern(form: str) -> str:
         elif token["directive"] is not None:
             directive = _SAME.get(token["directive"], token["directive"])
             if directive not in _GROUPS:
-                known = " ".join("%" + one for one in _GROUPS)
-                fix = f"use {known}, iso, or one of {', '.join(NAMED)}"
-                raise UsageError(f"unknown directive %{directive}", where=where, fix=fix)
+                directives = " ".join("%" + directive for directive in _GROUPS)
+                fix = f"use {directives}, iso, or one of {', '.join(NAMED)}"
+                raise UsageError(f"the directive %{directive} is unknown", where=where, fix=fix)
             used.append(directive)
             out.append(_group(form, directive, token.start()))
         elif token["sign"]:
@@ -216,9 +216,9 @@ def pattern(form: str) -> str:
     if len(letters) < len(used):
         raise UsageError("a directive occurs twice", where=where, fix="name each once")
     if not (letters & {"Y", "y"} and ("j" in letters or (letters & {"m", "b"} and "d" in letters))):
-        raise UsageError("no whole date in it", where=where, fix="name year, month and day")
+        raise UsageError("the format has no whole date", where=where, fix="name year, month and day")
     if not {"H", "I"} & letters and {"M", "S", "f", "p"} & letters:
-        raise UsageError("no hour in it", where=where, fix="name the hour, or the date alone")
+        raise UsageError("the format has no hour", where=where, fix="name the hour, or the date alone")
     if ("I" in letters) != ("p" in letters):
         fix = "name the hours of a clock of 12 by %I with %p, those of 24 by %H; export the log so where it has neither"
         raise UsageError("the half of the day goes with hours of 12", where=where, fix=fix)
@@ -226,16 +226,16 @@ def pattern(form: str) -> str:
 
 
 def _group(form: str, directive: str, at: int) -> str:
-    """The regular expression of the directive at a place of a form."""
+    """Builds the regular expression of the directive at a place of a form."""
     if directive == "f" and form[at - 1 : at] in ("_", "-", ":"):
         return r"(?P<f>\d{1,9})"  # the sign before it stands for the point
-    beside = _NUMERIC.match(form, at + 2) or (at > 1 and _NUMERIC.match(form, at - 2))
-    found = f"(?P<{directive}>\\d{{2}})" if beside and directive in "mdHMSI" else _GROUPS[directive]
-    return found + (r"(?:\.0*)?" if _ALONE.match(form, at) else "")
+    adjoining = _NUMERIC.match(form, at + 2) or (at > 1 and _NUMERIC.match(form, at - 2))
+    expression = f"(?P<{directive}>\\d{{2}})" if adjoining and directive in "mdHMSI" else _GROUPS[directive]
+    return expression + (r"(?:\.0*)?" if _ALONE.match(form, at) else "")
 
 
 def is_date_alone(form: str) -> bool:
-    """Whether a format has directives of a date, but none of the time of day."""
+    """Checks whether a format has directives of a date, but none of the time of day."""
     return "%" in form and not any(f"%{letter}" in form for letter in "HIMSf")
 
 
@@ -259,30 +259,30 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
         return _elapsed(text, form)
     if form in PLAIN_FORMS and (plain := _plain(text)) is not None:
         return plain
-    found = pc.extract_regex(text, pattern(form))
-    written = found.is_valid().to_numpy(zero_copy_only=False).astype(bool)
-    year, month, day, of_year, hour, twelve, minute, second = (_part(found, name) for name in "YmdjHIMS")
+    fields = pc.extract_regex(text, pattern(form))
+    written = fields.is_valid().to_numpy(zero_copy_only=False).astype(bool)
+    year, month, day, of_year, hour, twelve, minute, second = (_part(fields, name) for name in "YmdjHIMS")
     zero = np.zeros(len(text), dtype=np.int64)
     if year is None:
-        short = _part(found, "y")
+        short = _part(fields, "y")
         year = zero if short is None else np.where(short < _CENTURY, 2000, 1900) + short
     valid = written & (year >= YEARS[0]) & (year <= YEARS[1])
     distant = written & ~valid
     if twelve is not None:
         valid &= (twelve >= 1) & (twelve <= 12)
-        half = pc.starts_with(pc.utf8_lower(pc.coalesce(_field(found, "p"), "")), "p").to_numpy(zero_copy_only=False)
+        half = pc.starts_with(pc.utf8_lower(pc.coalesce(_field(fields, "p"), "")), "p").to_numpy(zero_copy_only=False)
         hour = twelve % 12 + 12 * half.astype(np.int64)
-    hour, minute, second = (zero if one is None else one for one in (hour, minute, second))
+    hour, minute, second = (zero if part is None else part for part in (hour, minute, second))
     valid &= ((hour < 24) | ((hour == 24) & (minute == 0) & (second == 0))) & (minute < 60) & (second < 60)
     if of_year is None:
-        month = _month(found) if month is None else month
+        month = _month(fields) if month is None else month
         days, dated = _days(year, month, zero + 1 if day is None else day)
     else:
         first = _midnight(year, zero + 1)
         days, dated = first + of_year - 1, (of_year >= 1) & (of_year <= _midnight(year + 1, zero + 1) - first)
     valid &= dated
-    fraction, digits = _fraction(found)
-    offset, utc = _offset(found, len(text))
+    fraction, digits = _fraction(fields)
+    offset, utc = _offset(fields, len(text))
     ns = days * DAY + ((hour * 60 + minute) * 60 + second) * NANOSECONDS + fraction - offset
     step = NANOSECONDS if np.any(second[valid]) else DAY if is_date_alone(form) else _MINUTE
     step = 10 ** (9 - digits) if digits else step
@@ -290,7 +290,7 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
 
 
 def _plain(text: pa.StringArray) -> Stamps | None:
-    """What `parse` gives for stamps that are all 2021-05-14 00:00:00 with a fraction or none, by Arrow's own parser.
+    """Parses stamps that are all 2021-05-14 00:00:00 with a fraction or none, by Arrow's own parser; `None` for others.
 
     `None` where one of them is not.
     """
@@ -317,16 +317,16 @@ def _counts(ns: IntArray, valid: BoolArray, step: int, *, utc: bool = False) -> 
 
 
 def _epoch(text: pa.StringArray, scale: int, zero: int, *, utc: bool) -> Stamps:
-    """A count of units of `scale` ns that is `zero` in 1970, exact in integers: a double holds today's seconds to
+    """Reads a count of units of `scale` ns that is `zero` in 1970, exact in integers: a double holds today's seconds to
     0.2 µs only."""
     text = _without_exponents(text, scale)
-    found = pc.extract_regex(text, r"^(?P<whole>\d{1,18}|[1-8]\d{18})(?:[.,](?P<f>\d{1,9})\d*)?$")
-    whole = _part(found, "whole")
-    fraction, digits = _fraction(found)
-    whole = (np.zeros(len(text), dtype=np.int64) if whole is None else whole) - zero
-    seconds = whole * (scale / NANOSECONDS)
-    valid = found.is_valid().to_numpy(zero_copy_only=False) & (seconds > _SINCE) & (seconds < _UNTIL)
-    ns = np.where(valid, whole, 0) * scale + fraction * scale // NANOSECONDS
+    fields = pc.extract_regex(text, r"^(?P<whole>\d{1,18}|[1-8]\d{18})(?:[.,](?P<f>\d{1,9})\d*)?$")
+    units = _part(fields, "whole")
+    fraction, digits = _fraction(fields)
+    units = (np.zeros(len(text), dtype=np.int64) if units is None else units) - zero
+    seconds = units * (scale / NANOSECONDS)
+    valid = fields.is_valid().to_numpy(zero_copy_only=False) & (seconds > _SINCE) & (seconds < _UNTIL)
+    ns = np.where(valid, units, 0) * scale + fraction * scale // NANOSECONDS
     return _counts(ns, valid, max(1, scale // 10**digits), utc=utc)
 
 
@@ -335,10 +335,10 @@ def _without_exponents(text: pa.StringArray, scale: int) -> pa.StringArray:
     written = pc.fill_null(pc.match_substring_regex(text, EXPONENT), False)
     if not pc.any(written).as_py():
         return text
-    numbers = [Decimal(one.replace(",", ".")) for one in text.filter(written).to_pylist()]
-    last = min(int(one.as_tuple().exponent) for one in numbers)
-    whole = [f"{one:f}" if 10.0**last * scale <= NANOSECONDS else "" for one in numbers]
-    return pc.replace_with_mask(text, written, pa.array(whole, pa.string()))
+    numbers = [Decimal(number.replace(",", ".")) for number in text.filter(written).to_pylist()]
+    last = min(int(number.as_tuple().exponent) for number in numbers)
+    texts = [f"{number:f}" if 10.0**last * scale <= NANOSECONDS else "" for number in numbers]
+    return pc.replace_with_mask(text, written, pa.array(texts, pa.string()))
 
 
 def _numbers(text: pa.StringArray) -> tuple[FloatArray, BoolArray, int]:
@@ -352,8 +352,8 @@ def _numbers(text: pa.StringArray) -> tuple[FloatArray, BoolArray, int]:
 
 
 def _serial(text: pa.StringArray, base: float) -> Stamps:
-    """Serial days. A double holds a day's number to a microsecond or so, and days have no round seconds: noise of the
-    last digits below a millisecond is rounding, and so is what is within the last digit of whole minutes."""
+    """Reads serial days. A double holds a day's number to a microsecond or so, and days have no round seconds: noise of
+    the last digits below a millisecond is rounding, and so is what is within the last digit of whole minutes."""
     value, valid, digits = _numbers(text)
     days = value - base
     valid = valid & (days > _SINCE / 86_400) & (days < _UNTIL / 86_400)
@@ -377,20 +377,20 @@ def _elapsed(text: pa.StringArray, form: str) -> Stamps:
     return _counts(ns, valid, step)
 
 
-def snapped(ns: IntArray, whole: int, within: int) -> IntArray:
-    """Instants, those within so much of a multiple of `whole` on it."""
-    near = np.round(ns / whole).astype(np.int64) * whole
-    return np.where(np.abs(ns - near) <= within, near, ns)
+def snapped(ns: IntArray, grid: int, within: int) -> IntArray:
+    """Instants, those within so much of a multiple of `grid` on it."""
+    nearest = np.round(ns / grid).astype(np.int64) * grid
+    return np.where(np.abs(ns - nearest) <= within, nearest, ns)
 
 
-def _field(found: pa.StructArray, name: str) -> Any:
-    index = found.type.get_field_index(name)
-    return None if index < 0 else pc.struct_field(found, [index])
+def _field(fields: pa.StructArray, name: str) -> Any:
+    index = fields.type.get_field_index(name)
+    return None if index < 0 else pc.struct_field(fields, [index])
 
 
-def _part(found: pa.StructArray, name: str) -> IntArray | None:
-    """One named group as integers, 0 where absent; `None` when the format has no such group."""
-    column = _field(found, name)
+def _part(fields: pa.StructArray, name: str) -> IntArray | None:
+    """Reads one named group as integers, 0 where absent; `None` when the format has no such group."""
+    column = _field(fields, name)
     if column is None:
         return None
     filled = pc.if_else(pc.equal(pc.coalesce(column, ""), ""), "0", column)
@@ -406,42 +406,42 @@ def _midnight(year: IntArray, month: IntArray) -> IntArray:
 def _days(year: IntArray, month: IntArray, day: IntArray) -> tuple[IntArray, BoolArray]:
     """Days since 1970 and whether the date exists."""
     first = _midnight(year, month)
-    known = (month >= 1) & (month <= 12) & (day >= 1) & (day <= _midnight(year, month + 1) - first)
-    return first + day - 1, known
+    exists = (month >= 1) & (month <= 12) & (day >= 1) & (day <= _midnight(year, month + 1) - first)
+    return first + day - 1, exists
 
 
-def _month(found: pa.StructArray) -> IntArray:
-    """The month of each name, 0 for none."""
-    names = pc.utf8_lower(pc.coalesce(_field(found, "b"), ""))
-    place = pc.fill_null(pc.index_in(names, pa.array(list(_MONTHS))), -1).to_numpy(zero_copy_only=False)
-    return np.array([*_MONTHS.values(), 0], dtype=np.int64)[place]
+def _month(fields: pa.StructArray) -> IntArray:
+    """Returns the month of each name, 0 for none."""
+    names = pc.utf8_lower(pc.coalesce(_field(fields, "b"), ""))
+    indices = pc.fill_null(pc.index_in(names, pa.array(list(_MONTHS))), -1).to_numpy(zero_copy_only=False)
+    return np.array([*_MONTHS.values(), 0], dtype=np.int64)[indices]
 
 
-def _fraction(found: pa.StructArray) -> tuple[IntArray, int]:
+def _fraction(fields: pa.StructArray) -> tuple[IntArray, int]:
     """Nanoseconds of the fraction, and the most digits it ever has."""
-    column = _field(found, "f")
+    column = _field(fields, "f")
     if column is None:
-        return np.zeros(len(found), dtype=np.int64), 0
+        return np.zeros(len(fields), dtype=np.int64), 0
     text = pc.coalesce(column, "")
     digits = int(pc.max(pc.binary_length(text)).as_py() or 0)
     padded = pc.utf8_rpad(text, 9, "0")
     return pc.cast(padded, pa.int64()).to_numpy(zero_copy_only=False), digits
 
 
-def _offset(found: pa.StructArray, n: int) -> tuple[IntArray, BoolArray]:
+def _offset(fields: pa.StructArray, n: int) -> tuple[IntArray, BoolArray]:
     """Nanoseconds east of UTC that each stamp states, and whether it states any."""
     offset = np.zeros(n, dtype=np.int64)
-    column = _field(found, "z")
+    column = _field(fields, "z")
     if column is None:
         return offset, np.zeros(n, dtype=bool)
     text = pc.coalesce(column, "")
-    stated = pc.not_equal(text, "").to_numpy(zero_copy_only=False).astype(bool)
+    states_zone = pc.not_equal(text, "").to_numpy(zero_copy_only=False).astype(bool)
     for value in set(pc.unique(text).to_pylist()) - {"", "Z", "UTC", "GMT"}:
         rows = pc.equal(text, value).to_numpy(zero_copy_only=False).astype(bool)
         hours, minutes = value[1:3], value[3:].lstrip(":") or "0"
         seconds = ABBREVIATED[value] * 3600 if value in ABBREVIATED else int(hours) * 3600 + int(minutes) * 60
         offset[rows] = (-seconds if value[0] == "-" else seconds) * NANOSECONDS
-    return offset, stated
+    return offset, states_zone
 
 
 _BARE_END = re.compile(r"(?<![\d:.])24:00(?![:\d])")
@@ -460,18 +460,28 @@ def parse_mixed(texts: Sequence[str] | pa.StringArray, form: str, *, before: str
         UsageError: see `pattern`.
     """
     text = pc.binary_join_element_wise(before, array(texts), " ") if before else array(texts)
-    found = parse(text, form)
-    if form in NAMED or bool(found.valid.all()) or 2 * int(found.valid.sum()) <= len(text):
-        return found, 0
-    at = np.flatnonzero(~found.valid)
-    rest = [other or "" for other in text.take(pa.array(at)).to_pylist()]
-    clock = "00:00:00" if form == "iso" else re.sub(r"%[fIpHMS]", lambda one: _CLOCK[one[0]], form.partition(" ")[2])
-    ends = [_BARE_END.sub("24:00:00", other) for other in rest]
-    dates = ["" if before else f"{other} {clock}" for other in rest]
-    ns, utc, valid, step, bare = found.ns.copy(), found.utc.copy(), found.valid.copy(), found.step, 0
-    for others, one in ((ends, _TO_THE_MINUTE.sub(r"\1\2%M\2%S", form)), (dates, form)):
-        read = parse(others, one)
+    stamps_read = parse(text, form)
+    if form in NAMED or bool(stamps_read.valid.all()) or 2 * int(stamps_read.valid.sum()) <= len(text):
+        return stamps_read, 0
+    at = np.flatnonzero(~stamps_read.valid)
+    rest = [cell or "" for cell in text.take(pa.array(at)).to_pylist()]
+    clock = (
+        "00:00:00"
+        if form == "iso"
+        else re.sub(r"%[fIpHMS]", lambda further_form: _CLOCK[further_form[0]], form.partition(" ")[2])
+    )
+    ends = [_BARE_END.sub("24:00:00", cell) for cell in rest]
+    dates = ["" if before else f"{cell} {clock}" for cell in rest]
+    ns, utc, valid, step, bare = (
+        stamps_read.ns.copy(),
+        stamps_read.utc.copy(),
+        stamps_read.valid.copy(),
+        stamps_read.step,
+        0,
+    )
+    for cells, further_form in ((ends, _TO_THE_MINUTE.sub(r"\1\2%M\2%S", form)), (dates, form)):
+        read = parse(cells, further_form)
         good = read.valid & ~valid[at]
         ns[at[good]], utc[at[good]], valid[at[good]] = read.ns[good], read.utc[good], True
         step, bare = min(step, read.step) if good.any() else step, int(good.sum())
-    return replace(found, ns=ns, utc=utc, valid=valid, step=step), bare
+    return replace(stamps_read, ns=ns, utc=utc, valid=valid, step=step), bare

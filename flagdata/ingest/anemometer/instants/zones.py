@@ -48,8 +48,8 @@ _STATED = re.compile(
 )
 
 
-def to_utc(wall: IntArray, place: tzinfo, *, lines: IntArray, where: str) -> tuple[IntArray, tuple[Finding, ...]]:
-    """UTC nanoseconds of wall-clock nanoseconds, in the order of the rows.
+def to_utc(wall: IntArray, local_zone: tzinfo, *, lines: IntArray, where: str) -> tuple[IntArray, tuple[Finding, ...]]:
+    """Converts wall-clock nanoseconds to UTC nanoseconds, in the order of the rows.
 
     Args:
         wall: (n,) nanoseconds since 1970 as the wall clock shows them.
@@ -61,9 +61,9 @@ def to_utc(wall: IntArray, place: tzinfo, *, lines: IntArray, where: str) -> tup
     if len(wall) == 0:
         return wall.copy(), ()
     first, last = int(wall.min()) - 26 * HOUR, int(wall.max()) + 26 * HOUR
-    offset = np.full(len(wall), offset_at(place, first), dtype=np.int64)
+    offset = np.full(len(wall), offset_at(local_zone, first), dtype=np.int64)
     findings: list[Finding] = []
-    for instant, before, after in _changes(place, first, last):
+    for instant, before, after in _changes(local_zone, first, last):
         start, end = instant + min(before, after), instant + max(before, after)
         rows = np.flatnonzero((wall >= start) & (wall < end))
         offset[wall >= end] = after
@@ -71,22 +71,20 @@ def to_utc(wall: IntArray, place: tzinfo, *, lines: IntArray, where: str) -> tup
             continue
         if after > before:
             raise TimeError(
-                f"{_show(int(wall[rows[0]]))} does not exist in {place}: the clocks were set forward over it",
+                f"{_show(int(wall[rows[0]]))} does not exist in {local_zone}: the clocks were set forward over it",
                 where=f"{where}, line {lines[rows[0]]}",
                 fix=_FIX,
             )
-        late = _second_pass(wall, rows, end - start, place, f"{where}, line {lines[rows[0]]}")
+        late = _second_pass(wall, rows, end - start, local_zone, f"{where}, line {lines[rows[0]]}")
         offset[late] = after
-        message = (
-            f"the hour from {_show(start)} occurs twice in {place}; by their order {len(rows) - len(late)} rows are "
-        )
-        message += f"of its first pass, {len(late)} of its second"
+        message = f"the hour from {_show(start)} occurs twice in {local_zone}; by their order {len(rows) - len(late)} "
+        message += f"rows are of its first pass, {len(late)} of its second"
         findings.append(Finding.of("clocks-set-back", message, count=len(rows), where=f"line {lines[rows[0]]}"))
     return wall - offset, tuple(findings)
 
 
-def _second_pass(wall: IntArray, rows: IntArray, length: int, place: tzinfo, where: str) -> IntArray:
-    """Which of the rows in a repeated interval [ns] are of its second pass."""
+def _second_pass(wall: IntArray, rows: IntArray, length: int, local_zone: tzinfo, where: str) -> IntArray:
+    """Finds the rows in a repeated interval [ns] that are of its second pass."""
     steps, step = np.diff(wall[rows[0] : rows[-1] + 1]), usual(wall)
     back = np.flatnonzero((steps < -length // 2) | ((steps == 0) & (step >= length)))
     if len(back) == 1:
@@ -101,13 +99,13 @@ def _second_pass(wall: IntArray, rows: IntArray, length: int, place: tzinfo, whe
         reason = "the log goes back more than once within that hour"
     elif before:
         reason = "the log runs through it once without a break, so its clock was not set back"
-    raise TimeError(f"{_show(int(wall[rows[0]]))} occurs twice in {place} and {reason}", where=where, fix=_FIX)
+    raise TimeError(f"{_show(int(wall[rows[0]]))} occurs twice in {local_zone} and {reason}", where=where, fix=_FIX)
 
 
 def instants(
     wall: IntArray, utc: BoolArray, *, line: IntArray, zone_name: str | None, where: str
 ) -> tuple[Instants, tuple[Finding, ...]]:
-    """UTC nanoseconds of stamps, some of which may state their own zone.
+    """Converts stamps, some of which may state their own zone, to UTC nanoseconds.
 
     Raises:
         TimeError: stamps without a zone and none named, or impossible in it.
@@ -115,37 +113,39 @@ def instants(
     if utc.all():
         return wall, ()
     if zone_name is None:
-        place = f"{where}, line {line[np.flatnonzero(~utc)[0]]}"
-        raise ZoneMissingError("the stamps carry no time zone", where=place, fix=_MISSING)
+        where_first = f"{where}, line {line[np.flatnonzero(~utc)[0]]}"
+        raise ZoneMissingError("the stamps carry no time zone", where=where_first, fix=_MISSING)
     time = wall.copy()
-    time[~utc], found = to_utc(wall[~utc], zone(zone_name), lines=line[~utc], where=where)
-    return time, found
+    time[~utc], findings = to_utc(wall[~utc], zone(zone_name), lines=line[~utc], where=where)
+    return time, findings
 
 
-def offset_at(place: tzinfo, instant: int) -> int:
-    """How far a zone's clocks are east of UTC at an instant [ns]."""
-    delta = (_EPOCH + timedelta(seconds=instant // NANOSECONDS)).astimezone(place).utcoffset()
+def offset_at(local_zone: tzinfo, instant: int) -> int:
+    """Computes how far a zone's clocks are east of UTC at an instant [ns]."""
+    delta = (_EPOCH + timedelta(seconds=instant // NANOSECONDS)).astimezone(local_zone).utcoffset()
     return 0 if delta is None else (delta.days * 86_400 + delta.seconds) * NANOSECONDS
 
 
-def _changes(place: tzinfo, low: int, high: int) -> Sequence[tuple[int, int, int]]:
+def _changes(local_zone: tzinfo, low: int, high: int) -> Sequence[tuple[int, int, int]]:
     """Changes of the zone's offset between two instants: (UTC ns, offset before, after [ns east]).
 
     Each is found to the second by bisection of steps of a day.
     """
-    found: list[tuple[int, int, int]] = []
-    edge, known = low, offset_at(place, low)
+    changes: list[tuple[int, int, int]] = []
+    edge, offset = low, offset_at(local_zone, low)
     while edge < high:
         upper = min(edge + 24 * HOUR, high)
-        value = offset_at(place, upper)
-        if value != known:
-            left, right = edge // NANOSECONDS, upper // NANOSECONDS
-            while right - left > 1:
-                middle = (left + right) // 2
-                left, right = (middle, right) if offset_at(place, middle * NANOSECONDS) == known else (left, middle)
-            found.append((right * NANOSECONDS, known, value))
-        edge, known = upper, value
-    return found
+        value = offset_at(local_zone, upper)
+        if value != offset:
+            earlier, later = edge // NANOSECONDS, upper // NANOSECONDS
+            while later - earlier > 1:
+                middle = (earlier + later) // 2
+                earlier, later = (
+                    (middle, later) if offset_at(local_zone, middle * NANOSECONDS) == offset else (earlier, middle)
+                )
+            changes.append((later * NANOSECONDS, offset, value))
+        edge, offset = upper, value
+    return changes
 
 
 def _show(wall: int) -> str:
@@ -167,24 +167,26 @@ class Statement:
     name: str
 
     def advice(self) -> str:
-        """What a user who named no zone may do."""
+        """Advises a user who named no zone."""
         return f"line {self.line} says {self.text!r}: if that is the zone of the stamps, --zone {self.name}"
 
 
-def stated(lines: Sequence[str]) -> Statement | None:
-    """The zone that the first lines of a file state; `None` where none does, or they state several."""
-    found = [
+def stated_zone(lines: Sequence[str]) -> Statement | None:
+    """Finds the zone that the first lines of a file state; `None` where none does, or they state several."""
+    statements = [
         Statement(line=number, text=" ".join(match[0].split()), name=name)
         for number, line in enumerate(lines[:LINES], start=1)
         for match in _STATED.finditer(line[:_LONGEST])
         if (name := _name(match["zone"].strip())) is not None
     ]
-    winters, summers = ({offset_at(zone(one.name), at) for one in found} for at in (0, 182 * 24 * HOUR))
-    return found[0] if len(winters) == 1 or len(summers) == 1 else None
+    winters, summers = (
+        {offset_at(zone(statement.name), at) for statement in statements} for at in (0, 182 * 24 * HOUR)
+    )
+    return statements[0] if len(winters) == 1 or len(summers) == 1 else None
 
 
 def _name(word: str) -> str | None:
-    """The zone that a value spells, as `flagdata.timebase.zone` reads it; a number alone is hours, or hours and
+    """Names the zone that a value spells, as `flagdata.timebase.zone` reads it; a number alone is hours, or hours and
     minutes."""
     number = re.fullmatch(r"(?:UTC|GMT)?\s?([+-]?)(\d{1,2})(\d{2})?", word, re.IGNORECASE)
     name = f"{number[1] or '+'}{int(number[2]):02d}:{number[3] or '00'}" if number is not None else word
@@ -195,18 +197,22 @@ def _name(word: str) -> str | None:
     return name
 
 
-def contradiction(says: str, theirs: str, given: str, time: Instants) -> tuple[Finding, ...]:
-    """The finding that the zone a file states is another than the one that was given, at its first or last instant.
+def contradiction(says: str, theirs: str, given_zone: str, time: Instants) -> tuple[Finding, ...]:
+    """Reports that the zone a file states is another than the one that was given, at its first or last instant.
 
     Args:
         says: who states it, as the subject and verb of a sentence.
         theirs: the zone that is stated.
-        given: the zone by which `time` [UTC ns] was read.
+        given_zone: the zone by which `time` [UTC ns] was read.
     """
     ends = (int(time.min()), int(time.max())) if len(time) else ()
-    apart = max((offset_at(zone(given), at) - offset_at(zone(theirs), at) for at in ends), key=abs, default=0) / HOUR
-    if not apart:
+    hours_between = (
+        max((offset_at(zone(given_zone), at) - offset_at(zone(theirs), at) for at in ends), key=abs, default=0) / HOUR
+    )
+    if not hours_between:
         return ()
-    message = f"{says} that the stamps are of {theirs}; {given} was given and is used, {abs(apart):g} h away"
+    message = (
+        f"{says} that the stamps are of {theirs}; {given_zone} was given and is used, {abs(hours_between):g} h away"
+    )
     fix = f"give --zone {theirs}, unless the file is known to be wrong"
-    return (Finding.of("zone-contradicts", message, value=apart, fix=fix),)
+    return (Finding.of("zone-contradicts", message, value=hours_between, fix=fix),)

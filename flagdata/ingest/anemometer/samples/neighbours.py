@@ -33,20 +33,20 @@ LEAD = 4.0
 """By which it must exceed the score at no lag."""
 
 
-def hours_off(series: WindSeries, other: WindSeries, *, name: str) -> Finding | None:
-    """The finding that `series` fits `other`, called `name`, at another half-hour than its stamps say; `None` if not.
+def hours_off(series: WindSeries, neighbour: WindSeries, *, name: str) -> Finding | None:
+    """Reports that `series` fits `neighbour`, called `name`, at another half-hour than its stamps say; `None` if not.
 
     Logs without wind over ground, or that share less than `FEWEST` bins, are not compared.
     """
-    if "wind_speed" not in series.channels or "wind_speed" not in other.channels:
+    if "wind_speed" not in series.channels or "wind_speed" not in neighbour.channels:
         return None
-    if min(len(series), len(other)) < FEWEST:
+    if min(len(series), len(neighbour)) < FEWEST:
         return None
-    spacing = max(float(np.median(np.diff(one.time))) for one in (series, other)) / NANOSECONDS
+    spacing = max(float(np.median(np.diff(log.time))) for log in (series, neighbour)) / NANOSECONDS
     length = next((bins for bins in BINS if bins >= 2 * spacing), BINS[-1] if spacing <= BINS[-1] else None)
     if length is None:
         return None
-    mine, theirs = _changes(series, length), _changes(other, length)
+    mine, theirs = _changes(series, length), _changes(neighbour, length)
     scores = {lag: _score(*mine, *theirs, lag // length) for lag in range(-FARTHEST, FARTHEST + 1, STEP)}
     best = max(scores, key=lambda lag: scores[lag][0])
     score, correlation, n = scores[best]
@@ -72,12 +72,15 @@ def _changes(series: WindSeries, length: int) -> tuple[IntArray, FloatArray]:
     return number[1:][follows], change[follows]
 
 
-def _score(mine: IntArray, one: FloatArray, theirs: IntArray, two: FloatArray, lag: int) -> tuple[float, float, int]:
-    """Score and correlation with `mine` moved later by `lag` bins, and the number of bins; 0 where they are few."""
-    common, here, there = np.intersect1d(mine + lag, theirs, assume_unique=True, return_indices=True)
+def _score(
+    mine: IntArray, first: FloatArray, theirs: IntArray, second: FloatArray, lag: int
+) -> tuple[float, float, int]:
+    """Computes score and correlation with `mine` moved later by `lag` bins, and the number of bins; 0 where they are
+    few."""
+    common, rows, rows_there = np.intersect1d(mine + lag, theirs, assume_unique=True, return_indices=True)
     if len(common) < FEWEST:
         return 0.0, 0.0, len(common)
-    one, two = one[here] - one[here].mean(), two[there] - two[there].mean()
-    power = float(np.sqrt((one @ one) * (two @ two)))
-    r = min(max(float(one @ two) / power, -0.999999), 0.999999) if power else 0.0
+    first, second = first[rows] - first[rows].mean(), second[rows_there] - second[rows_there].mean()
+    power = float(np.sqrt((first @ first) * (second @ second)))
+    r = min(max(float(first @ second) / power, -0.999999), 0.999999) if power else 0.0
     return math.atanh(r) * math.sqrt(len(common) - 3), r, len(common)

@@ -76,7 +76,7 @@ def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None)
     reading = reading.marked(lag > 0, "time-backwards", late, flag=SampleFlag.TIME_UNSURE, value=worst)
     reading = reading.take(np.argsort(reading.time, kind="stable")) if lag.any() else reading
     if choice is not None and {"rows-sorted", "clock-set-back", "clock-set-on"}.isdisjoint(
-        one.kind for one in reading.findings
+        finding.kind for finding in reading.findings
     ):
         message = f"the rows are in the order of their stamps, and no clock was set: --clock {choice} is not used"
         reading = reading.with_findings((Finding.of("clock-not-set", message),))
@@ -87,14 +87,14 @@ def _without_empty(reading: Reading) -> Reading:
     empty = np.logical_and.reduce([np.isnan(values) for values in reading.channels.values()])
     steps = np.diff(reading.time)
     stuck = (steps < 0) | (reading.stamped & (steps == 0))
-    beside = np.concatenate(([False], stuck)) | np.concatenate((stuck, [False]))
+    adjacent = np.concatenate(([False], stuck)) | np.concatenate((stuck, [False]))
     message = "{n} empty rows dropped, whose stamps are not after that of the row before"
-    rows = empty & beside if not empty.all() else np.zeros(len(empty), dtype=bool)
+    rows = empty & adjacent if not empty.all() else np.zeros(len(empty), dtype=bool)
     return reading.without(rows, "empty-rows", message, severity=Severity.NOTE)
 
 
 def _without_copies(reading: Reading) -> Reading:
-    """The rows without those that come again with the stamp and the values of another."""
+    """Drops the rows that come again with the stamp and the values of another."""
     time, steps = reading.time, np.diff(reading.time)
     if not np.any(steps <= 0):
         return reading
@@ -123,17 +123,17 @@ def _without_copies(reading: Reading) -> Reading:
     return reading.without(twice, "duplicate-rows", message)
 
 
-def _differ(reading: Reading, one: IntArray | slice, other: IntArray | slice) -> BoolArray:
-    """(m,) whether rows have other values than others."""
-    differ = np.zeros(len(reading.line[one]), dtype=bool)
+def _differ(reading: Reading, rows: IntArray | slice, other_rows: IntArray | slice) -> BoolArray:
+    """Checks (m,) whether rows have other values than others."""
+    differ = np.zeros(len(reading.line[rows]), dtype=bool)
     for values in reading.channels.values():
-        first, second = values[one], values[other]
+        first, second = values[rows], values[other_rows]
         differ |= ~((first == second) | (np.isnan(first) & np.isnan(second)))
-    return differ if reading.host_time is None else differ | (reading.host_time[one] != reading.host_time[other])
+    return differ if reading.host_time is None else differ | (reading.host_time[rows] != reading.host_time[other_rows])
 
 
 def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> Reading:
-    """The rows on one clock, without those of wild stamps.
+    """Puts the rows on one clock and drops those of wild stamps.
 
     Raises:
         TimeError: time runs back, and no clock was set.
@@ -171,13 +171,14 @@ def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> R
 
 
 def _believable(time: IntArray, jump: Jump) -> bool:
-    """Whether a step back is a clock that was set; else it may be files joined in another order."""
+    """Checks whether a step back is a clock that was set; else it may be files joined in another order."""
     passed_again = int(time[jump.row :].max()) > int(time[jump.row - 1])
     return jump.size >= -DAY and (jump.whole or jump.size >= -_SMALL or passed_again)
 
 
 def _runs_back(reading: Reading, where: str, *, settable: bool) -> TimeError:
-    """That time runs back, and the ways out; `settable` whether one is to say whose stamps are right."""
+    """Builds the error that time runs back, with the ways out; `settable` whether one is to say whose stamps are
+    right."""
     time = reading.time
     reached = np.maximum.accumulate(time)
     falls = np.flatnonzero(np.diff(time) < 0) + 1
@@ -196,20 +197,20 @@ def _runs_back(reading: Reading, where: str, *, settable: bool) -> TimeError:
 
 
 def _continued(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | None) -> Reading:
-    """The rows on one clock: set back by `jumps`, or set on as `clock.set_on` finds."""
+    """Puts the rows on one clock: set back by `jumps`, or set on as `clock.set_on` finds."""
     on = clock.set_on(reading.time, returns=jumps)
     if choice is None:
         undone = {-jump.size for jump in jumps}
         doubtful = tuple(jump for jump in on if jump.size not in undone)
-        reading = reading.with_findings(clock.report(reading.time, doubtful, reading.line, choice, kept=True))
+        reading = reading.with_findings(clock.report(reading.time, doubtful, reading.line, choice, stamps_stay=True))
         on = tuple(jump for jump in on if jump.size in undone)
-    every = tuple(sorted((*jumps, *on), key=lambda jump: jump.row))
-    if not every:
+    all_jumps = tuple(sorted((*jumps, *on), key=lambda jump: jump.row))
+    if not all_jumps:
         return reading
-    time, shifted = clock.continued(reading.time, every, choice)
+    time, shifted = clock.continued(reading.time, all_jumps, choice)
     flags = np.where(shifted, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
-    found = clock.report(reading.time, every, reading.line, choice, sortable=reading.stamped)
-    return replace(reading, time=time).with_findings(found, flags=flags)
+    findings = clock.report(reading.time, all_jumps, reading.line, choice, sortable=reading.stamped)
+    return replace(reading, time=time).with_findings(findings, flags=flags)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,16 +248,16 @@ def _distinct(reading: Reading, where: str) -> Reading:
         message += f"a moment: spread between their neighbours by up to {value:.4g} s, and unsure by as much"
     else:
         time, period, hold = _evenly(reading, runs)
-        counted = any(one.kind == RATE_GIVEN for one in reading.findings)
+        counted = any(finding.kind == RATE_GIVEN for finding in reading.findings)
         if (
             hold > _COARSE
             and not counted
             and (hold > 1.5 * reading.step or reading.step >= DAY or not _even(runs, period))
         ):
             raise _shared(reading, runs, hold, f"{where}, line {reading.line[shared][0]}")
-        held, moved = hold > 1.5 * reading.step or hold > _COARSE, np.ones(len(time), dtype=bool)
-        kind = "counted-together" if counted else "held-stamps" if held else "coarse-stamps"
-        value = (period if held and not counted else reading.step) / NANOSECONDS
+        held_stamps, moved = hold > 1.5 * reading.step or hold > _COARSE, np.ones(len(time), dtype=bool)
+        kind = "counted-together" if counted else "held-stamps" if held_stamps else "coarse-stamps"
+        value = (period if held_stamps and not counted else reading.step) / NANOSECONDS
         message = (
             f"stamps {hold / NANOSECONDS:g} s apart for about {int(np.median(runs.rows))} rows each: spread evenly, "
         )
@@ -299,12 +300,12 @@ def _evenly(reading: Reading, runs: _Runs) -> tuple[IntArray, float, int]:
     hold = round(float(np.median(room))) if len(room) else reading.step
     hold = min(hold, reading.step) if len(room) < 2 else hold  # how long a stamp stands is not known
     length = np.round(period * rows).astype(np.int64)
-    near = room <= 1.5 * np.maximum(length[:-1], hold)
-    length[:-1] = np.where(near, room, np.minimum(length[:-1], room))
+    adjoining = room <= 1.5 * np.maximum(length[:-1], hold)
+    length[:-1] = np.where(adjoining, room, np.minimum(length[:-1], room))
     time = reading.time + np.repeat(length, rows) * runs.place // np.repeat(rows, rows)
     # The log may begin and end within a stamp: those rows keep the period, the first ones before the next stamp.
     first, last = int(rows[0]), len(time) - int(rows[-1])
-    if len(room) and near[0]:
+    if len(room) and adjoining[0]:
         pace = min(period, int(room[0]) / first)  # no row comes before its stamp
         time[:first] = reading.time[first] - np.round(pace * np.arange(first, 0, -1)).astype(np.int64)
     time[last:] = reading.time[-1] + np.round(period * runs.place[last:]).astype(np.int64)
@@ -312,7 +313,8 @@ def _evenly(reading: Reading, runs: _Runs) -> tuple[IntArray, float, int]:
 
 
 def _even(runs: _Runs, period: float) -> bool:
-    """Whether nearly every stamp stands for as many rows as a period [ns] puts between it and the next, but for one."""
+    """Checks whether nearly every stamp stands for as many rows as a period [ns] puts between it and the next, but for
+    one."""
     off = np.abs(runs.room - runs.rows[:-1] * period) <= period
     return bool(off[1 if len(off) > 2 else 0 :].mean() >= _EVEN) if len(off) else True
 

@@ -52,24 +52,25 @@ class Motion:
 
 
 def position_columns(header: Sequence[str]) -> tuple[str, str] | None:
-    """The columns of latitude and longitude that a header names, each once; `None` where it does not."""
-    found = [[name for name in header if one.fullmatch(name.strip()[:40])] for one in (_LATITUDE, _LONGITUDE)]
-    return (found[0][0], found[1][0]) if all(len(names) == 1 for names in found) else None
+    """Finds the columns of latitude and longitude that a header names, each once; `None` where it does not."""
+    columns = [[name for name in header if pattern.fullmatch(name.strip()[:40])] for pattern in (_LATITUDE, _LONGITUDE)]
+    return (columns[0][0], columns[1][0]) if all(len(names) == 1 for names in columns) else None
 
 
 def extent(latitude: FloatArray, longitude: FloatArray) -> float:
-    """How far positions [deg] reach, without the farthest twentieth on each side [m]; 0 where there are none."""
-    known = (np.abs(latitude) <= 90) & (np.abs(longitude) <= 180) & ((latitude != 0) | (longitude != 0))
-    if int(known.sum()) < 2:
+    """Computes how far positions [deg] reach, without the farthest twentieth on each side [m]; 0 where there are
+    none."""
+    valid = (np.abs(latitude) <= 90) & (np.abs(longitude) <= 180) & ((latitude != 0) | (longitude != 0))
+    if int(valid.sum()) < 2:
         return 0.0
-    north, east = np.radians(latitude[known]), np.radians(longitude[known])
+    north, east = np.radians(latitude[valid]), np.radians(longitude[valid])
     east = np.unwrap(east) * float(np.cos(np.median(north)))
     low, high = np.quantile(np.stack([north, east]), [0.05, 0.95], axis=1)
     return float(np.hypot(*(high - low))) * EARTH
 
 
 def motion(reading: Reading, positions: Mapping[str, FloatArray]) -> Motion | None:
-    """The motion that a log shows; `None` where it shows none.
+    """Finds the motion that a log shows; `None` where it shows none.
 
     Args:
         positions: (n,) "latitude" and "longitude" [deg] of the rows, where the file has them.
@@ -80,82 +81,88 @@ def motion(reading: Reading, positions: Mapping[str, FloatArray]) -> Motion | No
         if median > MOVING * UNITS["kn"].scale:
             return Motion(text=f"moves at {median:.2g} m/s over ground in the median", speed=median)
     if {"latitude", "longitude"} <= set(positions):
-        far = extent(positions["latitude"], positions["longitude"])
-        if far > RANGE:
-            return Motion(text=f"moves: its positions reach over {far:.0f} m", speed=None)
+        reach = extent(positions["latitude"], positions["longitude"])
+        if reach > RANGE:
+            return Motion(text=f"moves: its positions reach over {reach:.0f} m", speed=None)
     return None
 
 
 def settle(
     reading: Reading,
-    given: Platform | None,
+    given_platform: Platform | None,
     *,
     positions: Mapping[str, FloatArray] | None = None,
     where: str,
 ) -> Reading:
-    """The reading with its wind in the channels that the platform allows.
+    """Puts a reading's wind in the channels that the platform allows.
 
     Args:
-        given: by the user.
+        given_platform: by the user.
         positions: see `motion`.
 
     Raises:
         InputError: a platform said to be fixed that moves.
     """
-    shown = motion(reading, positions or {})
-    if given == "fixed" and shown is not None:
+    motion_shown = motion(reading, positions or {})
+    if given_platform == "fixed" and motion_shown is not None:
         raise InputError(
-            f"the platform was given as fixed, but {shown.text}",
+            f"the platform was given as fixed, but {motion_shown.text}",
             where=where,
             fix="say --platform moving: its wind is then apparent wind; where the log's wind is over ground, "
             "computed from a moving platform: --platform corrected",
         )
     has = set(reading.channels)
-    if given == "fixed":
+    if given_platform == "fixed":
         text, names = "fixed platform, as given", {}
         if "wind_speed" not in has and "apparent_wind_speed" in has:
             text += ": apparent wind is wind over ground, its direction still from the sensor's own mark"
             names = {"apparent_wind_speed": "wind_speed"}
         return _renamed(reading, names, "fixed-platform", text, severity=Severity.NOTE)
-    if given == "corrected":
+    if given_platform == "corrected":
         text, names = "wind over ground was computed from a moving platform's motion before it was logged, as given", {}
         if "wind_speed" not in has and "theoretical_wind_speed" in has:
             text += "; what the file calls true wind is kept as wind_speed"
             names = {"theoretical_wind_speed": "wind_speed"}
         return _renamed(reading, names, "computed-true-wind", text)
-    if given is None and shown is None:
+    if given_platform is None and motion_shown is None:
         return _of_unknown(reading)
     if {"wind_speed", "apparent_wind_speed"} <= has:
         text = "wind over ground was computed by the instrument from a moving platform's heading and speed"
         return _renamed(reading, {}, "computed-true-wind", text)
-    names = {name: other for name, other in _RENAMED.items() if name in has and other not in has}
-    known = "a moving platform, as given" if shown is None else f"a platform that {shown.text}"
-    text = f"wind relative to {known}: no ground truth"
+    names = {name: renamed for name, renamed in _RENAMED.items() if name in has and renamed not in has}
+    platform = "a moving platform, as given" if motion_shown is None else f"a platform that {motion_shown.text}"
+    text = f"wind relative to {platform}: no ground truth"
     text += "; what the file calls wind speed is kept as apparent_wind_speed" if "wind_speed" in names else ""
     text += ", its direction as one from the bow" if "wind_direction" in names else ""
-    fix = None if given else "if the log's wind is over ground all the same, give --platform corrected"
-    return _renamed(reading, names, "apparent-wind-only", text, value=shown.speed if shown else None, fix=fix)
+    fix = None if given_platform else "if the log's wind is over ground all the same, give --platform corrected"
+    return _renamed(
+        reading, names, "apparent-wind-only", text, value=motion_shown.speed if motion_shown else None, fix=fix
+    )
 
 
 def _renamed(
     reading: Reading,
     names: Mapping[str, str],
     kind: str,
-    what: str,
+    text: str,
     *,
     severity: Severity = Severity.WARNING,
     value: float | None = None,
     fix: str | None = None,
 ) -> Reading:
-    """The reading with channels under other names, and its findings."""
-    finding = Finding(kind=kind, severity=severity, what=what, value=value, fix=fix)
+    """Renames channels of a reading and reports it."""
+    finding = Finding(kind=kind, severity=severity, what=text, value=value, fix=fix)
     channels = {names.get(name, name): values for name, values in reading.channels.items()}
     return replace(reading, channels=channels).with_findings((finding,))
 
 
-def check_corrected(reading: Reading, given: Platform | None, *, where: str) -> None:
+def check_corrected(reading: Reading, given_platform: Platform | None, *, where: str) -> None:
     """Raises InputError where the platform's motion is stated to have been removed, and no wind is over ground."""
-    if given != "corrected" or "wind_speed" in reading.channels or {"wind_x", "wind_y"} <= set(reading.channels):
+    if (
+        given_platform != "corrected"
+        or "wind_speed" in reading.channels
+        or {"wind_x", "wind_y"} <= set(reading.channels)
+    ):
         return
     raise InputError(
         "no wind over ground in the log, which was given as corrected for its platform's motion",
@@ -179,7 +186,7 @@ def _of_unknown(reading: Reading) -> Reading:
 def settled(
     channels: Mapping[str, Series], options: WindOptions, *, speeds: list[float], source: str, where: str
 ) -> tuple[dict[str, Series], Finding]:
-    """The channels with wind over ground among them where the platform is fixed, and its findings.
+    """Adds wind over ground to the channels where the platform is fixed, with a finding.
 
     Args:
         channels: apparent, theoretical and true wind.
@@ -202,16 +209,16 @@ def settled(
         raise UsageError("an azimuth belongs to a fixed platform", where=where, fix=fix)
     fix = None
     if moving:
-        known = f"a platform that moves at {speed:.1f} kn"
+        platform = f"a platform that moves at {speed:.1f} kn"
     elif options.platform in ("moving", "corrected"):
-        known = "a moving platform, as given"
+        platform = "a moving platform, as given"
     else:
-        known, fix = "a platform of unknown motion", "if the sensor is on a mast, give --platform fixed"
+        platform, fix = "a platform of unknown motion", "if the sensor is on a mast, give --platform fixed"
     if "wind_speed" not in channels:
-        message = f"wind relative to {known}: no ground truth"
+        message = f"wind relative to {platform}: no ground truth"
         kind = "apparent-wind-only"
         return dict(channels), Finding(kind=kind, severity=Severity.WARNING, value=speed, what=message, fix=fix)
-    message = f"wind over ground ({source}) was computed by the instrument from heading and speed of {known}"
+    message = f"wind over ground ({source}) was computed by the instrument from heading and speed of {platform}"
     if fix is not None:
         message = (
             f"wind over ground ({source}): if its platform moves, the instrument computed it from that platform's "
@@ -226,13 +233,13 @@ def _fixed(
     kind = "apparent" if "apparent_wind_speed" in channels else "theoretical"
     speed, angle = f"{kind}_wind_speed", f"{kind}_wind_direction"
     out = dict(channels)
-    stated = "wind_speed" in out
-    if not stated and speed in out:
+    states_ground = "wind_speed" in out
+    if not states_ground and speed in out:
         out["wind_speed"] = out.pop(speed)
     if options.azimuth is not None:
-        if stated or angle not in out:
-            message = "the stream states wind over ground itself" if stated else "the stream has no directions"
+        if states_ground or angle not in out:
+            message = "the stream states wind over ground itself" if states_ground else "the stream has no directions"
             raise UsageError(f"an azimuth was given, but {message}", where=where, fix="leave out --azimuth")
         out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
-    message = f"the wind over ground is that of {source}" if stated else f"{kind} wind is wind over ground"
+    message = f"the wind over ground is that of {source}" if states_ground else f"{kind} wind is wind over ground"
     return out, Finding.of("fixed-platform", f"fixed platform, as given: {message}")

@@ -23,7 +23,8 @@ from flagdata.timebase import NANOSECONDS, iso
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed", "wind_speed_estimate")
 """Channels that cannot be negative."""
 _FASTEST = 150.0
-"""Largest speed, or component, of air near the ground [m/s]."""
+"""Largest speed, or component, of air near the ground [m/s]. Lowered, it cuts real gusts; raised, codes for no value
+pass as wind."""
 _TURNS = (-math.pi - 1e-6, 2 * math.pi + 1e-6)
 """Directions as instruments write them, signed or not, with room for conversion from degrees [rad]; beyond, the cell is
 a code or another quantity."""
@@ -40,7 +41,8 @@ highest summit, 108 kPa at the lowest shore), with room for wind tunnels, sensor
 overshoot. A recipe's `range` narrows them."""
 _STALE_CHANCE, _STALE_SHORTEST, _STALE_SECONDS = 1e-3, 5, 1.0
 """Probability of flagging one run of repeats in a log without any, see `stale`; rows and seconds below which a run is
-never stale: fast loggers read a smoothed signal several times over."""
+never stale: fast loggers read a smoothed signal several times over. Lowered chances or raised lengths let short
+freezes of a sensor pass."""
 _COARSE_STEP, _LEAST_OFF = 0.2, 0.1
 """Step between speeds [m/s] from which on an instrument is coarse, and how far its least speed may be from that."""
 _VANE_ROWS, _VANE_SPEEDS = 20, 3
@@ -51,14 +53,14 @@ _SIGNED_SHARE, _SIGNED_KINDS, _SIGNED_LEVEL = 0.05, 3, -0.5
 """Share of the rows, different values, and their median [m/s], from which negative speeds are those of a component."""
 _INTENSITY, _STEADY_ROWS, _STEADY_SPAN, _SLOWEST = 0.02, 20, 600.0, 1.0
 """Turbulence intensity (standard deviation by the mean) that no wind outdoors stays below; readings, seconds and mean
-speed [m/s] from which on a speed is judged."""
+speed [m/s] from which on a speed is judged. A raised intensity reports calm nights as wind tunnels."""
 _OUT = "out-of-range"
 _OUT_FIX = "check the recipe's columns and units; a code for no value belongs into its [file] missing"
 
 
 def impossible(reading: Reading) -> Reading:
-    """Impossible winds: OUT_OF_RANGE. Impossible values of other channels are left out (NaN): one absurd temperature
-    does not make the wind beside it unusable."""
+    """Flags impossible winds OUT_OF_RANGE. Impossible values of other channels are left out (NaN): one absurd
+    temperature does not make the wind beside it unusable."""
     for name, (low, high) in _POSSIBLE.items():
         if name not in reading.channels:
             continue
@@ -67,8 +69,8 @@ def impossible(reading: Reading) -> Reading:
         bounds = f"{low:g} to {high:g} {CHANNELS[name].unit}"
         message = f"{{n}} impossible values of {name}, outside {bounds}; left out of averages"
         flag = SampleFlag.OUT_OF_RANGE if of_wind else SampleFlag.OK
-        known = (reading.flags & flag) != 0
-        reading = reading.marked(beyond & ~known, _OUT, message, flag=flag, fix=_OUT_FIX)
+        flagged = (reading.flags & flag) != 0
+        reading = reading.marked(beyond & ~flagged, _OUT, message, flag=flag, fix=_OUT_FIX)
         if not of_wind:
             reading = replace(reading, channels={**reading.channels, name: np.where(beyond, np.nan, values)})
     return reading
@@ -206,18 +208,18 @@ def one_direction(reading: Reading) -> Reading:
     """Directions that are the same in every row of a wind that varies, and speeds and directions that are all 0."""
     none = np.full(len(reading.time), np.nan)
     speed, towards = (reading.channels.get(name, none) for name in ("wind_speed", "wind_direction"))
-    known = np.isfinite(speed) & np.isfinite(towards)
-    if int(known.sum()) < _VANE_ROWS or len(np.unique(towards[known])) > 1:
+    finite = np.isfinite(speed) & np.isfinite(towards)
+    if int(finite.sum()) < _VANE_ROWS or len(np.unique(towards[finite])) > 1:
         return reading
-    at = float(np.degrees(towards[known][0]))
+    at = float(np.degrees(towards[finite][0]))
     message = f"wind_direction is {at:g}° in all {{n}} rows"
-    if not speed[known].any():
+    if not speed[finite].any():
         message += " and wind_speed is 0: calm air all along, or columns that were never filled"
-    elif len(np.unique(speed[known])) >= _VANE_SPEEDS:
+    elif len(np.unique(speed[finite])) >= _VANE_SPEEDS:
         message += ", while the speed varies: a vane that is stuck, not connected or not set up"
     else:
         return reading
-    return reading.marked(known, "direction-stays", message, value=at, fix="check the vane, its cable and the column")
+    return reading.marked(finite, "direction-stays", message, value=at, fix="check the vane, its cable and the column")
 
 
 def stale(reading: Reading) -> Reading:
@@ -234,17 +236,20 @@ def stale(reading: Reading) -> Reading:
     names = [n for n in (*SPEEDS, "wind_x", "wind_y", "wind_z") if n in reading.channels]
     names += [n for n in ("wind_direction", "apparent_wind_direction") if n in reading.channels]
     # Streams interleave kinds of wind: rows that hold the same channels are compared with each other.
-    held = np.zeros(len(reading.time), dtype=np.int64)
+    channels_present = np.zeros(len(reading.time), dtype=np.int64)
     for bit, name in enumerate(names):
-        held |= np.isfinite(reading.channels[name]).astype(np.int64) << bit
+        channels_present |= np.isfinite(reading.channels[name]).astype(np.int64) << bit
     moves = (reading.flags & (SampleFlag.DEAD_ZONE | SampleFlag.OUT_OF_RANGE)) != 0
-    for kind in np.unique(held[held > 0]).tolist():
-        rows = np.flatnonzero(held == kind)
+    for kind in np.unique(channels_present[channels_present > 0]).tolist():
+        rows = np.flatnonzero(channels_present == kind)
         present = [name for bit, name in enumerate(names) if kind >> bit & 1]
         if WIND_CHANNELS.isdisjoint(present) or len(rows) < _STALE_SHORTEST:
             continue  # a direction without a speed is no reading of the wind
         values = {name: reading.channels[name][rows] for name in present}
-        same = np.logical_and.reduce([one[1:] == one[:-1] for one in values.values()]) & ~moves[rows[1:]]
+        same = (
+            np.logical_and.reduce([channel_values[1:] == channel_values[:-1] for channel_values in values.values()])
+            & ~moves[rows[1:]]
+        )
         same &= ~_least(values.get("wind_speed", np.zeros(len(rows))))[1:]
         starts, lengths = _runs(same)
         span = (reading.time[rows[starts + lengths]] - reading.time[rows[starts]]) / NANOSECONDS
@@ -267,7 +272,7 @@ def _longer(
     span: FloatArray,
     allowed: float | None,
 ) -> tuple[BoolArray, str, str | None]:
-    """Which runs of repeats are too long, in words, and what to do where the air was that steady."""
+    """Decides which runs of repeats are too long, in words, and what to do where the air was that steady."""
     if allowed is not None:
         return span > allowed, f"for longer than the {allowed:g} s its recipe allows", None
     n = len(same) + 1
@@ -290,26 +295,27 @@ def _longer(
 
 def _limit(n: int, share: FloatArray) -> IntArray:
     """Repeats in a row that chance does not explain among n rows of which `share` repeat the one before them."""
-    kept = np.clip(share, 0.05, 0.999)
-    return np.maximum(_STALE_SHORTEST, np.ceil(math.log(n / _STALE_CHANCE) / -np.log(kept))).astype(np.int64)
+    clipped = np.clip(share, 0.05, 0.999)
+    return np.maximum(_STALE_SHORTEST, np.ceil(math.log(n / _STALE_CHANCE) / -np.log(clipped))).astype(np.int64)
 
 
 def _least(speed: FloatArray) -> BoolArray:
-    """(n,) rows whose speed is the least that a coarse instrument shows above calm: it stays there as calm air does."""
+    """Finds (n,) rows whose speed is the least that a coarse instrument shows above calm: it stays there as calm air
+    does."""
     above = speed[np.isfinite(speed) & (speed > 0)]
     step, least = resolution(above), float(above.min(initial=np.inf))
     return (speed == least) & (step >= _COARSE_STEP) & (abs(least - step) <= _LEAST_OFF * step)
 
 
 def _runs(same: BoolArray) -> tuple[IntArray, IntArray]:
-    """First row and number of repeats of each run of repeats."""
+    """Finds the first row and the number of repeats of each run of repeats."""
     edges = np.diff(same.astype(np.int8), prepend=np.int8(0), append=np.int8(0))
     starts = np.flatnonzero(edges == 1)
     return starts, np.flatnonzero(edges == -1) - starts
 
 
 def _within(starts: IntArray, lengths: IntArray) -> IntArray:
-    """All rows of runs."""
+    """Lists all rows of runs."""
     return np.repeat(starts - np.cumsum(lengths) + lengths, lengths) + np.arange(int(lengths.sum()))
 
 
@@ -329,15 +335,15 @@ def at_nyquist(reading: Reading) -> Reading:
         limit = rate / 2
         high = np.unique(np.round(values[values > rate / 4], 6))
         step = float(np.median(np.diff(high))) if len(high) > 2 else 1.0
-        near = values >= limit - max(2 * step, 0.05 * limit)
-        typical = float(np.median(values[near])) if near.any() else 0.0
+        at_limit = values >= limit - max(2 * step, 0.05 * limit)
+        typical = float(np.median(values[at_limit])) if at_limit.any() else 0.0
         message = (
             f"{{n}} values of {name}, median {typical:.2f} Hz in steps of {step:.2f} Hz, lie at the Nyquist limit "
             f"{limit:.2f} Hz of {rate:.1f} frames a second: the true frequency may as well be {rate - typical:.1f} or "
             f"{rate + typical:.1f} Hz"
         )
         fix = f"only a camera faster than {4 * limit:.0f} frames a second can show it"
-        reading = reading.marked(near, "at-nyquist", message, flag=SampleFlag.ALIASED, value=typical, fix=fix)
+        reading = reading.marked(at_limit, "at-nyquist", message, flag=SampleFlag.ALIASED, value=typical, fix=fix)
     return reading
 
 
@@ -351,12 +357,12 @@ def gaps(reading: Reading) -> Reading:
     blank = np.ones(len(reading.time), dtype=bool)
     for _, rows in kinds:
         blank[rows] = False
-    for names, own in kinds:
-        if len(own) < 4:
+    for names, rows_of_kind in kinds:
+        if len(rows_of_kind) < 4:
             continue
-        rows = np.union1d(own, np.flatnonzero(blank)) if len(kinds) > 1 else own
+        rows = np.union1d(rows_of_kind, np.flatnonzero(blank)) if len(kinds) > 1 else rows_of_kind
         of = f" of {next(name for name in names if name in WIND_CHANNELS)}" if len(kinds) > 1 else ""
-        between, steps = np.diff(reading.time[own]), np.diff(reading.time[rows])
+        between, steps = np.diff(reading.time[rows_of_kind]), np.diff(reading.time[rows])
         usual = float(np.median(between))
         jitter = 3 * (float(np.quantile(between, 0.99)) - usual)
         wide = np.flatnonzero(steps > max(1.5 * usual, min(usual + jitter, 3 * usual)))
@@ -385,8 +391,8 @@ def steady(reading: Reading) -> Reading:
     temperature in K or a humidity of some hours.
     """
     speed = reading.channels.get("wind_speed", np.full(len(reading.time), np.nan))
-    known = np.isfinite(speed) & ((reading.flags & UNUSABLE) == 0)
-    values, time = speed[known], reading.time[known]
+    usable = np.isfinite(speed) & ((reading.flags & UNUSABLE) == 0)
+    values, time = speed[usable], reading.time[usable]
     if len(values) < _STEADY_ROWS or float(np.ptp(time)) < _STEADY_SPAN * NANOSECONDS or values.mean() < _SLOWEST:
         return reading
     intensity = float(values.std() / values.mean())

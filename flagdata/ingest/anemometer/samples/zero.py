@@ -17,11 +17,13 @@ from flagdata.timebase import NANOSECONDS
 _WINDOW = 2.0
 """Length of a stretch that is looked at whole [s]."""
 _SHORTEST = 10.0
-"""Idle time it takes to believe an offset [s]: free air does not hold its speed within `_BAND` for so long."""
+"""Idle time it takes to believe an offset [s]: free air does not hold its speed within `_BAND` for so long.
+Lowered, a lull passes for idling; raised, short calms no longer show the offset."""
 _BAND = 0.05
-"""Widest spread of an idle reading within a stretch [m/s], or four steps of its resolution if that is more."""
+"""Widest spread of an idle reading within a stretch [m/s], or four steps of its resolution if that is more.
+Raised, light steady wind passes for idling."""
 _LARGEST = 1.0
-"""An idle reading beyond this is no zero offset but steady wind [m/s]."""
+"""An idle reading beyond this is no zero offset but steady wind [m/s]. Raised, steady wind may be subtracted."""
 _BELOW = 0.1
 """Readings below an idle one, over those that are idle, beyond which it is no calm air's."""
 _LEAST_JUMP = 0.1
@@ -50,13 +52,13 @@ class Zero:
 
 
 def resolution(values: FloatArray) -> float:
-    """Smallest step between different readings that occurs [same unit], 0 when all are equal."""
+    """Finds the smallest step between different readings that occurs [same unit], 0 when all are equal."""
     levels = np.unique(np.round(values[np.isfinite(values)], 9))
     return float(np.diff(levels).min()) if len(levels) > 1 else 0.0
 
 
 def estimate(time: IntArray, speed: FloatArray) -> Zero | None:
-    """The zero offset shown by idle stretches, `None` where there is not enough idle time.
+    """Estimates the zero offset shown by idle stretches, `None` where there is not enough idle time.
 
     Args:
         time: (n,) increasing UTC nanoseconds.
@@ -146,14 +148,14 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
 
 
 def _reported(reading: Reading, zero: Zero, shift: float) -> Reading:
-    """What calm air reads, whether the `shift` subtracted [m/s] has settled it, and the jump out of it."""
+    """Reports what calm air reads, whether the `shift` subtracted [m/s] has settled it, and the jump out of it."""
     settled = abs(zero.offset - shift) <= _BAND
     done, fix = "subtracted" if settled else "not subtracted", None
     if not settled:
         ways = f"--zero-offset estimate, or --zero-offset {zero.offset:.3g}"
         fix = f"correct it: {ways}" if shift else f"subtract it: {ways}"
-        left = zero.offset - shift
-        done = f"{shift:+.3f} m/s was subtracted, which leaves {left:+.3f} m/s in calm air" if shift else done
+        rest = zero.offset - shift
+        done = f"{shift:+.3f} m/s was subtracted, which leaves {rest:+.3f} m/s in calm air" if shift else done
     message = f"calm air reads {zero.offset:+.3f} m/s (σ {zero.sigma:.3f}, {zero.seconds:.0f} s idle); {done}"
     severity = Severity.NOTE if settled else Severity.WARNING
     reading = reading.marked(zero.idle, "zero-offset", message, severity=severity, value=zero.offset, fix=fix)

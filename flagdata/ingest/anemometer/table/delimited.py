@@ -40,13 +40,13 @@ class Delimited:
     uses = frozenset({"zone", "azimuth", "platform", "start", "date", *_ASKED})
 
     def recognise(self, head: Head) -> Guess | None:
-        """The recipe of the catalog whose columns the header names; the one with most columns in common."""
+        """Finds the recipe of the catalog whose columns the header names; the one with most columns in common."""
         best: Guess | None = None
         for name in recipes.SENSORS.names():
             recipe = recipes.load(name)
-            found = _match(recipe, name, head) if isinstance(recipe, Recipe) else None
-            if found and (best is None or found.score > best.score):
-                best = found
+            guess = _match(recipe, name, head) if isinstance(recipe, Recipe) else None
+            if guess and (best is None or guess.score > best.score):
+                best = guess
         return best
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
@@ -72,20 +72,21 @@ class Delimited:
 
 
 def _by_recipe(source: TextFile, recipe: Recipe, options: WindOptions, azimuth: float | None) -> Reading:
-    """All rows of a table, in the order of the file; `azimuth` of components' axes [rad, clockwise from true north]."""
+    """Reads all rows of a table, in the order of the file; `azimuth` of components' axes [rad, clockwise from true
+    north]."""
     where, rows = str(source.path), RowReader(source, recipe.file)
     if recipe.time.format == "excel-days":
         recipe = replace(recipe, time=replace(recipe.time, format=source.serial_days))
     columns = platform.position_columns(rows.header or ()) or ()
-    given = Given(start=options.start, date=options.date, clock=options.clock)
-    table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns, given=given)
+    stamp_options = Given(start=options.start, date=options.date, clock=options.clock)
+    table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns, stamp_options=stamp_options)
     reading = with_horizontal(table.reading, azimuth, where=where)
     positions = {name: table.extra[column] for name, column in zip(platform.POSITION, columns, strict=False)}
     return platform.settle(reading, options.platform, positions=positions, where=where)
 
 
 def drafted(source: TextFile, options: WindOptions) -> Draft | None:
-    """The draft of a file; `None` where it holds no table.
+    """Drafts a recipe for a file; `None` where it holds no table.
 
     Raises:
         UnknownNameError: an answer to a check that does not exist.
@@ -97,34 +98,34 @@ def drafted(source: TextFile, options: WindOptions) -> Draft | None:
 
 
 def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
-    found = drafted(source, options)
-    if found is None:
+    draft = drafted(source, options)
+    if draft is None:
         fix = "describe it by a recipe: --sensor FILE.toml"
         raise UsageError("no table in its first lines", where=where, fix=fix)
-    if len(found.winds) > 1 and options.wind is None:
-        question = f"the file holds {len(found.winds)} anemometers: {', '.join(found.winds)}; which one?"
+    if len(draft.winds) > 1 and options.wind is None:
+        question = f"the file holds {len(draft.winds)} anemometers: {', '.join(draft.winds)}; which one?"
         raise OpenFactsError.of([Open(key="wind", question=question, example="COLUMN")], where=where)
-    if found.open:
-        raise OpenFactsError.of(found.open, where=where)
-    recipe = recipes.parse(found.recipe, where=f"the draft for {where}")
+    if draft.open:
+        raise OpenFactsError.of(draft.open, where=where)
+    recipe = recipes.parse(draft.recipe, where=f"the draft for {where}")
     recipe = replace(recipe, expect=frozenset((*options.expect, *(("order",) if options.clock is not None else ()))))
-    azimuth = _WEST if found.of_earth and options.azimuth is None else options.azimuth
+    azimuth = _WEST if draft.of_earth and options.azimuth is None else options.azimuth
     reading = _by_recipe(source, recipe, options, azimuth)
     if _LEFT_OUT & {finding.kind for finding in reading.findings}:
         _refuse_new_names(source, recipe, where)
     odd = doubts(
         reading,
         recipe,
-        assumed=frozenset(fact.what for fact in found.facts if fact.origin == "assumed"),
-        left_out=sum(one.count for one in reading.findings if one.kind in _LEFT_OUT),
+        assumed=frozenset(fact.what for fact in draft.facts if fact.origin == "assumed"),
+        left_out=sum(finding.count for finding in reading.findings if finding.kind in _LEFT_OUT),
         now=time.time_ns(),
     )
     if odd:
-        asked = [Open(key="expect", question=f"{one.text}. {one.question}", example=one.key) for one in odd]
+        asked = [Open(key="expect", question=f"{doubt.text}. {doubt.question}", example=doubt.key) for doubt in odd]
         raise OpenFactsError.of(asked, where=where)
-    unused = _unused(found)
-    understood = tuple(fact.line() for fact in found.facts)
-    return replace(reading.with_findings(unused), drafted=found.recipe, stated=found.stated, understood=understood)
+    unused = _unused(draft)
+    understood = tuple(fact.line() for fact in draft.facts)
+    return replace(reading.with_findings(unused), drafted=draft.recipe, stated=draft.stated, understood=understood)
 
 
 def _refuse_new_names(source: TextFile, recipe: Recipe, where: str) -> None:
@@ -138,13 +139,13 @@ def _refuse_new_names(source: TextFile, recipe: Recipe, where: str) -> None:
             raise InputError(message, where=f"{where}, line {number}", fix="split the file before it")
 
 
-def _unused(found: Draft) -> tuple[Finding, ...]:
-    message = f"columns that are not used: {', '.join(found.unused)}"
-    return (Finding.of("columns-not-read", message),) if found.unused else ()
+def _unused(draft: Draft) -> tuple[Finding, ...]:
+    message = f"columns that are not used: {', '.join(draft.unused)}"
+    return (Finding.of("columns-not-read", message),) if draft.unused else ()
 
 
 def _states_its_unit(recipe: Recipe) -> bool:
-    """Whether the headings that a recipe expects state the unit of the wind."""
+    """Checks whether the headings that a recipe expects state the unit of the wind."""
     winds = [layout.column for name, layout in recipe.channels.items() if name in WIND_CHANNELS]
     return all(isinstance(column, str) and meaning(column).unit is not None for column in winds)
 
@@ -160,10 +161,10 @@ def _match(recipe: Recipe, name: str, head: Head) -> Guess | None:
     needed = [c.column for c in recipe.channels.values() if not c.optional] + list(recipe.time.columns)
     if not all(column in cells for column in needed):
         return None
-    found = [c.column for c in recipe.channels.values() if c.column in cells]
+    columns = [c.column for c in recipe.channels.values() if c.column in cells]
     return Guess(
         format="delimited",
         recipe=name,
-        score=min(0.95, 0.6 + 0.05 * (len(found) + len(recipe.time.columns))),
+        score=min(0.95, 0.6 + 0.05 * (len(columns) + len(recipe.time.columns))),
         reasons=(f"line {layout.preamble + 1} names the columns of recipe {name}: {', '.join(map(str, needed))}",),
     )

@@ -62,21 +62,22 @@ class RowClock:
             texts = block.joined(self.columns)
         else:
             texts = [" ".join(row[i].strip() for i in self.columns) for row in block]
-        found, bare = dates.parse(texts, self.form)
+        stamps, bare = dates.parse(texts, self.form)
         self.bare_dates += bare
-        return found
+        return stamps
 
-    def add(self, found: Stamps, keep: BoolArray) -> None:
-        self.ns.add(found.ns[keep])
-        self.utc.add(found.utc[keep])
-        self.step = min(self.step, found.step)
+    def add(self, stamps: Stamps, keep: BoolArray) -> None:
+        self.ns.add(stamps.ns[keep])
+        self.utc.add(stamps.utc[keep])
+        self.step = min(self.step, stamps.step)
 
     def stated(self) -> bool:
-        """Whether every stamp states its zone, as Unix times do, or needs none, as counts since a start."""
+        """Checks whether every stamp states its zone, as Unix times do, or needs none, as counts since a start."""
         return dates.is_elapsed(self.form) or bool(self.utc.view().all())
 
     def order(self, line: IntArray, choice: ClockChoice | None) -> tuple[Order, tuple[Finding, ...]]:
-        """The rows from the oldest on, for logs that list the newest first or out of order; and its findings.
+        """Orders the rows from the oldest on, for logs that list the newest first or out of order; also returns its
+        findings.
 
         Args:
             line: (n,) numbers of the rows' lines, for messages.
@@ -98,20 +99,20 @@ class RowClock:
         return np.arange(len(wall))[order][sorting[0]], (*findings, sorting[1])
 
     def instants(
-        self, order: Order, *, line: IntArray, zone_name: str | None, where: str, given: Given
+        self, order: Order, *, line: IntArray, zone_name: str | None, where: str, stamp_options: Given
     ) -> tuple[Instants, tuple[Finding, ...]]:
-        """The instants and what was found; the blocks are let go."""
+        """Converts the stamps to instants and reports what was odd; the blocks are released."""
         wall, utc = self.ns.view()[order], self.utc.view()[order]
         self.ns, self.utc = Growing(np.int64), Growing(np.bool_)
         if dates.is_elapsed(self.form):
-            return dates.since_start(wall, self.form, start=given.start, line=line, where=where)
+            return dates.since_start(wall, self.form, start=stamp_options.start, line=line, where=where)
         if self.form not in stamps.NAMED and "%p" not in self.form and not utc.any():
             dates.refuse_twelve(wall, line=line, where=where)
         findings: tuple[Finding, ...] = ()
         if dates.needs_date(self.form):
-            wall, findings = dates.completed(wall, self.form, date=given.date, line=line, where=where)
-        elif given.start is not None or given.date is not None:
-            option = "--start" if given.start is not None else "--date"
+            wall, findings = dates.completed(wall, self.form, date=stamp_options.date, line=line, where=where)
+        elif stamp_options.start is not None or stamp_options.date is not None:
+            option = "--start" if stamp_options.start is not None else "--date"
             raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")
         if self.bare_dates:
             message = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
@@ -122,5 +123,5 @@ class RowClock:
 
 
 def cells_of(block: Block, index: int) -> Sequence[str] | pa.StringArray:
-    """The cells of one column."""
+    """Returns the cells of one column."""
     return block.column(index) if isinstance(block, Columns) else [row[index] for row in block]

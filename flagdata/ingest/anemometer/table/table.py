@@ -73,14 +73,14 @@ class _Column:
     states: Growing[np.uint8] = field(default_factory=lambda: Growing(np.uint8))
 
     def value(self, order: Order) -> FloatArray:
-        """All values; they are let go, so that a long log is not held twice."""
-        found, self.values = self.values.view()[order], Growing(np.float64)
-        return found
+        """Returns all values in order and releases them, so that a long log is not held twice."""
+        values, self.values = self.values.view()[order], Growing(np.float64)
+        return values
 
     def state(self, order: Order) -> UInt8Array:
-        """All states; likewise."""
-        found, self.states = self.states.view()[order], Growing(np.uint8)
-        return found
+        """Returns all states in order and releases them."""
+        states, self.states = self.states.view()[order], Growing(np.uint8)
+        return states
 
 
 @dataclass
@@ -168,27 +168,27 @@ class _Gathered:
 
 
 def _still(states: Mapping[str, UInt8Array]) -> dict[str, BoolArray]:
-    """Where a word for calm air stands in a speed: the speed's name and those of its directions → (n,) rows.
+    """Finds where a word for calm air stands in a speed: the speed's name and those of its directions → (n,) rows.
 
     WMO-No. 8 (part I, chapter 5) and WMO-No. 306 (FM 15, 00000KT): calm air has speed 0 and no direction.
     """
     calm = {name: state == Cell.CALM for name, state in states.items() if (state == Cell.CALM).any()}
     return {
-        one: here
-        for name, here in calm.items()
-        for one in (name, *(other for other in states if other.startswith(name.replace("speed", "direction"))))
+        channel: is_calm
+        for name, is_calm in calm.items()
+        for channel in (name, *(angle for angle in states if angle.startswith(name.replace("speed", "direction"))))
     }
 
 
-def _of_cells(kind: str, severity: Severity, name: str, here: BoolArray, line: IntArray, what: str) -> Finding:
-    """The finding about the cells of a channel in the rows `here` (n,)."""
-    count = int(here.sum())
+def _of_cells(kind: str, severity: Severity, name: str, affected: BoolArray, line: IntArray, text: str) -> Finding:
+    """Reports cells of a channel in the rows `affected` (n,)."""
+    count = int(affected.sum())
     return Finding(
         kind=kind,
         severity=severity,
         count=count,
-        where=f"line {line[here][0]}",
-        what=f"{count} {what.format(name=name)}",
+        where=f"line {line[affected][0]}",
+        what=f"{count} {text.format(name=name)}",
     )
 
 
@@ -200,14 +200,14 @@ def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str, points: Map
 
 
 def _where(block: Block, wanted: BoolArray) -> Block:
-    """The rows of a block that are wanted (n,)."""
+    """Selects the rows of a block that are wanted (n,)."""
     if isinstance(block, Columns):
         return block.where(wanted)
-    return [row for row, kept in zip(block, wanted.tolist(), strict=True) if kept]
+    return [row for row, is_wanted in zip(block, wanted.tolist(), strict=True) if is_wanted]
 
 
 def _among(block: Block, index: int, values: Sequence[str]) -> BoolArray:
-    """(n,) whether the trimmed cells of a column are among `values`."""
+    """Checks (n,) whether the trimmed cells of a column are among `values`."""
     if isinstance(block, Columns):
         return block.among(index, values)
     return np.array([row[index].strip() in values for row in block], dtype=bool)
@@ -220,7 +220,7 @@ def read_table(
     where: str,
     zone_name: str | None,
     extra: Sequence[str] = (),
-    given: Given | None = None,
+    stamp_options: Given | None = None,
 ) -> Table:
     """Read cells by a recipe.
 
@@ -229,18 +229,18 @@ def read_table(
         where: the file, for messages.
         zone_name: of wall-clock stamps; goes before the recipe's.
         extra: further columns to read, by name.
-        given: what the user says about stamps that are no dates.
+        stamp_options: what the user says about stamps that are no dates.
 
     Raises:
         UsageError: a start or date for stamps that have one.
         InputError: no such columns, or hardly a row that can be read.
         TimeError: stamps without a zone, or impossible ones.
     """
-    own = [_index(column, rows, where) for column in recipe.time.columns]
+    time_columns = [_index(column, rows, where) for column in recipe.time.columns]
     host = RowClock(form=recipe.file.host, columns=[0]) if recipe.file.host else None
     gathered = _Gathered(
-        clock=RowClock(form=recipe.time.format, columns=own) if own or host is None else host,
-        host=host if own else None,
+        clock=RowClock(form=recipe.time.format, columns=time_columns) if time_columns or host is None else host,
+        host=host if time_columns else None,
         channels={
             name: _channel_column(name, i, recipe.channels[name])
             for name, i in _channel_columns(recipe, rows, where).items()
@@ -253,10 +253,10 @@ def read_table(
         gathered.add(line, block, recipe)
     pa.default_memory_pool().release_unused()  # the text of the last blocks
     findings = [*rows.findings(), *_stamp_findings(gathered, rows, recipe, where)]
-    given = given or Given()
-    order, found = gathered.clock.order(gathered.line(), given.clock)
+    stamp_options = stamp_options or Given()
+    order, new_findings = gathered.clock.order(gathered.line(), stamp_options.clock)
     line = gathered.line()[order]
-    findings.extend(found)
+    findings.extend(new_findings)
     if zone_name is not None and gathered.host is None and gathered.clock.stated():
         counts = dates.is_elapsed(gathered.clock.form)
         why = (
@@ -267,14 +267,16 @@ def read_table(
         text = f"{why}: {zone_name} is not used"
         findings.append(Finding.of("zone-not-needed", text))
         zone_name = None
-    named, zone_name = zone_name, zone_name or recipe.time.zone
-    time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where, given=given)
-    findings.extend(found)
-    if named is not None and recipe.time.zone is not None:
-        findings.extend(zones.contradiction("the heading, or the recipe, says", recipe.time.zone, named, time))
+    zone_given, zone_name = zone_name, zone_name or recipe.time.zone
+    time, new_findings = gathered.clock.instants(
+        order, line=line, zone_name=zone_name, where=where, stamp_options=stamp_options
+    )
+    findings.extend(new_findings)
+    if zone_given is not None and recipe.time.zone is not None:
+        findings.extend(zones.contradiction("the heading, or the recipe, says", recipe.time.zone, zone_given, time))
     host_time = None
     if gathered.host is not None:
-        host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
+        host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, stamp_options=Given())
     channels: dict[str, FloatArray] = {}
     flags = np.zeros(len(line), dtype=np.uint16)
     states = {name: column.state(order) for name, column in gathered.channels.items()}
@@ -297,11 +299,11 @@ def read_table(
             findings.append(replace(below, value=limit))
             # averages over the ground truth's window know by the threshold what a 0 may hide
             sensor = sensor if sensor.threshold is not None else replace(sensor, threshold=limit)
-        channel_flags, found = cell_flags(name, layout, value, state, line)
-        findings.extend(found)
+        channel_flags, new_findings = cell_flags(name, layout, value, state, line)
+        findings.extend(new_findings)
         if CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from"):
-            value, found = rules.direction(name, value, line, offset=unit(layout.unit).scale * layout.offset)
-            findings.extend(found)
+            value, new_findings = rules.direction(name, value, line, offset=unit(layout.unit).scale * layout.offset)
+            findings.extend(new_findings)
             zero, north = value == 0, np.abs(value - 2 * np.pi) < _ROUND
             if zero.any() and north.any():
                 message = (
@@ -313,9 +315,9 @@ def read_table(
         if name in WIND_CHANNELS:
             flags |= channel_flags
     for check in gathered.checks:
-        fault, found = check.faults(order, line)
+        fault, new_findings = check.faults(order, line)
         flags[fault] |= SampleFlag.SENSOR_FAULT
-        findings.extend(found)
+        findings.extend(new_findings)
     reading = Reading(
         time=time,
         channels=channels,
@@ -331,9 +333,9 @@ def read_table(
 
 
 def _listed(names: Collection[str]) -> str:
-    """The first of the names, and how many more there are."""
-    shown = [repr(name) for name in sorted(names)[:_LISTED]]
-    return " or ".join(shown) + (f", or one of {len(names) - _LISTED} more" if len(names) > _LISTED else "")
+    """Lists the first of the names, and how many more there are."""
+    first_names = [repr(name) for name in sorted(names)[:_LISTED]]
+    return " or ".join(first_names) + (f", or one of {len(names) - _LISTED} more" if len(names) > _LISTED else "")
 
 
 def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str) -> tuple[Finding, ...]:
@@ -345,7 +347,7 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
     bad, form, distant = gathered.bad_stamps, gathered.clock.form, gathered.distant
     count = len(gathered.line())
     years = f"outside the accepted years, {YEARS[0]} to {YEARS[1]}"
-    far = f"; {distant} of them are {years}: a clock that was not set" if distant else ""
+    distance_note = f"; {distant} of them are {years}: a clock that was not set" if distant else ""
     if count == 0 and not bad and recipe.rows is not None:
         raise InputError(
             f"no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site",
@@ -355,7 +357,7 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
     if count == 0:
         refused = InputError if recipe.rows is None else NothingMeasuredError  # of several sites the others are read
         raise refused(
-            f"no row with a readable time stamp{far}",
+            f"no row with a readable time stamp{distance_note}",
             where=f"{where}, line {bad[0] if bad else rows.first_line}",
             fix=f"stamps are expected as {form}; check the recipe, or that the logger recorded anything",
         )
@@ -371,7 +373,7 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
             if distant == len(bad)
             else unset
             if blank == len(bad)
-            else f"{len(bad)} rows whose stamp is not {form} or no date; left out{far}",
+            else f"{len(bad)} rows whose stamp is not {form} or no date; left out{distance_note}",
             count=len(bad),
             where=f"line {bad[0]}",
         ),
@@ -380,12 +382,12 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
 
 def _channel_columns(recipe: Recipe, rows: Rows, where: str) -> dict[str, int]:
     absent = set(rows.header).isdisjoint if rows.header is not None else None
-    found: dict[str, int] = {}
+    columns: dict[str, int] = {}
     for name, layout in recipe.channels.items():
         if layout.optional and isinstance(layout.column, str) and absent is not None and absent([layout.column]):
             continue
-        found[name] = _index(layout.column, rows, where)
-    return found
+        columns[name] = _index(layout.column, rows, where)
+    return columns
 
 
 def _channel_column(name: str, index: int, layout: ChannelLayout) -> _Column:
@@ -402,12 +404,12 @@ def _index(column: str | int, rows: Rows, where: str) -> int:
     header = rows.header
     if isinstance(column, int):
         if header is not None and column > len(header):
-            raise InputError(f"no column {column}, only {len(header)}", where=where, fix="correct the recipe")
+            raise InputError(f"there is no column {column}, only {len(header)}", where=where, fix="correct the recipe")
         return column - 1 + rows.shift
     names = list(header or ())
     if column not in names:
         fix = UnknownNameError.of("column", column, names).fix
-        raise InputError(f"no column {column!r} in the header", where=where, fix=fix)
+        raise InputError(f"the header has no column {column!r}", where=where, fix=fix)
     if names.count(column) > 1:
         raise InputError(
             f"{names.count(column)} columns are called {column!r}", where=where, fix="give the column's number instead"
@@ -419,12 +421,12 @@ def in_si(value: FloatArray, layout: ChannelLayout) -> FloatArray:
     """Cells of a column in SI, by the recipe's calibration; directions still as the vane gives them."""
     if layout.gain != 1.0 or layout.offset != 0.0:
         value = value * layout.gain + layout.offset
-    stated = unit(layout.unit)
-    return value if stated.scale == 1.0 and stated.offset == 0.0 else stated.to_si(value)
+    si_unit = unit(layout.unit)
+    return value if si_unit.scale == 1.0 and si_unit.offset == 0.0 else si_unit.to_si(value)
 
 
 def turned(angle: FloatArray, layout: ChannelLayout) -> FloatArray:
-    """A vane's angles [rad] as 'from', clockwise, 0 to 2π."""
+    """Turns a vane's angles [rad] to 'from', clockwise, 0 to 2π."""
     mounted = unit(layout.unit).to_si(layout.rotation) + (np.pi if layout.convention == "to" else 0.0)
     return np.mod(angle + mounted, 2 * np.pi)
 
@@ -436,10 +438,10 @@ def cell_flags(
     flags = np.zeros(len(value), dtype=np.uint16)
     findings: list[Finding] = []
 
-    def note(mask: BoolArray, flag: SampleFlag, kind: str, severity: Severity, what: str) -> None:
+    def note(mask: BoolArray, flag: SampleFlag, kind: str, severity: Severity, text: str) -> None:
         if mask.any():
             flags[mask] |= flag
-            findings.append(_of_cells(kind, severity, name, mask, line, f"{what} of {{name}}"))
+            findings.append(_of_cells(kind, severity, name, mask, line, f"{text} of {{name}}"))
 
     note(state == Cell.MISSING, SampleFlag.MISSING, "missing-values", Severity.WARNING, "missing values")
     note(state == Cell.UNREADABLE, SampleFlag.MISSING, "unreadable-values", Severity.ERROR, "unreadable values")
@@ -451,7 +453,7 @@ def cell_flags(
     return flags, tuple(findings)
 
 
-def refuse_if_most(bad: int, good: int, what: str, where: str) -> None:
+def refuse_if_most(bad: int, good: int, text: str, where: str) -> None:
     """Refuse a file of which less than half can be read: it is of another format.
 
     Raises:
@@ -459,7 +461,7 @@ def refuse_if_most(bad: int, good: int, what: str, where: str) -> None:
     """
     if bad > good or (bad and bad == good and good > 1):
         raise InputError(
-            f"{bad} of {bad + good} are {what}", where=where, fix="look at it with flagdata ingest --sniff"
+            f"{bad} of {bad + good} are {text}", where=where, fix="look at it with flagdata ingest --sniff"
         )
 
 

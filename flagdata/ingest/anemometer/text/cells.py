@@ -104,10 +104,10 @@ def numbers(
 
 
 def _without(text: pa.StringArray, suffix: str) -> pa.StringArray:
-    """Trimmed cells without the suffix that each number must have; numbers without it become "?"."""
-    known = pc.ends_with(text, suffix)
-    bare = pc.utf8_trim_whitespace(pc.if_else(known, pc.utf8_slice_codeunits(text, 0, -len(suffix)), text))
-    return pc.if_else(pc.and_(pc.invert(known), pc.match_substring_regex(bare, r"\d")), "?", bare)
+    """Strips from trimmed cells the suffix that each number must have; numbers without it become "?"."""
+    has_suffix = pc.ends_with(text, suffix)
+    bare = pc.utf8_trim_whitespace(pc.if_else(has_suffix, pc.utf8_slice_codeunits(text, 0, -len(suffix)), text))
+    return pc.if_else(pc.and_(pc.invert(has_suffix), pc.match_substring_regex(bare, r"\d")), "?", bare)
 
 
 def _mask(array: pa.BooleanArray) -> BoolArray:
@@ -115,13 +115,13 @@ def _mask(array: pa.BooleanArray) -> BoolArray:
 
 
 def _numeric(codes: Sequence[str]) -> list[float]:
-    found: list[float] = []
+    numbers: list[float] = []
     for code in codes:
         try:
-            found.append(float(code.replace(",", ".")))
+            numbers.append(float(code.replace(",", ".")))
         except ValueError:
             continue
-    return [code for code in found if np.isfinite(code)]
+    return [code for code in numbers if np.isfinite(code)]
 
 
 T = TypeVar("T", bound=np.generic)
@@ -151,5 +151,5 @@ class Growing(Generic[T]):
         self._count = end
 
     def view(self) -> NDArray[T]:
-        """(n,) all values so far, without a copy."""
+        """Views (n,) all values so far, without a copy."""
         return self._room[: self._count]

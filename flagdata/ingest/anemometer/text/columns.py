@@ -37,29 +37,29 @@ class Columns:
         return len(self.cells[0])
 
     def column(self, index: int) -> pa.StringArray:
-        """The cells of one column."""
+        """Returns the cells of one column."""
         return self.cells[index]
 
     def joined(self, indices: Sequence[int]) -> pa.StringArray:
-        """The cells of several columns of each row, trimmed, with a blank between."""
+        """Joins the cells of several columns of each row, trimmed, with a blank between."""
         return pc.binary_join_element_wise(*(pc.utf8_trim_whitespace(self.cells[i]) for i in indices), " ")
 
     def among(self, index: int, values: Sequence[str]) -> BoolArray:
-        """(n,) whether the trimmed cells of a column are among `values`."""
-        found = pc.is_in(pc.utf8_trim_whitespace(self.cells[index]), pa.array(list(values), pa.string()))
-        return found.to_numpy(zero_copy_only=False).astype(bool)
+        """Checks (n,) whether the trimmed cells of a column are among `values`."""
+        is_among = pc.is_in(pc.utf8_trim_whitespace(self.cells[index]), pa.array(list(values), pa.string()))
+        return is_among.to_numpy(zero_copy_only=False).astype(bool)
 
     def where(self, wanted: BoolArray) -> Columns:
-        """The rows that are wanted (n,)."""
+        """Selects the rows that are wanted (n,)."""
         mask = pa.array(wanted)
         return Columns(cells=[cells.filter(mask) for cells in self.cells])
 
     def with_rows(self, rows: Sequence[Sequence[str]], order: IntArray) -> Columns:
-        """These rows and then `rows`, all in the `order` of indices given (n,)."""
-        more = [pa.array([row[i] for row in rows], pa.string()) for i in range(len(self.cells))]
+        """Returns these rows and then `rows`, all in the `order` of indices given (n,)."""
+        further = [pa.array([row[i] for row in rows], pa.string()) for i in range(len(self.cells))]
         return Columns(
             cells=[
-                pa.concat_arrays([own, new]).take(pa.array(order)) for own, new in zip(self.cells, more, strict=True)
+                pa.concat_arrays([own, new]).take(pa.array(order)) for own, new in zip(self.cells, further, strict=True)
             ]
         )
 
@@ -102,20 +102,20 @@ class Lines:
     shape: Shape
 
     def text(self, index: int, encoding: str) -> str:
-        """A line as text."""
+        """Decodes a line as text."""
         return self.data[self.start[index] : self.end[index]].decode(encoding)
 
     def columns(self, count: int) -> Columns:
-        """The first `count` columns of the regular lines."""
+        """Returns the first `count` columns of the regular lines."""
         from pyarrow import csv
 
-        kept = self._kept()
+        regular = self._regular_bytes()
         names = [str(i) for i in range(self.shape.cells)]
-        if not kept:
+        if not regular:
             return Columns(cells=[pa.array([], pa.string()) for _ in range(count)])
         table = csv.read_csv(
-            pa.BufferReader(owned(kept)),
-            read_options=csv.ReadOptions(use_threads=False, block_size=len(kept) + 1, column_names=names),
+            pa.BufferReader(owned(regular)),
+            read_options=csv.ReadOptions(use_threads=False, block_size=len(regular) + 1, column_names=names),
             parse_options=csv.ParseOptions(delimiter=chr(self.shape.delimiter), ignore_empty_lines=False),
             convert_options=csv.ConvertOptions(
                 check_utf8=False,
@@ -127,8 +127,8 @@ class Lines:
         )
         return Columns(cells=[table.column(i).combine_chunks() for i in range(count)])
 
-    def _kept(self) -> bytes:
-        """The bytes of the regular lines alone."""
+    def _regular_bytes(self) -> bytes:
+        """Joins the bytes of the regular lines."""
         if self.regular.all():
             return self.data
         edges = np.diff(np.concatenate(([0], self.regular.astype(np.int8), [0])))
@@ -137,15 +137,15 @@ class Lines:
         return b"".join(self.data[bounds[low] : bounds[high]] for low, high in zip(begins, ends, strict=True))
 
 
-def shape_of(line: bytes, *, delimiter: str, named: int | None, comment: str | None, ascii_only: bool) -> Shape:
-    """The shape of a file of which `line` is a row and whose header names `named` cells, if it has one."""
+def shape_of(line: bytes, *, delimiter: str, names: int | None, comment: str | None, ascii_only: bool) -> Shape:
+    """Finds the shape of a file of which `line` is a row and whose header names `names` cells, if it has one."""
     mark = ord(delimiter)
-    found = line.count(mark) + 1
-    beyond = found - named if named is not None else 0
+    cells = line.count(mark) + 1
+    beyond = cells - names if names is not None else 0
     empty = beyond if beyond > 0 and line.endswith(beyond * delimiter.encode()) else 0
     return Shape(
         delimiter=mark,
-        cells=found if named is None or empty else named,
+        cells=cells if names is None or empty else names,
         empty=empty,
         comment=comment.encode()[0] if comment else None,
         ascii=ascii_only,
@@ -153,7 +153,7 @@ def shape_of(line: bytes, *, delimiter: str, named: int | None, comment: str | N
 
 
 def lines_of(data: bytes, shape: Shape) -> Lines | None:
-    """The lines of a block that ends with a line end or with the file; `None` where that takes a closer look.
+    """Splits a block that ends with a line end or with the file into lines; `None` where that takes a closer look.
 
     It does where a CR alone ends a line, and where Arrow would take a cell's first character for a byte-order mark.
     """
@@ -182,15 +182,15 @@ def lines_of(data: bytes, shape: Shape) -> Lines | None:
 
 def _with(data: bytes, byte: UInt8Array, feeds: IntArray, start: IntArray, shape: Shape) -> BoolArray:
     """Lines that hold nothing but blanks, or a byte that has to be looked at: NUL, Ctrl-Z, beyond ASCII."""
-    found = np.zeros(len(feeds), dtype=bool)
+    odd_lines = np.zeros(len(feeds), dtype=bool)
     odd = (byte == 0) | (byte == 0x1A) if 0 in data or b"\x1a" in data else None
     if shape.ascii and not data.isascii():
         odd = byte > 0x7F if odd is None else odd | (byte > 0x7F)
     if odd is not None:
-        found[np.searchsorted(feeds, np.flatnonzero(odd))] = True
+        odd_lines[np.searchsorted(feeds, np.flatnonzero(odd))] = True
     if shape.delimiter <= 32 and len(start):
-        found |= np.add.reduceat((byte > 32).astype(np.int64), start) == 0
-    return found
+        odd_lines |= np.add.reduceat((byte > 32).astype(np.int64), start) == 0
+    return odd_lines
 
 
 def _misquoted(

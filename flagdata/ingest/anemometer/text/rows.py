@@ -60,7 +60,7 @@ class RowReader:
                 self.header.pop()
 
     def blocks(self, width: int) -> Iterator[tuple[IntArray, Columns | list[list[str]]]]:
-        """Line numbers and rows of at least `width` cells; with a header, of as many cells as it names.
+        """Yields line numbers and rows of at least `width` cells; with a header, of as many cells as it names.
 
         Empty cells beyond (delimiters at the line's end) are allowed. Where the encoding lets bytes be cut, regular
         lines come as columns: see `columns`.
@@ -70,18 +70,18 @@ class RowReader:
         return self._columns(width) if plain and delimiter != '"' else self.rows(width)
 
     def rows(self, width: int) -> Iterator[tuple[IntArray, list[list[str]]]]:
-        """What `blocks` gives, row by row: its definition."""
+        """Yields what `blocks` gives, row by row: its definition."""
         for first, lines in self._source.blocks():
             where, good = self._sorted(list(range(first, first + len(lines))), lines, width)
             if good:
                 yield where, good
 
     def _sorted(self, numbers: Sequence[int], lines: Sequence[str], width: int) -> tuple[IntArray, list[list[str]]]:
-        """The rows of these lines that fit, with their numbers; the others are counted."""
-        named = len(self.header) if self.header is not None else None
+        """Cuts these lines into rows and keeps those that fit, with their numbers; the others are counted."""
+        names = len(self.header) if self.header is not None else None
         comment = self._layout.comment
-        looked: list[int] = []
-        kept: list[str] = []
+        numbers_kept: list[int] = []
+        lines_kept: list[str] = []
         for number, line in zip(numbers, lines, strict=True):
             if number < self.first_line or not line.strip(" \t\x00\x1a"):
                 continue
@@ -89,22 +89,22 @@ class RowReader:
                 continue
             if width > 1 and _is_mark(line, self._layout.delimiter):
                 continue
-            looked.append(number)
-            kept.append(line)
+            numbers_kept.append(number)
+            lines_kept.append(line)
         good: list[list[str]] = []
         where: list[int] = []
-        for number, row in zip(looked, cells_of_lines(kept, self._layout.delimiter), strict=True):
+        for number, row in zip(numbers_kept, cells_of_lines(lines_kept, self._layout.delimiter), strict=True):
             size = len(row)
             # Cells below the empty headings at the end, which hold something in some rows only, shift no others.
-            fits = named is None or size in (named, self._headed) or _only_empty_beyond(row, named)
+            fits = names is None or size in (names, self._headed) or _only_empty_beyond(row, names)
             if fits and size >= width:
                 good.append(row)
                 where.append(number)
             else:
                 self._malformed.append(number)
         self._read += len(good)
-        if looked:
-            self._last_malformed = bool(self._malformed) and self._malformed[-1] == looked[-1]
+        if numbers_kept:
+            self._last_malformed = bool(self._malformed) and self._malformed[-1] == numbers_kept[-1]
         return np.array(where, dtype=np.int64), good
 
     def _columns(self, width: int) -> Iterator[tuple[IntArray, Columns | list[list[str]]]]:
@@ -121,49 +121,49 @@ class RowReader:
                     yield where, good
                 first += len(texts)
                 continue
-            where, found = self._of_lines(lines, first, width, encoding)
+            where, columns = self._of_lines(lines, first, width, encoding)
             if len(where):
-                yield where, found
+                yield where, columns
             first += len(lines.start)
 
     def _shape(self, data: bytes) -> Shape | None:
-        """The shape of the file's regular lines by its first row; `None` where the block has no row."""
+        """Finds the shape of the file's regular lines by its first row; `None` where the block has no row."""
         at = -1
         for _ in range(self.first_line - 1):
             at = data.find(b"\n", at + 1)
             if at < 0:
                 return None
         line = data[at + 1 :].partition(b"\n")[0].rstrip(b"\r")
-        named = len(self.header) if self.header is not None else None
+        names = len(self.header) if self.header is not None else None
         return shape_of(
             line,
             delimiter=self._layout.delimiter,
-            named=named,
+            names=names,
             comment=self._layout.comment,
             ascii_only=self._source.encoding == "latin-1",
         )
 
     def _of_lines(self, lines: Lines, first: int, width: int, encoding: str) -> tuple[IntArray, Columns]:
-        """Rows of a block whose first line has the number `first`."""
+        """Reads the rows of a block whose first line has the number `first`."""
         number = first + np.arange(len(lines.start), dtype=np.int64)
         lines = replace(lines, regular=lines.regular & (number >= self.first_line))
-        regular, others = number[lines.regular], number[~lines.regular]
-        found = lines.columns(width)
+        regular, irregular = number[lines.regular], number[~lines.regular]
+        columns = lines.columns(width)
         before = self._last_malformed
-        texts = [lines.text(at, encoding) for at in (others - first).tolist()]
-        where, good = self._sorted(others.tolist(), texts, width)
+        texts = [lines.text(at, encoding) for at in (irregular - first).tolist()]
+        where, good = self._sorted(irregular.tolist(), texts, width)
         self._read += len(regular)
         if len(regular) and (not self._malformed or self._malformed[-1] < regular[-1]):
             self._last_malformed = False
-        elif not len(others):
+        elif not len(irregular):
             self._last_malformed = before
         if not good:
-            return regular, found
+            return regular, columns
         order = np.argsort(np.concatenate((regular, where)), kind="stable")
-        return np.sort(np.concatenate((regular, where))), found.with_rows(good, order)
+        return np.sort(np.concatenate((regular, where))), columns.with_rows(good, order)
 
     def findings(self) -> tuple[Finding, ...]:
-        """What did not fit; complete when `blocks` has been read.
+        """Reports what did not fit; complete when `blocks` has been read.
 
         Raises:
             InputError: most lines do not fit.
@@ -199,7 +199,7 @@ class RowReader:
 
 
 def _is_mark(line: str, delimiter: str) -> bool:
-    """Whether a line is one word without letters and digits: a ruler, or "***" where a file ends."""
+    """Checks whether a line is one word without letters and digits: a ruler, or "***" where a file ends."""
     words = line.split()
     return len(words) == 1 and delimiter not in words[0] and not any(sign.isalnum() for sign in words[0])
 
@@ -212,7 +212,8 @@ def blank_cells(line: str) -> list[str]:
 
 
 def has_open_quote(line: str, delimiter: str) -> bool:
-    """Whether a quote begins a cell and is not closed; one within a cell that has none before it is a sign (0.01")."""
+    """Checks whether a quote begins a cell and is not closed; one within a cell that has none before it is a sign
+    (0.01")."""
     if line.count('"') % 2 == 0:
         return False
     cell, rest = re.escape(delimiter), line
@@ -224,16 +225,16 @@ def has_open_quote(line: str, delimiter: str) -> bool:
     return False
 
 
-def _only_empty_beyond(row: Sequence[str], named: int) -> bool:
-    return len(row) > named and not any(cell.strip() for cell in row[named:])
+def _only_empty_beyond(row: Sequence[str], names: int) -> bool:
+    return len(row) > names and not any(cell.strip() for cell in row[names:])
 
 
 def cells_of_lines(lines: Sequence[str], delimiter: str) -> list[list[str]]:
-    """Cells of each line. Quotes bind within a line; a line with a quote that is not closed becomes one cell."""
+    """Cuts each line into cells. Quotes bind within a line; a line with a quote that is not closed becomes one cell."""
     if delimiter == " ":
         return [blank_cells(line) for line in lines]
     if not any('"' in line for line in lines):
         return [line.split(delimiter) for line in lines]
     closed = ["" if has_open_quote(line, delimiter) else line for line in lines]
     rows = list(csv.reader(closed, delimiter=delimiter))
-    return [row if kept else [line] for row, kept, line in zip(rows, closed, lines, strict=True)]
+    return [row if is_closed else [line] for row, is_closed, line in zip(rows, closed, lines, strict=True)]

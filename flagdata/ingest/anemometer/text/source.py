@@ -68,7 +68,8 @@ class TextFile:
         return (line for _, block in self.blocks() for line in block)
 
     def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
-        """The file's bytes without a byte-order mark of UTF-8, about `size` at a time; each block ends with a line."""
+        """Yields the file's bytes without a byte-order mark of UTF-8, about `size` at a time; each block ends with a
+        line."""
         with opened(self.path) as stream:
             rest = b""
             first = True
@@ -84,7 +85,7 @@ class TextFile:
                 yield rest
 
     def head(self, count: int = 60) -> list[str]:
-        """The first `count` lines."""
+        """Returns the first `count` lines."""
         with _text(self.path, self.encoding) as stream:
             return [line.rstrip("\n") for line in islice(stream, count)]
 
@@ -101,7 +102,7 @@ class TableText(TextFile):
 
     @classmethod
     def of(cls, source: TextFile, lines: Sequence[str], findings: Iterable[Finding] = ()) -> TableText:
-        """A file converted to these lines, with what was found beside the file's own findings."""
+        """Converts a file to these lines, with what was found beside the file's own findings."""
         return cls(
             path=source.path,
             encoding="utf-8",
@@ -111,22 +112,22 @@ class TableText(TextFile):
         )
 
     def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
-        """See `TextFile.blocks`."""
+        """Yields blocks of lines as `TextFile.blocks` does."""
         for first in range(0, len(self.text), size):
             yield first + 1, list(self.text[first : first + size])
 
     def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
-        """See `TextFile.raw_blocks`: the rows' text, not the file's bytes."""
+        """Yields bytes as `TextFile.raw_blocks` does: the rows' text, not the file's bytes."""
         for _, lines in self.blocks():
             yield "".join(f"{line}\n" for line in lines).encode(self.encoding)
 
     def head(self, count: int = 60) -> list[str]:
-        """See `TextFile.head`."""
+        """Returns the first lines as `TextFile.head` does."""
         return list(self.text[:count])
 
 
 def opened(path: Path) -> IO[bytes]:
-    """The bytes of a file, of one compressed by gzip those that are in it."""
+    """Opens the bytes of a file, of one compressed by gzip those that are in it."""
     with path.open("rb") as stream:
         packed = stream.read(2) == GZIP
     return gzip.open(path, "rb") if packed else path.open("rb")  # type: ignore[return-value]
@@ -188,7 +189,7 @@ NETCDF = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF")
 
 
 def is_workbook(path: Path, head: bytes) -> bool:
-    """Whether a file is an Excel workbook (Office Open XML), by its content."""
+    """Checks whether a file is an Excel workbook (Office Open XML), by its content."""
     if not head.startswith(b"PK\x03\x04"):
         return False
     try:
@@ -199,19 +200,20 @@ def is_workbook(path: Path, head: bytes) -> bool:
 
 
 def signature(head: bytes) -> tuple[str, str] | None:
-    """What a file of another kind is by its first bytes, and what to do with it; `None` when none is recognised."""
+    """Names what a file of another kind is by its first bytes, and what to do with it; `None` when none is
+    recognised."""
     if len(head) > 188 * 2 and head[0] == head[188] == head[376] == 0x47:
         return "a video (MPEG transport stream)", "ingest it as a camera file"
     if len(head) > 4 + 192 and head[4] == head[4 + 192] == 0x47:
         return "a video (AVCHD, MTS)", "ingest it as a camera file"
-    for at, magic, message, fix in _SIGNATURES:
+    for at, magic, kind, fix in _SIGNATURES:
         if head[at : at + len(magic)] == magic:
-            return message, fix
+            return kind, fix
     return None
 
 
 def first_bytes(path: Path) -> bytes:
-    """The first `HEAD` bytes of a file; of one compressed by gzip, of what is in it.
+    """Reads the first `HEAD` bytes of a file; of one compressed by gzip, of what is in it.
 
     Raises:
         NotFoundError: there is none.
@@ -263,9 +265,9 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None, topic:
         return netcdf.open_dataset(path, limits=limits)
     if topic is not None:
         raise UsageError("a topic of what is no MCAP file", where=where, fix="leave out --topic")
-    other = signature(head)
-    if other:
-        raise InputError(f"this is {other[0]}, not a text log", where=where, fix=other[1])
+    other_kind = signature(head)
+    if other_kind:
+        raise InputError(f"this is {other_kind[0]}, not a text log", where=where, fix=other_kind[1])
     codec = encoding or next((name for bom, name in _BOMS if head.startswith(bom)), None)
     if codec is None and _looks_utf16(head):
         raise InputError(
@@ -305,13 +307,15 @@ def _refuse_binary(head: bytes, where: str) -> None:
 
 
 def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[Finding, ...]]:
-    """The codec that decodes the whole file."""
+    """Chooses the codec that decodes the whole file."""
     where = str(path)
     try:
         info = codecs.lookup(codec or "utf-8")
         text = getattr(info, "_is_text_encoding", True)  # what open() itself looks at
     except LookupError:
-        raise InputError(f"no encoding {codec!r}", where=where, fix="give a Python codec name such as cp1252") from None
+        raise InputError(
+            f"there is no encoding {codec!r}", where=where, fix="give a Python codec name such as cp1252"
+        ) from None
     if not text or info.incrementaldecoder is None:
         raise InputError(f"{codec!r} is not a text encoding", where=where, fix="give one such as cp1252")
     decoder = info.incrementaldecoder()
@@ -331,7 +335,7 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
                 done += error.object[: error.start].count(b"\n")
             if codec is not None:
                 raise InputError(
-                    f"not valid {codec}: {error.__class__.__name__}",
+                    f"the text is not valid {codec}: {error.__class__.__name__}",
                     where=f"{where}, line {done + 1}",
                     fix="name the encoding it is in, e.g. --encoding cp1252",
                 ) from None
@@ -347,7 +351,7 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
 
 
 def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Finding, ...]]:
-    """Line ends of each kind, NUL bytes and the longest line, within the limits.
+    """Counts line ends of each kind, NUL bytes and the longest line, within the limits.
 
     In `wide` encodings (2 or 4 bytes a character) the limits hold all the same, but bytes say nothing on line ends.
     """

@@ -258,7 +258,7 @@ BAD: list[tuple[str, str, str, str]] = [
     ("check-key", "[sensor]", "[[check]]\ncolum = 2\n[sensor]", "did you mean 'column'"),
     ("check-no-table", 'name = "mine"', 'check = [1]\nname = "mine"', "not a table"),
     ("not-toml", "[time]", "[time", "not TOML"),
-    ("directive", '"iso"', '"%Y-%m-%d %W"', "unknown directive"),
+    ("directive", '"iso"', '"%Y-%m-%d %W"', "directive %W is unknown"),
 ]
 
 

@@ -193,7 +193,7 @@ ORDERS: dict[str, tuple[list[str], str | None, str]] = {
 @pytest.mark.parametrize("name", ORDERS)
 def test_the_order_of_a_date_is_decided_by_its_numbers_or_given(name: str) -> None:
     texts, given_order, form = ORDERS[name]
-    assert date_form(texts, given=given_order, where="x")[0] == form  # type: ignore[arg-type]
+    assert date_form(texts, given_order=given_order, where="x")[0] == form  # type: ignore[arg-type]
 
 
 UNDECIDED: dict[str, tuple[list[str], str | None, str]] = {
@@ -212,7 +212,7 @@ UNDECIDED: dict[str, tuple[list[str], str | None, str]] = {
 def test_what_nothing_decides_is_refused_with_the_option(name: str) -> None:
     texts, given_order, fix = UNDECIDED[name]
     with pytest.raises(TimeError) as caught:
-        date_form(texts, given=given_order, where="x")  # type: ignore[arg-type]
+        date_form(texts, given_order=given_order, where="x")  # type: ignore[arg-type]
     assert fix in (caught.value.fix or "")
 
 

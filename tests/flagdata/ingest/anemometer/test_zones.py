@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from flagdata.ingest.anemometer.instants.zones import stated
+from flagdata.ingest.anemometer.instants.zones import stated_zone
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]
@@ -37,7 +37,7 @@ def kinds(log: WindLog) -> list[str]:
     ],
 )
 def test_a_zone_that_lines_above_the_rows_state_is_found(text: str, name: str) -> None:
-    statement = stated(text.split("\n"))
+    statement = stated_zone(text.split("\n"))
     assert statement is not None
     assert statement.name == name
 
@@ -47,7 +47,7 @@ def test_a_zone_that_lines_above_the_rows_state_is_found(text: str, name: str) -
     ["Time zone: local", "UTC Offset,99", "zone 5 of the site", "Time Zone: UTC\nGMT Offset: -5", "Timestamp,UTC"],
 )
 def test_what_names_no_zone_or_two_states_none(text: str) -> None:
-    assert stated(text.split("\n")) is None
+    assert stated_zone(text.split("\n")) is None
 
 
 def test_a_zone_that_contradicts_the_preamble_is_reported_by_every_reader(read: Read) -> None:

@@ -18,7 +18,7 @@ TEN = parse("2026-05-01T10:00:00Z")
 def find(
     metadata: dict[str, str], *, option: int | None = None, recorded: str | None = None, place: str | None = None
 ) -> Start:
-    return find_start(option, metadata, recorded=recorded, place=place, duration=60.0, where="a.mp4")
+    return find_start(option, metadata, recorded=recorded, zone_name=place, duration=60.0, where="a.mp4")
 
 
 def test_the_option_wins_over_everything() -> None:
@@ -103,7 +103,7 @@ def test_an_unknown_start_is_flagged_and_goes_before_the_files_own() -> None:
         options.camera.start,
         {"creation_time": "2024-05-01T12:00:00Z"},
         recorded=None,
-        place=None,
+        zone_name=None,
         duration=10.0,
         where="film.mp4",
     )

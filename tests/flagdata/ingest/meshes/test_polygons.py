@@ -70,7 +70,7 @@ def test_corners_in_a_line_make_no_triangle_without_area(tmp_path: Path) -> None
         ([(0, 0), (2, 0), (1, 0), (1, 1)], "touch"),
         ([(0, 0), (2, 0), (0, 0), (1, 1), (0, 2)], "touch"),
         ([(0, 0), (1, 0), (1, 0), (0, 1)], "touch"),
-        ([(0, 0), (1, 0), (2, 0), (3, 0)], "without area"),
+        ([(0, 0), (1, 0), (2, 0), (3, 0)], "has no area"),
         # A star of five points turns one way only, twice around.
         ([(np.cos(4 * np.pi * k / 5), np.sin(4 * np.pi * k / 5)) for k in range(5)], "cross"),
     ],

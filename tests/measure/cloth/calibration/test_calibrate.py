@@ -265,7 +265,7 @@ def test_what_is_left_has_to_be_long_enough_too(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(module, "simulated", half)
     short = replace(_observed(0.17), readings=_observed(0.17).readings[:6])
-    with pytest.raises(InputError, match=r"15 s of film with a log beside them; flag 0\.3 is left out: 0 of 128"):
+    with pytest.raises(InputError, match=r"15 s of film have a log beside them; flag 0\.3 is left out: 0 of 128"):
         _found(_observed(0.3), short)
 
 
@@ -295,7 +295,7 @@ def test_ten_seconds_are_enough_beside_ten_others_and_not_alone() -> None:
     """As three winds of a tunnel, each filmed for ten seconds."""
     short = [replace(one, readings=one.readings[:4]) for one in (_observed(0.17), _observed(0.17, seed=10))]
     assert [design.duration for design in module.designs_of(short, _OPTIONS)] == [10.0, 10.0]
-    with pytest.raises(InputError, match="10 s of film with a log"):
+    with pytest.raises(InputError, match="10 s of film have a log"):
         module.designs_of(short[:1], _OPTIONS)
 
 

@@ -138,7 +138,7 @@ def test_of_three_bad_recordings_no_weight_is_given_and_each_is_named(tmp_path: 
 def test_recordings_that_are_together_too_short_are_refused_before_anything_is_read(tmp_path: Path) -> None:
     done = _run(_table(tmp_path / "t.csv", windows=6), "--flag-size", "1.5x1.0")
     assert isinstance(done.exception, InputError)
-    assert done.exception.what == "15 s of film with a log beside them"
+    assert done.exception.what == "only 15 s of film have a log beside them"
     assert "give 20 s or more in all" in done.exception.fix
 
 
@@ -148,7 +148,7 @@ def test_recordings_that_are_together_too_short_are_refused_before_anything_is_r
         ((), "the flag's size is missing"),
         (("--flag-size", "1.5x1.0", "--azimuth", "190"), "give degrees from 1 to 179"),
         (("--flag-size", "1.5x1.0", "--crop", "0,0,9,9"), "a table of observables has no pictures"),
-        (("--flag-size", "1.5x1.0", "--start", "110s"), "10 s of film with a log beside them"),
+        (("--flag-size", "1.5x1.0", "--start", "110s"), "10 s of film have a log beside them"),
     ],
 )
 @pytest.mark.usefixtures("cheap")
@@ -198,7 +198,7 @@ def test_a_table_without_a_flag_is_refused(tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (("--log", "cup"), "name the lake that it was ingested into"),
-        (("--clock-offset", "1±0.1"), "an offset without a log"),
+        (("--clock-offset", "1±0.1"), "an offset needs a log"),
         (("--end", "30s"), "rows against wind have no times"),
     ],
 )

@@ -87,7 +87,7 @@ def test_a_film_without_a_log_is_refused() -> None:
 
 
 def test_a_film_too_short_to_weigh_is_refused_by_its_length_before_its_log_is_cut() -> None:
-    with pytest.raises(InputError, match=r"0\.5 s of film with a log"):
+    with pytest.raises(InputError, match=r"0\.5 s of film have a log"):
         filmed.part_of(_subject(), first=0.0, last=0.5).read(_SIZE)
 
 
@@ -110,7 +110,7 @@ def test_films_that_are_together_too_short_are_refused_before_a_picture_is_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _named(monkeypatch, {"monday": 15.0, "tuesday": 4.0})
-    with pytest.raises(InputError, match=r"15 s of film with a log beside them; tuesday is left out: 4 s of film"):
+    with pytest.raises(InputError, match=r"15 s of film have a log beside them; tuesday is left out: 4 s of film"):
         sources_of(("monday", "tuesday"), OfFlag(), _SIZE, None, at="main")
 
 

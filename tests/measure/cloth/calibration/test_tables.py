@@ -132,8 +132,8 @@ _TEN = [[2.5 * n, 5.0, 0.3] for n in range(10)]
         ("time,wind,droop,Droop [deg]", [[*row, 1] for row in _TEN], "columns droop stand twice"),
         ("time,wind,droop,duration", [[*row, 1] for row in _TEN], "columns time and duration"),
         ("wind,droop,extension", _TEN, "rows against wind with no column duration and count"),
-        ("wind,duration,droop", [[5.0, 7.5, 0.3]], "a row of 7.5 s in a wind of 5 m/s"),
-        ("wind,duration,droop", [[0.0, 60.0, 0.3]], "a row of 60 s in a wind of 0 m/s"),
+        ("wind,duration,droop", [[5.0, 7.5, 0.3]], "a row lasts 7.5 s in a wind of 5 m/s"),
+        ("wind,duration,droop", [[0.0, 60.0, 0.3]], "a row lasts 60 s in a wind of 0 m/s"),
     ],
 )
 def test_what_does_not_say_what_its_rows_are_of_is_refused(

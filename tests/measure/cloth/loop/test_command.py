@@ -99,7 +99,7 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
         (("--flag-size", "1.5x1.0", "--material", "bunting"), "woven-polyester, woven-cotton"),
         (("--flag-size", "1.5x1.0", "--suspect", "lifft"), "did you mean 'lift'"),
         (("--flag-size", "1.5x1.0", "--suspect", "vertical-wind"), "vertical-wind+ or vertical-wind-"),
-        (("--flag-size", "1.5x1.0", "--start", "40s"), "s of film with a log beside them"),
+        (("--flag-size", "1.5x1.0", "--start", "40s"), "s of film have a log beside them"),
     ],
 )
 def test_what_makes_no_sense_is_refused_and_nothing_is_written(
