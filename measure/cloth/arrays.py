@@ -24,7 +24,7 @@ from measure.cloth.simulation import Flag
 from measure.cloth.sources import Opened, Sources, opened
 from measure.cloth.tables import TIME, Columns, known_columns, of_columns
 from measure.film.similarity import FlagSize
-from measure.film.source import Reading
+from measure.film.source import FilmReading
 
 Arrays = Mapping[str, ArrayLike]
 Number = float | tuple[float, float] | str | Stated
@@ -72,7 +72,7 @@ def sources_of(
     """
     first, last = chosen.start or 0.0, chosen.end
     offset = None if chosen.clock_offset is None else Stated.of(chosen.clock_offset)
-    reading = Reading.of(chosen, size)
+    reading = FilmReading.of(chosen, size)
 
     def name(numbered: tuple[int, Arrays | Path | str]) -> str:
         number, one = numbered

@@ -17,7 +17,7 @@ from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from measure.cloth.calibration import ANSWER, Calibration
 from measure.cloth.simulation import OBSERVED, VERSION
-from measure.film.source import Reading
+from measure.film.source import FilmReading
 from measure.observables.artifact import VERSION as READINGS
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
@@ -25,7 +25,7 @@ _FORMAT = 1
 _HEAD = "flagdata_calibration"
 
 
-def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...]) -> Artifact:
+def artifact(found: Calibration, reading: FilmReading, parents: tuple[str, ...]) -> Artifact:
     """The row of a calibration, without its object.
 
     Args:
@@ -56,7 +56,7 @@ def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...]) -> 
     )
 
 
-def keep(lake: Lake, found: Calibration, reading: Reading, parents: tuple[str, ...], *, branch: str) -> Placed:
+def keep(lake: Lake, found: Calibration, reading: FilmReading, parents: tuple[str, ...], *, branch: str) -> Placed:
     """Commit a calibration where it is new, see `flagdata.lake.results`.
 
     Raises:

@@ -25,7 +25,7 @@ from measure.cloth.statement import words
 from measure.cloth.verdict import verdict_of
 from measure.cloth.verdict_page import verdict_page
 from measure.film.similarity import FlagSize
-from measure.film.source import Reading
+from measure.film.source import FilmReading
 from measure.forecasting.strengths import Suspicion
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Candidate, Verdict
@@ -174,7 +174,7 @@ def close_films(
         kinds=CRITERIA.film_kinds if chosen.nulls is None else chosen.nulls,
         suspected=None if chosen.suspect is None else Suspicion.parse(chosen.suspect, weighable(calibration.flag)),
     )
-    reading = Reading.of(chosen, size)
+    reading = FilmReading.of(chosen, size)
     opened = sources_of(sources, chosen, size, lake, at=branch)
     with progress(None, label="observe", unit="window") as advance:
         gathered = opened.read(size, advance=advance)

@@ -24,7 +24,7 @@ from measure.cloth.tables import column_names, of_table
 from measure.cloth.wind import Log
 from measure.film.conditioned import ConditionedFilm
 from measure.film.similarity import FlagSize
-from measure.film.source import Reading, Subject, subjects
+from measure.film.source import FilmReading, Subject, subjects
 from measure.observables import OBSERVABLES
 from measure.observables.observable import WINDOW
 from measure.observables.watching import watched
@@ -196,7 +196,7 @@ class Sources:
 def opened(
     source: str,
     size: FlagSize,
-    reading: Reading,
+    reading: FilmReading,
     *,
     lake: Lake | None,
     at: str,
