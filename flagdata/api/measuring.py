@@ -109,7 +109,7 @@ def measure(chosen: Measuring) -> Measured:
             at and there is nothing to return.
         InputError: a file that is no film, or a film that is too short.
     """
-    return call("measure.commands.measuring:measured", chosen)
+    return call("measure.commands.measure_film:measured", chosen)
 
 
 @options

@@ -14,7 +14,7 @@ from flagdata.errors import RefusedError
 from measure.estimate.joint import WIND
 from measure.film.conditioned import ConditionedFilm
 from measure.film.similarity import POWERS, FlagSize, trained_on
-from measure.film.windows import Layout, WindowReader
+from measure.film.windows import WindowLayout, WindowReader
 from measure.observables.film import FilmWindow
 from measure.observables.watching import Watcher
 from models.estimator import Estimator
@@ -63,7 +63,7 @@ class Features:
 
     film: str
     starts: FloatArray
-    layout: Layout
+    layout: WindowLayout
     values: FloatArray
     names: tuple[str, ...]
     summaries: Float32Array

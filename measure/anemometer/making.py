@@ -25,11 +25,11 @@ from measure.anemometer.networks import CALIBRATED, network
 from measure.anemometer.storage import write
 from measure.cloth.recording import usable
 from measure.film.similarity import FlagSize
-from measure.film.source import Reading, Subject, subjects
+from measure.film.source import FilmReading, Subject, subjects
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
 
-def artifact(result: Calibrated, name: str, reading: Reading) -> Artifact:
+def artifact(result: Calibrated, name: str, reading: FilmReading) -> Artifact:
     """Builds the row of a reading model, without its object.
 
     Args:
@@ -60,7 +60,7 @@ def artifact(result: Calibrated, name: str, reading: Reading) -> Artifact:
     )
 
 
-def keep(lake: Lake, result: Calibrated, name: str, reading: Reading, *, branch: str) -> Placed:
+def keep(lake: Lake, result: Calibrated, name: str, reading: FilmReading, *, branch: str) -> Placed:
     """Commits a reading model where it is new, see `flagdata.lake.results`.
 
     Raises:
@@ -102,7 +102,7 @@ class Made:
 def made(
     sources: Sequence[str],
     size: FlagSize,
-    reading: Reading,
+    reading: FilmReading,
     *,
     name: str | None,
     model: str | None,

@@ -24,7 +24,7 @@ from measure.cloth.simulation import Flag
 from measure.cloth.sources import Opened, Sources, opened
 from measure.cloth.tables import TIME, Columns, known_columns, of_columns
 from measure.film.similarity import FlagSize
-from measure.film.source import Reading
+from measure.film.source import FilmReading
 
 Arrays = Mapping[str, ArrayLike]
 Number = float | tuple[float, float] | str | Stated
@@ -72,20 +72,20 @@ def sources_of(
     """
     first, last = chosen.start or 0.0, chosen.end
     offset = None if chosen.clock_offset is None else Stated.of(chosen.clock_offset)
-    reading = Reading.of(chosen, size)
+    reading = FilmReading.of(chosen, size)
 
     def name(numbered: tuple[int, Arrays | Path | str]) -> str:
-        number, one = numbered
-        return f"recording {number}" if isinstance(one, Mapping) else str(one)
+        number, source = numbered
+        return f"recording {number}" if isinstance(source, Mapping) else str(source)
 
     def opening(numbered: tuple[int, Arrays | Path | str]) -> Opened:
-        _, one = numbered
-        if isinstance(one, Mapping):
-            rows = of_arrays(one, name=name(numbered))
-            cuts = tuple(cut(each, first, last) if each.place is None else each for each in rows)
+        _, source = numbered
+        if isinstance(source, Mapping):
+            rows = of_arrays(source, name=name(numbered))
+            cuts = tuple(cut(row, first, last) if row.place is None else row for row in rows)
             return Opened(name=name(numbered), parent=None, rows=cuts)
         part = {"first": first, "last": last, "log": chosen.log, "offset": offset}
-        return opened(str(one), size, reading, lake=lake, at=at, **part)
+        return opened(str(source), size, reading, lake=lake, at=at, **part)
 
     return Sources.of(list(enumerate(recordings, start=1)), opening, name=name)
 
@@ -104,18 +104,18 @@ def calibrated(chosen: Calibrating) -> Calibrated:
     drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
     options = options_of(chosen, size, **drawn)
     gathered = sources_of(several, chosen, size, lake_of(chosen.lake), at=chosen.at or "main").read(size)
-    found = calibrate(
+    calibration = calibrate(
         gathered.recordings,
         options,
         folder=folder_of(chosen),
         workers=chosen.workers,
         left_out=gathered.left_out,
     )
-    return _answer(found)
+    return _answer(calibration)
 
 
 def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
-    """The recordings of a table that is given as arrays, in the units of the table of observables.
+    """Returns the recordings of a table that is given as arrays, in the units of the table of observables.
 
     Raises:
         InputError: a column that is not known, columns of different lengths, or as `measure.cloth.tables.of_table`.
@@ -136,16 +136,16 @@ def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
 
 def _answer(found: Calibration) -> Calibrated:
     quantities = {
-        one.name: Weighed(
-            unit=one.unit,
-            value=one.value,
-            sigma=one.sigma,
-            interval=one.interval,
-            assumed=one.assumed,
-            bound=one.span.worded(lambda value: f"{value:.4g}", f" {one.unit}") if one.bounded else None,
-            level=one.span.level,
+        quantity.name: Weighed(
+            unit=quantity.unit,
+            value=quantity.value,
+            sigma=quantity.sigma,
+            interval=quantity.interval,
+            assumed=quantity.assumed,
+            bound=quantity.span.worded(lambda value: f"{value:.4g}", f" {quantity.unit}") if quantity.bounded else None,
+            level=quantity.span.level,
         )
-        for one in found.cloth
+        for quantity in found.cloth
     }
     return Calibrated(
         sentence=found.sentence,

@@ -17,7 +17,7 @@ from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from measure.cloth.calibration import ANSWER, Calibration
 from measure.cloth.simulation import OBSERVED, VERSION
-from measure.film.source import Reading
+from measure.film.source import FilmReading
 from measure.observables.artifact import VERSION as READINGS
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
@@ -25,19 +25,19 @@ _FORMAT = 1
 _HEAD = "flagdata_calibration"
 
 
-def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...]) -> Artifact:
-    """The row of a calibration, without its object.
+def artifact(found: Calibration, reading: FilmReading, parents: tuple[str, ...]) -> Artifact:
+    """Returns the row of a calibration, without its object.
 
     Args:
         reading: how films were read.
         parents: artifacts that the recordings were read from; none for tables.
     """
     values = {q.name: q.value for q in found.cloth if q.value is not None}
-    sources = [one.observed.source for one in found.recordings]
-    spans = [[one.observed.first, one.observed.duration] for one in found.recordings]
+    sources = [recording.observed.source for recording in found.recordings]
+    spans = [[recording.observed.first, recording.observed.duration] for recording in found.recordings]
     return Artifact(
         kind=Kind.MEASUREMENT,
-        name=", ".join(one.observed.name for one in found.recordings),
+        name=", ".join(recording.observed.name for recording in found.recordings),
         parents=parents,
         seed=found.options.seed,
         parameters=canonical(values),
@@ -56,7 +56,7 @@ def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...]) -> 
     )
 
 
-def keep(lake: Lake, found: Calibration, reading: Reading, parents: tuple[str, ...], *, branch: str) -> Placed:
+def keep(lake: Lake, found: Calibration, reading: FilmReading, parents: tuple[str, ...], *, branch: str) -> Placed:
     """Commit a calibration where it is new, see `flagdata.lake.results`.
 
     Raises:
@@ -67,8 +67,8 @@ def keep(lake: Lake, found: Calibration, reading: Reading, parents: tuple[str, .
 
 
 def write(path: Path, found: Calibration) -> None:
-    """A new Zarr folder: `cloth` (draw, quantity) where the weight is not withheld, and for each recording `readings-N`
-    (window, observable) and `wind-N` (window)."""
+    """Writes a new Zarr folder: `cloth` (draw, quantity) where the weight is not withheld, and for each recording
+    `readings-N` (window, observable) and `wind-N` (window)."""
     import zarr
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
@@ -79,8 +79,11 @@ def write(path: Path, found: Calibration) -> None:
     if found.withheld is None:
         cloth = np.stack([found.draws.cloth[name] for name in names], axis=1)
         write_plain(group, "cloth", cloth.astype(np.float32), ("draw", "quantity"))
-    for number, one in enumerate(found.recordings):
+    for number, recording in enumerate(found.recordings):
         write_plain(
-            group, f"readings-{number}", one.observed.readings.astype(np.float32), (f"window-{number}", "observable")
+            group,
+            f"readings-{number}",
+            recording.observed.readings.astype(np.float32),
+            (f"window-{number}", "observable"),
         )
-        write_plain(group, f"wind-{number}", one.observed.speed.astype(np.float32), (f"window-{number}",))
+        write_plain(group, f"wind-{number}", recording.observed.speed.astype(np.float32), (f"window-{number}",))

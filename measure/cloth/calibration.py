@@ -66,7 +66,7 @@ class CalibrationOptions:
     material: Fabric | None = None
 
     def recipe(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "flag_size": [self.flag.length, self.flag.height],
             "attachment": self.flag.attachment,
@@ -103,16 +103,16 @@ class Quantity:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Its ends, of a bound one at infinity or where the quantity ends."""
+        """Returns its ends, of a bound one at infinity or where the quantity ends."""
         return self.span.low, self.span.high
 
     @property
     def bounded(self) -> bool:
-        """Whether only a bound is known of it, since the posterior piles up where the prior ends."""
+        """Returns whether only a bound is known of it, since the posterior piles up where the prior ends."""
         return self.value is None and self.span.bound in (Bound.LEAST, Bound.MOST)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values; an end of the interval that nothing bounds is null."""
+        """Returns JSON values; an end of the interval that nothing bounds is null."""
         return {
             "unit": self.unit,
             "value": self.value,
@@ -140,7 +140,7 @@ class Check:
     error: float
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {"count": self.count, "held": self.held, "median_error": self.error}
 
 
@@ -168,15 +168,17 @@ class Fitted:
 
     @property
     def unlike(self) -> str | None:
-        """What no simulated flag shows, in words; None where some look like it."""
+        """Returns what no simulated flag shows, in words; None where some look like it."""
         if self.misfit >= _UNLIKE:
             return None
         names = [*OBSERVED, *(f"the change of {name} with the wind" for name in OBSERVED)]
         order = np.argsort(-np.abs(np.nan_to_num(self.apart)))
-        far = [(names[place], float(self.apart[place])) for place in order.tolist() if abs(self.apart[place]) > _APART]
-        if not far:
+        distant = [
+            (names[column], float(self.apart[column])) for column in order.tolist() if abs(self.apart[column]) > _APART
+        ]
+        if not distant:
             return "its observables together"
-        return ", ".join(f"{name} {abs(z):.1f} σ too {'large' if z > 0 else 'small'}" for name, z in far[:4])
+        return ", ".join(f"{name} {abs(z):.1f} σ too {'large' if z > 0 else 'small'}" for name, z in distant[:4])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -203,17 +205,25 @@ class Calibration:
 
     @property
     def weight(self) -> Quantity:
-        """The area weight."""
+        """Returns the area weight."""
         return self.cloth[0]
 
     @property
     def withheld(self) -> str | None:
-        """Why no value is given, where no simulated flag looks like a recording."""
-        return next((f"{one.observed.name}: {one.unlike}" for one in self.recordings if one.unlike is not None), None)
+        """Returns why no value is given, where no simulated flag looks like a recording."""
+        return next(
+            (
+                f"{recording.observed.name}: {recording.unlike}"
+                for recording in self.recordings
+                if recording.unlike is not None
+            ),
+            None,
+        )
 
     @property
     def stated(self) -> str | None:
-        """The area weight as `flagdata measure --area-weight` takes it; None where it is not determined or a bound."""
+        """Returns the area weight as `flagdata measure --area-weight` takes it; None where it is not determined or a
+        bound."""
         weight = self.weight
         if weight.value is None or weight.sigma is None:
             return None
@@ -221,15 +231,15 @@ class Calibration:
 
     @property
     def weighs(self) -> bool:
-        """Whether anything is given of the area weight: a value or a bound."""
+        """Returns whether anything is given of the area weight: a value or a bound."""
         return self.withheld is None and (self.weight.value is not None or self.weight.bounded)
 
     @property
     def sentence(self) -> str:
-        """The answer in words."""
+        """Returns the answer in words."""
         weight = self.weight
         level = f"{self.options.level * 100:.3g} %"
-        windows = sum(len(one.observed.readings) for one in self.recordings)
+        windows = sum(len(recording.observed.readings) for recording in self.recordings)
         if self.withheld is not None:
             return f"area weight: withheld, since no simulated flag looks like {self.withheld}"
         if weight.bounded:
@@ -243,23 +253,23 @@ class Calibration:
         return f"area weight {weight.value:.3f} kg/m² [{low:.3f}, {high:.3f}] {level}, n = {windows} windows"
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         weight = self.weight
         return {
             "sentence": self.sentence,
             "cloth": {q.name: q.as_dict() for q in self.cloth},
             "recordings": [
                 {
-                    "name": one.observed.name,
-                    "source": one.observed.source,
-                    "windows": len(one.observed.readings),
-                    "wind_speed": float(one.observed.speed.mean()),
-                    "misfit": one.misfit,
-                    "failed": one.failed,
-                    "observables": [name for name, there in zip(OBSERVED, one.used, strict=True) if there],
-                    "place": {q.name: q.as_dict() for q in place},
+                    "name": recording.observed.name,
+                    "source": recording.observed.source,
+                    "windows": len(recording.observed.readings),
+                    "wind_speed": float(recording.observed.speed.mean()),
+                    "misfit": recording.misfit,
+                    "failed": recording.failed,
+                    "observables": [name for name, used in zip(OBSERVED, recording.used, strict=True) if used],
+                    "place": {q.name: q.as_dict() for q in view},
                 }
-                for one, place in zip(self.recordings, self.places, strict=True)
+                for recording, view in zip(self.recordings, self.places, strict=True)
             ],
             "area_weight_stated": self.stated,
             "withheld": self.withheld,
@@ -282,7 +292,7 @@ def calibrate(
     left_out: Sequence[Finding] = (),
     advance: Callable[[int], object] | None = None,
 ) -> Calibration:
-    """Weigh the cloth of one flag.
+    """Weighs the cloth of one flag.
 
     Args:
         recordings: of it, each cut to what is to be used.
@@ -295,40 +305,40 @@ def calibrate(
         InputError: see `Observed` and `designs_of`.
         RefusedError: see `answered`.
     """
-    made: list[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]] = []
-    for one, design in zip(recordings, designs_of(recordings, options), strict=True):
+    simulations: list[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]] = []
+    for recording, design in zip(recordings, designs_of(recordings, options), strict=True):
         readings = simulated(design, folder=folder, workers=workers, advance=advance)
         correction = corrected(design, readings, folder=folder, workers=workers, advance=advance)
-        made.append((one, design.values(), readings, correction))
-    return answered(made, options, left_out=left_out)
+        simulations.append((recording, design.values(), readings, correction))
+    return answered(simulations, options, left_out=left_out)
 
 
 def designs_of(recordings: Sequence[Observed], options: CalibrationOptions) -> list[Design]:
-    """What is simulated for each of several recordings of one cloth.
+    """Returns what is simulated for each of several recordings of one cloth.
 
     Raises:
         InputError: a recording that is given twice, or too short recordings in all.
     """
     check_in_all(recordings)
-    names = [f"{one.source} {one.name} {one.first:g}" for one in recordings]
-    twice = [one.name for place, one in enumerate(recordings) if names[place] in names[:place]]
+    names = [f"{recording.source} {recording.name} {recording.first:g}" for recording in recordings]
+    twice = [recording.name for number, recording in enumerate(recordings) if names[number] in names[:number]]
     if twice:
         raise InputError(f"{twice[0]} is given twice", where="recordings", fix="give each recording of the flag once")
     return [
         Design(
             flag=options.flag,
-            log=one.log,
-            duration=one.duration,
+            log=recording.log,
+            duration=recording.duration,
             azimuth=options.azimuth,
             elevation=options.elevation,
             count=options.simulations,
             seed=options.seed,
             distance=options.distance,
             recording=name,
-            place=name if one.place is None else one.place,
+            place=name if recording.place is None else recording.place,
             fabric=FABRIC if options.material is None else options.material.drawn,
         )
-        for one, name in zip(recordings, names, strict=True)
+        for recording, name in zip(recordings, names, strict=True)
     ]
 
 
@@ -348,22 +358,22 @@ class _Simulated:
     used: BoolArray
 
     def rows(self, which: IntArray) -> _Simulated:
-        """With some of the simulations."""
-        values = {name: own[which] for name, own in self.values.items()}
+        """Returns it with some of the simulations."""
+        values = {name: drawn[which] for name, drawn in self.values.items()}
         return replace(self, values=values, summaries=self.summaries[which])
 
     def sight(self, options: CalibrationOptions) -> Sight:
-        """With an emulator fitted to the simulations.
+        """Returns it with an emulator fitted to the simulations.
 
         Raises:
             RefusedError: see `Emulator.fit`.
         """
-        one = self.observed
+        recording = self.observed
         return Sight(
-            emulator=Emulator.fit(self.values, self.summaries, self.used, name=one.name),
+            emulator=Emulator.fit(self.values, self.summaries, self.used, name=recording.name),
             azimuth=options.azimuth,
             elevation=options.elevation,
-            place=one.place,
+            place=recording.place,
         )
 
 
@@ -373,9 +383,9 @@ def answered(
     *,
     left_out: Sequence[Finding] = (),
 ) -> Calibration:
-    """The answer from recordings, each with its simulations' values, name → (simulation,), their readings (simulation,
-    window, observable), and how far these lie from those of a finer mesh. Those whose simulations do not show what they
-    show are left out.
+    """Returns the answer from recordings, each with its simulations' values, name → (simulation,), their readings
+    (simulation, window, observable), and how far these lie from those of a finer mesh. Those whose simulations do not
+    show what they show are left out.
 
     Args:
         left_out: a warning for each recording that is not among them.
@@ -385,19 +395,19 @@ def answered(
         InputError: too little is left.
     """
 
-    def seen(one: tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]) -> tuple[_Simulated, Sight]:
-        observed, values, readings, correction = one
+    def seen(simulation: tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]) -> tuple[_Simulated, Sight]:
+        observed, values, readings, correction = simulation
         summaries = with_errors(observed, readings, correction, seed=options.seed)
-        looked = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
-        used = informative(values, summaries, looked, name=observed.name)
-        own = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
-        return own, own.sight(options)
+        visible = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
+        used = informative(values, summaries, visible, name=observed.name)
+        simulated = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
+        return simulated, simulated.sight(options)
 
-    both, unshown = usable(simulations, seen, name=lambda one: one[0].name)
+    fitted, unshown = usable(simulations, seen, name=lambda simulation: simulation[0].name)
     left_out = (*left_out, *unshown)
-    check_in_all([one.observed for one, _ in both], left_out=left_out)
-    found = _answered(both, options, left_out=left_out)
-    return _without_unlike(found, both, options, left_out=left_out)
+    check_in_all([simulation.observed for simulation, _ in fitted], left_out=left_out)
+    calibration = _answered(fitted, options, left_out=left_out)
+    return _without_unlike(calibration, fitted, options, left_out=left_out)
 
 
 def _without_unlike(
@@ -407,13 +417,13 @@ def _without_unlike(
     *,
     left_out: Sequence[Finding],
 ) -> Calibration:
-    """The answer of those recordings that simulated flags look like, if there are such; otherwise the answer as it is,
-    which then is withheld with the reason."""
-    unlike = [one for one in found.recordings if one.unlike is not None]
-    like = [own for own, one in zip(both, found.recordings, strict=True) if one.unlike is None]
-    if not unlike or sum(own.observed.duration for own, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
+    """Returns the answer of those recordings that simulated flags look like, if there are such; otherwise the answer
+    as it is, which then is withheld with the reason."""
+    unlike = [recording for recording in found.recordings if recording.unlike is not None]
+    like = [pair for pair, recording in zip(both, found.recordings, strict=True) if recording.unlike is None]
+    if not unlike or sum(pair.observed.duration for pair, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
         return found
-    warned = [Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(one), fix=_LOOK) for one in unlike]
+    warned = [Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(fitted), fix=_LOOK) for fitted in unlike]
     again = _answered(like, options, left_out=(*left_out, *warned))
     return found if again.withheld is not None else again
 
@@ -421,20 +431,21 @@ def _without_unlike(
 def _answered(
     both: Sequence[tuple[_Simulated, Sight]], options: CalibrationOptions, *, left_out: Sequence[Finding]
 ) -> Calibration:
-    """The answer from recordings whose simulations show what they show."""
-    made, sights = [own for own, _ in both], [own for _, own in both]
-    found = posterior(sights, [one.observed.summary for one in made], seed=options.seed)
+    """Returns the answer from recordings whose simulations show what they show."""
+    simulations, sights = [simulation for simulation, _ in both], [sight for _, sight in both]
+    draws = posterior(sights, [simulation.observed.summary for simulation in simulations], seed=options.seed)
     fitted = tuple(
-        _fitted(one, sight, found, place, options) for place, (one, sight) in enumerate(zip(made, sights, strict=True))
+        _fitted(simulation, sight, draws, number, options)
+        for number, (simulation, sight) in enumerate(zip(simulations, sights, strict=True))
     )
     calibration = Calibration(
         options=options,
-        draws=found,
+        draws=draws,
         recordings=fitted,
-        check=checked(made, options),
-        cloth=tuple(quantity(q, found.cloth[q.name], options.level) for q in CLOTH),
+        check=checked(simulations, options),
+        cloth=tuple(quantity(q, draws.cloth[q.name], options.level) for q in CLOTH),
         places=tuple(
-            tuple(quantity(q, place[q.name], options.level) for q in _placed(options)) for place in found.places
+            tuple(quantity(q, view[q.name], options.level) for q in _placed(options)) for view in draws.places
         ),
     )
     findings = (*left_out, *_findings(calibration))
@@ -444,57 +455,60 @@ def _answered(
 
 
 def with_errors(observed: Observed, readings: FloatArray, correction: Correction, *, seed: int) -> FloatArray:
-    """(simulation, summary) of readings (simulation, window, observable) with errors of numerics and of pixels."""
+    """Returns (simulation, summary) of readings (simulation, window, observable) with errors of numerics and of
+    pixels."""
     summaries = correction.of(observed.projection.of(readings), seed=seed)
     return (summaries + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
 
 
 def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
-    """What draws of the posterior say of a quantity."""
+    """Returns what draws of the posterior say of a quantity."""
     assumed = about.at(np.array([(1 - level) / 2, (1 + level) / 2])).tolist()
     shares = np.linspace(0.0, 1.0, 1001)
     ranks = np.interp(draws, about.at(shares), shares)
     determined = float(ranks.std()) < DETERMINED / math.sqrt(12)
     # What is not determined has the prior's interval, which has no end where draws pile up.
     places = ranks if determined and about.ends is not None else None
-    own = span(draws, places, level=level, limits=about.limits, assumed=about.ends or about.limits)
+    interval = span(draws, places, level=level, limits=about.limits, assumed=about.ends or about.limits)
     return Quantity(
         name=about.name,
         unit=about.unit,
-        value=float(np.median(draws)) if determined and own.estimated else None,
-        sigma=float(draws.std()) if own.estimated else None,
-        span=own,
+        value=float(np.median(draws)) if determined and interval.estimated else None,
+        sigma=float(draws.std()) if interval.estimated else None,
+        span=interval,
         assumed=(assumed[0], assumed[1]),
         range=about.ends,
     )
 
 
 def _assumed(about: Uncertain, level: float) -> Quantity:
-    """What is assumed of a quantity, where nothing is found."""
+    """Returns what is assumed of a quantity, where nothing is found."""
     return quantity(about, about.at(np.linspace(0.0, 1.0, 1001)), level)
 
 
 def checked(made: Sequence[_Simulated], options: CalibrationOptions) -> Check:
-    """Weigh simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
+    """Weighs simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
     first recording alone where the others are of other cloths."""
-    weights = [one.values[CLOTH[0].name] for one in made]
-    made = [one for one, own in zip(made, weights, strict=True) if np.array_equal(own, weights[0])]
-    complete = np.flatnonzero(np.all([np.isfinite(one.summaries[:, one.used]).all(axis=1) for one in made], axis=0))
+    weights = [simulation.values[CLOTH[0].name] for simulation in made]
+    made = [simulation for simulation, drawn in zip(made, weights, strict=True) if np.array_equal(drawn, weights[0])]
+    complete = np.flatnonzero(
+        np.all([np.isfinite(simulation.summaries[:, simulation.used]).all(axis=1) for simulation in made], axis=0)
+    )
     rng = stream(options.seed, "calibrate", "check")
     chosen = rng.permutation(complete)[:_CHECKED]
     errors: list[float] = []
-    held = 0
+    contained = 0
     for fold in range(min(_FOLDS, len(chosen))):
-        own = chosen[fold::_FOLDS]
-        rest = np.setdiff1d(np.arange(len(weights[0])), own)
-        sights = [one.rows(rest).sight(options) for one in made]
+        fold_members = chosen[fold::_FOLDS]
+        rest = np.setdiff1d(np.arange(len(weights[0])), fold_members)
+        sights = [simulation.rows(rest).sight(options) for simulation in made]
         seed = child_seed(options.seed, "check", fold)
-        weight = weighed(sights, [one.summaries[own] for one in made], seed=seed)[CLOTH[0].name]
-        truth = weights[0][own]
+        weight = weighed(sights, [simulation.summaries[fold_members] for simulation in made], seed=seed)[CLOTH[0].name]
+        truth = weights[0][fold_members]
         low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
-        held += int(((low <= truth) & (truth <= high)).sum())
+        contained += int(((low <= truth) & (truth <= high)).sum())
         errors.extend(np.abs(middle / truth - 1).tolist())
-    return Check(count=len(errors), held=held, error=float(np.median(errors)) if errors else math.nan)
+    return Check(count=len(errors), held=contained, error=float(np.median(errors)) if errors else math.nan)
 
 
 def _placed(options: CalibrationOptions) -> tuple[Uncertain, ...]:
@@ -502,69 +516,72 @@ def _placed(options: CalibrationOptions) -> tuple[Uncertain, ...]:
 
 
 def _fitted(made: _Simulated, sight: Sight, found: Posterior, place: int, options: CalibrationOptions) -> Fitted:
-    """What the emulator says that flags of the posterior show."""
-    one, summaries = made.observed, made.summaries
+    """Returns what the emulator says that flags of the posterior show."""
+    recording, summaries = made.observed, made.summaries
     values = {**found.cloth, **found.places[place]}
     predicted = sight.emulator.draw(values, seed=options.seed)
     used = sight.emulator.used
     count = len(OBSERVED)
     # What depends on nothing that is regressed on is that of simulations at random.
     rows = stream(options.seed, "calibrate", "rows").integers(len(summaries), size=len(predicted))
-    whole = np.where(np.isfinite(summaries), summaries, np.nanmean(summaries, axis=0))[rows]
-    whole[:, used] = predicted
-    windows = one.projection.at(whole.reshape(len(predicted), -1, count))
+    replicates = np.where(np.isfinite(summaries), summaries, np.nanmean(summaries, axis=0))[rows]
+    replicates[:, used] = predicted
+    windows = recording.projection.at(replicates.reshape(len(predicted), -1, count))
     low, middle, high = np.quantile(windows, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=0)
-    looked = np.isfinite(one.summary) & np.isfinite(whole).all(axis=0)
-    centre, inverse = whole[:, looked].mean(axis=0), np.linalg.pinv(np.cov(whole[:, looked].T))
-    offsets = np.concatenate([whole[:, looked], one.summary[None, looked]]) - centre
-    *distances, own = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
+    compared = np.isfinite(recording.summary) & np.isfinite(replicates).all(axis=0)
+    centre, inverse = replicates[:, compared].mean(axis=0), np.linalg.pinv(np.cov(replicates[:, compared].T))
+    offsets = np.concatenate([replicates[:, compared], recording.summary[None, compared]]) - centre
+    *distances, distance_observed = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
     distance = np.array(distances)
-    spread = whole.std(axis=0)
-    apart = np.where(
-        looked & (spread > 0), (one.summary - whole.mean(axis=0)) / np.where(spread > 0, spread, 1.0), np.nan
+    spread = replicates.std(axis=0)
+    deviations = np.where(
+        compared & (spread > 0),
+        (recording.summary - replicates.mean(axis=0)) / np.where(spread > 0, spread, 1.0),
+        np.nan,
     )
     return Fitted(
-        observed=one,
+        observed=recording,
         low=low,
         middle=middle,
         high=high,
         used=np.asarray(used.reshape(-1, count).any(axis=0)),
-        misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))),
-        apart=apart,
+        misfit=float((1 + (distance >= distance_observed).sum()) / (1 + len(distance))),
+        apart=deviations,
         failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
     )
 
 
 def _findings(calibration: Calibration) -> tuple[Finding, ...]:
-    found = list(constant_wind([one.observed for one in calibration.recordings]))
-    for one in calibration.recordings:
-        found.extend(one.observed.findings)
-        if one.unlike is not None:
-            what = f"{_unlike(one)}. The weight is withheld"
-            found.append(Finding.of("unlike-simulations", what, fix=_LOOK))
-        if one.failed > 0.1 * calibration.options.simulations:
-            what = f"{one.failed} of {calibration.options.simulations} simulations of {one.observed.name} were left out"
-            found.append(Finding.of("failed-simulations", what))
+    findings = list(constant_wind([recording.observed for recording in calibration.recordings]))
+    for fitted in calibration.recordings:
+        findings.extend(fitted.observed.findings)
+        if fitted.unlike is not None:
+            text = f"{_unlike(fitted)}. The weight is withheld"
+            findings.append(Finding.of("unlike-simulations", text, fix=_LOOK))
+        if fitted.failed > 0.1 * calibration.options.simulations:
+            count = calibration.options.simulations
+            text = f"{fitted.failed} of {count} simulations of {fitted.observed.name} were left out"
+            findings.append(Finding.of("failed-simulations", text))
     if not calibration.draws.together:
-        found.append(TAKEN_APART)
+        findings.append(TAKEN_APART)
     check, level = calibration.check, calibration.options.level
     if check.held < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
-        what = (
+        text = (
             f"of {check.count} simulations left out, the intervals of {check.held} contain the area weight, where "
             f"{check.count * level:.0f} are expected: they are too narrow"
         )
         fix = "give more simulations with --simulations"
-        found.append(Finding.of("narrow-intervals", what, fix=fix))
-    found.extend(_leaning(calibration))
+        findings.append(Finding.of("narrow-intervals", text, fix=fix))
+    findings.extend(_leaning(calibration))
     undetermined = [q.name.replace("_", " ") for q in calibration.cloth if q.value is None and not q.bounded]
     if undetermined:
-        what = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
-        found.append(Finding.of("not-determined", what))
-    return tuple(found)
+        text = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
+        findings.append(Finding.of("not-determined", text))
+    return tuple(findings)
 
 
 def _unlike(one: Fitted) -> str:
-    """What is unlike about a recording, and what may be the cause."""
+    """Returns what is unlike about a recording, and what may be the cause."""
     return (
         f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth may not be "
         "separated from what is behind it, or its size, attachment or place be another than stated, or something may "
@@ -574,18 +591,19 @@ def _unlike(one: Fitted) -> str:
 
 def _leaning(calibration: Calibration) -> list[Finding]:
     """Quantities of which only a bound is known."""
-    found = []
-    for own in calibration.cloth:
-        if not own.bounded or own.range is None:
+    findings = []
+    for quantity in calibration.cloth:
+        if not quantity.bounded or quantity.range is None:
             continue
-        most = own.span.bound is Bound.MOST
-        what = (
-            f"{own.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within {WITHIN:.0%} of the end of "
-            f"what is assumed, {own.range[0 if most else 1]:.3g} {own.unit}; {'less' if most else 'more'} would look "
-            "the same, so that only a bound is given"
+        most = quantity.span.bound is Bound.MOST
+        end = f"{quantity.range[0 if most else 1]:.3g} {quantity.unit}"
+        text = (
+            f"{quantity.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within {WITHIN:.0%} of the "
+            f"end of what is assumed, {end}; {'less' if most else 'more'} would look the same, so that only a bound is "
+            "given"
         )
         fix = "check the flag's size and where the camera stood" + (
-            ", or weigh a piece of the cloth on a scale" if own is calibration.weight else ""
+            ", or weigh a piece of the cloth on a scale" if quantity is calibration.weight else ""
         )
-        found.append(Finding.of("leans-on-prior", what, fix=fix))
-    return found
+        findings.append(Finding.of("leans-on-prior", text, fix=fix))
+    return findings

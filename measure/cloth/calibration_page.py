@@ -35,7 +35,7 @@ class Band:
 
 
 def against_wind(observed: Observed, names: Sequence[str], bands: Sequence[Band], *, dots: str, opacity: float) -> str:
-    """A picture with a panel an observable, as a data URL.
+    """Draws a picture with a panel an observable, as a data URL.
 
     Args:
         names: of the observables.
@@ -70,7 +70,7 @@ _DEGREES = ("azimuth", "elevation")
 
 
 def calibration_page(found: Calibration, provenance: Mapping[str, str], *, sections: Sequence[Section] = ()) -> str:
-    """The page.
+    """Writes the page.
 
     Args:
         provenance: rows of a table, in order.
@@ -78,7 +78,7 @@ def calibration_page(found: Calibration, provenance: Mapping[str, str], *, secti
     """
     check = found.check
     values = {
-        "name": ", ".join(one.observed.name for one in found.recordings),
+        "name": ", ".join(recording.observed.name for recording in found.recordings),
         "sentence": found.sentence,
         "tone": "settled" if found.weight.value is not None else "open" if found.weighs else "missed",
         "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in found.findings],
@@ -88,14 +88,14 @@ def calibration_page(found: Calibration, provenance: Mapping[str, str], *, secti
         "posterior": None if found.withheld else _posterior(found),
         "recordings": [
             {
-                "name": one.observed.name,
-                "windows": len(one.observed.readings),
-                "wind": f"{one.observed.speed.mean():.1f}",
-                "misfit": f"{one.misfit:.2g}",
-                "place": [shown_quantity(q) for q in place],
-                "picture": _windows(one),
+                "name": recording.observed.name,
+                "windows": len(recording.observed.readings),
+                "wind": f"{recording.observed.speed.mean():.1f}",
+                "misfit": f"{recording.misfit:.2g}",
+                "place": [shown_quantity(q) for q in view],
+                "picture": _windows(recording),
             }
-            for one, place in zip(found.recordings, found.places, strict=True)
+            for recording, view in zip(found.recordings, found.places, strict=True)
         ],
         "check": {"count": check.count, "held": check.held, "error": f"{check.error:.1%}"},
         "sections": list(sections),
@@ -105,18 +105,18 @@ def calibration_page(found: Calibration, provenance: Mapping[str, str], *, secti
 
 
 def shown_quantity(one: Quantity) -> dict[str, str]:
-    """A quantity as text: angles in degrees, and as `interval` what its values can be: both ends, or a bound with its
-    level."""
+    """Returns a quantity as text: angles in degrees, and as `interval` what its values can be: both ends, or a bound
+    with its level."""
     turn = 180 / math.pi if one.name in _DEGREES else 1.0
     least, most = one.assumed
     unit = "" if one.unit == "1" else one.unit
-    known = one.span.worded(lambda value: f"{value * turn:.3g}")
+    interval = one.span.worded(lambda value: f"{value * turn:.3g}")
     return {
         "name": one.name.replace("_", " "),
         "unit": "°" if one.name in _DEGREES else unit,
         "value": "" if one.value is None else f"{one.value * turn:.3g}",
         "bounded": "yes" if one.bounded else "",
-        "interval": known,
+        "interval": interval,
         "level": f"{one.span.level * 100:.3g} %",
         "assumed": f"{least * turn:.3g} to {most * turn:.3g}",
     }

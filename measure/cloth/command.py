@@ -25,7 +25,7 @@ from measure.cloth.statement import words
 from measure.cloth.verdict import verdict_of
 from measure.cloth.verdict_page import verdict_page
 from measure.film.similarity import FlagSize
-from measure.film.source import Reading
+from measure.film.source import FilmReading
 from measure.forecasting.strengths import Suspicion
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Candidate, Verdict
@@ -44,7 +44,7 @@ def answer_of(
     reading: Mapping[str, Any],
     parents: tuple[str, ...],
 ) -> VerdictAnswer:
-    """That of films and of tables of observables.
+    """Makes the answer of films and of tables of observables.
 
     Args:
         name: what the measurement is called.
@@ -56,8 +56,8 @@ def answer_of(
     recipe = {
         "close-loop-on-films": ANSWER,
         "simulations": VERSION,
-        "sources": [one.source for one in recordings],
-        "spans": [[one.first, one.duration] for one in recordings],
+        "sources": [recording.source for recording in recordings],
+        "spans": [[recording.first, recording.duration] for recording in recordings],
         **reading,
         **outcome.options.recipe(),
     }
@@ -83,21 +83,21 @@ _ROUGH = 1e-3
 
 
 def models(verdict: Verdict, outcome: SolvedLoop, *, name: str) -> tuple[NamedModel, ...]:
-    """The base model as calibrated and, where an effect is named, the larger one.
+    """Returns the base model as calibrated and, where an effect is named, the larger one.
 
     Args:
         name: that theirs begin with.
     """
-    made = [NamedModel(name=f"{name}-base", content=_content(verdict, outcome, f"{name}-base", ()))]
+    recipes = [NamedModel(name=f"{name}-base", content=_content(verdict, outcome, f"{name}-base", ()))]
     if effects := acting(verdict)[:1]:
         larger = f"{name}-{effects[0].effect}"
-        made.append(NamedModel(name=larger, content=_content(verdict, outcome, larger, effects)))
-    return tuple(made)
+        recipes.append(NamedModel(name=larger, content=_content(verdict, outcome, larger, effects)))
+    return tuple(recipes)
 
 
 def _content(verdict: Verdict, outcome: SolvedLoop, title: str, effects: Sequence[Candidate]) -> Mapping[str, Any]:
-    calibration, own = outcome.options.calibration, fitted(verdict, effects)
-    speeds = [float(one.speed.mean()) for one in outcome.recordings]
+    calibration, cloth = outcome.options.calibration, fitted(verdict, effects)
+    speeds = [float(recording.speed.mean()) for recording in outcome.recordings]
     fabric = FABRIC if calibration.material is None else calibration.material.tables[0]
     speed: Any = speeds[0] if min(speeds) == max(speeds) else {"low": min(speeds), "high": max(speeds)}
     return {
@@ -117,9 +117,9 @@ def _content(verdict: Verdict, outcome: SolvedLoop, title: str, effects: Sequenc
         "time": {"settle": SETTLE, "frames": _FRAMES, "rate": _RATE},
         "material": {
             "name": fabric,
-            "density": own["area_weight"],
-            "bending-factor": own["bending"] / mean_bending(named(fabric)),
-            "damping": max(own["damping"] - _STEP, 0.0),
+            "density": cloth["area_weight"],
+            "bending-factor": cloth["bending"] / mean_bending(named(fabric)),
+            "damping": max(cloth["damping"] - _STEP, 0.0),
         },
         **acted(effects),
     }
@@ -174,12 +174,12 @@ def close_films(
         kinds=CRITERIA.film_kinds if chosen.nulls is None else chosen.nulls,
         suspected=None if chosen.suspect is None else Suspicion.parse(chosen.suspect, weighable(calibration.flag)),
     )
-    reading = Reading.of(chosen, size)
+    reading = FilmReading.of(chosen, size)
     opened = sources_of(sources, chosen, size, lake, at=branch)
     with progress(None, label="observe", unit="window") as advance:
         gathered = opened.read(size, advance=advance)
     recordings = distinct(gathered.recordings)
-    say(announced(workload([one.duration for one in recordings], options), workers=chosen.processes))
+    say(announced(workload([recording.duration for recording in recordings], options), workers=chosen.processes))
     outcome = solve(
         recordings,
         options,
@@ -188,7 +188,7 @@ def close_films(
         stage=stage_bars(),
     )
     verdict = verdict_of(outcome)
-    left_out = tuple((one.kind, one.what) for one in gathered.left_out)
+    left_out = tuple((finding.kind, finding.what) for finding in gathered.left_out)
     verdict = replace(verdict, findings=(*left_out, *verdict.findings), seconds=time.monotonic() - begun)
     called = name or recordings[0].name
     return answer_of(
@@ -202,7 +202,8 @@ def close_films(
 
 
 def simulations_of(recordings: int) -> int:
-    """Of the base model for each of so many recordings: as many as the covariance of all their summaries asks for."""
+    """Counts simulations of the base model for each of so many recordings: as many as the covariance of all their
+    summaries asks for."""
     return _FEW if recordings <= _TWO else _MANY
 
 
@@ -212,14 +213,14 @@ def workload(durations: Sequence[float], options: FilmLoopOptions) -> float:
     Args:
         durations: of the recordings [s].
     """
-    each = options.calibration.simulations + TOGETHER * options.kinds
+    flags = options.calibration.simulations + TOGETHER * options.kinds
     paired = PAIRS * len(weighable(options.calibration.flag)) * len(durations)
     finer = sum(effort(duration) for duration in durations)
-    return each * sum(durations) + finer + paired * lasting(len(durations))
+    return flags * sum(durations) + finer + paired * lasting(len(durations))
 
 
 def weight(stated: Stated) -> tuple[float, float]:
-    """Mean and standard deviation of a stated area weight [kg/m²]; of a range those of a uniform distribution.
+    """Returns mean and standard deviation of a stated area weight [kg/m²]; of a range those of a uniform distribution.
 
     Raises:
         UsageError: a weight that no cloth has.

@@ -55,7 +55,7 @@ class Weighable(Strengths):
 
     @cached_property
     def prior(self) -> Uncertain:
-        """Of the strength beyond its null value."""
+        """Returns the prior of the strength beyond its null value."""
         scale = Scale.LOG if self.low > 0 else Scale.LINEAR
         return Uncertain(
             name=self.name,
@@ -66,11 +66,11 @@ class Weighable(Strengths):
 
 
 def weighable(flag: Flag) -> tuple[Weighable, ...]:
-    """The effects that are weighed for a flag: one that is held along its hoist cannot be held more."""
+    """Returns the effects that are weighed for a flag: one that is held along its hoist cannot be held more."""
     return tuple(
-        Weighable(column=one.column, low=one.low, high=one.high)
-        for one in all_strengths()
-        if flag.attachment == "corners" or one.name != _HOIST
+        Weighable(column=strength.column, low=strength.low, high=strength.high)
+        for strength in all_strengths()
+        if flag.attachment == "corners" or strength.name != _HOIST
     )
 
 
@@ -110,44 +110,44 @@ class Design:
 
     @property
     def cloth(self) -> tuple[Uncertain, ...]:
-        """What differs among the cloths."""
+        """Returns what differs among the cloths."""
         return (*CLOTH, STRETCHING, self.fabric)
 
     def quantities(self) -> tuple[Uncertain, ...]:
-        """What differs among the simulations."""
-        known = self.log.distance is not None
+        """Returns what differs among the simulations."""
+        has_distance = self.log.distance is not None
         return (
             *self.cloth,
             *NUISANCES,
             self.azimuth,
             self.elevation,
-            *(() if known else (DISTANCE,)),
+            *(() if has_distance else (DISTANCE,)),
             *((clock_error(self.log.clock),) if self.log.clock else ()),
         )
 
     def values(self) -> Mapping[str, FloatArray]:
         """Name → (count,), by ascending damping, so that batches can be simulated in long steps."""
         # In another order in each place: two scramblings of a Sobol sequence are correlated, row by row.
-        own = child_seed(self.seed, "calibrate", "place", self.place)
-        order = stream(own, "calibrate", "order").permutation(self.count)
-        there = draws(self.quantities(), self.count, seed=own, name="design")
-        drawn = {name: values[order] for name, values in there.items()}
+        seed = child_seed(self.seed, "calibrate", "place", self.place)
+        order = stream(seed, "calibrate", "order").permutation(self.count)
+        placed = draws(self.quantities(), self.count, seed=seed, name="design")
+        drawn = {name: values[order] for name, values in placed.items()}
         drawn |= draws(self.cloth, self.count, seed=self.seed, name="cloths")
         if self.log.distance is not None:
             drawn[DISTANCE.name] = np.full(self.count, self.log.distance)
         order = np.argsort(drawn["damping"], kind="stable")
-        return {name: own[order] for name, own in drawn.items()}
+        return {name: values[order] for name, values in drawn.items()}
 
     def batches(self) -> list[FlagBatch]:
-        """In the order of `values`."""
+        """Returns all batches in the order of `values`."""
         return [
             self.batch(np.arange(first, min(first + BATCH, self.count), dtype=np.int64))
             for first in range(0, self.count, BATCH)
         ]
 
     def batch(self, which: IntArray) -> FlagBatch:
-        """Some of the simulations, by their places in `values`."""
-        values = {name: own[which] for name, own in self.values().items()}
+        """Returns some of the simulations, by their places in `values`."""
+        values = {name: drawn[which] for name, drawn in self.values().items()}
         view = [values.pop("azimuth"), values.pop("elevation"), np.full(len(which), self.distance)]
         return FlagBatch(
             flag=self.flag,
@@ -155,21 +155,21 @@ class Design:
             duration=self.duration,
             values=values,
             places=np.stack(view, axis=1)[:, None],
-            seeds=tuple(child_seed(self.seed, "calibrate", "flag", self.recording, int(place)) for place in which),
+            seeds=tuple(child_seed(self.seed, "calibrate", "flag", self.recording, int(number)) for number in which),
         )
 
     def damped(self) -> IntArray:
         """Places of the simulations in the longest steps that the design has."""
-        own = self.batches()
-        steps = [batch.step or 0.0 for batch in own]
-        sizes = [len(batch.seeds) for batch in own]
+        batches = self.batches()
+        steps = [batch.step or 0.0 for batch in batches]
+        sizes = [len(batch.seeds) for batch in batches]
         return np.flatnonzero(np.repeat(np.array(steps) == max(steps), sizes))
 
 
 def simulated(
     design: Design, *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
 ) -> FloatArray:
-    """(simulation, window, observable) in the order of the design's values; NaN where a flag diverged.
+    """Returns (simulation, window, observable) in the order of the design's values; NaN where a flag diverged.
 
     Args:
         folder: where batches are kept.
@@ -184,18 +184,18 @@ def simulated(
 def read(
     batches: Sequence[FlagBatch], *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
 ) -> FloatArray:
-    """(flag, place, window, observable) of batches, in order; those that the folder lacks are simulated. As
+    """Returns (flag, place, window, observable) of batches, in order; those that the folder lacks are simulated. As
     `simulated`."""
     paths = [folder / f"{digest(canonical(dict(batch.content())))[:32]}.npz" for batch in batches]
-    missing = [place for place, path in enumerate(paths) if not path.exists()]
+    missing = [number for number, path in enumerate(paths) if not path.exists()]
     if advance is not None and len(missing) < len(batches):
-        advance(sum(len(batch.seeds) for place, batch in enumerate(batches) if place not in set(missing)))
+        advance(sum(len(batch.seeds) for number, batch in enumerate(batches) if number not in set(missing)))
     folder.mkdir(parents=True, exist_ok=True)
     if missing:
         with ProcessPoolExecutor(
             min(workers, len(missing)), mp_context=get_context("spawn"), initializer=single_threaded
         ) as pool:
-            running = {pool.submit(_make, batches[place], paths[place]): place for place in missing}
+            running = {pool.submit(_make, batches[number], paths[number]): number for number in missing}
             for done in as_completed(running):
                 done.result()
                 if advance is not None:
@@ -230,7 +230,8 @@ _DAMPING = next(one for one in CLOTH if one.name == "damping")
 
 
 def lasting(recordings: int) -> float:
-    """s of each of so many recordings in which flags with an effect are simulated: a whole number of windows."""
+    """Returns the seconds of each of so many recordings in which flags with an effect are simulated: a whole number
+    of windows."""
     most = min(MINUTE, LONGEST_PAIRS / recordings)
     return WINDOW * max(FEWEST_WINDOWS, int(most / WINDOW + 1e-9))
 
@@ -253,7 +254,7 @@ class Pairs:
 
 
 def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
-    """The flags of a recording's design that are simulated with an effect, those of its longest steps.
+    """Chooses the flags of a recording's design that are simulated with an effect, those of its longest steps.
 
     Args:
         until: part of the film that is simulated [s].
@@ -278,46 +279,46 @@ def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
 
 
 def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed: int) -> list[list[FlagBatch]]:
-    """Null experiments: for each recording a batch a kind of numerics, of `TOGETHER` cloths each. A cloth is the same
-    in all recordings, its place and anemometer are not.
+    """Designs null experiments: for each recording a batch a kind of numerics, of `TOGETHER` cloths each. A cloth is
+    the same in all recordings, its place and anemometer are not.
 
     Args:
         places: for each recording the first one of its place.
     """
     count = kinds * TOGETHER
     cloths = draws(designs[0].cloth, count, seed=seed, name="null cloths")
-    found = []
+    experiments = []
     for number, design in zip(places, designs, strict=True):
-        own = {
-            one.name: one.at(stream(seed, "films", "null places", number, one.name).random(count))
-            for one in design.quantities()
+        drawn = {
+            quantity.name: quantity.at(stream(seed, "films", "null places", number, quantity.name).random(count))
+            for quantity in design.quantities()
         }
-        own |= cloths
+        drawn |= cloths
         if design.log.distance is not None:
-            own["distance_constant"] = np.full(count, design.log.distance)
-        seen = np.stack([own["azimuth"], own["elevation"], np.full(count, design.distance)], axis=1)
+            drawn["distance_constant"] = np.full(count, design.log.distance)
+        views = np.stack([drawn["azimuth"], drawn["elevation"], np.full(count, design.distance)], axis=1)
         first = design.batches()[0]
         batches = []
         for kind in range(kinds):
             part = np.arange(kind * TOGETHER, (kind + 1) * TOGETHER)
             numerics = Discretisation.drawn(stream(seed, "films", "kind", kind), explicit=_little())
-            values = {name: own[name][part] for name in first.values}
+            values = {name: drawn[name][part] for name in first.values}
             values["damping"] = _damping(values["damping"], explicit=numerics.step is None)
             batches.append(
                 replace(
                     first,
                     values=values,
-                    places=seen[part][:, None],
+                    places=views[part][:, None],
                     discretisation=numerics,
-                    seeds=tuple(child_seed(seed, "films", "null", design.recording, int(place)) for place in part),
+                    seeds=tuple(child_seed(seed, "films", "null", design.recording, int(member)) for member in part),
                 )
             )
-        found.append(batches)
-    return found
+        experiments.append(batches)
+    return experiments
 
 
 def _little() -> float:
-    """Share of the cloths that damp less than what leapfrog is for."""
+    """Returns the share of the cloths that damp less than what leapfrog is for."""
     low, high = _DAMPING.at(np.array([0.0, 1.0])).tolist()
     return math.log(max(LITTLE / low, 1.0)) / math.log(high / low)
 
@@ -334,7 +335,7 @@ _PACE = 25.0
 
 
 def announced(flag_seconds: float, *, workers: int) -> str:
-    """What is to be simulated, and for about how long.
+    """Returns what is to be simulated, and for about how long.
 
     Args:
         flag_seconds: simulated seconds of all flags together.

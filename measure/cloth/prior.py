@@ -72,9 +72,9 @@ class Among:
 
     def at(self, share: FloatArray) -> FloatArray:
         """Values of shares in [0, 1)."""
-        whole = np.minimum(share, np.nextafter(1.0, 0.0)) * len(self.places)
-        part = whole.astype(np.int64)
-        return (np.array(self.places)[part] + whole - part) / self.count
+        scaled = np.minimum(share, np.nextafter(1.0, 0.0)) * len(self.places)
+        part = scaled.astype(np.int64)
+        return (np.array(self.places)[part] + scaled - part) / self.count
 
     def as_dict(self) -> dict[str, int | list[int]]:
         return {"places": list(self.places), "count": self.count}
@@ -101,7 +101,7 @@ class Uncertain:
 
     @property
     def degrees(self) -> str:
-        """The prior of an angle in words."""
+        """Returns the prior of an angle in words."""
         if isinstance(self.prior, Normal):
             return f"{math.degrees(self.prior.mean):.3g} ± {math.degrees(self.prior.sigma):.2g}°"
         low, high = self.ends or (-math.inf, math.inf)
@@ -109,7 +109,7 @@ class Uncertain:
 
     @property
     def ends(self) -> tuple[float, float] | None:
-        """Of the prior; None of one that is no range."""
+        """Returns the ends of the prior; None of one that is no range."""
         return (self.prior.low, self.prior.high) if isinstance(self.prior, Range) else None
 
     def at(self, share: FloatArray) -> FloatArray:
@@ -193,7 +193,7 @@ DISTANCE = Uncertain(
 
 
 def clock_error(sigma: float) -> Uncertain:
-    """Of a log's times beside the film's, their standard uncertainty [s]."""
+    """Makes the prior of a log's times beside the film's, their standard uncertainty [s]."""
     return Uncertain(name="clock_error", unit="s", prior=Normal(mean=0.0, sigma=sigma), source="the log's clock model")
 
 
@@ -222,11 +222,11 @@ def draws(quantities: tuple[Uncertain, ...], count: int, *, seed: int, name: str
     """
     engine = qmc.Sobol(len(quantities), scramble=True, rng=stream(seed, "calibrate", name))
     shares = np.asarray(engine.random_base2(max(0, math.ceil(math.log2(max(count, 1))))), dtype=np.float64)[:count]
-    return {quantity.name: quantity.at(shares[:, place]) for place, quantity in enumerate(quantities)}
+    return {quantity.name: quantity.at(shares[:, column]) for column, quantity in enumerate(quantities)}
 
 
 def stated_angle(about: Uncertain, stated: Stated, *, where: str) -> Uncertain:
-    """An angle as the user states it [°], an exact value with the uncertainty of a direction.
+    """Makes the prior of an angle as the user states it [°], an exact value with the uncertainty of a direction.
 
     Raises:
         UsageError: an azimuth that is not between 0 and 180, or an elevation beyond 60.
@@ -295,18 +295,18 @@ class Fabric:
 
     @property
     def drawn(self) -> Uncertain:
-        """What simulations draw in place of any."""
+        """Returns what simulations draw in place of any."""
         places = tuple(TABLES.index(table) for table in self.tables)
         return replace(FABRIC, prior=Among(places=places, count=len(TABLES)), source=f"stated: {self.name}")
 
 
 def fabric(name: str, *, where: str) -> Fabric:
-    """A class of cloths, or one of the cloths that were measured.
+    """Finds a class of cloths, or one of the cloths that were measured.
 
     Raises:
         UnknownNameError: neither, with all that are known.
     """
     if name not in CLASSES and name not in TABLES:
-        known = ", ".join([*CLASSES, *TABLES])
-        raise UnknownNameError(f"no cloth like {name!r} was measured", where=where, fix=f"give one of {known}")
+        names = ", ".join([*CLASSES, *TABLES])
+        raise UnknownNameError(f"no cloth like {name!r} was measured", where=where, fix=f"give one of {names}")
     return Fabric(name=name, tables=CLASSES.get(name, (name,)))

@@ -73,99 +73,106 @@ def compared(
         control: the best wrong effect; None for none.
         weighed: mean and standard deviation of a stated area weight [kg/m²].
     """
-    found: list[Comparison] = []
+    comparisons: list[Comparison] = []
     for words, tasks in (
         ("other halves", _halves(recordings, simulations)),
         ("recordings left out", _left_out(recordings, sights)),
     ):
         predictions = [
-            one
+            predicted
             for task in tasks
-            for one in _predicted(task, effect=effect, control=control, weighed=weighed, seed=seed)
+            for predicted in _predicted(task, effect=effect, control=control, weighed=weighed, seed=seed)
         ]
-        for place, name in enumerate(OBSERVED):
-            own = [one for one in predictions if math.isfinite(one.observed[place] + one.before[place])]
-            if own:
-                found.append(_comparison(f"{name}, {words}", name, place, own, control, seed=seed))
-    return tuple(found)
+        for column, name in enumerate(OBSERVED):
+            shown_by = [
+                prediction
+                for prediction in predictions
+                if math.isfinite(prediction.observed[column] + prediction.before[column])
+            ]
+            if shown_by:
+                comparisons.append(_comparison(f"{name}, {words}", name, column, shown_by, control, seed=seed))
+    return tuple(comparisons)
 
 
 def _halves(recordings: Sequence[Observed], simulations: Simulations) -> list[_Task]:
-    """One half of each recording fitted and the other predicted, both ways; none where `halved` gives none."""
+    """Pairs the halves of each recording, one fitted and the other predicted, both ways; none where `halved` gives
+    none."""
     return [
-        _Task(fitted=a, predicted=tuple((place, s, o) for place, (s, o) in enumerate(b)))
+        _Task(fitted=a, predicted=tuple((number, s, o) for number, (s, o) in enumerate(b)))
         for a, b in permutations(halved(recordings, simulations), 2)
     ]
 
 
 def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[tuple[tuple[Sight, Observed], ...], ...]:
-    """The models and windows of all first halves, and those of all second halves; nothing of recordings that are too
-    short, or that are rows of a table against wind, whose windows are the same."""
-    if min(len(one.readings) for one in recordings) < 2 * LEAST_WINDOWS or any(one.place for one in recordings):
+    """Returns the models and windows of all first halves, and those of all second halves; nothing of recordings that
+    are too short, or that are rows of a table against wind, whose windows are the same."""
+    if min(len(recording.readings) for recording in recordings) < 2 * LEAST_WINDOWS or any(
+        recording.place for recording in recordings
+    ):
         return ()
-    middles = [len(one.readings) // 2 for one in recordings]
+    middles = [len(recording.readings) // 2 for recording in recordings]
     sides = []
     for halves in ([slice(0, middle) for middle in middles], [slice(middle, None) for middle in middles]):
         models = sights_of(recordings, simulations, windows=halves)
-        parts = [part_of(one, windows) for one, windows in zip(recordings, halves, strict=True)]
+        parts = [part_of(recording, windows) for recording, windows in zip(recordings, halves, strict=True)]
         sides.append(tuple(zip(models, parts, strict=True)))
     return tuple(sides)
 
 
 def _left_out(recordings: Sequence[Observed], sights: Sequence[Sight]) -> list[_Task]:
-    """Each recording predicted by all others."""
-    both = list(zip(sights, recordings, strict=True))
-    if len(both) < 2:
+    """Leaves each recording out, to be predicted by all others."""
+    pairs = list(zip(sights, recordings, strict=True))
+    if len(pairs) < 2:
         return []
     return [
-        _Task(fitted=(*both[:place], *both[place + 1 :]), predicted=((None, *both[place]),))
-        for place in range(len(both))
+        _Task(fitted=(*pairs[:number], *pairs[number + 1 :]), predicted=((None, *pairs[number]),))
+        for number in range(len(pairs))
     ]
 
 
 def _predicted(
     task: _Task, *, effect: Weighable | None, control: Weighable | None, weighed: tuple[float, float] | None, seed: int
 ) -> list[Prediction]:
-    sights = [one for one, _ in task.fitted]
-    seen = of_recordings(sights, [own for _, own in task.fitted], weighed)
+    sights = [sight for sight, _ in task.fitted]
+    experiment = of_recordings(sights, [recording for _, recording in task.fitted], weighed)
     rng = stream(seed, "films", "places")
 
     def means(which: Weighable | None) -> list[FloatArray]:
-        """(observable,) of each predicted sight."""
-        found = fitted(sights, seen, which, seed=seed)
-        own, places, strength = hypothesis(sights, which).values(found.scores[0])
-        made = []
-        for place, one, _ in task.predicted:
+        """Predicts (observable,) of each predicted sight."""
+        fit = fitted(sights, experiment, which, seed=seed)
+        cloth, places, strength = hypothesis(sights, which).values(fit.scores[0])
+        columns = []
+        for fitted_number, sight, _ in task.predicted:
             values = (
-                places[place]
-                if place is not None
-                else {q.name: q.at(rng.random(len(found.weights[0]))) for q in one.quantities}
+                places[fitted_number]
+                if fitted_number is not None
+                else {q.name: q.at(rng.random(len(fit.weights[0]))) for q in sight.quantities}
             )
-            mean, _ = one.predict({**own, **values}, None if which is None else which.name, strength)
-            full = np.full(len(one.used), np.nan)
-            full[one.used] = found.weights[0] @ mean
-            made.append(full[: len(OBSERVED)])
-        return made
+            mean, _ = sight.predict({**cloth, **values}, None if which is None else which.name, strength)
+            full = np.full(len(sight.used), np.nan)
+            full[sight.used] = fit.weights[0] @ mean
+            columns.append(full[: len(OBSERVED)])
+        return columns
 
-    known = all(
-        one is None or all(one.name in s.responses for s in (*sights, *(p for _, p, _ in task.predicted)))
-        for one in (effect, control)
+    responding = all(
+        added is None or all(added.name in s.responses for s in (*sights, *(p for _, p, _ in task.predicted)))
+        for added in (effect, control)
     )
     before = means(None)
-    after = means(effect) if effect is not None and known else None
-    wrong = means(control) if control is not None and known else None
+    after = means(effect) if effect is not None and responding else None
+    wrong = means(control) if control is not None and responding else None
     result = []
-    for number, (_, one, own) in enumerate(task.predicted):
-        scatter = np.full(len(one.used), np.nan)
-        scatter[one.used] = one.emulator.deviations
+    for number, (_, sight, recording) in enumerate(task.predicted):
+        scatter = np.full(len(sight.used), np.nan)
+        scatter[sight.used] = sight.emulator.deviations
         result.append(
             Prediction(
-                observed=own.summary[: len(OBSERVED)],
+                observed=recording.summary[: len(OBSERVED)],
                 before=before[number],
                 after=None if after is None else after[number],
                 control=None if wrong is None else wrong[number],
                 scatter=scatter[: len(OBSERVED)],
-                windows=len(own.readings),
+                windows=len(recording.readings),
             )
         )
     return result
@@ -174,30 +181,32 @@ def _predicted(
 def _comparison(
     words: str, name: str, place: int, own: Sequence[Prediction], control: Weighable | None, *, seed: int
 ) -> Comparison:
-    """Root mean squares over the predicted parts, with intervals by the scatter of replicates."""
+    """Compares root mean squares over the predicted parts, with intervals by the scatter of replicates."""
     unit = OBSERVABLES[name].unit
-    observed, scatter = (np.array([getattr(one, key)[place] for one in own]) for key in ("observed", "scatter"))
+    observed, scatter = (
+        np.array([getattr(prediction, key)[place] for prediction in own]) for key in ("observed", "scatter")
+    )
     noise = scatter * stream(seed, "films", "unseen", words).standard_normal((_DRAWS, len(own)))
 
     def errors(predicted: Sequence[FloatArray]) -> tuple[float, FloatArray]:
-        off = observed - np.array([one[place] for one in predicted])
+        off = observed - np.array([prediction[place] for prediction in predicted])
         return float(np.sqrt(np.square(off).mean())), np.sqrt(np.square(off + noise).mean(axis=1))
 
-    before = errors([one.before for one in own])
-    with_effect = [one.after for one in own if one.after is not None]
-    with_control = [one.control for one in own if one.control is not None]
+    before = errors([prediction.before for prediction in own])
+    with_effect = [prediction.after for prediction in own if prediction.after is not None]
+    with_control = [prediction.control for prediction in own if prediction.control is not None]
     after, wrong = errors(with_effect) if with_effect else None, errors(with_control) if with_control else None
     floor = float(np.sqrt(np.square(scatter).mean()))
     reduction = None if after is None else (before[0] - after[0], before[1] - after[1])
-    stated = _estimate(before, unit)
+    error_before = _estimate(before, unit)
     return Comparison(
         what=words,
-        frames=sum(one.windows for one in own),
-        before=stated,
+        frames=sum(prediction.windows for prediction in own),
+        before=error_before,
         after=_estimate(after, unit),
         reduction=_estimate(reduction, unit),
         floor=Estimate(value=floor, low=floor, high=floor, unit=unit, level=CRITERIA.interval),
-        share=None if reduction is None or stated.low <= floor else reduction[0] / (before[0] - floor),
+        share=None if reduction is None or error_before.low <= floor else reduction[0] / (before[0] - floor),
         control=None if wrong is None else _estimate(wrong, unit),
         control_name="" if wrong is None or control is None else control.column.effect,
     )

@@ -54,7 +54,7 @@ def close_loop(
     workers: int = 1,
     stage: Stage | None = None,
 ) -> Verdict:
-    """The verdict on recordings of one flag.
+    """Finds the verdict on recordings of one flag.
 
     Args:
         recordings: each cut to what is to be used; in different winds they say most.
@@ -72,24 +72,24 @@ def close_loop(
 
 
 def verdict_of(outcome: SolvedLoop) -> Verdict:
-    """The verdict in numbers and sentences."""
-    judged, options = outcome.judged, outcome.options
+    """Returns the verdict in numbers and sentences."""
+    decision, options = outcome.judged, outcome.options
     effects = outcome.weighing.effects
-    named = tuple(dict.fromkeys(effects[place].column.effect for place in judged.named))
-    acting = outcome.best if judged.named else None
-    others = [place for place in np.argsort(-judged.probability) if place not in judged.confident]
+    names = tuple(dict.fromkeys(effects[number].column.effect for number in decision.named))
+    acting = outcome.best if decision.named else None
+    rest = [number for number in np.argsort(-decision.probability) if number not in decision.confident]
     comparisons = compared(
         outcome.recordings,
         outcome.simulations,
         outcome.sights,
         effect=None if acting is None else acting[0],
-        control=effects[others[0]] if others and acting is not None else None,
+        control=effects[rest[0]] if rest and acting is not None else None,
         weighed=options.area_weight,
         seed=options.calibration.seed,
     )
     verdict = Verdict(
-        conclusion=judged.conclusion,
-        named=named,
+        conclusion=decision.conclusion,
+        named=names,
         words="",
         test=_test(outcome),
         parameters=_parameters(outcome),
@@ -103,18 +103,20 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
             "options": options.recipe(),
         },
         power=_power(outcome),
-        open=judged.open,
+        open=decision.open,
         findings=tuple((f.kind, f.what) for f in outcome.findings if f.severity is not Severity.NOTE),
     )
     unseen = [
-        one.column.effect for one, errors in zip(effects, outcome.sensitivity.tolist(), strict=True) if errors < SEEN
+        effect.column.effect
+        for effect, errors in zip(effects, outcome.sensitivity.tolist(), strict=True)
+        if errors < SEEN
     ]
     return stated(
         verdict,
         outcome.recordings,
         weighed=options.area_weight is not None,
         unseen=tuple(dict.fromkeys(unseen)),
-        departing=tuple(one for one in outcome.departures if abs(one.deviations) >= SEEN),
+        departing=tuple(departure for departure in outcome.departures if abs(departure.deviations) >= SEEN),
     )
 
 
@@ -141,43 +143,43 @@ def _test(outcome: SolvedLoop) -> NullTest:
 
 
 def _power(outcome: SolvedLoop) -> tuple[Power, ...]:
-    """Of each effect, the surest first."""
+    """Lists the power for each effect, the surest first."""
     effects, power = outcome.weighing.effects, outcome.judged.scored.power
     return tuple(
         Power(
-            effect=effects[place].column.effect,
-            parameter=effects[place].column.parameter,
-            strength=expected(outcome.sights, effects[place]),
-            unit=effects[place].column.unit,
-            share=float(power[place]),
+            effect=effects[number].column.effect,
+            parameter=effects[number].column.parameter,
+            strength=expected(outcome.sights, effects[number]),
+            unit=effects[number].column.unit,
+            share=float(power[number]),
         )
-        for place in np.argsort(-power, kind="stable").tolist()
+        for number in np.argsort(-power, kind="stable").tolist()
     )
 
 
 def _parameters(outcome: SolvedLoop) -> tuple[Parameter, ...]:
-    """Area weight, bending and damping, of the base model and with the effect."""
+    """Estimates area weight, bending and damping, of the base model and with the effect."""
     before = _cloths(outcome, None, outcome.base)
     after = None
     if outcome.judged.named and outcome.best is not None:
         after = _cloths(outcome, *outcome.best)
-    made = []
-    for place, one in enumerate(CLOTH):
-        later = None if after is None else after[place]
-        made.append(
+    parameters = []
+    for number, quantity in enumerate(CLOTH):
+        later = None if after is None else after[number]
+        parameters.append(
             Parameter(
-                name=one.name,
-                before=before[place][0],
+                name=quantity.name,
+                before=before[number][0],
                 after=None if later is None else later[0],
-                shift=None if later is None else (later[0].value - before[place][0].value) / before[place][1],
+                shift=None if later is None else (later[0].value - before[number][0].value) / before[number][1],
             )
         )
-    return tuple(made)
+    return tuple(parameters)
 
 
 def _cloths(outcome: SolvedLoop, effect: Weighable | None, fit: Fit) -> list[tuple[Estimate, float]]:
-    own, _, _ = hypothesis(outcome.sights, effect).values(fit.scores[0])
-    return [_marginal(own[one.name], fit.weights[0], one.unit) for one in CLOTH]
+    cloth, _, _ = hypothesis(outcome.sights, effect).values(fit.scores[0])
+    return [_marginal(cloth[quantity.name], fit.weights[0], quantity.unit) for quantity in CLOTH]
 
 
 def _marginal(values: FloatArray, weights: FloatArray, unit: str) -> tuple[Estimate, float]:
@@ -189,29 +191,29 @@ def _marginal(values: FloatArray, weights: FloatArray, unit: str) -> tuple[Estim
 
 
 def strength_of(effect: Weighable, fit: Fit) -> Estimate:
-    """A strength, its interval widened by what meshes and cloths do to effects, as on trajectories; a bound where the
-    posterior leans on an end of what is assumed of it (`measure.ends`)."""
+    """Estimates a strength, its interval widened by what meshes and cloths do to effects, as on trajectories; a
+    bound where the posterior leans on an end of what is assumed of it (`measure.ends`)."""
     shares = ndtr(fit.scores[0][:, -1])  # the last coordinate
-    strengths, whole = effect.prior.at(shares), float(np.exp(CRITERIA.reach * CRITERIA.strength_factor))
-    found, _ = _marginal(strengths, fit.weights[0], effect.column.unit)
-    if (bound := _bound(effect, strengths, shares, fit.weights[0], whole=whole)) is not None:
+    strengths, factor = effect.prior.at(shares), float(np.exp(CRITERIA.reach * CRITERIA.strength_factor))
+    marginal, _ = _marginal(strengths, fit.weights[0], effect.column.unit)
+    if (bound := _bound(effect, strengths, shares, fit.weights[0], whole=factor)) is not None:
         return bound
-    value, size, null = found.value, abs(found.value), effect.column.described.null
-    inward, outward = size * (1 - 1 / whole), size * (whole - 1)
+    value, size, null = marginal.value, abs(marginal.value), effect.column.described.null
+    inward, outward = size * (1 - 1 / factor), size * (factor - 1)
     below, above = (inward, outward) if value > 0 else (outward, inward)
     return Estimate(
         value=null + value,
-        low=null + value - float(np.hypot(below, value - found.low)),
-        high=null + value + float(np.hypot(above, found.high - value)),
-        unit=found.unit,
-        level=found.level,
+        low=null + value - float(np.hypot(below, value - marginal.low)),
+        high=null + value + float(np.hypot(above, marginal.high - value)),
+        unit=marginal.unit,
+        level=marginal.level,
     )
 
 
 def _bound(
     effect: Weighable, strengths: FloatArray, shares: FloatArray, weights: FloatArray, *, whole: float
 ) -> Estimate | None:
-    """A strength that is known on one side only; None of one with two ends.
+    """Returns a strength that is known on one side only; None of one with two ends.
 
     Args:
         strengths, shares: (n,) of it beyond null, and their places in its prior, of importance samples.
@@ -220,66 +222,70 @@ def _bound(
     """
     even = (np.arange(_EVEN) + 0.5) / _EVEN
     drawn = np.minimum(np.searchsorted(np.cumsum(weights), even), len(weights) - 1)
-    found = span(
+    interval = span(
         strengths[drawn],
         shares[drawn],
         level=CRITERIA.interval,
         limits=(0.0, np.inf) if effect.low > 0 else (-np.inf, np.inf),
         assumed=(effect.low, effect.high),
     )
-    if found.bound is None:
+    if interval.bound is None:
         return None
-    least = found.bound is Bound.LEAST
-    end = found.high if found.bound is Bound.MOST else found.low if least else float(np.median(strengths[drawn]))
+    least = interval.bound is Bound.LEAST
+    end = (
+        interval.high if interval.bound is Bound.MOST else interval.low if least else float(np.median(strengths[drawn]))
+    )
     # A bound gives way by the factor: upwards where it is one from above, and towards zero where it holds a size.
     wider = end / whole if (end > 0) == least else end * whole
     null = effect.column.described.null
-    ends = {Bound.LEAST: (wider, found.high), Bound.MOST: (found.low, wider)}.get(found.bound, (found.low, found.high))
+    ends = {Bound.LEAST: (wider, interval.high), Bound.MOST: (interval.low, wider)}.get(
+        interval.bound, (interval.low, interval.high)
+    )
     return Estimate(
-        value=null + (end if found.bound is Bound.NOTHING else wider),
+        value=null + (end if interval.bound is Bound.NOTHING else wider),
         low=null + ends[0],
         high=null + ends[1],
         unit=effect.column.unit,
-        level=found.level,
-        bound=found.bound.value,
+        level=interval.level,
+        bound=interval.bound.value,
     )
 
 
 def _ranking(outcome: SolvedLoop) -> tuple[Candidate, ...]:
-    judged, own = outcome.judged, outcome.weighing
-    seen = of_recordings(outcome.sights, outcome.recordings, outcome.options.area_weight)
-    made = []
-    for place in np.argsort(-judged.probability).tolist():
-        effect = own.effects[place]
-        fit = fitted(outcome.sights, seen, effect, seed=outcome.options.calibration.seed)
-        made.append(
+    decision, weighing = outcome.judged, outcome.weighing
+    experiment = of_recordings(outcome.sights, outcome.recordings, outcome.options.area_weight)
+    candidates = []
+    for number in np.argsort(-decision.probability).tolist():
+        effect = weighing.effects[number]
+        fit = fitted(outcome.sights, experiment, effect, seed=outcome.options.calibration.seed)
+        candidates.append(
             Candidate(
                 effect=effect.column.effect,
                 parameter=effect.column.parameter,
                 strength=strength_of(effect, fit),
-                z=float(judged.scored.z[place]),
-                p_value=float(judged.scored.alone[place]),
-                p_family=float(judged.scored.family[place]),
-                gain=float(own.factors[0, place]),
+                z=float(decision.scored.z[number]),
+                p_value=float(decision.scored.alone[number]),
+                p_family=float(decision.scored.family[number]),
+                gain=float(weighing.factors[0, number]),
                 gain_error=float("nan"),
                 behind=0.0,
-                leftover=float(judged.leftover[place]),
+                leftover=float(decision.leftover[number]),
                 null=effect.column.described.null,
-                probability=float(judged.probability[place]),
-                why_not=_why_not(outcome, place),
+                probability=float(decision.probability[number]),
+                why_not=_why_not(outcome, number),
             )
         )
-    return tuple(made)
+    return tuple(candidates)
 
 
 def _why_not(outcome: SolvedLoop, place: int) -> str:
-    judged = outcome.judged
-    if place in judged.named:
+    decision = outcome.judged
+    if place in decision.named:
         return ""
-    if judged.conclusion in NOT_REJECTED:
+    if decision.conclusion in NOT_REJECTED:
         return "the base model is not rejected"
-    if judged.leftover[place] <= outcome.options.level:
+    if decision.leftover[place] <= outcome.options.level:
         return "what remains with it is larger than in null experiments"
-    if place in judged.confident:
+    if place in decision.confident:
         return "another effect explains more"
-    return f"its probability is {judged.probability[place]:.1g}, given that one effect is missing"
+    return f"its probability is {decision.probability[place]:.1g}, given that one effect is missing"

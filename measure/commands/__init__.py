@@ -8,6 +8,6 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.commands.close_loop import CloseLoopCommand
-    from measure.commands.measured import read
+    from measure.commands.measurement_artifact import read
 
 __getattr__ = lazy_exports(__name__, __file__)

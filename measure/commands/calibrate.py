@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from measure.cloth.calibration import Calibration
     from measure.estimate.page import Section
     from measure.film.similarity import FlagSize
-    from measure.film.source import Reading
+    from measure.film.source import FilmReading
 
 
 @options
@@ -105,11 +105,11 @@ def calibrate(chosen: CalibrateCommand) -> None:
     from measure.cloth.design import announced
     from measure.cloth.numerics import FLAGS, effort
     from measure.film.similarity import FlagSize
-    from measure.film.source import Reading
+    from measure.film.source import FilmReading
 
     lake = chosen.opened()
     size = FlagSize.of(chosen.flag_size)
-    reading = Reading.of(chosen, size)
+    reading = FilmReading.of(chosen, size)
     drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
     options = options_of(chosen, size, **drawn)
     weighable = anemometer = None
@@ -185,7 +185,7 @@ def _check_only(chosen: CalibrateCommand) -> None:
         )
 
 
-def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: Reading, lake: Lake | None) -> Made | None:
+def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: FilmReading, lake: Lake | None) -> Made | None:
     """The reading model; None with the reason on stderr where none can be made and the weight was asked for as well."""
     from measure.anemometer.making import made
     from measure.cloth.sources import is_table

@@ -22,10 +22,10 @@ from flagdata.shared_options import FILM, HOW, WRITTEN, AsJson, Keeping
 if TYPE_CHECKING:
     from flagdata.lake import Lake
     from measure.anemometer.networks import Network
-    from measure.commands.measuring import Request
+    from measure.commands.measure_film import Request
     from measure.estimate.measuring import Measurement, Options
     from measure.estimate.series import Beside
-    from measure.film.source import Reading, Subject
+    from measure.film.source import FilmReading, Subject
     from measure.refine.refinement import Refinement
 
 
@@ -97,7 +97,7 @@ def measure(chosen: MeasureCommand) -> None:
     if chosen.source is not None and chosen.lake is None:
         check_without_lake(chosen.source)
     from measure.anemometer.networks import network
-    from measure.commands.measuring import Request
+    from measure.commands.measure_film import Request
     from measure.film.source import subjects
 
     lake, at = chosen.opened(), chosen.version
@@ -160,9 +160,9 @@ class _Job:
         """Measure one film; commit and write what is to be shown."""
         from flagdata.lake.results import placed
         from flagdata.outputs import fresh_folder, write_file
-        from measure.commands.measured import artifact as artifact_of
-        from measure.commands.measured import keep, write
-        from measure.commands.measuring import run
+        from measure.commands.measure_film import run
+        from measure.commands.measurement_artifact import artifact as artifact_of
+        from measure.commands.measurement_artifact import keep, write
         from measure.estimate.series import beside
 
         estimator = self.network.estimator
@@ -289,7 +289,7 @@ class _Job:
         return rows if artifact is None else {**rows, "artifact": artifact}
 
 
-def _given(options: Options, reading: Reading) -> Mapping[str, Any]:
+def _given(options: Options, reading: FilmReading) -> Mapping[str, Any]:
     return {k: v for k, v in {**options.recipe(), **reading.recipe()}.items() if v is not None}
 
 

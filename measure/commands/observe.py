@@ -16,8 +16,8 @@ from flagdata.shared_options import WRITTEN, AsJson, Keeping
 if TYPE_CHECKING:
     from flagdata.lake import Lake
     from flagdata.rows import Rows
-    from measure.film.source import Reading, Subject
-    from measure.observables.table import Table
+    from measure.film.source import FilmReading, Subject
+    from measure.observables.table import ObservableTable
 
 
 @options
@@ -104,17 +104,17 @@ def observed(chosen: Observing) -> Rows:
     return Rows(table.arrow())
 
 
-def _table(chosen: Observing, lake: Lake | None, *, at: str | None) -> tuple[Table, Subject, Reading]:
+def _table(chosen: Observing, lake: Lake | None, *, at: str | None) -> tuple[ObservableTable, Subject, FilmReading]:
     """Returns the observables of a film, with where it is from and how it was read."""
     from measure.film.similarity import FlagSize
-    from measure.film.source import Reading, subjects
+    from measure.film.source import FilmReading, subjects
     from measure.observables.table import table_of
     from measure.observables.watching import count_of, watched
 
     if chosen.window < 1.0:
         raise UsageError(f"windows of {chosen.window:g} s", where="--window", fix="give 1s or more: a flutter's period")
     size = FlagSize.of(chosen.flag_size)
-    reading = Reading.of(chosen, size)
+    reading = FilmReading.of(chosen, size)
     (subject,) = subjects(str(chosen.source), query=None, lake=lake, at=at, reading=reading)
     part = {"first": chosen.start, "last": chosen.end, "seconds": chosen.window}
     with progress(count_of(subject.film, **part), label="observe", unit="window") as advance:
@@ -130,7 +130,7 @@ def _table(chosen: Observing, lake: Lake | None, *, at: str | None) -> tuple[Tab
     return table, subject, reading
 
 
-def _check_shown(table: Table, subject: Subject) -> None:
+def _check_shown(table: ObservableTable, subject: Subject) -> None:
     """Raises:
     RefusedError: no window shows the cloth.
     """

@@ -18,7 +18,7 @@ import numpy as np
 from flagdata.console import progress, say
 from flagdata.lake import Lake
 from flagdata.pages.pictures import data_url, figure_url, moving
-from measure.commands.measured import read
+from measure.commands.measurement_artifact import read
 from measure.demo.cards import Card, Judgement, Truth
 from measure.demo.page import recovered, write_page
 from measure.demo.recording import (

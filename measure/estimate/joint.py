@@ -19,7 +19,7 @@ from measure.estimate.answer import Quantity, quantities
 from measure.estimate.combine import OWN, Dependence, combined, effective
 from measure.estimate.options import Options
 from measure.film.similarity import POWERS, Sizes, scaled_back
-from measure.film.windows import Layout
+from measure.film.windows import WindowLayout
 from measure.gate.verdict import Reason
 from models.estimator import Estimator
 from models.mixture import Mixture
@@ -198,7 +198,7 @@ class Joint:
                 draws[:, column] = np.clip(draws[:, column], stated_value.low, stated_value.high)
         return draws, np.concatenate(places, axis=1)[:, rows].reshape(-1, len(self.names))
 
-    def window(self, look: Look, layout: Layout, p: float) -> WindowAnswer:
+    def window(self, look: Look, layout: WindowLayout, p: float) -> WindowAnswer:
         values = [self._values(logits) for logits in look.logits]
         draws = [scaled_back(v, self.names, s) for v, s in zip(values, self.sizes.draws, strict=True)]
         places = np.concatenate([self._places(v) for v in values])

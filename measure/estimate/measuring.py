@@ -19,7 +19,7 @@ from measure.estimate.combine import OWN, Dependence
 from measure.estimate.joint import DRAWS, Joint, Look, WindowAnswer
 from measure.estimate.options import Options
 from measure.film.similarity import Sizes, sizes, trained_on
-from measure.film.windows import Layout, Window, WindowReader, findings_of
+from measure.film.windows import Window, WindowLayout, WindowReader, findings_of
 from measure.gate.reasons import REASONS
 from measure.gate.verdict import Verdict, verdict
 from measure.gate.window import WindowGate
@@ -233,7 +233,7 @@ def _look(window: Window, gate: WindowGate, joint: Joint) -> Look:
     )
 
 
-def _without_windows(film: Film, layout: Layout, distinct: Distinct, faults: Sequence[Finding]) -> FlagdataError:
+def _without_windows(film: Film, layout: WindowLayout, distinct: Distinct, faults: Sequence[Finding]) -> FlagdataError:
     """Explains why no window of a film is complete."""
     still = [fault for fault in faults if fault.kind == "no-motion"]
     if distinct.repeated and not still:
@@ -254,7 +254,7 @@ def _without_windows(film: Film, layout: Layout, distinct: Distinct, faults: Seq
     )
 
 
-def _used(looks: Sequence[Look], gate_verdict: Verdict, layout: Layout) -> list[int]:
+def _used(looks: Sequence[Look], gate_verdict: Verdict, layout: WindowLayout) -> list[int]:
     """Selects windows that the answer rests on: none that overlap, none without anything to measure where others have
     it; of a familiar recording none that are strange."""
     length = layout.frames * max(layout.spacings)

@@ -9,7 +9,7 @@ from flagdata.lazy import lazy_exports
 if TYPE_CHECKING:
     from measure.film.conditioned import ConditionedFilm
     from measure.film.similarity import FlagSize, scaled_back, sizes
-    from measure.film.source import Reading, Subject, subjects
-    from measure.film.windows import Layout, WindowReader, findings_of
+    from measure.film.source import FilmReading, Subject, subjects
+    from measure.film.windows import WindowLayout, WindowReader, findings_of
 
 __getattr__ = lazy_exports(__name__, __file__)

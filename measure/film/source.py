@@ -24,7 +24,7 @@ from measure.film.similarity import FlagSize
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class FilmReading:
     """How a source is read.
 
     Attributes:
@@ -42,7 +42,7 @@ class Reading:
     sequence_fps: float | None = None
 
     @classmethod
-    def of(cls, chosen: OfCloth, size: FlagSize | None) -> Reading:
+    def of(cls, chosen: OfCloth, size: FlagSize | None) -> FilmReading:
         """Returns what the options of a verb say of a film, whose flag is of such a size.
 
         Raises:
@@ -130,7 +130,7 @@ def box_of(crop: tuple[int, int, int, int] | str | None) -> CropBox | None:
 
 
 def subjects(
-    source: str | None, *, query: str | None, lake: Lake | None, at: str | None, reading: Reading
+    source: str | None, *, query: str | None, lake: Lake | None, at: str | None, reading: FilmReading
 ) -> list[Subject]:
     """The films that a source or a query names.
 

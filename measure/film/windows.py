@@ -35,7 +35,7 @@ largest size considered, whichever is longer: a repeated frame at 30 Hz, but non
 
 
 @dataclass(frozen=True, kw_only=True)
-class Layout:
+class WindowLayout:
     """Where windows lie.
 
     Attributes:
@@ -94,7 +94,7 @@ def lay_out(
     step: float | None,
     first: float | None = None,
     last: float | None = None,
-) -> Layout:
+) -> WindowLayout:
     """Windows that follow each other, or start every `step` [s].
 
     Args:
@@ -119,7 +119,7 @@ def lay_out(
             f"the time between windows is {step:g} s", where="--windows", fix="give a time above 0, as in 1.2s"
         )
     longest = frames * max(spacings)
-    layout = Layout(
+    layout = WindowLayout(
         frames=frames,
         spacings=spacings,
         step=step if step is not None else longest,
@@ -193,7 +193,7 @@ class WindowReader:
             yield time, frame
 
 
-def cut(frames: Iterable[TimedFrame], layout: Layout) -> Iterator[Window]:
+def cut(frames: Iterable[TimedFrame], layout: WindowLayout) -> Iterator[Window]:
     """The windows of a film, in order; one in which frames are missing is left out.
 
     Args:
@@ -218,7 +218,7 @@ def cut(frames: Iterable[TimedFrame], layout: Layout) -> Iterator[Window]:
             yield window
 
 
-def _window(held: deque[TimedFrame], layout: Layout, index: int, interpolator: Interpolator) -> Window | None:
+def _window(held: deque[TimedFrame], layout: WindowLayout, index: int, interpolator: Interpolator) -> Window | None:
     if len(held) < 2:
         return None
     times = np.array([time for time, _ in held])
@@ -242,7 +242,9 @@ def _window(held: deque[TimedFrame], layout: Layout, index: int, interpolator: I
     return Window(index=index, start=start, clips=np.stack(clips), interpolated=interpolated)
 
 
-def findings_of(layout: Layout, *, found: int, interpolated: int, frames: int, repeated: int) -> tuple[Finding, ...]:
+def findings_of(
+    layout: WindowLayout, *, found: int, interpolated: int, frames: int, repeated: int
+) -> tuple[Finding, ...]:
     """What the cutting left out or made between frames.
 
     Args:

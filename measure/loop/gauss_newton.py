@@ -31,7 +31,7 @@ _LONGEST = 1.5
 """A step of the calibrated parameters beyond so many prior standard deviations is cut: the linear model ends there."""
 
 
-class DivergedError(FlagdataError):
+class FitDivergedError(FlagdataError):
     """A model whose predictions are not finite."""
 
     kind = ErrorKind.DIVERGED
@@ -172,7 +172,7 @@ def _round(
             break
         origin = origin.halved()
     else:
-        raise DivergedError(
+        raise FitDivergedError(
             "its cloth does not stay one",
             where=", ".join(column.name for column, _ in origin.effects) or "base model",
             fix="look at the recordings' residuals: no model of the library is near them",

@@ -30,7 +30,7 @@ from measure.forecasting.regressors import EffectColumn, columns, names
 from measure.forecasting.segments import Segments
 from measure.inference.evidence import Evidence, left_together
 from measure.inference.whitened_misfit import WhitenedMisfit
-from measure.loop.gauss_newton import DivergedError, Refined, refine
+from measure.loop.gauss_newton import FitDivergedError, Refined, refine
 from measure.loop.validation import LeftOut, left_out
 from measure.nulls.reference import Reference
 from measure.verdict.criteria import CRITERIA
@@ -168,7 +168,7 @@ class Fits:
         if key not in self._made:
             try:
                 self._made[key] = refine(self.forecaster, self.segments, self.whitened, key, columns=columns())
-            except DivergedError:
+            except FitDivergedError:
                 self._made[key] = None
         return self._made[key]
 
@@ -208,7 +208,7 @@ class Fits:
         """
         fitted = self.of(())
         if fitted is None:
-            raise DivergedError("the base model's cloth does not stay one", fix="check cloth, pins and wind")
+            raise FitDivergedError("the base model's cloth does not stay one", fix="check cloth, pins and wind")
         return fitted
 
 

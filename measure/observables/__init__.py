@@ -13,7 +13,7 @@ from flagdata.lazy import lazy_exports
 from flagdata.registry import Registry
 from measure.observables.cloth import ClothWindow, View, seen_from
 from measure.observables.film import FilmWindow
-from measure.observables.observable import Observable, Reading, UnseenError
+from measure.observables.observable import Observable, UnseenError, WindowReading
 from measure.observables.silhouettes import Silhouettes
 
 if TYPE_CHECKING:
@@ -29,10 +29,10 @@ __all__ = [
     "ClothWindow",
     "FilmWindow",
     "Observable",
-    "Reading",
     "Silhouettes",
     "UnseenError",
     "View",
+    "WindowReading",
     "seen_from",
 ]
 

@@ -11,14 +11,14 @@ from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 from measure.film.source import Subject
-from measure.observables.table import Table
+from measure.observables.table import ObservableTable
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
 VERSION = 5
 """Raised whenever the same film gives other readings."""
 
 
-def artifact(table: Table, subject: Subject, options: Mapping[str, Any]) -> Artifact:
+def artifact(table: ObservableTable, subject: Subject, options: Mapping[str, Any]) -> Artifact:
     """Builds the row of a table, without its object.
 
     Args:
@@ -42,7 +42,7 @@ def artifact(table: Table, subject: Subject, options: Mapping[str, Any]) -> Arti
     )
 
 
-def keep(lake: Lake, table: Table, subject: Subject, options: Mapping[str, Any], *, branch: str) -> Placed:
+def keep(lake: Lake, table: ObservableTable, subject: Subject, options: Mapping[str, Any], *, branch: str) -> Placed:
     """Commit a table where it is new, see `flagdata.lake.results`.
 
     Raises:

@@ -11,7 +11,7 @@ from measure.observables.cloth import ClothWindow
 from measure.observables.film import FilmWindow
 from measure.observables.unseen import UnseenError
 
-__all__ = ["Observable", "Reading", "UnseenError"]
+__all__ = ["Observable", "UnseenError", "WindowReading"]
 
 _Window = TypeVar("_Window")
 WINDOW = 2.5
@@ -19,7 +19,7 @@ WINDOW = 2.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class WindowReading:
     """What a window gives for an observable.
 
     Attributes:
@@ -66,18 +66,18 @@ class Observable:
         """The unit of the value before it is divided by the flag's length or height."""
         return None if self.counted_in is None else "m" if self.unit == "1" else "m/s"
 
-    def of_film(self, window: FilmWindow) -> Reading:
+    def of_film(self, window: FilmWindow) -> WindowReading:
         """Reads the observable from pixels, less the bias."""
         reading = _read(self.pixels, window)
-        return Reading(value=reading.value - self.bias, reason=reading.reason)
+        return WindowReading(value=reading.value - self.bias, reason=reading.reason)
 
-    def of_cloth(self, window: ClothWindow) -> Reading:
+    def of_cloth(self, window: ClothWindow) -> WindowReading:
         """Reads the observable from geometry."""
         return _read(self.geometry, window)
 
 
-def _read(definition: Callable[[_Window], float], window: _Window) -> Reading:
+def _read(definition: Callable[[_Window], float], window: _Window) -> WindowReading:
     try:
-        return Reading(value=definition(window))
+        return WindowReading(value=definition(window))
     except UnseenError as why:
-        return Reading(value=math.nan, reason=why.kind)
+        return WindowReading(value=math.nan, reason=why.kind)

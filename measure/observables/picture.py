@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from measure.observables import OBSERVABLES
-from measure.observables.table import Table
+from measure.observables.table import ObservableTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _BLUE, _RUST = "#2b6f8f", "#c4622d"
 
 
-def picture(table: Table) -> Figure:
+def picture(table: ObservableTable) -> Figure:
     """Draws a row an observable: over time on the left, over the wind on the right; bars of one sigma of the pixels."""
     from matplotlib.figure import Figure
 

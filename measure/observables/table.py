@@ -19,7 +19,7 @@ from flagdata.lake.meshes import write_plain
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
 from measure.observables import OBSERVABLES
-from measure.observables.observable import Observable, Reading
+from measure.observables.observable import Observable, WindowReading
 from measure.observables.unseen import REASONS
 from measure.observables.watching import Watched
 
@@ -32,7 +32,7 @@ UNSEEN = "no-silhouette"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Table:
+class ObservableTable:
     """Readings of a film.
 
     Attributes:
@@ -49,7 +49,7 @@ class Table:
     height: float
     seconds: float
     time: FloatArray
-    readings: Mapping[str, tuple[Reading, ...]]
+    readings: Mapping[str, tuple[WindowReading, ...]]
     wind: FloatArray | None = None
 
     def values(self, name: str) -> FloatArray:
@@ -163,14 +163,14 @@ def table_of(
     height: float,
     start: int | None = None,
     wind: WindSeries | None = None,
-) -> Table:
+) -> ObservableTable:
     """Computes all observables of all windows.
 
     Args:
         start: instant of the film's first frame [UTC ns]; None where it is unknown: then the table has no wind.
         wind: of the log.
     """
-    nothing = Reading(value=math.nan, reason=UNSEEN)
+    nothing = WindowReading(value=math.nan, reason=UNSEEN)
     readings = {
         name: tuple(nothing if window is None else OBSERVABLES[name].of_film(window) for window in watched.windows)
         for name in OBSERVABLES
@@ -180,7 +180,7 @@ def table_of(
         truth = TruthSeries.of(wind)
         ends = [start + round((begin + watched.seconds) * NANOSECONDS) for begin in watched.starts.tolist()]
         logged = np.array([truth.before(end, window=max(watched.seconds, truth.period)).wind for end in ends])
-    return Table(
+    return ObservableTable(
         film=film,
         length=length,
         height=height,

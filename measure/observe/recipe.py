@@ -151,7 +151,7 @@ def parse(path: Path) -> ExperimentRecipe:
         UsageError: values that do not fit together.
     """
     where, folder = str(path), path.parent
-    form = tables.read(_Form, parsed(read_recipe(path).text, where=where), where=where)
+    form = tables.read(_ExperimentTables, parsed(read_recipe(path).text, where=where), where=where)
     return ExperimentRecipe(
         title=form.title or path.stem,
         up=form.up,
@@ -167,7 +167,7 @@ def parse(path: Path) -> ExperimentRecipe:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Form:
+class _ExperimentTables:
     """The tables of an experiment; those that depend on others are read after them."""
 
     title: str = ""
@@ -261,7 +261,7 @@ def read(recipe: ExperimentRecipe, lake: Lake | None = None) -> Observed:
     return observe([_observation(source, recipe, lake) for source in recipe.recordings], recipe.setup)
 
 
-def _setup(form: _Form, folder: Path, *, where: str) -> Setup:
+def _setup(form: _ExperimentTables, folder: Path, *, where: str) -> Setup:
     cloth, pins, inside = form.cloth, form.pins, f"{where} [material]"
     from_catalog = "name" in form.material or "file" in form.material
     material = tables.entries(_MATERIAL | (_CHANGES if from_catalog else {}), form.material, where=inside)

@@ -32,7 +32,7 @@ ALLOWED = {
     "sim/datasets/card.py": LAKE + "; a path that the user gives goes through flagdata.outputs",
     "flagdata/lake/transaction.py": LAKE,
     "measure/closing/artifacts.py": LAKE,
-    "measure/commands/measured.py": LAKE + "; or into a scratch folder (--zarr)",
+    "measure/commands/measurement_artifact.py": LAKE + "; or into a scratch folder (--zarr)",
     "models/training/command.py": LAKE,
     "sim/datasets/build.py": LAKE,
     "flagdata/checksums.py": "states the checksums inside a folder that its caller made",

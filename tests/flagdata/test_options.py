@@ -73,12 +73,12 @@ def called_with(place: str, call: Callable[[], object], monkeypatch: pytest.Monk
 
 def test_a_measurement_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pytest.MonkeyPatch) -> None:
     from measure.commands.measure import MeasureCommand
-    from measure.commands.measuring import Request
+    from measure.commands.measure_film import Request
 
     words = "flag.mp4 --flag-size 1.5x1.0 --area-weight 0.19±0.01 --windows 1.2s --seed 3 --level 0.8 --end 3s"
     of_command = typed_words("measure", MeasureCommand, *words.split(), "--crop", "10,10,240,240")
     of_call = called_with(
-        "measure.commands.measuring.measured",
+        "measure.commands.measure_film.measured",
         lambda: flagdata.measure(
             "flag.mp4",
             flag_size=(1.5, 1.0),

@@ -29,7 +29,7 @@ CASES = [
         code=1,
     ),
     Case(
-        "commands/measuring.py",
+        "commands/measure_film.py",
         "choose one of --area-weight and --material",
         f"{SHORT} --area-weight 0.1 --material x",
         (f"{SHORT} --area-weight 0.1", OR, f"{SHORT} --material camel-ponte-roma"),

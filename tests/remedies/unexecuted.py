@@ -127,7 +127,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/view/media.py", "run flagdata verify"),
         ("measure/anemometer/storage.py", "run flagdata verify; cal"),
         ("measure/closing/artifacts.py", "run flagdata verify; clo"),
-        ("measure/commands/measured.py", "run flagdata verify; mea"),
+        ("measure/commands/measurement_artifact.py", "run flagdata verify; mea"),
     ),
 }
 """Reason → module of the remedy, and enough of its words to distinguish it from others of the module."""

@@ -13,7 +13,7 @@ from flagdata.rng import stream
 from flagdata.signals import Sensor
 from measure.anemometer import Calibrated, Features, Place, Recording, calibrated
 from measure.cloth import Log
-from measure.film import FlagSize, Layout
+from measure.film import FlagSize, WindowLayout
 
 SIZE = FlagSize(length=1.5, height=1.0)
 STEP = 1.2
@@ -64,7 +64,7 @@ def features(
     values = noise.copy()
     values[:, :4] = (means[:, None] - 5.0) / 0.8 * np.array([1.0, -1.0, 0.5, 2.0]) + NOISE * noise[:, :4]
     values[:, 5] += other
-    layout = Layout(frames=30, spacings=(0.04,), step=STEP, period=0.04, first=0.0, last=count * STEP)
+    layout = WindowLayout(frames=30, spacings=(0.04,), step=STEP, period=0.04, first=0.0, last=count * STEP)
     return Features(
         film="made",
         starts=starts,

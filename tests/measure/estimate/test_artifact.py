@@ -9,9 +9,9 @@ import numpy as np
 
 from measure.anemometer import Network
 from measure.commands import read
-from measure.commands.measured import artifact, write
+from measure.commands.measurement_artifact import artifact, write
 from measure.estimate import beside
-from measure.film import ConditionedFilm, Reading, Subject
+from measure.film import ConditionedFilm, FilmReading, Subject
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even
 from tests.measure.estimate.test_measuring import far, measured
@@ -20,7 +20,7 @@ from tests.measure.estimate.test_measuring import far, measured
 def test_a_bound_is_no_wind_of_the_catalog(model: Estimator) -> None:
     film, strong = even(3 * FRAMES), far(model, 0, 1.0)
     network = Network(estimator=strong, identity="0" * 64, artifact=None, folder=Path())
-    row = artifact(measured(film, strong), Subject(film=ConditionedFilm(film)), network, Reading())
+    row = artifact(measured(film, strong), Subject(film=ConditionedFilm(film)), network, FilmReading())
     assert (row.wind, row.wind_sigma) == (None, None)
     assert "wind_speed" not in json.loads(str(row.parameters))
     assert "wind-speed-at-end" in row.quality

@@ -59,7 +59,7 @@ def test_a_model_that_diverges_is_drawn_back(
 def test_a_model_that_always_diverges_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     lost = linearised(*NOTHING, Model(calibration=FAR.calibration))
     monkeypatch.setattr(gauss_newton, "_linearised", lambda *_: lost)
-    with pytest.raises(gauss_newton.DivergedError, match="does not stay one"):
+    with pytest.raises(gauss_newton.FitDivergedError, match="does not stay one"):
         gauss_newton._round(  # pyright: ignore[reportPrivateUsage]
             *NOTHING, Model(calibration=FAR.calibration), null(len(THETA)), np.full(4, 5.0), (), anchor=Calibration()
         )

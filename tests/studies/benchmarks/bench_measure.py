@@ -24,7 +24,7 @@ from flagdata.film import Film
 from flagdata.rng import child_seed
 from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options, measure, of_model
-from measure.film import FlagSize, Reading, subjects
+from measure.film import FilmReading, FlagSize, subjects
 from measure.refine import Clip
 from measure.refine import run as refine
 from tests.studies.long_films import simulated
@@ -46,7 +46,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         path = Path(folder) / "flag.mp4"
         _write(path, frames)
         begun = time.perf_counter()
-        (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=Reading())
+        (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=FilmReading())
         opened = time.perf_counter() - begun
         command = [sys.executable, "-m", "flagdata.cli", "measure", str(path), "--flag-size", "1.5x1.0"]
         return {

@@ -29,7 +29,7 @@ from measure.anemometer.features import features_of
 from measure.anemometer.measuring import measured_from
 from measure.cloth import Log
 from measure.estimate import Measurement, Options, beside
-from measure.film import FlagSize, Reading, Subject, subjects
+from measure.film import FilmReading, FlagSize, Subject, subjects
 from sim.datasets import Cast, load
 from sim.datasets.anemometer import air
 from sim.run import Crew
@@ -108,7 +108,7 @@ def judged(lake: Lake, name: str, *, seed: int, first: float, kept: Path) -> dic
 
 
 def _subject(lake: Lake, name: str) -> Subject:
-    (subject,) = subjects(name, query=None, lake=lake, at="main", reading=Reading(aspect=SIZE.aspect))
+    (subject,) = subjects(name, query=None, lake=lake, at="main", reading=FilmReading(aspect=SIZE.aspect))
     return subject
 
 

@@ -21,7 +21,7 @@ from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.stated import Stated
 from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Measurement, Options, measure, of_model
-from measure.film import FlagSize, Reading, subjects
+from measure.film import FilmReading, FlagSize, subjects
 from measure.gate import REASONS, WindowGate
 from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE
@@ -84,7 +84,7 @@ def answers(design: Design, found: Network, gate: WindowGate, *, seed: int) -> d
 
 def answer(path: Path, found: Network, gate: WindowGate, options: Options) -> dict[str, Any]:
     """The answer for a film: wind and area weight with their intervals, or why it is refused."""
-    (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=Reading())
+    (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=FilmReading())
     try:
         measured = measure(
             subject.film, found.estimator, gate=gate, dependence=of_model(found.estimator), options=options

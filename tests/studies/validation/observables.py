@@ -19,7 +19,7 @@ import numpy as np
 
 from flagdata.arrays import FloatArray
 from flagdata.errors import FlagdataError
-from measure.film import FlagSize, Reading, subjects
+from measure.film import FilmReading, FlagSize, subjects
 from measure.observables import OBSERVABLES, ClothWindow, Observable, edges_of, watched
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.films import chosen
@@ -58,7 +58,7 @@ def _once(design: Design, path: Path) -> dict[str, Any]:
 def compared(design: Design) -> dict[str, Any]:
     """Pixels and geometry of the windows of a film; NaN as None."""
     motion = read(REFERENCE, design.run)
-    (subject,) = subjects(str(path_of(design, FOLDER)), query=None, lake=None, at=None, reading=Reading())
+    (subject,) = subjects(str(path_of(design, FOLDER)), query=None, lake=None, at=None, reading=FilmReading())
     row: dict[str, Any] = {
         "name": design.name,
         "wind": motion.wind,

@@ -15,7 +15,7 @@ import torch
 from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.rng import stream
 from measure.cloth import OBSERVED
-from measure.film import FlagSize, Reading, subjects
+from measure.film import FilmReading, FlagSize, subjects
 from measure.observables import OBSERVABLES, watched
 from sim.assets import Assets
 from sim.mesh import Mesh
@@ -40,7 +40,7 @@ def filmed(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh, at: Path
     path = at / f"film-{truth['number']}.mp4"
     if not path.exists():
         write(path, pictures(truth, positions[: round(SECONDS * RATE) + 1], mesh), seed=truth["seed"])
-    (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=Reading(aspect=_SIZE.aspect))
+    (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=FilmReading(aspect=_SIZE.aspect))
     seen = watched(subject.film, _SIZE, last=SECONDS)
     nothing = [math.nan] * len(OBSERVED)
     return np.array(

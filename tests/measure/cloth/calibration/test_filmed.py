@@ -15,7 +15,7 @@ from flagdata.signals import Sensor, WindSeries
 from measure.cloth import OBSERVED, sources_of
 from measure.cloth import sources as filmed
 from measure.film import FlagSize
-from measure.observables import Reading
+from measure.observables import WindowReading
 
 _SIZE = FlagSize(length=1.5, height=1.0)
 _START = 1_700_000_000_000_000_000
@@ -48,7 +48,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> None:
         return SimpleNamespace(windows=tuple(None if k == 2 else k for k in range(count)), seconds=2.5)
 
     monkeypatch.setattr(filmed, "watched", watched)
-    fake = SimpleNamespace(of_film=lambda window: Reading(value=float(window)), sigma=0.01)
+    fake = SimpleNamespace(of_film=lambda window: WindowReading(value=float(window)), sigma=0.01)
     monkeypatch.setattr(filmed, "OBSERVABLES", dict.fromkeys(OBSERVED, fake))
 
 

@@ -23,7 +23,7 @@ from flagdata.timebase import NANOSECONDS
 from measure.anemometer.networks import Network
 from measure.estimate.measuring import Measurement
 from measure.estimate.series import WIND, Beside
-from measure.film.source import Reading, Subject
+from measure.film.source import FilmReading, Subject
 
 _FORMAT = 1
 _ANSWER = 3
@@ -34,7 +34,7 @@ REFUSED = "refused-by-gate"
 """Quality flag of what was kept although the gate refused it."""
 
 
-def artifact(measured: Measurement, subject: Subject, network: Network, reading: Reading) -> Artifact:
+def artifact(measured: Measurement, subject: Subject, network: Network, reading: FilmReading) -> Artifact:
     """The row of a measurement, without its object."""
     parents = [] if subject.artifact is None else [subject.artifact.id]
     parents += [] if network.artifact is None else [network.artifact.id]
@@ -85,7 +85,7 @@ def keep(
     measured: Measurement,
     subject: Subject,
     network: Network,
-    reading: Reading,
+    reading: FilmReading,
     series: Beside,
     *,
     branch: str,

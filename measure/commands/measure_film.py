@@ -22,7 +22,7 @@ from measure.estimate.answer import Quantity
 from measure.estimate.combine import of_model
 from measure.estimate.material import weight_of
 from measure.estimate.measuring import Measurement, Options, measure
-from measure.film.source import Reading, Subject, size_of, subjects
+from measure.film.source import FilmReading, Subject, size_of, subjects
 
 
 def run(
@@ -77,7 +77,7 @@ class Request:
     """
 
     options: Options
-    reading: Reading
+    reading: FilmReading
     origin: str | None
 
     @classmethod
@@ -104,7 +104,7 @@ class Request:
             refine=refine,
             area_weight=stated,
         )
-        return cls(options=options, reading=Reading.of(chosen, size), origin=origin)
+        return cls(options=options, reading=FilmReading.of(chosen, size), origin=origin)
 
 
 def measured(chosen: Measuring) -> Measured:
@@ -141,7 +141,7 @@ def measured(chosen: Measuring) -> Measured:
     )
 
 
-def _subjects(source: Path | str | Frames, *, lake: Lake | None, at: str | None, reading: Reading) -> list[Subject]:
+def _subjects(source: Path | str | Frames, *, lake: Lake | None, at: str | None, reading: FilmReading) -> list[Subject]:
     if not isinstance(source, Frames):
         return subjects(str(source), query=None, lake=lake, at=at, reading=reading)
     if reading.true_fps is not None or reading.sequence_fps is not None:
