@@ -75,17 +75,17 @@ def sources_of(
     reading = Reading.of(chosen, size)
 
     def name(numbered: tuple[int, Arrays | Path | str]) -> str:
-        number, one = numbered
-        return f"recording {number}" if isinstance(one, Mapping) else str(one)
+        number, recording = numbered
+        return f"recording {number}" if isinstance(recording, Mapping) else str(recording)
 
     def opening(numbered: tuple[int, Arrays | Path | str]) -> Opened:
-        _, one = numbered
-        if isinstance(one, Mapping):
-            rows = of_arrays(one, name=name(numbered))
-            cuts = tuple(cut(each, first, last) if each.place is None else each for each in rows)
+        _, recording = numbered
+        if isinstance(recording, Mapping):
+            rows = of_arrays(recording, name=name(numbered))
+            cuts = tuple(cut(row, first, last) if row.place is None else row for row in rows)
             return Opened(name=name(numbered), parent=None, rows=cuts)
         part = {"first": first, "last": last, "log": chosen.log, "offset": offset}
-        return opened(str(one), size, reading, lake=lake, at=at, **part)
+        return opened(str(recording), size, reading, lake=lake, at=at, **part)
 
     return Sources.of(list(enumerate(recordings, start=1)), opening, name=name)
 
@@ -104,18 +104,18 @@ def calibrated(chosen: Calibrating) -> Calibrated:
     drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
     options = options_of(chosen, size, **drawn)
     gathered = sources_of(several, chosen, size, lake_of(chosen.lake), at=chosen.at or "main").read(size)
-    found = calibrate(
+    calibration = calibrate(
         gathered.recordings,
         options,
         folder=folder_of(chosen),
         workers=chosen.workers,
         left_out=gathered.left_out,
     )
-    return _answer(found)
+    return _answer(calibration)
 
 
 def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
-    """The recordings of a table that is given as arrays, in the units of the table of observables.
+    """Reads the recordings of a table that is given as arrays, in the units of the table of observables.
 
     Raises:
         InputError: a column that is not known, columns of different lengths, or as `measure.cloth.tables.of_table`.
@@ -131,29 +131,29 @@ def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
     table = Columns(where=name, values=values, lines=tuple(range(1, rows + 1)))
     names = sorted(values)
     identity = array_hash({"columns": names}, [values[key] for key in names])
-    return of_columns(table, name=name, identity=identity, beside=None)
+    return of_columns(table, name=name, identity=identity, wind_log=None)
 
 
-def _answer(found: Calibration) -> Calibrated:
+def _answer(calibration: Calibration) -> Calibrated:
     quantities = {
-        one.name: Weighed(
-            unit=one.unit,
-            value=one.value,
-            sigma=one.sigma,
-            interval=one.interval,
-            assumed=one.assumed,
-            bound=one.span.worded(lambda value: f"{value:.4g}", f" {one.unit}") if one.bounded else None,
-            level=one.span.level,
+        quantity.name: Weighed(
+            unit=quantity.unit,
+            value=quantity.value,
+            sigma=quantity.sigma,
+            interval=quantity.interval,
+            assumed=quantity.assumed,
+            bound=quantity.span.worded(lambda value: f"{value:.4g}", f" {quantity.unit}") if quantity.bounded else None,
+            level=quantity.span.level,
         )
-        for one in found.cloth
+        for quantity in calibration.cloth
     }
     return Calibrated(
-        sentence=found.sentence,
-        level=found.options.level,
+        sentence=calibration.sentence,
+        level=calibration.options.level,
         quantities=quantities,
-        draws={name: found.draws.cloth[name] for name in quantities},
-        withheld=found.withheld,
-        stated=found.stated,
-        findings=found.findings,
-        document=found.as_dict(),
+        draws={name: calibration.draws.cloth[name] for name in quantities},
+        withheld=calibration.withheld,
+        stated=calibration.stated,
+        findings=calibration.findings,
+        document=calibration.as_dict(),
     )

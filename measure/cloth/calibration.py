@@ -66,7 +66,7 @@ class CalibrationOptions:
     material: Fabric | None = None
 
     def recipe(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             "flag_size": [self.flag.length, self.flag.height],
             "attachment": self.flag.attachment,
@@ -112,7 +112,7 @@ class Quantity:
         return self.value is None and self.span.bound in (Bound.LEAST, Bound.MOST)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values; an end of the interval that nothing bounds is null."""
+        """Returns JSON values; an end of the interval that nothing bounds is null."""
         return {
             "unit": self.unit,
             "value": self.value,
@@ -140,7 +140,7 @@ class Check:
     error: float
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {"count": self.count, "held": self.held, "median_error": self.error}
 
 
@@ -173,10 +173,12 @@ class Fitted:
             return None
         names = [*OBSERVED, *(f"the change of {name} with the wind" for name in OBSERVED)]
         order = np.argsort(-np.abs(np.nan_to_num(self.apart)))
-        far = [(names[place], float(self.apart[place])) for place in order.tolist() if abs(self.apart[place]) > _APART]
-        if not far:
+        departures = [
+            (names[column], float(self.apart[column])) for column in order.tolist() if abs(self.apart[column]) > _APART
+        ]
+        if not departures:
             return "its observables together"
-        return ", ".join(f"{name} {abs(z):.1f} σ too {'large' if z > 0 else 'small'}" for name, z in far[:4])
+        return ", ".join(f"{name} {abs(z):.1f} σ too {'large' if z > 0 else 'small'}" for name, z in departures[:4])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -209,7 +211,14 @@ class Calibration:
     @property
     def withheld(self) -> str | None:
         """Why no value is given, where no simulated flag looks like a recording."""
-        return next((f"{one.observed.name}: {one.unlike}" for one in self.recordings if one.unlike is not None), None)
+        return next(
+            (
+                f"{recording.observed.name}: {recording.unlike}"
+                for recording in self.recordings
+                if recording.unlike is not None
+            ),
+            None,
+        )
 
     @property
     def stated(self) -> str | None:
@@ -229,7 +238,7 @@ class Calibration:
         """The answer in words."""
         weight = self.weight
         level = f"{self.options.level * 100:.3g} %"
-        windows = sum(len(one.observed.readings) for one in self.recordings)
+        windows = sum(len(recording.observed.readings) for recording in self.recordings)
         if self.withheld is not None:
             return f"area weight: withheld, since no simulated flag looks like {self.withheld}"
         if weight.bounded:
@@ -243,23 +252,23 @@ class Calibration:
         return f"area weight {weight.value:.3f} kg/m² [{low:.3f}, {high:.3f}] {level}, n = {windows} windows"
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         weight = self.weight
         return {
             "sentence": self.sentence,
             "cloth": {q.name: q.as_dict() for q in self.cloth},
             "recordings": [
                 {
-                    "name": one.observed.name,
-                    "source": one.observed.source,
-                    "windows": len(one.observed.readings),
-                    "wind_speed": float(one.observed.speed.mean()),
-                    "misfit": one.misfit,
-                    "failed": one.failed,
-                    "observables": [name for name, there in zip(OBSERVED, one.used, strict=True) if there],
-                    "place": {q.name: q.as_dict() for q in place},
+                    "name": recording.observed.name,
+                    "source": recording.observed.source,
+                    "windows": len(recording.observed.readings),
+                    "wind_speed": float(recording.observed.speed.mean()),
+                    "misfit": recording.misfit,
+                    "failed": recording.failed,
+                    "observables": [name for name, is_used in zip(OBSERVED, recording.used, strict=True) if is_used],
+                    "place": {q.name: q.as_dict() for q in place_quantities},
                 }
-                for one, place in zip(self.recordings, self.places, strict=True)
+                for recording, place_quantities in zip(self.recordings, self.places, strict=True)
             ],
             "area_weight_stated": self.stated,
             "withheld": self.withheld,
@@ -282,7 +291,7 @@ def calibrate(
     left_out: Sequence[Finding] = (),
     advance: Callable[[int], object] | None = None,
 ) -> Calibration:
-    """Weigh the cloth of one flag.
+    """Weighs the cloth of one flag.
 
     Args:
         recordings: of it, each cut to what is to be used.
@@ -295,40 +304,40 @@ def calibrate(
         InputError: see `Observed` and `designs_of`.
         RefusedError: see `answered`.
     """
-    made: list[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]] = []
-    for one, design in zip(recordings, designs_of(recordings, options), strict=True):
+    simulations: list[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]] = []
+    for recording, design in zip(recordings, designs_of(recordings, options), strict=True):
         readings = simulated(design, folder=folder, workers=workers, advance=advance)
         correction = corrected(design, readings, folder=folder, workers=workers, advance=advance)
-        made.append((one, design.values(), readings, correction))
-    return answered(made, options, left_out=left_out)
+        simulations.append((recording, design.values(), readings, correction))
+    return answered(simulations, options, left_out=left_out)
 
 
 def designs_of(recordings: Sequence[Observed], options: CalibrationOptions) -> list[Design]:
-    """What is simulated for each of several recordings of one cloth.
+    """Designs what is simulated for each of several recordings of one cloth.
 
     Raises:
         InputError: a recording that is given twice, or too short recordings in all.
     """
     check_in_all(recordings)
-    names = [f"{one.source} {one.name} {one.first:g}" for one in recordings]
-    twice = [one.name for place, one in enumerate(recordings) if names[place] in names[:place]]
+    names = [f"{recording.source} {recording.name} {recording.first:g}" for recording in recordings]
+    twice = [recording.name for index, recording in enumerate(recordings) if names[index] in names[:index]]
     if twice:
         raise InputError(f"{twice[0]} is given twice", where="recordings", fix="give each recording of the flag once")
     return [
         Design(
             flag=options.flag,
-            log=one.log,
-            duration=one.duration,
+            log=recording.log,
+            duration=recording.duration,
             azimuth=options.azimuth,
             elevation=options.elevation,
             count=options.simulations,
             seed=options.seed,
             distance=options.distance,
             recording=name,
-            place=name if one.place is None else one.place,
+            place=name if recording.place is None else recording.place,
             fabric=FABRIC if options.material is None else options.material.drawn,
         )
-        for one, name in zip(recordings, names, strict=True)
+        for recording, name in zip(recordings, names, strict=True)
     ]
 
 
@@ -348,22 +357,22 @@ class _Simulated:
     used: BoolArray
 
     def rows(self, which: IntArray) -> _Simulated:
-        """With some of the simulations."""
-        values = {name: own[which] for name, own in self.values.items()}
+        """Keeps some of the simulations."""
+        values = {name: column[which] for name, column in self.values.items()}
         return replace(self, values=values, summaries=self.summaries[which])
 
     def sight(self, options: CalibrationOptions) -> Sight:
-        """With an emulator fitted to the simulations.
+        """Fits an emulator to the simulations.
 
         Raises:
             RefusedError: see `Emulator.fit`.
         """
-        one = self.observed
+        observed = self.observed
         return Sight(
-            emulator=Emulator.fit(self.values, self.summaries, self.used, name=one.name),
+            emulator=Emulator.fit(self.values, self.summaries, self.used, name=observed.name),
             azimuth=options.azimuth,
             elevation=options.elevation,
-            place=one.place,
+            place=observed.place,
         )
 
 
@@ -385,56 +394,60 @@ def answered(
         InputError: too little is left.
     """
 
-    def seen(one: tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]) -> tuple[_Simulated, Sight]:
-        observed, values, readings, correction = one
+    def seen(simulation: tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]) -> tuple[_Simulated, Sight]:
+        observed, values, readings, correction = simulation
         summaries = with_errors(observed, readings, correction, seed=options.seed)
-        looked = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
-        used = informative(values, summaries, looked, name=observed.name)
-        own = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
-        return own, own.sight(options)
+        is_shown = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
+        used = informative(values, summaries, is_shown, name=observed.name)
+        recording = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
+        return recording, recording.sight(options)
 
-    both, unshown = usable(simulations, seen, name=lambda one: one[0].name)
+    models, unshown = usable(simulations, seen, name=lambda simulation: simulation[0].name)
     left_out = (*left_out, *unshown)
-    check_in_all([one.observed for one, _ in both], left_out=left_out)
-    found = _answered(both, options, left_out=left_out)
-    return _without_unlike(found, both, options, left_out=left_out)
+    check_in_all([recording.observed for recording, _ in models], left_out=left_out)
+    calibration = _answered(models, options, left_out=left_out)
+    return _without_unlike(calibration, models, options, left_out=left_out)
 
 
 def _without_unlike(
-    found: Calibration,
-    both: Sequence[tuple[_Simulated, Sight]],
+    calibration: Calibration,
+    models: Sequence[tuple[_Simulated, Sight]],
     options: CalibrationOptions,
     *,
     left_out: Sequence[Finding],
 ) -> Calibration:
-    """The answer of those recordings that simulated flags look like, if there are such; otherwise the answer as it is,
-    which then is withheld with the reason."""
-    unlike = [one for one in found.recordings if one.unlike is not None]
-    like = [own for own, one in zip(both, found.recordings, strict=True) if one.unlike is None]
-    if not unlike or sum(own.observed.duration for own, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
-        return found
-    warned = [Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(one), fix=_LOOK) for one in unlike]
+    """Answers from those recordings that simulated flags look like, if there are such; otherwise returns the answer as
+    it is, which then is withheld with the reason."""
+    unlike = [recording for recording in calibration.recordings if recording.unlike is not None]
+    like = [model for model, recording in zip(models, calibration.recordings, strict=True) if recording.unlike is None]
+    if not unlike or sum(recording.observed.duration for recording, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
+        return calibration
+    warned = [
+        Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(recording), fix=_LOOK) for recording in unlike
+    ]
     again = _answered(like, options, left_out=(*left_out, *warned))
-    return found if again.withheld is not None else again
+    return calibration if again.withheld is not None else again
 
 
 def _answered(
-    both: Sequence[tuple[_Simulated, Sight]], options: CalibrationOptions, *, left_out: Sequence[Finding]
+    models: Sequence[tuple[_Simulated, Sight]], options: CalibrationOptions, *, left_out: Sequence[Finding]
 ) -> Calibration:
-    """The answer from recordings whose simulations show what they show."""
-    made, sights = [own for own, _ in both], [own for _, own in both]
-    found = posterior(sights, [one.observed.summary for one in made], seed=options.seed)
+    """Answers from recordings whose simulations show what they show."""
+    recordings, sights = [part for part, _ in models], [part for _, part in models]
+    posterior_draws = posterior(sights, [recording.observed.summary for recording in recordings], seed=options.seed)
     fitted = tuple(
-        _fitted(one, sight, found, place, options) for place, (one, sight) in enumerate(zip(made, sights, strict=True))
+        _fitted(recording, sight, posterior_draws, index, options)
+        for index, (recording, sight) in enumerate(zip(recordings, sights, strict=True))
     )
     calibration = Calibration(
         options=options,
-        draws=found,
+        draws=posterior_draws,
         recordings=fitted,
-        check=checked(made, options),
-        cloth=tuple(quantity(q, found.cloth[q.name], options.level) for q in CLOTH),
+        check=checked(recordings, options),
+        cloth=tuple(quantity(q, posterior_draws.cloth[q.name], options.level) for q in CLOTH),
         places=tuple(
-            tuple(quantity(q, place[q.name], options.level) for q in _placed(options)) for place in found.places
+            tuple(quantity(q, place_draws[q.name], options.level) for q in _placed(options))
+            for place_draws in posterior_draws.places
         ),
     )
     findings = (*left_out, *_findings(calibration))
@@ -444,148 +457,164 @@ def _answered(
 
 
 def with_errors(observed: Observed, readings: FloatArray, correction: Correction, *, seed: int) -> FloatArray:
-    """(simulation, summary) of readings (simulation, window, observable) with errors of numerics and of pixels."""
+    """Adds errors of numerics and of pixels to readings (simulation, window, observable): (simulation, summary)."""
     summaries = correction.of(observed.projection.of(readings), seed=seed)
     return (summaries + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
 
 
 def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
-    """What draws of the posterior say of a quantity."""
+    """Summarises draws of the posterior of a quantity."""
     assumed = about.at(np.array([(1 - level) / 2, (1 + level) / 2])).tolist()
     shares = np.linspace(0.0, 1.0, 1001)
     ranks = np.interp(draws, about.at(shares), shares)
     determined = float(ranks.std()) < DETERMINED / math.sqrt(12)
     # What is not determined has the prior's interval, which has no end where draws pile up.
     places = ranks if determined and about.ends is not None else None
-    own = span(draws, places, level=level, limits=about.limits, assumed=about.ends or about.limits)
+    interval = span(draws, places, level=level, limits=about.limits, assumed=about.ends or about.limits)
     return Quantity(
         name=about.name,
         unit=about.unit,
-        value=float(np.median(draws)) if determined and own.estimated else None,
-        sigma=float(draws.std()) if own.estimated else None,
-        span=own,
+        value=float(np.median(draws)) if determined and interval.estimated else None,
+        sigma=float(draws.std()) if interval.estimated else None,
+        span=interval,
         assumed=(assumed[0], assumed[1]),
         range=about.ends,
     )
 
 
 def _assumed(about: Uncertain, level: float) -> Quantity:
-    """What is assumed of a quantity, where nothing is found."""
+    """Returns what is assumed of a quantity, where nothing is found."""
     return quantity(about, about.at(np.linspace(0.0, 1.0, 1001)), level)
 
 
-def checked(made: Sequence[_Simulated], options: CalibrationOptions) -> Check:
-    """Weigh simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
+def checked(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Check:
+    """Weighs simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
     first recording alone where the others are of other cloths."""
-    weights = [one.values[CLOTH[0].name] for one in made]
-    made = [one for one, own in zip(made, weights, strict=True) if np.array_equal(own, weights[0])]
-    complete = np.flatnonzero(np.all([np.isfinite(one.summaries[:, one.used]).all(axis=1) for one in made], axis=0))
+    weights = [recording.values[CLOTH[0].name] for recording in recordings]
+    recordings = [
+        recording
+        for recording, drawn_weights in zip(recordings, weights, strict=True)
+        if np.array_equal(drawn_weights, weights[0])
+    ]
+    complete = np.flatnonzero(
+        np.all([np.isfinite(recording.summaries[:, recording.used]).all(axis=1) for recording in recordings], axis=0)
+    )
     rng = stream(options.seed, "calibrate", "check")
     chosen = rng.permutation(complete)[:_CHECKED]
     errors: list[float] = []
-    held = 0
+    contained = 0
     for fold in range(min(_FOLDS, len(chosen))):
-        own = chosen[fold::_FOLDS]
-        rest = np.setdiff1d(np.arange(len(weights[0])), own)
-        sights = [one.rows(rest).sight(options) for one in made]
+        fold_rows = chosen[fold::_FOLDS]
+        rest = np.setdiff1d(np.arange(len(weights[0])), fold_rows)
+        sights = [recording.rows(rest).sight(options) for recording in recordings]
         seed = child_seed(options.seed, "check", fold)
-        weight = weighed(sights, [one.summaries[own] for one in made], seed=seed)[CLOTH[0].name]
-        truth = weights[0][own]
+        weight = weighed(sights, [recording.summaries[fold_rows] for recording in recordings], seed=seed)[CLOTH[0].name]
+        truth = weights[0][fold_rows]
         low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
-        held += int(((low <= truth) & (truth <= high)).sum())
+        contained += int(((low <= truth) & (truth <= high)).sum())
         errors.extend(np.abs(middle / truth - 1).tolist())
-    return Check(count=len(errors), held=held, error=float(np.median(errors)) if errors else math.nan)
+    return Check(count=len(errors), held=contained, error=float(np.median(errors)) if errors else math.nan)
 
 
 def _placed(options: CalibrationOptions) -> tuple[Uncertain, ...]:
     return (*(q for q in NUISANCES if q.name == "gain"), options.azimuth, options.elevation)
 
 
-def _fitted(made: _Simulated, sight: Sight, found: Posterior, place: int, options: CalibrationOptions) -> Fitted:
-    """What the emulator says that flags of the posterior show."""
-    one, summaries = made.observed, made.summaries
-    values = {**found.cloth, **found.places[place]}
+def _fitted(
+    recording: _Simulated, sight: Sight, posterior_draws: Posterior, index: int, options: CalibrationOptions
+) -> Fitted:
+    """Computes what the emulator says that flags of the posterior show."""
+    observed, summaries = recording.observed, recording.summaries
+    values = {**posterior_draws.cloth, **posterior_draws.places[index]}
     predicted = sight.emulator.draw(values, seed=options.seed)
     used = sight.emulator.used
     count = len(OBSERVED)
     # What depends on nothing that is regressed on is that of simulations at random.
     rows = stream(options.seed, "calibrate", "rows").integers(len(summaries), size=len(predicted))
-    whole = np.where(np.isfinite(summaries), summaries, np.nanmean(summaries, axis=0))[rows]
-    whole[:, used] = predicted
-    windows = one.projection.at(whole.reshape(len(predicted), -1, count))
+    predictions = np.where(np.isfinite(summaries), summaries, np.nanmean(summaries, axis=0))[rows]
+    predictions[:, used] = predicted
+    windows = observed.projection.at(predictions.reshape(len(predicted), -1, count))
     low, middle, high = np.quantile(windows, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=0)
-    looked = np.isfinite(one.summary) & np.isfinite(whole).all(axis=0)
-    centre, inverse = whole[:, looked].mean(axis=0), np.linalg.pinv(np.cov(whole[:, looked].T))
-    offsets = np.concatenate([whole[:, looked], one.summary[None, looked]]) - centre
-    *distances, own = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
+    is_compared = np.isfinite(observed.summary) & np.isfinite(predictions).all(axis=0)
+    centre, inverse = predictions[:, is_compared].mean(axis=0), np.linalg.pinv(np.cov(predictions[:, is_compared].T))
+    offsets = np.concatenate([predictions[:, is_compared], observed.summary[None, is_compared]]) - centre
+    *distances, observed_distance = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
     distance = np.array(distances)
-    spread = whole.std(axis=0)
-    apart = np.where(
-        looked & (spread > 0), (one.summary - whole.mean(axis=0)) / np.where(spread > 0, spread, 1.0), np.nan
+    spread = predictions.std(axis=0)
+    deviations = np.where(
+        is_compared & (spread > 0),
+        (observed.summary - predictions.mean(axis=0)) / np.where(spread > 0, spread, 1.0),
+        np.nan,
     )
     return Fitted(
-        observed=one,
+        observed=observed,
         low=low,
         middle=middle,
         high=high,
         used=np.asarray(used.reshape(-1, count).any(axis=0)),
-        misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))),
-        apart=apart,
+        misfit=float((1 + (distance >= observed_distance).sum()) / (1 + len(distance))),
+        apart=deviations,
         failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
     )
 
 
 def _findings(calibration: Calibration) -> tuple[Finding, ...]:
-    found = list(constant_wind([one.observed for one in calibration.recordings]))
-    for one in calibration.recordings:
-        found.extend(one.observed.findings)
-        if one.unlike is not None:
-            what = f"{_unlike(one)}. The weight is withheld"
-            found.append(Finding.of("unlike-simulations", what, fix=_LOOK))
-        if one.failed > 0.1 * calibration.options.simulations:
-            what = f"{one.failed} of {calibration.options.simulations} simulations of {one.observed.name} were left out"
-            found.append(Finding.of("failed-simulations", what))
+    findings = list(constant_wind([recording.observed for recording in calibration.recordings]))
+    for recording in calibration.recordings:
+        findings.extend(recording.observed.findings)
+        if recording.unlike is not None:
+            sentence = f"{_unlike(recording)}. The weight is withheld"
+            findings.append(Finding.of("unlike-simulations", sentence, fix=_LOOK))
+        if recording.failed > 0.1 * calibration.options.simulations:
+            sentence = (
+                f"{recording.failed} of {calibration.options.simulations} simulations of {recording.observed.name} "
+                "were left out"
+            )
+            findings.append(Finding.of("failed-simulations", sentence))
     if not calibration.draws.together:
-        found.append(TAKEN_APART)
+        findings.append(TAKEN_APART)
     check, level = calibration.check, calibration.options.level
     if check.held < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
-        what = (
+        sentence = (
             f"of {check.count} simulations left out, the intervals of {check.held} contain the area weight, where "
             f"{check.count * level:.0f} are expected: they are too narrow"
         )
         fix = "give more simulations with --simulations"
-        found.append(Finding.of("narrow-intervals", what, fix=fix))
-    found.extend(_leaning(calibration))
+        findings.append(Finding.of("narrow-intervals", sentence, fix=fix))
+    findings.extend(_leaning(calibration))
     undetermined = [q.name.replace("_", " ") for q in calibration.cloth if q.value is None and not q.bounded]
     if undetermined:
-        what = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
-        found.append(Finding.of("not-determined", what))
-    return tuple(found)
+        sentence = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
+        findings.append(Finding.of("not-determined", sentence))
+    return tuple(findings)
 
 
-def _unlike(one: Fitted) -> str:
-    """What is unlike about a recording, and what may be the cause."""
+def _unlike(recording: Fitted) -> str:
+    """Describes what is unlike about a recording, and what may be the cause."""
     return (
-        f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth may not be "
+        f"no simulated flag looks like {recording.observed.name} (p = {recording.misfit:.1g}): {recording.unlike}. "
+        "The cloth may not be "
         "separated from what is behind it, or its size, attachment or place be another than stated, or something may "
         "act on it that the model lacks"
     )
 
 
 def _leaning(calibration: Calibration) -> list[Finding]:
-    """Quantities of which only a bound is known."""
-    found = []
-    for own in calibration.cloth:
-        if not own.bounded or own.range is None:
+    """Reports quantities of which only a bound is known."""
+    findings = []
+    for bounded_quantity in calibration.cloth:
+        if not bounded_quantity.bounded or bounded_quantity.range is None:
             continue
-        most = own.span.bound is Bound.MOST
-        what = (
-            f"{own.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within {WITHIN:.0%} of the end of "
-            f"what is assumed, {own.range[0 if most else 1]:.3g} {own.unit}; {'less' if most else 'more'} would look "
+        most = bounded_quantity.span.bound is Bound.MOST
+        sentence = (
+            f"{bounded_quantity.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within {WITHIN:.0%} "
+            "of the end of "
+            f"what is assumed, {bounded_quantity.range[0 if most else 1]:.3g} {bounded_quantity.unit}; "
+            f"{'less' if most else 'more'} would look "
             "the same, so that only a bound is given"
         )
         fix = "check the flag's size and where the camera stood" + (
-            ", or weigh a piece of the cloth on a scale" if own is calibration.weight else ""
+            ", or weigh a piece of the cloth on a scale" if bounded_quantity is calibration.weight else ""
         )
-        found.append(Finding.of("leans-on-prior", what, fix=fix))
-    return found
+        findings.append(Finding.of("leans-on-prior", sentence, fix=fix))
+    return findings

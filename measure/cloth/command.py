@@ -44,7 +44,7 @@ def answer_of(
     reading: Mapping[str, Any],
     parents: tuple[str, ...],
 ) -> VerdictAnswer:
-    """That of films and of tables of observables.
+    """Builds the answer of films and of tables of observables.
 
     Args:
         name: what the measurement is called.
@@ -56,8 +56,8 @@ def answer_of(
     recipe = {
         "close-loop-on-films": ANSWER,
         "simulations": VERSION,
-        "sources": [one.source for one in recordings],
-        "spans": [[one.first, one.duration] for one in recordings],
+        "sources": [recording.source for recording in recordings],
+        "spans": [[recording.first, recording.duration] for recording in recordings],
         **reading,
         **outcome.options.recipe(),
     }
@@ -83,21 +83,21 @@ _ROUGH = 1e-3
 
 
 def models(verdict: Verdict, outcome: SolvedLoop, *, name: str) -> tuple[NamedModel, ...]:
-    """The base model as calibrated and, where an effect is named, the larger one.
+    """Returns the base model as calibrated and, where an effect is named, the larger one.
 
     Args:
         name: that theirs begin with.
     """
-    made = [NamedModel(name=f"{name}-base", content=_content(verdict, outcome, f"{name}-base", ()))]
+    named_models = [NamedModel(name=f"{name}-base", content=_content(verdict, outcome, f"{name}-base", ()))]
     if effects := acting(verdict)[:1]:
         larger = f"{name}-{effects[0].effect}"
-        made.append(NamedModel(name=larger, content=_content(verdict, outcome, larger, effects)))
-    return tuple(made)
+        named_models.append(NamedModel(name=larger, content=_content(verdict, outcome, larger, effects)))
+    return tuple(named_models)
 
 
 def _content(verdict: Verdict, outcome: SolvedLoop, title: str, effects: Sequence[Candidate]) -> Mapping[str, Any]:
-    calibration, own = outcome.options.calibration, fitted(verdict, effects)
-    speeds = [float(one.speed.mean()) for one in outcome.recordings]
+    calibration, values = outcome.options.calibration, fitted(verdict, effects)
+    speeds = [float(recording.speed.mean()) for recording in outcome.recordings]
     fabric = FABRIC if calibration.material is None else calibration.material.tables[0]
     speed: Any = speeds[0] if min(speeds) == max(speeds) else {"low": min(speeds), "high": max(speeds)}
     return {
@@ -117,9 +117,9 @@ def _content(verdict: Verdict, outcome: SolvedLoop, title: str, effects: Sequenc
         "time": {"settle": SETTLE, "frames": _FRAMES, "rate": _RATE},
         "material": {
             "name": fabric,
-            "density": own["area_weight"],
-            "bending-factor": own["bending"] / mean_bending(named(fabric)),
-            "damping": max(own["damping"] - _STEP, 0.0),
+            "density": values["area_weight"],
+            "bending-factor": values["bending"] / mean_bending(named(fabric)),
+            "damping": max(values["damping"] - _STEP, 0.0),
         },
         **acted(effects),
     }
@@ -179,7 +179,7 @@ def close_films(
     with progress(None, label="observe", unit="window") as advance:
         gathered = opened.read(size, advance=advance)
     recordings = distinct(gathered.recordings)
-    say(announced(workload([one.duration for one in recordings], options), workers=chosen.processes))
+    say(announced(workload([recording.duration for recording in recordings], options), workers=chosen.processes))
     outcome = solve(
         recordings,
         options,
@@ -188,7 +188,7 @@ def close_films(
         stage=stage_bars(),
     )
     verdict = verdict_of(outcome)
-    left_out = tuple((one.kind, one.what) for one in gathered.left_out)
+    left_out = tuple((finding.kind, finding.what) for finding in gathered.left_out)
     verdict = replace(verdict, findings=(*left_out, *verdict.findings), seconds=time.monotonic() - begun)
     called = name or recordings[0].name
     return answer_of(
@@ -202,7 +202,8 @@ def close_films(
 
 
 def simulations_of(recordings: int) -> int:
-    """Of the base model for each of so many recordings: as many as the covariance of all their summaries asks for."""
+    """Returns how many simulations of the base model each of so many recordings needs for the covariance of all their
+    summaries."""
     return _FEW if recordings <= _TWO else _MANY
 
 
@@ -212,19 +213,19 @@ def workload(durations: Sequence[float], options: FilmLoopOptions) -> float:
     Args:
         durations: of the recordings [s].
     """
-    each = options.calibration.simulations + TOGETHER * options.kinds
+    flags = options.calibration.simulations + TOGETHER * options.kinds
     paired = PAIRS * len(weighable(options.calibration.flag)) * len(durations)
     finer = sum(effort(duration) for duration in durations)
-    return each * sum(durations) + finer + paired * lasting(len(durations))
+    return flags * sum(durations) + finer + paired * lasting(len(durations))
 
 
-def weight(stated: Stated) -> tuple[float, float]:
-    """Mean and standard deviation of a stated area weight [kg/m²]; of a range those of a uniform distribution.
+def weight(area_weight: Stated) -> tuple[float, float]:
+    """Returns mean and standard deviation of a stated area weight [kg/m²]; of a range those of a uniform distribution.
 
     Raises:
         UsageError: a weight that no cloth has.
     """
-    middle = (stated.low + stated.high) / 2
+    middle = (area_weight.low + area_weight.high) / 2
     if not middle > 0:
-        raise UsageError(f"{stated.text} kg/m²", where="--area-weight", fix="give one above 0, as in 0.155±0.005")
-    return middle, max(stated.sigma, (stated.high - stated.low) / 12**0.5, _RELATIVE * middle)
+        raise UsageError(f"{area_weight.text} kg/m²", where="--area-weight", fix="give one above 0, as in 0.155±0.005")
+    return middle, max(area_weight.sigma, (area_weight.high - area_weight.low) / 12**0.5, _RELATIVE * middle)

@@ -90,7 +90,7 @@ def refuse_of_others(chosen: JudgingFilms, *, films: bool) -> None:
     rows = described(type(chosen))
     for name in OF_MARKERS if films else described(OfFilms):
         if name in typed(chosen) and name != "material":
-            what = "films and tables of observables" if films else "markers and meshes"
-            other = "markers and meshes" if films else "films and tables of observables"
+            kind = "films and tables of observables" if films else "markers and meshes"
+            other_kind = "markers and meshes" if films else "films and tables of observables"
             spelled = rows[name][1].spelled(name)
-            raise UsageError(f"the sources are {what}", where=spelled, fix=f"leave it out: it is about {other}")
+            raise UsageError(f"the sources are {kind}", where=spelled, fix=f"leave it out: it is about {other_kind}")

@@ -66,11 +66,11 @@ class Weighable(Strengths):
 
 
 def weighable(flag: Flag) -> tuple[Weighable, ...]:
-    """The effects that are weighed for a flag: one that is held along its hoist cannot be held more."""
+    """Returns the effects that are weighed for a flag: one that is held along its hoist cannot be held more."""
     return tuple(
-        Weighable(column=one.column, low=one.low, high=one.high)
-        for one in all_strengths()
-        if flag.attachment == "corners" or one.name != _HOIST
+        Weighable(column=strength.column, low=strength.low, high=strength.high)
+        for strength in all_strengths()
+        if flag.attachment == "corners" or strength.name != _HOIST
     )
 
 
@@ -114,40 +114,40 @@ class Design:
         return (*CLOTH, STRETCHING, self.fabric)
 
     def quantities(self) -> tuple[Uncertain, ...]:
-        """What differs among the simulations."""
-        known = self.log.distance is not None
+        """Returns what differs among the simulations."""
+        lag_known = self.log.distance is not None
         return (
             *self.cloth,
             *NUISANCES,
             self.azimuth,
             self.elevation,
-            *(() if known else (DISTANCE,)),
+            *(() if lag_known else (DISTANCE,)),
             *((clock_error(self.log.clock),) if self.log.clock else ()),
         )
 
     def values(self) -> Mapping[str, FloatArray]:
         """Name → (count,), by ascending damping, so that batches can be simulated in long steps."""
         # In another order in each place: two scramblings of a Sobol sequence are correlated, row by row.
-        own = child_seed(self.seed, "calibrate", "place", self.place)
-        order = stream(own, "calibrate", "order").permutation(self.count)
-        there = draws(self.quantities(), self.count, seed=own, name="design")
-        drawn = {name: values[order] for name, values in there.items()}
+        place_seed = child_seed(self.seed, "calibrate", "place", self.place)
+        order = stream(place_seed, "calibrate", "order").permutation(self.count)
+        unordered = draws(self.quantities(), self.count, seed=place_seed, name="design")
+        drawn = {name: values[order] for name, values in unordered.items()}
         drawn |= draws(self.cloth, self.count, seed=self.seed, name="cloths")
         if self.log.distance is not None:
             drawn[DISTANCE.name] = np.full(self.count, self.log.distance)
         order = np.argsort(drawn["damping"], kind="stable")
-        return {name: own[order] for name, own in drawn.items()}
+        return {name: column[order] for name, column in drawn.items()}
 
     def batches(self) -> list[FlagBatch]:
-        """In the order of `values`."""
+        """Returns the batches, in the order of `values`."""
         return [
             self.batch(np.arange(first, min(first + BATCH, self.count), dtype=np.int64))
             for first in range(0, self.count, BATCH)
         ]
 
     def batch(self, which: IntArray) -> FlagBatch:
-        """Some of the simulations, by their places in `values`."""
-        values = {name: own[which] for name, own in self.values().items()}
+        """Returns some of the simulations, by their indices in `values`."""
+        values = {name: column[which] for name, column in self.values().items()}
         view = [values.pop("azimuth"), values.pop("elevation"), np.full(len(which), self.distance)]
         return FlagBatch(
             flag=self.flag,
@@ -155,21 +155,22 @@ class Design:
             duration=self.duration,
             values=values,
             places=np.stack(view, axis=1)[:, None],
-            seeds=tuple(child_seed(self.seed, "calibrate", "flag", self.recording, int(place)) for place in which),
+            seeds=tuple(child_seed(self.seed, "calibrate", "flag", self.recording, int(index)) for index in which),
         )
 
     def damped(self) -> IntArray:
-        """Places of the simulations in the longest steps that the design has."""
-        own = self.batches()
-        steps = [batch.step or 0.0 for batch in own]
-        sizes = [len(batch.seeds) for batch in own]
+        """Returns indices of the simulations in the longest steps that the design has."""
+        batches = self.batches()
+        steps = [batch.step or 0.0 for batch in batches]
+        sizes = [len(batch.seeds) for batch in batches]
         return np.flatnonzero(np.repeat(np.array(steps) == max(steps), sizes))
 
 
 def simulated(
     design: Design, *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
 ) -> FloatArray:
-    """(simulation, window, observable) in the order of the design's values; NaN where a flag diverged.
+    """Simulates readings (simulation, window, observable) in the order of the design's values; NaN where a flag
+    diverged.
 
     Args:
         folder: where batches are kept.
@@ -184,18 +185,18 @@ def simulated(
 def read(
     batches: Sequence[FlagBatch], *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
 ) -> FloatArray:
-    """(flag, place, window, observable) of batches, in order; those that the folder lacks are simulated. As
+    """Reads (flag, place, window, observable) of batches, in order; those that the folder lacks are simulated. As
     `simulated`."""
     paths = [folder / f"{digest(canonical(dict(batch.content())))[:32]}.npz" for batch in batches]
-    missing = [place for place, path in enumerate(paths) if not path.exists()]
+    missing = [index for index, path in enumerate(paths) if not path.exists()]
     if advance is not None and len(missing) < len(batches):
-        advance(sum(len(batch.seeds) for place, batch in enumerate(batches) if place not in set(missing)))
+        advance(sum(len(batch.seeds) for index, batch in enumerate(batches) if index not in set(missing)))
     folder.mkdir(parents=True, exist_ok=True)
     if missing:
         with ProcessPoolExecutor(
             min(workers, len(missing)), mp_context=get_context("spawn"), initializer=single_threaded
         ) as pool:
-            running = {pool.submit(_make, batches[place], paths[place]): place for place in missing}
+            running = {pool.submit(_make, batches[index], paths[index]): index for index in missing}
             for done in as_completed(running):
                 done.result()
                 if advance is not None:
@@ -230,7 +231,8 @@ _DAMPING = next(one for one in CLOTH if one.name == "damping")
 
 
 def lasting(recordings: int) -> float:
-    """s of each of so many recordings in which flags with an effect are simulated: a whole number of windows."""
+    """Returns for how many seconds of each of so many recordings flags with an effect are simulated: a whole number of
+    windows."""
     most = min(MINUTE, LONGEST_PAIRS / recordings)
     return WINDOW * max(FEWEST_WINDOWS, int(most / WINDOW + 1e-9))
 
@@ -253,7 +255,7 @@ class Pairs:
 
 
 def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
-    """The flags of a recording's design that are simulated with an effect, those of its longest steps.
+    """Selects the flags of a recording's design that are simulated with an effect, those of its longest steps.
 
     Args:
         until: part of the film that is simulated [s].
@@ -278,7 +280,7 @@ def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
 
 
 def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed: int) -> list[list[FlagBatch]]:
-    """Null experiments: for each recording a batch a kind of numerics, of `TOGETHER` cloths each. A cloth is the same
+    """Draws nulls: for each recording a batch a kind of numerics, of `TOGETHER` cloths each. A cloth is the same
     in all recordings, its place and anemometer are not.
 
     Args:
@@ -286,38 +288,38 @@ def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed:
     """
     count = kinds * TOGETHER
     cloths = draws(designs[0].cloth, count, seed=seed, name="null cloths")
-    found = []
+    by_recording = []
     for number, design in zip(places, designs, strict=True):
-        own = {
-            one.name: one.at(stream(seed, "films", "null places", number, one.name).random(count))
-            for one in design.quantities()
+        null_values = {
+            quantity.name: quantity.at(stream(seed, "films", "null places", number, quantity.name).random(count))
+            for quantity in design.quantities()
         }
-        own |= cloths
+        null_values |= cloths
         if design.log.distance is not None:
-            own["distance_constant"] = np.full(count, design.log.distance)
-        seen = np.stack([own["azimuth"], own["elevation"], np.full(count, design.distance)], axis=1)
+            null_values["distance_constant"] = np.full(count, design.log.distance)
+        views = np.stack([null_values["azimuth"], null_values["elevation"], np.full(count, design.distance)], axis=1)
         first = design.batches()[0]
         batches = []
         for kind in range(kinds):
             part = np.arange(kind * TOGETHER, (kind + 1) * TOGETHER)
             numerics = Discretisation.drawn(stream(seed, "films", "kind", kind), explicit=_little())
-            values = {name: own[name][part] for name in first.values}
+            values = {name: null_values[name][part] for name in first.values}
             values["damping"] = _damping(values["damping"], explicit=numerics.step is None)
             batches.append(
                 replace(
                     first,
                     values=values,
-                    places=seen[part][:, None],
+                    places=views[part][:, None],
                     discretisation=numerics,
-                    seeds=tuple(child_seed(seed, "films", "null", design.recording, int(place)) for place in part),
+                    seeds=tuple(child_seed(seed, "films", "null", design.recording, int(index)) for index in part),
                 )
             )
-        found.append(batches)
-    return found
+        by_recording.append(batches)
+    return by_recording
 
 
 def _little() -> float:
-    """Share of the cloths that damp less than what leapfrog is for."""
+    """Computes the share of the cloths that damp less than what leapfrog is for."""
     low, high = _DAMPING.at(np.array([0.0, 1.0])).tolist()
     return math.log(max(LITTLE / low, 1.0)) / math.log(high / low)
 
@@ -334,7 +336,7 @@ _PACE = 25.0
 
 
 def announced(flag_seconds: float, *, workers: int) -> str:
-    """What is to be simulated, and for about how long.
+    """Describes what is to be simulated, and for about how long.
 
     Args:
         flag_seconds: simulated seconds of all flags together.

@@ -37,8 +37,8 @@ depends on nothing that is regressed on adds noise to the scatter's estimate, an
 
 
 def regressors(values: Mapping[str, FloatArray]) -> FloatArray:
-    """(n, p) what summaries are linear in: quadratics in the logarithms of weight and damping with their product, the
-    logarithm of bending, and the place through the cosine of its azimuth, the chord's shortening."""
+    """Computes what summaries are linear in, (n, p): quadratics in the logarithms of weight and damping with their
+    product, the logarithm of bending, and the place through the cosine of its azimuth, the chord's shortening."""
     weight, bending, damping = (
         np.log(values[quantity.name] / _middle(quantity)) / _half(quantity) for quantity in CLOTH
     )
@@ -64,19 +64,21 @@ class Emulator:
     weights: FloatArray
 
     @classmethod
-    def fit(cls, values: Mapping[str, FloatArray], summaries: FloatArray, shown: BoolArray, *, name: str) -> Emulator:
+    def fit(
+        cls, values: Mapping[str, FloatArray], summaries: FloatArray, is_shown: BoolArray, *, name: str
+    ) -> Emulator:
         """Fit it to simulations.
 
         Args:
             values: name → (n,) of the simulations.
             summaries: (n, k), NaN where a simulation does not show one.
-            shown: (k,) those that the recording shows.
+            is_shown: (k,) those that the recording shows.
             name: of the recording.
 
         Raises:
             RefusedError: too few simulations show what the recording shows.
         """
-        used = shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
+        used = is_shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
         complete = np.asarray(np.isfinite(summaries[:, used]).all(axis=1) & used.any(), dtype=np.bool_)
         x, y = regressors(values)[complete], summaries[complete][:, used]
         needed = least(x.shape[1] + 1, y.shape[1]) + 8
@@ -89,9 +91,9 @@ class Emulator:
             )
         model = Metamodel.fit(x, y, np.arange(len(x)))
         residuals = np.full((len(summaries), y.shape[1]), np.nan)
-        own = cls(model=model, used=used, residuals=residuals, weights=values[CLOTH[0].name])
-        mean, _ = own.predict(values)
-        return replace(own, residuals=np.where(complete[:, None], summaries[:, used] - mean, np.nan))
+        emulator = cls(model=model, used=used, residuals=residuals, weights=values[CLOTH[0].name])
+        mean, _ = emulator.predict(values)
+        return replace(emulator, residuals=np.where(complete[:, None], summaries[:, used] - mean, np.nan))
 
     @property
     def factor(self) -> FloatArray:
@@ -110,17 +112,19 @@ class Emulator:
         return x @ self.model.coefficients, 1 + ((x @ self.model.inverse) * x).sum(axis=1)
 
     def draw(self, values: Mapping[str, FloatArray], *, seed: int) -> FloatArray:
-        """(n, used summary) draws of the predictive density at values."""
+        """Draws from the predictive density at values, (n, used summary)."""
         return self.model.draw(regressors(values), stream(seed, "calibrate", "predicted"))
 
 
-def informative(values: Mapping[str, FloatArray], summaries: FloatArray, shown: BoolArray, *, name: str) -> BoolArray:
-    """(k,) those of the shown summaries that depend on what is regressed on.
+def informative(
+    values: Mapping[str, FloatArray], summaries: FloatArray, is_shown: BoolArray, *, name: str
+) -> BoolArray:
+    """Selects those of the shown summaries that depend on what is regressed on, (k,).
 
     Raises:
         RefusedError: none does.
     """
-    used = shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
+    used = is_shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
     complete = np.isfinite(summaries[:, used]).all(axis=1)
     x, y = regressors(values)[complete], summaries[complete][:, used]
     if len(x) <= x.shape[1] + 1 or not used.any():
@@ -137,7 +141,7 @@ def informative(values: Mapping[str, FloatArray], summaries: FloatArray, shown: 
 
 
 def _left_out(x: FloatArray, y: FloatArray) -> FloatArray:
-    """(k,) root mean square of leave-one-out errors of least squares."""
+    """Computes the root mean square of leave-one-out errors of least squares, (k,)."""
     design = np.concatenate([np.ones((len(x), 1)), (x - x.mean(axis=0)) / x.std(axis=0)], axis=1)
     hat = design @ np.linalg.pinv(design)
     residual = (y - hat @ y) / (1 - np.diag(hat))[:, None]
@@ -188,7 +192,7 @@ class Scatter:
     together: bool
 
     def log_density(self, offset: FloatArray, stretch: FloatArray) -> FloatArray:
-        """(n,) logarithm of multivariate t at offsets (n, k), its covariance (n,) times as large."""
+        """Computes the logarithm of multivariate t at offsets (n, k), its covariance (n,) times as large: (n,)."""
         k, freedom = offset.shape[1], self.freedom
         constant = gammaln((freedom + k) / 2) - gammaln(freedom / 2) - 0.5 * k * math.log(freedom * math.pi)
         return (
@@ -199,12 +203,12 @@ class Scatter:
         )
 
     def distance(self, offset: FloatArray, stretch: FloatArray) -> FloatArray:
-        """(n,) squared standardised distance of offsets (n, k)."""
+        """Computes the squared standardised distance of offsets (n, k): (n,)."""
         return np.asarray(np.square(offset @ self.white.T).sum(axis=1) / stretch)
 
 
 def scatter(emulators: Sequence[Emulator]) -> Scatter:
-    """Of recordings of one cloth."""
+    """Estimates the scatter of recordings of one cloth."""
     covariance, freedom, together = _covariance(emulators)
     freedom = min(freedom, HEAVY)
     factor = np.linalg.cholesky(covariance * (freedom - 2) / freedom)
@@ -217,14 +221,15 @@ def scatter(emulators: Sequence[Emulator]) -> Scatter:
 
 
 def _covariance(emulators: Sequence[Emulator]) -> tuple[FloatArray, float, bool]:
-    """Predictive one of the residuals, its degrees of freedom, and whether it is of all recordings together."""
+    """Returns the predictive covariance of the residuals, its degrees of freedom, and whether it is of all recordings
+    together."""
     first = emulators[0]
-    if all(np.array_equal(one.weights, first.weights) for one in emulators):
-        residuals = np.concatenate([one.residuals for one in emulators], axis=1)
-        whole = residuals[np.isfinite(residuals).all(axis=1)]
-        freedom = float(len(whole) - len(first.model.coefficients) - residuals.shape[1] + 1)
+    if all(np.array_equal(emulator.weights, first.weights) for emulator in emulators):
+        residuals = np.concatenate([emulator.residuals for emulator in emulators], axis=1)
+        complete = residuals[np.isfinite(residuals).all(axis=1)]
+        freedom = float(len(complete) - len(first.model.coefficients) - residuals.shape[1] + 1)
         if freedom >= FEWEST_FREEDOM or len(emulators) == 1:
             freedom = max(freedom, 3.0)
-            return np.asarray(whole.T @ whole / (freedom - 2)), freedom, True
-    blocks = [one.model.scatter / max(one.model.freedom - 2, 1.0) for one in emulators]
-    return np.asarray(block_diag(*blocks)), max(min(one.model.freedom for one in emulators), 3.0), False
+            return np.asarray(complete.T @ complete / (freedom - 2)), freedom, True
+    blocks = [emulator.model.scatter / max(emulator.model.freedom - 2, 1.0) for emulator in emulators]
+    return np.asarray(block_diag(*blocks)), max(min(emulator.model.freedom for emulator in emulators), 3.0), False

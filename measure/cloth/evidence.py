@@ -58,15 +58,16 @@ class Experiments:
         return np.concatenate(self.summaries, axis=1)
 
     def repeated(self, times: int) -> Experiments:
-        """Each so many times, one after the other."""
+        """Repeats each so many times, one after the other."""
         return Experiments(
-            summaries=tuple(np.repeat(own, times, axis=0) for own in self.summaries),
+            summaries=tuple(np.repeat(rows, times, axis=0) for rows in self.summaries),
             sigma=self.sigma,
             stated=None if self.stated is None else np.repeat(self.stated, times),
         )
 
     def off(self, weight: FloatArray) -> FloatArray:
-        """(n,) by how many standard deviations stated weights are off from (n,) [kg/m²]; 0 where none was stated."""
+        """Returns by how many standard deviations stated weights are off from weights (n,) [kg/m²]: (n,), 0 where none
+        was stated."""
         return np.zeros(len(weight)) if self.stated is None else np.log(self.stated / weight) / self.sigma
 
 
@@ -117,17 +118,19 @@ class Hypothesis:
         return cloth, places, None if self.effect is None else self.effect.at(ndtr(scores[:, -1]))
 
     def predicted(self, scores: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Means (n, k) of all recordings' summaries, factors (n,) of their scatter, area weights (n,) [kg/m²]."""
+        """Predicts means (n, k) of all recordings' summaries, factors (n,) of their scatter, area weights (n,)
+        [kg/m²]."""
         cloth, places, strength = self.values(scores)
         name = None if self.effect is None else self.effect.name
-        found = [
-            sight.predict({**cloth, **place}, name, strength) for sight, place in zip(self.sights, places, strict=True)
+        predictions = [
+            sight.predict({**cloth, **place_values}, name, strength)
+            for sight, place_values in zip(self.sights, places, strict=True)
         ]
-        mean = np.concatenate([own for own, _ in found], axis=1)
-        return mean, np.mean([own for _, own in found], axis=0), cloth["area_weight"]
+        mean = np.concatenate([part_mean for part_mean, _ in predictions], axis=1)
+        return mean, np.mean([part_stretch for _, part_stretch in predictions], axis=0), cloth["area_weight"]
 
     def log_posterior(self, scores: FloatArray, observed: Experiments) -> FloatArray:
-        """(n,) logarithm of likelihood times prior, but for a constant of stated weights."""
+        """Computes the logarithm of likelihood times prior, but for a constant of stated weights: (n,)."""
         mean, stretch, weight = self.predicted(scores)
         total = -0.5 * np.square(scores).sum(axis=1) - 0.5 * scores.shape[1] * np.log(2 * np.pi)
         total += self.scatter.log_density(observed.whole - mean, stretch)
@@ -159,29 +162,29 @@ class Hypothesis:
         )
 
     def misfit(self, observed: Experiments) -> FloatArray:
-        """(n,) that of `fit`, without the rest of it."""
+        """Computes the misfit of `fit` alone, (n,)."""
         return np.array([misfit for _, _, misfit in self._modes(observed)]).min(axis=0)
 
     def _modes(self, observed: Experiments) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-        """Of the posterior, from each start, as `_climbed`."""
-        found = []
+        """Finds modes of the posterior, from each start, as `_climbed`."""
+        modes = []
         for begin in _STARTS if self.effect is not None else (0.0,):
             at = np.zeros((len(observed), self.dimension))
             if self.effect is not None:
                 at[:, -1] = begin
-            found.append(self._climbed(at, observed))
-        return found
+            modes.append(self._climbed(at, observed))
+        return modes
 
     def _climbed(self, at: FloatArray, observed: Experiments) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """A mode (n, d) from a start, the curvature there (n, d, d), and the misfit (n,)."""
+        """Climbs from a start to a mode (n, d), with the curvature there (n, d, d), and the misfit (n,)."""
         value, damping = self.log_posterior(at, observed), np.full(len(at), 1.0)
         for _ in range(_STEPS):
             gradient, curvature = self._slope(at, observed)
             step = np.linalg.solve(curvature * (1 + damping[:, None, None] * np.eye(at.shape[1])), gradient[..., None])
             tried = np.clip(at + np.clip(step[..., 0], -2.0, 2.0), -5.0, 5.0)
-            found = self.log_posterior(tried, observed)
-            better = found > value
-            at, value = np.where(better[:, None], tried, at), np.where(better, found, value)
+            tried_value = self.log_posterior(tried, observed)
+            better = tried_value > value
+            at, value = np.where(better[:, None], tried, at), np.where(better, tried_value, value)
             damping = np.where(better, damping / 5, damping * 4).clip(1e-6, 1e6)
         _, curvature = self._slope(at, observed)
         mean, stretch, weight = self.predicted(at)
@@ -189,7 +192,7 @@ class Hypothesis:
         return at, curvature, misfit + self.scatter.distance(observed.whole - mean, stretch)
 
     def _slope(self, at: FloatArray, observed: Experiments) -> tuple[FloatArray, FloatArray]:
-        """Gradient (n, d) and Gauss–Newton's curvature (n, d, d) of minus the logarithm, at scores (n, d)."""
+        """Computes gradient (n, d) and Gauss–Newton's curvature (n, d, d) of minus the logarithm, at scores (n, d)."""
         n, d = at.shape
         moved = at[:, None] + _DIFFERENCE * np.concatenate([np.zeros((1, d)), np.eye(d)])
         gradient, curvature = -at.copy(), np.broadcast_to(np.eye(d), (n, d, d)).copy()
@@ -210,7 +213,8 @@ class Hypothesis:
 
 
 def _log_t(offset: FloatArray, precision: FloatArray) -> FloatArray:
-    """(n, m) logarithm of multivariate t with `_TAIL` degrees of freedom, at offsets (n, m, d) from its middle."""
+    """Computes the logarithm of multivariate t with `_TAIL` degrees of freedom, at offsets (n, m, d) from its middle:
+    (n, m)."""
     d = offset.shape[2]
     distance = np.einsum("nmi,nij,nmj->nm", offset, precision, offset)
     _, determinant = np.linalg.slogdet(precision)
@@ -219,7 +223,7 @@ def _log_t(offset: FloatArray, precision: FloatArray) -> FloatArray:
 
 
 def quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) -> list[float]:
-    """Of weighted draws (m,)."""
+    """Computes quantiles of weighted draws (m,)."""
     order = np.argsort(values)
     total: FloatArray = np.cumsum(weights[order])
     return [float(values[order][min(int(np.searchsorted(total, share)), len(order) - 1)]) for share in shares]
@@ -238,9 +242,9 @@ class Misfits:
     left: FloatArray
 
     def rows(self, which: Sequence[int]) -> Misfits:
-        """Of some experiments."""
-        own = np.asarray(which, dtype=np.int64)
-        return Misfits(base=self.base[own], left=self.left[own])
+        """Selects some experiments."""
+        indices = np.asarray(which, dtype=np.int64)
+        return Misfits(base=self.base[indices], left=self.left[indices])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -258,13 +262,13 @@ class Weighing:
     misfits: Misfits
 
     def rows(self, which: Sequence[int]) -> Weighing:
-        """Of some experiments."""
-        own = np.asarray(which, dtype=np.int64)
-        return Weighing(effects=self.effects, factors=self.factors[own], misfits=self.misfits.rows(which))
+        """Selects some experiments."""
+        indices = np.asarray(which, dtype=np.int64)
+        return Weighing(effects=self.effects, factors=self.factors[indices], misfits=self.misfits.rows(which))
 
 
 def hypothesis(sights: Sequence[Sight], effect: Weighable | None) -> Hypothesis:
-    """The base model, or it with an effect."""
+    """Builds the base model, or it with an effect."""
     return Hypothesis(sights=tuple(sights), effect=None if effect is None else effect.prior)
 
 
@@ -275,7 +279,7 @@ def weigh(
     *,
     seed: int,
 ) -> Weighing:
-    """Weigh effects on experiments, each by itself.
+    """Weighs effects on experiments, each by itself.
 
     Args:
         effects: those that all sights' models know a response of.
@@ -284,19 +288,19 @@ def weigh(
     fits = [fitted(sights, observed, effect, seed=seed) for effect in effects]
     return Weighing(
         effects=tuple(effects),
-        factors=_side_by_side([one.evidence - base.evidence for one in fits], len(observed)),
-        misfits=Misfits(base=base.misfit, left=_side_by_side([one.misfit for one in fits], len(observed))),
+        factors=_side_by_side([fit.evidence - base.evidence for fit in fits], len(observed)),
+        misfits=Misfits(base=base.misfit, left=_side_by_side([fit.misfit for fit in fits], len(observed))),
     )
 
 
 def misfits(sights: Sequence[Sight], observed: Experiments, effects: Sequence[Weighable]) -> Misfits:
-    """Those of `weigh`, without Bayes factors."""
-    left = [hypothesis(sights, effect).misfit(observed) for effect in effects]
-    return Misfits(base=hypothesis(sights, None).misfit(observed), left=_side_by_side(left, len(observed)))
+    """Computes the misfits of `weigh`, without Bayes factors."""
+    with_effects = [hypothesis(sights, effect).misfit(observed) for effect in effects]
+    return Misfits(base=hypothesis(sights, None).misfit(observed), left=_side_by_side(with_effects, len(observed)))
 
 
 def _side_by_side(columns: Sequence[FloatArray], count: int) -> FloatArray:
-    """(count, column), also of none."""
+    """Stacks columns to (count, column), also where there are none."""
     return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
 
 
@@ -307,11 +311,11 @@ def fitted(
     *,
     seed: int,
 ) -> Fit:
-    """One model fitted to experiments; as `weigh`."""
+    """Fits one model to experiments; as `weigh`."""
     rng = stream(seed, "films", "weigh", "base" if effect is None else effect.name)
     return hypothesis(sights, effect).fit(observed, rng)
 
 
 def expected(sights: Sequence[Sight], effect: Weighable) -> float:
-    """The strength at which these changes are, beyond null."""
-    return float(np.mean([own.responses[effect.name].expected for own in sights]))
+    """Returns the strength at which these changes are, beyond null."""
+    return float(np.mean([sight.responses[effect.name].expected for sight in sights]))

@@ -47,28 +47,30 @@ class Departure:
 
 
 def departures(recordings: Sequence[Observed], sights: Sequence[Sight], base: Fit) -> tuple[Departure, ...]:
-    """Of each recording those of all observables that are used, the farthest first.
+    """Computes the departures of all observables that each recording uses, the farthest first.
 
     Args:
         base: the base model fitted to the recordings.
     """
-    found = []
+    all_departures = []
     cloth, places, _ = hypothesis(sights, None).values(base.scores[0])
-    for one, own, place in zip(recordings, sights, places, strict=True):
-        mean, _ = own.predict({**cloth, **place})
-        off = one.summary[own.used] - base.weights[0] @ mean
-        columns = np.flatnonzero(own.used).tolist()
-        found += [
-            Departure(recording=one.name, observable=OBSERVED[column], off=float(size), deviations=float(size / sigma))
-            for column, size, sigma in zip(columns, off, own.emulator.deviations, strict=True)
+    for recording, sight, place_values in zip(recordings, sights, places, strict=True):
+        mean, _ = sight.predict({**cloth, **place_values})
+        off = recording.summary[sight.used] - base.weights[0] @ mean
+        columns = np.flatnonzero(sight.used).tolist()
+        all_departures += [
+            Departure(
+                recording=recording.name, observable=OBSERVED[column], off=float(size), deviations=float(size / sigma)
+            )
+            for column, size, sigma in zip(columns, off, sight.emulator.deviations, strict=True)
             if column < len(OBSERVED)
         ]
-    return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
+    return tuple(sorted(all_departures, key=lambda departure: -abs(departure.deviations)))
 
 
-def root_mean_square(found: Sequence[Departure]) -> float:
-    """Of departures, in standard deviations of replicates."""
-    return float(np.sqrt(np.mean(np.square([one.deviations for one in found]))))
+def root_mean_square(departing: Sequence[Departure]) -> float:
+    """Computes the root mean square of departures, in standard deviations of replicates."""
+    return float(np.sqrt(np.mean(np.square([departure.deviations for departure in departing]))))
 
 
 STRONG = 0.9
@@ -84,26 +86,28 @@ def sensitivity(sights: Sequence[Sight], effects: Sequence[Weighable], base: Fit
         base: the base model fitted to the recordings, about whose cloth and view it is found.
         observed: the recordings.
     """
-    own = hypothesis(sights, None)
+    base_model = hypothesis(sights, None)
     at = base.weights[:1] @ base.scores[0]
     moved = np.concatenate([at, at + _DIFFERENCE * np.eye(at.shape[1])])
-    mean, _, weight = own.predicted(moved)
+    mean, _, weight = base_model.predicted(moved)
     off = observed.repeated(len(moved)).off(weight)
-    slopes = np.concatenate([own.scatter.white @ (mean[1:] - mean[0]).T, (off[1:] - off[0])[None]]) / _DIFFERENCE
+    slopes = np.concatenate([base_model.scatter.white @ (mean[1:] - mean[0]).T, (off[1:] - off[0])[None]]) / _DIFFERENCE
     # What the prior lets them make up for: ridge regression on slopes, the scores' prior being standard normal.
-    left = np.eye(len(slopes)) - slopes @ np.linalg.solve(slopes.T @ slopes + np.eye(slopes.shape[1]), slopes.T)
-    cloth, places, _ = own.values(at)
-    found = []
+    residual_maker = np.eye(len(slopes)) - slopes @ np.linalg.solve(
+        slopes.T @ slopes + np.eye(slopes.shape[1]), slopes.T
+    )
+    cloth, places, _ = base_model.values(at)
+    sensitivities = []
     for effect in effects:
         strength = effect.prior.at(np.array([STRONG]))
         parts = []
-        for sight, place in zip(sights, places, strict=True):
-            with_it, _ = sight.predict({**cloth, **place}, effect.name, strength)
-            without, _ = sight.predict({**cloth, **place})
+        for sight, place_values in zip(sights, places, strict=True):
+            with_it, _ = sight.predict({**cloth, **place_values}, effect.name, strength)
+            without, _ = sight.predict({**cloth, **place_values})
             parts.append((with_it - without)[0])
-        column = np.concatenate([own.scatter.white @ np.concatenate(parts), [0.0]])
-        found.append(float(np.sqrt(column @ left @ column)))
-    return np.array(found)
+        column = np.concatenate([base_model.scatter.white @ np.concatenate(parts), [0.0]])
+        sensitivities.append(float(np.sqrt(column @ residual_maker @ column)))
+    return np.array(sensitivities)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,17 +141,17 @@ class FilmLoopOptions:
                 where="close-loop",
                 fix=f"give a level between 0 and 1, and {CRITERIA.fewest_kinds} kinds or more",
             )
-        known = [one.name for one in weighable(self.calibration.flag)]
-        if unknown := set(self.only) - set(known):
-            raise UsageError(f"{', '.join(sorted(unknown))}: not weighed on films", fix=f"give {', '.join(known)}")
+        offered = [effect.name for effect in weighable(self.calibration.flag)]
+        if unknown := set(self.only) - set(offered):
+            raise UsageError(f"{', '.join(sorted(unknown))}: not weighed on films", fix=f"give {', '.join(offered)}")
 
     @property
     def effects(self) -> tuple[Weighable, ...]:
         """That are weighed."""
-        return tuple(one for one in weighable(self.calibration.flag) if not self.only or one.name in self.only)
+        return tuple(effect for effect in weighable(self.calibration.flag) if not self.only or effect.name in self.only)
 
     def recipe(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         return {
             **self.calibration.recipe(),
             "area_weight": None if self.area_weight is None else list(self.area_weight),
@@ -190,9 +194,9 @@ class SolvedLoop:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """On the recordings."""
-        own = (finding for one in self.recordings for finding in one.findings)
-        apart = [] if self.together else [TAKEN_APART]
-        return (*self.left_out, *constant_wind(self.recordings), *own, *apart)
+        recorded = (finding for recording in self.recordings for finding in recording.findings)
+        of_scatter = [] if self.together else [TAKEN_APART]
+        return (*self.left_out, *constant_wind(self.recordings), *recorded, *of_scatter)
 
 
 def solve(
@@ -203,7 +207,7 @@ def solve(
     workers: int = 1,
     stage: Stage | None = None,
 ) -> SolvedLoop:
-    """What a verdict is made from; as `close_loop`."""
+    """Simulates and judges: returns what a verdict is made from; as `close_loop`."""
     if not recordings:
         raise InputError("no recordings", where="close-loop", fix="give one or more")
     effects, seed = options.effects, options.calibration.seed
@@ -211,32 +215,37 @@ def solve(
         recordings, options.calibration, effects, kinds=options.kinds, folder=folder, workers=workers, stage=stage
     )
     recordings, simulations, sights, left_out = shown_by(recordings, simulations)
-    effects = tuple(one for one in effects if all(one.name in own.responses for own in sights))
+    effects = tuple(effect for effect in effects if all(effect.name in sight.responses for sight in sights))
     null, kinds = of_nulls(sights, recordings, simulations, options.area_weight, seed=seed)
     model = of_base(sights, recordings, simulations, options.area_weight, seed=seed)
-    seen = of_recordings(sights, recordings, options.area_weight)
-    scored = score(seen, model, null, kinds, directions(sights, effects, options.suspected), level=options.level)
-    base = fitted(sights, seen, None, seed=seed)
+    observed = of_recordings(sights, recordings, options.area_weight)
+    scored = score(observed, model, null, kinds, directions(sights, effects, options.suspected), level=options.level)
+    base = fitted(sights, observed, None, seed=seed)
     departing = departures(recordings, sights, base)
-    own = weigh(sights, seen, effects, seed=seed)
-    judged = judge(
-        own, misfits(sights, null, effects), kinds, scored, level=options.level, departure=root_mean_square(departing)
+    weighing = weigh(sights, observed, effects, seed=seed)
+    judgement = judge(
+        weighing,
+        misfits(sights, null, effects),
+        kinds,
+        scored,
+        level=options.level,
+        departure=root_mean_square(departing),
     )
     best = None
     if effects:
-        first = effects[judged.confident[0]]
-        best = first, fitted(sights, seen, first, seed=seed)
+        first = effects[judgement.confident[0]]
+        best = first, fitted(sights, observed, first, seed=seed)
     return SolvedLoop(
         options=options,
         recordings=recordings,
         left_out=left_out,
         simulations=simulations,
         sights=sights,
-        weighing=own,
-        judged=judged,
+        weighing=weighing,
+        judged=judgement,
         base=base,
         best=best,
         departures=departing,
-        sensitivity=sensitivity(sights, effects, base, seen),
+        sensitivity=sensitivity(sights, effects, base, observed),
         together=hypothesis(sights, None).scatter.together,
     )

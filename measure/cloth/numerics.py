@@ -87,37 +87,41 @@ class Finer:
 
     @classmethod
     def of(cls, design: Design) -> Finer:
-        """Of the cloths that damp as much as the step does: those that hardly damp would cost ten times as much."""
+        """Chooses cloths that damp as much as the step does: those that hardly damp would cost ten times as much."""
         places = np.flatnonzero(design.values()["damping"] >= (FINE.step or 0.0))
         chosen = stream(design.seed, "calibrate", "finer").choice(places, min(FLAGS, len(places)), replace=False)
-        own = np.sort(chosen)
-        parts = [own[first : first + TOGETHER] for first in range(0, len(own), TOGETHER)]
+        indices = np.sort(chosen)
+        parts = [indices[first : first + TOGETHER] for first in range(0, len(indices), TOGETHER)]
         until = min(LASTING, design.duration)
         return cls(
-            places=own, batches=tuple(replace(design.batch(part), until=until, discretisation=FINE) for part in parts)
+            places=indices,
+            batches=tuple(replace(design.batch(part), until=until, discretisation=FINE) for part in parts),
         )
 
     def correction(self, fine: FloatArray, coarse: FloatArray) -> Correction:
-        """From their readings.
+        """Computes the correction from their readings.
 
         Args:
             fine: (flag, window, observable) of them.
             coarse: (simulation, window, observable) of all of the design's.
         """
         change = fine - coarse[self.places][:, : fine.shape[1]]
-        seen = np.isfinite(change)
-        windows = seen.sum(axis=1)
-        whole = windows > 1
-        count = whole.sum(axis=0)
-        change = np.where(seen & whole[:, None], change, 0.0)
-        own = change.sum(axis=1) / np.maximum(windows, 1)
-        mean = own.sum(axis=0) / np.maximum(count, 1)
-        between = np.where(whole, np.square(own - mean), 0.0).sum(axis=0) / np.maximum(count - 1, 1)
-        passing = np.where(seen & whole[:, None], np.square(change - own[:, None]), 0.0).sum(axis=1)
+        finite = np.isfinite(change)
+        windows = finite.sum(axis=1)
+        enough = windows > 1
+        count = enough.sum(axis=0)
+        change = np.where(finite & enough[:, None], change, 0.0)
+        means = change.sum(axis=1) / np.maximum(windows, 1)
+        mean = means.sum(axis=0) / np.maximum(count, 1)
+        between = np.where(enough, np.square(means - mean), 0.0).sum(axis=0) / np.maximum(count - 1, 1)
+        passing = np.where(finite & enough[:, None], np.square(change - means[:, None]), 0.0).sum(axis=1)
         passing = (passing / np.maximum(windows * (windows - 1), 1)).sum(axis=0) / np.maximum(count, 1)
         variance = np.maximum(between - passing, 0.0) + between / np.maximum(count, 1)
-        told = count >= FEWEST
-        first = np.where(told, mean, MEASURED.mean[0]), np.where(told, np.sqrt(variance), MEASURED.sigma[0])
+        is_estimated = count >= FEWEST
+        first = (
+            np.where(is_estimated, mean, MEASURED.mean[0]),
+            np.where(is_estimated, np.sqrt(variance), MEASURED.sigma[0]),
+        )
         return Correction(mean=np.stack([first[0], MEASURED.mean[1]]), sigma=np.stack([first[1], MEASURED.sigma[1]]))
 
 
@@ -129,7 +133,7 @@ def corrected(
     workers: int = 1,
     advance: Callable[[int], object] | None = None,
 ) -> Correction:
-    """How far a design's simulations lie from those of a finer mesh.
+    """Computes how far a design's simulations lie from those of a finer mesh.
 
     Args:
         readings: (simulation, window, observable) of the design's.

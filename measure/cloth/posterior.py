@@ -41,7 +41,8 @@ def ensemble(
     steps: int,
     rng: np.random.Generator,
 ) -> FloatArray:
-    """(group, draw, dimension) normal scores; of the steps the first half is not kept, and one in `_THIN` of the rest.
+    """Samples normal scores (group, draw, dimension); the first half of the steps is not kept, and of the rest one in
+    `_THIN`.
 
     Args:
         likelihood: logarithms (group, n) at normal scores (group, n, dimension).
@@ -57,21 +58,21 @@ def ensemble(
     weight = likelihood(prior) + rng.gumbel(size=prior.shape[:2])
     chosen = np.argsort(-weight, axis=1)[:, :walkers]
     at = np.take_along_axis(prior, chosen[..., None], axis=1)
-    value, half, kept = density(at), walkers // 2, []
+    value, half, samples = density(at), walkers // 2, []
     sides = (slice(0, half), slice(half, None))
     for step in range(steps):
         for moving, still in (sides, sides[::-1]):
             stretch = (1 + rng.random((groups, half)) * (_STRETCH - 1)) ** 2 / _STRETCH  # of density ∝ 1/√z
-            other = np.take_along_axis(at[:, still], rng.integers(half, size=(groups, half, 1)), axis=1)
-            tried = other + stretch[..., None] * (at[:, moving] - other)
-            found = density(tried)
-            odds = (dimension - 1) * np.log(stretch) + found - value[:, moving]
+            partners = np.take_along_axis(at[:, still], rng.integers(half, size=(groups, half, 1)), axis=1)
+            tried = partners + stretch[..., None] * (at[:, moving] - partners)
+            tried_density = density(tried)
+            odds = (dimension - 1) * np.log(stretch) + tried_density - value[:, moving]
             taken = np.log(rng.random((groups, half))) < odds
             at[:, moving] = np.where(taken[..., None], tried, at[:, moving])
-            value[:, moving] = np.where(taken, found, value[:, moving])
+            value[:, moving] = np.where(taken, tried_density, value[:, moving])
         if step >= steps // 2 and step % _THIN == 0:
-            kept.append(at.copy())
-    return np.concatenate(kept, axis=1)
+            samples.append(at.copy())
+    return np.concatenate(samples, axis=1)
 
 
 WALKERS, STEPS = 256, 600
@@ -124,11 +125,15 @@ def _drawn(
     base: Hypothesis, observed: Sequence[FloatArray], *, walkers: int, steps: int, rng: np.random.Generator
 ) -> FloatArray:
     """Draws normal scores (flag, draw, dimension) of flags whose summaries are (flag, summary) in each recording."""
-    shown = np.concatenate([rows[:, sight.used] for sight, rows in zip(base.sights, observed, strict=True)], axis=1)
+    used_summaries = np.concatenate(
+        [rows[:, sight.used] for sight, rows in zip(base.sights, observed, strict=True)], axis=1
+    )
 
     def likelihood(scores: FloatArray) -> FloatArray:
         mean, stretch, _ = base.predicted(scores.reshape(-1, scores.shape[2]))
-        offset = np.repeat(shown, scores.shape[1], axis=0) - mean
+        offset = np.repeat(used_summaries, scores.shape[1], axis=0) - mean
         return base.scatter.log_density(offset, stretch).reshape(scores.shape[:2])
 
-    return ensemble(likelihood, groups=len(shown), dimension=base.dimension, walkers=walkers, steps=steps, rng=rng)
+    return ensemble(
+        likelihood, groups=len(used_summaries), dimension=base.dimension, walkers=walkers, steps=steps, rng=rng
+    )

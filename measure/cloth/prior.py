@@ -70,9 +70,9 @@ class Among:
 
     def at(self, share: FloatArray) -> FloatArray:
         """Values of shares in [0, 1)."""
-        whole = np.minimum(share, np.nextafter(1.0, 0.0)) * len(self.places)
-        part = whole.astype(np.int64)
-        return (np.array(self.places)[part] + whole - part) / self.count
+        position = np.minimum(share, np.nextafter(1.0, 0.0)) * len(self.places)
+        part = position.astype(np.int64)
+        return (np.array(self.places)[part] + position - part) / self.count
 
     def as_dict(self) -> dict[str, int | list[int]]:
         return {"places": list(self.places), "count": self.count}
@@ -191,7 +191,7 @@ DISTANCE = Uncertain(
 
 
 def clock_error(sigma: float) -> Uncertain:
-    """Of a log's times beside the film's, their standard uncertainty [s]."""
+    """Describes the standard uncertainty of a log's times beside the film's [s]."""
     return Uncertain(name="clock_error", unit="s", prior=Normal(mean=0.0, sigma=sigma), source="the log's clock model")
 
 
@@ -220,22 +220,22 @@ def draws(quantities: tuple[Uncertain, ...], count: int, *, seed: int, name: str
     """
     engine = qmc.Sobol(len(quantities), scramble=True, rng=stream(seed, "calibrate", name))
     shares = np.asarray(engine.random_base2(max(0, math.ceil(math.log2(max(count, 1))))), dtype=np.float64)[:count]
-    return {quantity.name: quantity.at(shares[:, place]) for place, quantity in enumerate(quantities)}
+    return {quantity.name: quantity.at(shares[:, column]) for column, quantity in enumerate(quantities)}
 
 
-def stated_angle(about: Uncertain, stated: Stated, *, where: str) -> Uncertain:
-    """An angle as the user states it [°], an exact value with the uncertainty of a direction.
+def stated_angle(about: Uncertain, angle: Stated, *, where: str) -> Uncertain:
+    """Takes an angle as the user states it [°]; an exact value gets the uncertainty of a direction.
 
     Raises:
         UsageError: an azimuth that is not between 0 and 180, or an elevation beyond 60.
     """
     least, most = (1.0, 179.0) if about.name == "azimuth" else (-60.0, 60.0)
-    if stated.low < least or stated.high > most:
-        raise UsageError(f"{stated.text}°", where=where, fix=f"give degrees from {least:g} to {most:g}, as in 70±7")
-    low, high = math.radians(stated.low), math.radians(stated.high)
+    if angle.low < least or angle.high > most:
+        raise UsageError(f"{angle.text}°", where=where, fix=f"give degrees from {least:g} to {most:g}, as in 70±7")
+    low, high = math.radians(angle.low), math.radians(angle.high)
     if low < high:
         return replace(about, prior=Range(low=low, high=high), source="stated", limits=(low, high))
-    sigma = math.radians(stated.sigma)
+    sigma = math.radians(angle.sigma)
     # An azimuth is to the wind, whose direction is not better known than it is lined up.
     total = math.hypot(sigma, DIRECTION) if about.name == "azimuth" else max(sigma, math.radians(1.0))
     return replace(about, prior=Normal(mean=low, sigma=total), source="stated")
@@ -297,12 +297,12 @@ class Fabric:
 
 
 def fabric(name: str, *, where: str) -> Fabric:
-    """A class of cloths, or one of the cloths that were measured.
+    """Returns a class of cloths, or one of the cloths that were measured.
 
     Raises:
         UnknownNameError: neither, with all that are known.
     """
     if name not in CLASSES and name not in TABLES:
-        known = ", ".join([*CLASSES, *TABLES])
-        raise UnknownNameError(f"no cloth like {name!r} was measured", where=where, fix=f"give one of {known}")
+        names = ", ".join([*CLASSES, *TABLES])
+        raise UnknownNameError(f"no cloth like {name!r} was measured", where=where, fix=f"give one of {names}")
     return Fabric(name=name, tables=CLASSES.get(name, (name,)))

@@ -60,24 +60,25 @@ class Projection:
         return np.stack([constant, relative], axis=1) if self.changes else constant[:, None]
 
     def of(self, readings: FloatArray) -> FloatArray:
-        """(…, 1 or 2, observable) of readings (…, window, observable); NaN where too few windows show one."""
+        """Computes summaries (…, 1 or 2, observable) of readings (…, window, observable); NaN where too few windows
+        show one."""
         x = self.regressors
-        there = np.isfinite(readings)
-        y = np.where(there, readings, 0.0)
-        products = np.einsum("wi,wj,...wk->...kij", x, x, there.astype(np.float64))
-        enough = there.mean(axis=-2) >= SHOWN
+        finite = np.isfinite(readings)
+        y = np.where(finite, readings, 0.0)
+        products = np.einsum("wi,wj,...wk->...kij", x, x, finite.astype(np.float64))
+        enough = finite.mean(axis=-2) >= SHOWN
         products = np.where(enough[..., None, None], products, np.eye(x.shape[1]))
         right = np.einsum("wi,...wk->...ki", x, y)
-        found = np.linalg.solve(products, right[..., None])[..., 0]
-        return np.swapaxes(np.where(enough[..., None], found, np.nan), -1, -2)
+        coefficients = np.linalg.solve(products, right[..., None])[..., 0]
+        return np.swapaxes(np.where(enough[..., None], coefficients, np.nan), -1, -2)
 
     def at(self, summaries: FloatArray) -> FloatArray:
-        """(…, window, observable) that summaries stand for."""
+        """Returns the readings (…, window, observable) that summaries stand for."""
         return np.einsum("wi,...ik->...wk", self.regressors, summaries)
 
 
 def shown(readings: FloatArray) -> BoolArray:
-    """(observable,) whether enough windows (window, observable) show it."""
+    """Returns whether enough windows (window, observable) show each observable, (observable,)."""
     return np.asarray(np.isfinite(readings).mean(axis=0) >= SHOWN)
 
 
@@ -99,7 +100,7 @@ PASSING_TOGETHER = {("frequency", "bandwidth"): 0.75, ("bandwidth", "amplitude-u
 
 
 def pixel_errors(projection: Projection, windows: int, count: int, *, name: str, seed: int) -> FloatArray:
-    """(count, 1 or 2, observable) errors of summaries of films whose windows err by a standard deviation of one.
+    """Draws errors (count, 1 or 2, observable) of summaries of films whose windows err by a standard deviation of one.
 
     Args:
         projection: of the film's windows.
@@ -108,20 +109,20 @@ def pixel_errors(projection: Projection, windows: int, count: int, *, name: str,
     """
     size = len(OBSERVED)
     passing = stream(seed, "pixels", "passing", name).standard_normal((count, windows, size)) @ _PASSING.T
-    look, film = (stream(seed, "pixels", "lasting", *own).standard_normal((count, size)) for own in ((), (name,)))
+    look, film = (stream(seed, "pixels", "lasting", *key).standard_normal((count, size)) for key in ((), (name,)))
     lasting = (np.sqrt(COMMON) * look + np.sqrt(1 - COMMON) * film) @ _LASTING.T
-    found = projection.of(np.sqrt(1 - LASTING) * passing)
-    found[:, 0] += np.sqrt(LASTING) * lasting
-    return found
+    errors = projection.of(np.sqrt(1 - LASTING) * passing)
+    errors[:, 0] += np.sqrt(LASTING) * lasting
+    return errors
 
 
 def correlations(together: Mapping[tuple[str, str], float]) -> FloatArray:
-    """(observable, observable) of pairs of names."""
-    found = np.eye(len(OBSERVED))
-    for (one, other), value in together.items():
-        a, b = OBSERVED.index(one), OBSERVED.index(other)
-        found[a, b] = found[b, a] = value
-    return found
+    """Builds the matrix (observable, observable) of the correlations of pairs of names."""
+    matrix = np.eye(len(OBSERVED))
+    for (first, second), value in together.items():
+        a, b = OBSERVED.index(first), OBSERVED.index(second)
+        matrix[a, b] = matrix[b, a] = value
+    return matrix
 
 
 _LASTING, _PASSING = (np.linalg.cholesky(correlations(one)) for one in (LASTING_TOGETHER, PASSING_TOGETHER))
@@ -145,8 +146,8 @@ class Excerpt:
     def of(cls, windows: Sequence[FilmWindow | None]) -> Excerpt | None:
         """The window nearest to the middle of a film's second half; None where no window of that half was read."""
         half = len(windows) // 2
-        later = [cls(number=half + k, window=one) for k, one in enumerate(windows[half:]) if one is not None]
-        return min(later, key=lambda own: abs(own.number - (half + len(windows)) / 2), default=None)
+        later = [cls(number=half + k, window=window) for k, window in enumerate(windows[half:]) if window is not None]
+        return min(later, key=lambda excerpt: abs(excerpt.number - (half + len(windows)) / 2), default=None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -223,39 +224,39 @@ class Observed:
         return self.projection.of(self.readings).ravel()
 
     def pixels(self, count: int, *, seed: int) -> FloatArray:
-        """(count, 1 or 2, observable) draws of what errors of pixels add to its summary."""
+        """Draws what errors of pixels add to its summary, (count, 1 or 2, observable)."""
         return self.sigma * pixel_errors(self.projection, len(self.readings), count, name=self.name, seed=seed)
 
 
 def constant_wind(recordings: Sequence[Observed]) -> tuple[Finding, ...]:
-    """What recordings of a flag leave open where all their winds are one."""
-    speed = np.concatenate([one.speed for one in recordings])
+    """Reports what recordings of a flag leave open where all their winds are one."""
+    speed = np.concatenate([recording.speed for recording in recordings])
     if speed.std() >= STEADY * speed.mean():
         return ()
-    what = (
+    sentence = (
         f"the wind hardly changes ({speed.mean():.1f} m/s, its windows within {speed.std():.2f} m/s): "
         "air density, drag coefficient, the anemometer's gain and the weight act alike, and the weight rests on "
         "what is assumed of the others"
     )
     fix = "add recordings in other winds: flagdata calibrate takes several of one flag"
-    return (Finding.of("constant-wind", what, fix=fix),)
+    return (Finding.of("constant-wind", sentence, fix=fix),)
 
 
-def cut(found: Observed, first: float, last: float | None) -> Observed:
-    """The windows from `first` to `last` [s], `LONGEST` at most.
+def cut(observed: Observed, first: float, last: float | None) -> Observed:
+    """Cuts out the windows from `first` to `last` [s], `LONGEST` at most.
 
     Raises:
         InputError: the log does not cover them, or too few are left.
     """
     begin = math.ceil(first / WINDOW - 1e-9)
-    end = len(found.readings) if last is None else math.floor(last / WINDOW + 1e-9)
+    end = len(observed.readings) if last is None else math.floor(last / WINDOW + 1e-9)
     most = begin + round(LONGEST / WINDOW)
-    findings = found.findings
-    if min(end, len(found.readings)) > most:
-        findings = (*findings, first_part((min(end, len(found.readings)) - begin) * WINDOW))
-    readings = found.readings[begin : min(end, most)]
-    log = found.log.cut(begin * WINDOW, (begin + len(readings)) * WINDOW)
-    return replace(found, readings=readings, log=log, first=found.first + begin * WINDOW, findings=findings)
+    findings = observed.findings
+    if min(end, len(observed.readings)) > most:
+        findings = (*findings, first_part((min(end, len(observed.readings)) - begin) * WINDOW))
+    readings = observed.readings[begin : min(end, most)]
+    log = observed.log.cut(begin * WINDOW, (begin + len(readings)) * WINDOW)
+    return replace(observed, readings=readings, log=log, first=observed.first + begin * WINDOW, findings=findings)
 
 
 def check_duration(seconds: float, *, where: str) -> None:
@@ -300,9 +301,9 @@ def check_in_all(recordings: Sequence[_Lasting], *, left_out: Sequence[Finding] 
 
 
 def first_part(duration: float) -> Finding:
-    """What a recording of that duration [s] above `LONGEST` is reported with."""
-    what = f"of {duration:.1f} s the first {LONGEST:g} are used"
-    return Finding.of("first-part", what, fix="choose others with --start and --end")
+    """Reports that of a recording of that duration [s] only the first `LONGEST` are used."""
+    sentence = f"of {duration:.1f} s the first {LONGEST:g} are used"
+    return Finding.of("first-part", sentence, fix="choose others with --start and --end")
 
 
 S = TypeVar("S")
@@ -314,7 +315,7 @@ LEFT_OUT = "left-out"
 def usable(
     recordings: Sequence[S], use: Callable[[S], T], *, name: Callable[[S], str]
 ) -> tuple[list[T], tuple[Finding, ...]]:
-    """What those recordings come to that can be used, and a warning for each that cannot. Errors of a kind that is not
+    """Returns what usable recordings come to, and a warning for each other. Errors of a kind that is not
     the recording's, such as a name that nothing has, are raised.
 
     Args:
@@ -325,23 +326,23 @@ def usable(
         InputError, RefusedError: the error of a single recording.
         RefusedError: none of several can be used.
     """
-    found: list[T] = []
+    used: list[T] = []
     failed: list[tuple[str, InputError | RefusedError]] = []
-    for one in recordings:
+    for recording in recordings:
         try:
-            found.append(use(one))
+            used.append(use(recording))
         except (InputError, RefusedError) as error:
             if len(recordings) == 1:
                 raise
-            failed.append((name(one), error))
-    if failed and not found:
+            failed.append((name(recording), error))
+    if failed and not used:
         reasons = "; ".join(f"{who}: {error.what}" for who, error in failed)
         raise RefusedError(
             f"none of {len(failed)} recordings can be used: {reasons}",
             where=", ".join(who for who, _ in failed),
             fix="; ".join(dict.fromkeys(error.fix for _, error in failed)),
         )
-    return found, tuple(
+    return used, tuple(
         Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=f"{who} is left out: {error.what}", fix=error.fix)
         for who, error in failed
     )

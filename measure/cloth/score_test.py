@@ -60,16 +60,16 @@ class Directions:
     suspected: tuple[int, int] | None = None
 
     def far(self, z: FloatArray) -> FloatArray:
-        """(n, direction) of standardised z (n, effect + 1): how far each goes in the direction that counts."""
+        """Returns how far standardised z (n, effect + 1) goes in each direction that counts, (n, direction)."""
         if self.suspected is not None:
-            place, sign = self.suspected
-            return sign * z[:, place : place + 1]
+            index, sign = self.suspected
+            return sign * z[:, index : index + 1]
         return np.concatenate([self.along(z), z[:, -1:]], axis=1)
 
     def along(self, z: FloatArray) -> FloatArray:
-        """(n, effect) of each effect's, whether suspected or not."""
-        own = z[:, :-1]
-        return np.where(self.signs == 0, np.abs(own), own)
+        """Returns each effect's, whether suspected or not, (n, effect)."""
+        z_effects = z[:, :-1]
+        return np.where(self.signs == 0, np.abs(z_effects), z_effects)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +86,7 @@ class Axes:
 
     @classmethod
     def of(cls, residuals: FloatArray, changes: FloatArray) -> Axes:
-        """From residuals (n, k) and changes (effect, k)."""
+        """Fits axes to residuals (n, k) and changes (effect, k)."""
         spread = residuals.std(axis=0)
         covariance, _ = shrunk_covariance(residuals / spread)
         white = np.linalg.inv(np.linalg.cholesky(covariance)) / spread
@@ -96,7 +96,7 @@ class Axes:
         return cls(weights=white.T @ (along / np.where(length > 0, length, 1.0)), white=white)
 
     def z(self, residuals: FloatArray) -> FloatArray:
-        """(n, effect + 1) z_e, and z_0."""
+        """Computes z_e, and z_0, of residuals: (n, effect + 1)."""
         k = self.white.shape[0]
         misfit = np.square(residuals @ self.white.T).sum(axis=1)
         root = (np.cbrt(misfit / k) - (1 - 2 / (9 * k))) / math.sqrt(2 / (9 * k))
@@ -117,7 +117,7 @@ class Standing:
     spread: FloatArray
 
     def of(self, residuals: FloatArray) -> FloatArray:
-        """(n, effect + 1) standardised z_e and z_0 of residuals (n, k)."""
+        """Standardises z_e and z_0 of residuals (n, k): (n, effect + 1)."""
         return (self.axes.z(residuals) - self.centre) / self.spread
 
 
@@ -142,12 +142,15 @@ class Scene:
     _known: dict[frozenset[int], Axes] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, own: Experiments, base: Experiments, nulls: Experiments, kinds: IntArray, changes: FloatArray) -> Scene:
-        """From summaries and weights as scales read them."""
-        at = [_logarithm(each, own) for each in (own, base, nulls)]
+    def of(
+        cls, observed: Experiments, base: Experiments, nulls: Experiments, kinds: IntArray, changes: FloatArray
+    ) -> Scene:
+        """Regresses summaries on the weights that scales read."""
+        at = [_logarithm(experiments, observed) for experiments in (observed, base, nulls)]
         coefficients = np.linalg.lstsq(_regressors(at[1]), base.whole, rcond=None)[0]
         residuals = [
-            each.whole - _regressors(one) @ coefficients for each, one in zip((own, base, nulls), at, strict=True)
+            experiments.whole - _regressors(log_weight) @ coefficients
+            for experiments, log_weight in zip((observed, base, nulls), at, strict=True)
         ]
         return cls(
             own=residuals[0],
@@ -159,25 +162,25 @@ class Scene:
         )
 
     def axes(self, *without: int) -> Axes:
-        """Of V without some kinds."""
+        """Returns the axes of V without some kinds."""
         key = frozenset(without)
         if key not in self._known:
-            kept = ~np.isin(self.kinds, list(key))
-            self._known[key] = Axes.of(np.concatenate([self.base, self.null[kept]]), self.changes)
+            is_used = ~np.isin(self.kinds, list(key))
+            self._known[key] = Axes.of(np.concatenate([self.base, self.null[is_used]]), self.changes)
         return self._known[key]
 
     def standing(self, without: int | None) -> Standing:
-        """By null flags of all kinds but one; None for all."""
-        left = () if without is None else (without,)
-        found = np.concatenate(
+        """Standardises by null flags of all kinds but one; None for all."""
+        excluded = () if without is None else (without,)
+        scores = np.concatenate(
             [
-                self.axes(*left, kind).z(self.null[self.alike & (self.kinds == kind)])
+                self.axes(*excluded, kind).z(self.null[self.alike & (self.kinds == kind)])
                 for kind in np.unique(self.kinds[self.alike]).tolist()
-                if kind not in left
+                if kind not in excluded
             ]
         )
-        spread = found.std(axis=0, ddof=1)
-        return Standing(axes=self.axes(*left), centre=found.mean(axis=0), spread=np.where(spread > 0, spread, 1.0))
+        spread = scores.std(axis=0, ddof=1)
+        return Standing(axes=self.axes(*excluded), centre=scores.mean(axis=0), spread=np.where(spread > 0, spread, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -215,7 +218,7 @@ class Scored:
 
 
 def score(
-    own: Experiments,
+    observed: Experiments,
     base: Experiments,
     nulls: Experiments,
     kinds: IntArray,
@@ -223,30 +226,30 @@ def score(
     *,
     level: float,
 ) -> Scored:
-    """Test one experiment.
+    """Tests one experiment.
 
     Args:
-        own: of it alone.
+        observed: of it alone.
         base: simulations of the base model.
         nulls: null flags.
         kinds: (null,) of their numerics.
         level: at which power is stated.
     """
-    scene = Scene.of(own, base, nulls, kinds, directions.changes)
-    whole = scene.standing(None)
-    z = whole.of(scene.own)
-    left = np.full((len(kinds), len(directions.changes) + 1), np.nan)
-    apart = {kind: scene.standing(kind) for kind in np.unique(kinds[scene.alike]).tolist()}
-    for kind, standing in apart.items():
-        here = scene.alike & (kinds == kind)
-        left[here] = standing.of(scene.null[here])
-    left, shown = left[scene.alike], kinds[scene.alike]
-    farthest = ClusteredNulls(null=directions.far(left).max(axis=1), kinds=shown)
-    along, alone = directions.along(z)[0], directions.along(left)
+    scene = Scene.of(observed, base, nulls, kinds, directions.changes)
+    overall = scene.standing(None)
+    z = overall.of(scene.own)
+    null_z = np.full((len(kinds), len(directions.changes) + 1), np.nan)
+    by_kind = {kind: scene.standing(kind) for kind in np.unique(kinds[scene.alike]).tolist()}
+    for kind, standing in by_kind.items():
+        of_kind = scene.alike & (kinds == kind)
+        null_z[of_kind] = standing.of(scene.null[of_kind])
+    null_z, null_kinds = null_z[scene.alike], kinds[scene.alike]
+    farthest = ClusteredNulls(null=directions.far(null_z).max(axis=1), kinds=null_kinds)
+    along, alone = directions.along(z)[0], directions.along(null_z)
     # As the largest of all directions, whichever was suspected.
-    largest = ClusteredNulls(null=np.concatenate([alone, left[:, -1:]], axis=1).max(axis=1), kinds=shown)
-    family = np.array([largest.p(float(one)) for one in along])
-    power = _power(scene, apart, directions, farthest.critical(level))
+    largest = ClusteredNulls(null=np.concatenate([alone, null_z[:, -1:]], axis=1).max(axis=1), kinds=null_kinds)
+    family = np.array([largest.p(float(z_effect)) for z_effect in along])
+    power = _power(scene, by_kind, directions, farthest.critical(level))
     suspected = directions.suspected
     return Scored(
         z=z[0, :-1],
@@ -254,7 +257,10 @@ def score(
         statistic=float(directions.far(z).max()),
         nulls=farthest,
         alone=np.array(
-            [ClusteredNulls(null=alone[:, place], kinds=shown).p(float(along[place])) for place in range(len(along))]
+            [
+                ClusteredNulls(null=alone[:, index], kinds=null_kinds).p(float(along[index]))
+                for index in range(len(along))
+            ]
         ),
         family=family,
         power=power,
@@ -264,37 +270,43 @@ def score(
     )
 
 
-def _power(scene: Scene, apart: dict[int, Standing], directions: Directions, critical: float | None) -> FloatArray:
-    """(effect,) share of null flags that are beyond a critical value once each effect acts on them."""
-    found = np.zeros(len(directions.changes))
+def _power(scene: Scene, by_kind: dict[int, Standing], directions: Directions, critical: float | None) -> FloatArray:
+    """Computes the share of null flags that are beyond a critical value once each effect acts on them, (effect,)."""
+    shares = np.zeros(len(directions.changes))
     if critical is None:
-        return found
-    for place, change in enumerate(directions.changes):
-        signs = (1, -1) if directions.signs[place] == 0 else (1,)
-        if directions.suspected is not None and directions.suspected[0] == place:
+        return shares
+    for index, change in enumerate(directions.changes):
+        signs = (1, -1) if directions.signs[index] == 0 else (1,)
+        if directions.suspected is not None and directions.suspected[0] == index:
             signs = (directions.suspected[1],)
         beyond = [
             directions.far(standing.of(scene.null[scene.alike & (scene.kinds == kind)] + sign * change)).max(axis=1)
             > critical
-            for kind, standing in apart.items()
+            for kind, standing in by_kind.items()
             for sign in signs
         ]
-        found[place] = float(np.concatenate(beyond).mean())
-    return found
+        shares[index] = float(np.concatenate(beyond).mean())
+    return shares
 
 
-def _logarithm(each: Experiments, own: Experiments) -> FloatArray:
-    """(n,) of area weights as a scale read them over the stated one; 0 where none was stated, so that all are alike."""
-    return np.zeros(len(each)) if each.stated is None or own.stated is None else np.log(each.stated / own.stated[0])
+def _logarithm(experiments: Experiments, observed: Experiments) -> FloatArray:
+    """Returns logarithms (n,) of area weights as a scale read them over the stated one; 0 where none was stated, so
+    that all are alike."""
+    return (
+        np.zeros(len(experiments))
+        if experiments.stated is None or observed.stated is None
+        else np.log(experiments.stated / observed.stated[0])
+    )
 
 
 def _regressors(logarithm: FloatArray) -> FloatArray:
-    """(n, 3) quadratic in it."""
+    """Returns the quadratic in it, (n, 3)."""
     return np.stack([np.ones_like(logarithm), logarithm, logarithm**2], axis=1)
 
 
 def directions(sights: Sequence[Sight], effects: Sequence[Weighable], suspected: Suspicion | None) -> Directions:
-    """Along which the recordings are tested: the mean changes of their summaries by the effects' pairs.
+    """Returns the directions along which recordings are tested: the mean changes of their summaries by the effects'
+    pairs.
 
     Args:
         effects: those that all sights' models know a response of.
@@ -303,18 +315,18 @@ def directions(sights: Sequence[Sight], effects: Sequence[Weighable], suspected:
     Raises:
         InputError: too few pairs of the suspected one show the flag.
     """
-    names = [one.name for one in effects]
+    names = [effect.name for effect in effects]
     if suspected is not None and suspected.name not in names:
         raise InputError(
             f"too few flags with {suspected.name} show what the recordings show",
             where="--suspect",
             fix="suspect another effect, or leave it out",
         )
-    changes = [np.concatenate([own.responses[name].change for own in sights]) for name in names]
-    size = sum(int(own.used.sum()) for own in sights)
+    changes = [np.concatenate([sight.responses[name].change for sight in sights]) for name in names]
+    size = sum(int(sight.used.sum()) for sight in sights)
     return Directions(
         changes=np.array(changes).reshape(len(names), size),
-        signs=np.array([int(one.low > 0) for one in effects], dtype=np.int64),
+        signs=np.array([int(effect.low > 0) for effect in effects], dtype=np.int64),
         suspected=None if suspected is None else (names.index(suspected.name), suspected.sign),
     )
 
@@ -356,11 +368,13 @@ class Judged:
         return self.scored.p_value
 
 
-def judge(own: Weighing, nulls: Misfits, kinds: IntArray, scored: Scored, *, level: float, departure: float) -> Judged:
-    """Judge one experiment.
+def judge(
+    weighing: Weighing, nulls: Misfits, kinds: IntArray, scored: Scored, *, level: float, departure: float
+) -> Judged:
+    """Judges one experiment.
 
     Args:
-        own: of it alone.
+        weighing: of it alone.
         nulls: what models leave of null flags.
         kinds: (null,) of their numerics.
         scored: how it was tested.
@@ -368,22 +382,22 @@ def judge(own: Weighing, nulls: Misfits, kinds: IntArray, scored: Scored, *, lev
         departure: root mean square departure of its observables from the base model fitted to it [their scatters].
     """
     nulls, kinds = nulls.rows(np.flatnonzero(scored.alike).tolist()), kinds[scored.alike]
-    factors = own.factors[0]
+    factors = weighing.factors[0]
     probability = np.exp(TEMPERED * factors - logsumexp(TEMPERED * factors))
     order = np.argsort(-probability)
     count = 1 + int(np.searchsorted(np.cumsum(probability[order]), CONFIDENCE - 1e-9))
-    confident = tuple(int(place) for place in order[:count])
+    confident = tuple(int(index) for index in order[:count])
     leftover = np.array(
         [
-            ClusteredNulls(null=nulls.left[:, place], kinds=kinds).p(float(own.misfits.left[0, place]))
-            for place in range(len(own.effects))
+            ClusteredNulls(null=nulls.left[:, index], kinds=kinds).p(float(weighing.misfits.left[0, index]))
+            for index in range(len(weighing.effects))
         ]
     )
 
-    def judged(conclusion: Conclusion, named: tuple[int, ...] = (), reasons: tuple[str, ...] = ()) -> Judged:
+    def judged(conclusion: Conclusion, indices: tuple[int, ...] = (), reasons: tuple[str, ...] = ()) -> Judged:
         return Judged(
             conclusion=conclusion,
-            named=named,
+            named=indices,
             confident=confident,
             probability=probability,
             leftover=leftover,
@@ -398,9 +412,9 @@ def judge(own: Weighing, nulls: Misfits, kinds: IntArray, scored: Scored, *, lev
         return judged(Conclusion.UNDECIDED if reasons else Conclusion.SUFFICIENT, reasons=reasons)
     if not scored.pointed:
         return judged(Conclusion.OUTSIDE)
-    if any(leftover[place] > level for place in confident):
+    if any(leftover[index] > level for index in confident):
         return judged(Conclusion.EFFECT if len(confident) == 1 else Conclusion.ONE_OF, confident)
-    excess = float(own.misfits.base[0] - np.median(nulls.base))
-    explained = float(own.misfits.base[0] - own.misfits.left[0, confident[0]])
+    excess = float(weighing.misfits.base[0] - np.median(nulls.base))
+    explained = float(weighing.misfits.base[0] - weighing.misfits.left[0, confident[0]])
     part = explained >= PART * excess
     return judged(Conclusion.PARTLY, confident[:1]) if part else judged(Conclusion.OUTSIDE)

@@ -115,16 +115,19 @@ def first_of(places: Sequence[str | None]) -> list[int]:
 
 def dimension(sights: Sequence[Sight]) -> int:
     """Counts the coordinates of the cloth and of all places."""
-    return len(CLOTH) + sum(len(sights[first].quantities) for first in set(first_of([one.place for one in sights])))
+    return len(CLOTH) + sum(len(sights[first].quantities) for first in set(first_of([sight.place for sight in sights])))
 
 
 def values(scores: FloatArray, sights: Sequence[Sight]) -> tuple[dict[str, FloatArray], list[dict[str, FloatArray]]]:
     """Returns cloths, and places of each recording, at normal scores (n, dimension or more)."""
     shares: Iterator[FloatArray] = iter(ndtr(scores).T)
-    cloth = {one.name: one.at(next(shares)) for one in CLOTH}
-    owners = first_of([one.place for one in sights])
-    own = {first: {one.name: one.at(next(shares)) for one in sights[first].quantities} for first in sorted(set(owners))}
-    return cloth, [own[first] for first in owners]
+    cloth = {quantity.name: quantity.at(next(shares)) for quantity in CLOTH}
+    owners = first_of([sight.place for sight in sights])
+    place_values = {
+        first: {quantity.name: quantity.at(next(shares)) for quantity in sights[first].quantities}
+        for first in sorted(set(owners))
+    }
+    return cloth, [place_values[first] for first in owners]
 
 
 def responded(
@@ -143,11 +146,11 @@ def responded(
         with_it, without: summaries (pair, k), without errors of numerics and pixels.
     """
     change = (with_it - without)[:, emulator.used]
-    there = np.asarray(np.isfinite(change).all(axis=1), dtype=np.bool_)
-    if there.sum() < FEWEST_PAIRS:
+    finite = np.asarray(np.isfinite(change).all(axis=1), dtype=np.bool_)
+    if finite.sum() < FEWEST_PAIRS:
         return None
-    change, strengths = change[there], strengths[there]
-    values = {name: own[there] for name, own in values.items()}
+    change, strengths = change[finite], strengths[finite]
+    values = {name: column[finite] for name, column in values.items()}
     white = np.linalg.solve(emulator.factor, change.T).T
     tried = []
     for logarithmic in (False, True) if effect.low > 0 else (False,):
@@ -157,10 +160,10 @@ def responded(
         residual = white - hat @ white
         error = float(np.square(residual / (1 - np.diag(hat))[:, None]).mean())
         tried.append((error, logarithmic, z, inverse, residual))
-    _, logarithmic, z, inverse, missed = min(tried, key=lambda one: one[0])
+    _, logarithmic, z, inverse, missed = min(tried, key=lambda trial: trial[0])
     coefficients = inverse @ z.T @ change
     predicted, stretch = emulator.predict(values)
-    off = np.linalg.solve(emulator.factor, (without[there][:, emulator.used] - predicted).T).T
+    off = np.linalg.solve(emulator.factor, (without[finite][:, emulator.used] - predicted).T).T
     # The regression was fitted to the flags without the effect: their residuals are the smaller for it.
     fitted, fresh = (2 - stretch)[:, None], stretch[:, None]
     return Response(

@@ -66,7 +66,7 @@ class Discretisation:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, *, explicit: float) -> Discretisation:
-        """One at random: half of the meshes are irregular, as other codes' are.
+        """Draws one at random: half of the meshes are irregular, as other codes' are.
 
         Args:
             explicit: share of leapfrog.
@@ -80,7 +80,7 @@ class Discretisation:
         )
 
     def mesh(self, fit: Mesh) -> Mesh:
-        """This kind's mesh of the cloth of the fit's one."""
+        """Returns this kind's mesh of the cloth of the fit's one."""
         low, (width, height) = fit.rest.min(axis=0), np.ptp(fit.rest, axis=0).tolist()
         spacing = math.sqrt(width * height / fit.vertex_count) / self.finer
         flat = grid(
@@ -95,7 +95,7 @@ class Discretisation:
         return replace(flat, rest=flat.rest + low)
 
     def content(self) -> dict[str, float | int | None]:
-        """JSON values."""
+        """Returns JSON values."""
         return {"finer": self.finer, "diagonals": self.diagonals, "uneven": self.uneven, "step": self.step}
 
 
@@ -145,14 +145,14 @@ class Flag:
     attachment: str = "corners"
 
     def mesh(self, columns: int) -> Mesh:
-        """A regular mesh of it."""
+        """Returns a regular mesh of it."""
         rows = max(2, round(columns * self.height / self.length))
         return grid(width=self.length, height=self.height, columns=columns, rows=rows)
 
     def handles(self, mesh: Mesh) -> Handles:
-        """How it is held."""
-        own = held.full_hoist(mesh.rest) if self.attachment == "hoist" else held.corners(mesh.rest)
-        return Handles(vertices=own)
+        """Returns how it is held."""
+        vertices = held.full_hoist(mesh.rest) if self.attachment == "hoist" else held.corners(mesh.rest)
+        return Handles(vertices=vertices)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -196,7 +196,7 @@ class FlagBatch:
         return self.duration if self.until is None else self.until
 
     def content(self) -> Mapping[str, object]:
-        """All that shapes what it gives, as JSON values."""
+        """Returns all that shapes what it gives, as JSON values."""
         log = self.log
         return {
             "version": VERSION,
@@ -204,7 +204,7 @@ class FlagBatch:
             "log": [log.times.tolist(), log.speed.tolist(), None if log.turn is None else log.turn.tolist()],
             "averaging": log.averaging,
             "duration": self.duration,
-            "values": {name: own.tolist() for name, own in sorted(self.values.items())},
+            "values": {name: column.tolist() for name, column in sorted(self.values.items())},
             "places": self.places.tolist(),
             "seeds": list(self.seeds),
             "columns": self.columns,
@@ -213,37 +213,46 @@ class FlagBatch:
         }
 
     def _beside(self) -> dict[str, object]:
-        """What differs from a calibration's simulations, whose hash is older."""
-        found: dict[str, object] = {}
+        """Returns what differs from a calibration's simulations, whose hash is older."""
+        entries: dict[str, object] = {}
         if self.effects:
-            found["effects"] = [
-                [one.name, dict(one.shapes), own.tolist(), *([one.revision] if one.revision > 1 else [])]
-                for one, own in self.effects
+            entries["effects"] = [
+                [
+                    effect.name,
+                    dict(effect.shapes),
+                    strengths.tolist(),
+                    *([effect.revision] if effect.revision > 1 else []),
+                ]
+                for effect, strengths in self.effects
             ]
         if self.until is not None:
-            found["until"] = self.until
+            entries["until"] = self.until
         if self.discretisation is not None:
-            found["discretisation"] = self.discretisation.content()
-        return found
+            entries["discretisation"] = self.discretisation.content()
+        return entries
 
     def read(self) -> FloatArray:
-        """(flag, place, window, observable), NaN where a window does not show one or a flag diverged."""
-        own = self.discretisation
-        mesh = self.flag.mesh(self.columns) if own is None else own.mesh(self.flag.mesh(self.columns))
+        """Reads (flag, place, window, observable), NaN where a window does not show one or a flag diverged."""
+        discretisation = self.discretisation
+        mesh = (
+            self.flag.mesh(self.columns)
+            if discretisation is None
+            else discretisation.mesh(self.flag.mesh(self.columns))
+        )
         positions = self.positions(mesh)
-        found = np.full((len(self.seeds), self.places.shape[1], self.windows, len(self.observables)), np.nan)
-        for place, flag in enumerate(np.moveaxis(positions, -1, 0)):
+        readings = np.full((len(self.seeds), self.places.shape[1], self.windows, len(self.observables)), np.nan)
+        for index, flag in enumerate(np.moveaxis(positions, -1, 0)):
             if np.isfinite(flag).all():
-                scale = float(self.values["scale"][place])
-                for number, (azimuth, elevation, distance) in enumerate(self.places[place].tolist()):
+                scale = float(self.values["scale"][index])
+                for number, (azimuth, elevation, distance) in enumerate(self.places[index].tolist()):
                     view = View(azimuth=azimuth, elevation=elevation, distance=distance)
-                    found[place, number] = windows(
+                    readings[index, number] = windows(
                         flag * scale, mesh=mesh, flag=self.flag, view=view, rate=RATE, observables=self.observables
                     )
-        return found
+        return readings
 
     def positions(self, mesh: Mesh, *, rate: float = RATE) -> FloatArray:
-        """(frame, vertex, 3, flag) [m] of the film's frames, `rate` a second [Hz]."""
+        """Simulates positions (frame, vertex, 3, flag) [m] of the film's frames, `rate` a second [Hz]."""
         system, state, integrator = self._assembled(mesh)
         simulated = batch.Batch(system=system, state=state, integrator=integrator, divergence=batch.Divergence.KEEP)
         return simulated.positions(batch.after(SETTLE, self._simulated, rate), rate)
@@ -254,45 +263,47 @@ class FlagBatch:
         system, state = assemble(self._scenes(mesh, damped=step or 0.0))
         integrator = Symplectic() if step is None else BackwardEuler(step=step, tolerance=_TOLERANCE)
         system = replace(system, wind=self._wind(system))
-        system, state = apply([one.at(torch.from_numpy(own)) for one, own in self.effects], system, state)
+        system, state = apply(
+            [effect.at(torch.from_numpy(strengths)) for effect, strengths in self.effects], system, state
+        )
         return system, state, integrator
 
     def _scenes(self, mesh: Mesh, *, damped: float) -> list[Scene]:
-        """At rest; `damped` is the damping of the integrator itself [s]."""
+        """Builds scenes at rest; `damped` is the damping of the integrator itself [s]."""
         handles = self.flag.handles(mesh)
-        own = []
-        for place, seed in enumerate(self.seeds):
+        scenes = []
+        for index, seed in enumerate(self.seeds):
             along = mesh.rest[:, 0]
             flat = np.stack([along * math.cos(_AHEAD), along * math.sin(_AHEAD), mesh.rest[:, 1]], axis=1)
-            material = self._material(place, damped)
+            material = self._material(index, damped)
             start = roughened(flat, handles, stream(seed, "calibrate", "start"), _ROUGH)
-            own.append(Scene(mesh=mesh, position=start, material=material, handles=handles))
-        return own
+            scenes.append(Scene(mesh=mesh, position=start, material=material, handles=handles))
+        return scenes
 
-    def _material(self, place: int, damped: float) -> Material:
-        own = {name: float(values[place]) for name, values in self.values.items()}
+    def _material(self, index: int, damped: float) -> Material:
+        drawn = {name: float(values[index]) for name, values in self.values.items()}
         return cloth(
-            own["area_weight"],
-            own["bending"],
-            max(own["damping"] - damped, 0.0),
-            stretching=own["stretching"],
-            fabric=TABLES[int(own["fabric"] * len(TABLES))],
+            drawn["area_weight"],
+            drawn["bending"],
+            max(drawn["damping"] - damped, 0.0),
+            stretching=drawn["stretching"],
+            fabric=TABLES[int(drawn["fabric"] * len(TABLES))],
         )
 
     def _wind(self, system: System) -> SampledWind:
-        made = []
-        for place, seed in enumerate(self.seeds):
-            own = {name: float(values[place]) for name, values in self.values.items()}
+        velocities = []
+        for index, seed in enumerate(self.seeds):
+            drawn = {name: float(values[index]) for name, values in self.values.items()}
             velocity = blown(
-                self.log.moved(own.get("clock_error", 0.0)),
+                self.log.moved(drawn.get("clock_error", 0.0)),
                 before=SETTLE,
                 duration=self.duration,
-                distance=own["distance_constant"],
-                eddies=own["eddies"],
+                distance=drawn["distance_constant"],
+                eddies=drawn["eddies"],
                 seed=child_seed(seed, "calibrate", "wind"),
             )
-            made.append(velocity * own["gain"])
-        samples = torch.as_tensor(np.stack(made, axis=-1), dtype=system.cloth.dtype)
+            velocities.append(velocity * drawn["gain"])
+        samples = torch.as_tensor(np.stack(velocities, axis=-1), dtype=system.cloth.dtype)
         times = Even(start=0.0, period=1 / WIND_RATE, count=len(samples))
         return SampledWind(times=times, samples=samples, beyond=Beyond.HOLD)
 
@@ -308,7 +319,7 @@ class FlagBatch:
 
 
 def cloth(area_weight: float, bending: float, damping: float, *, stretching: float, fabric: str) -> Material:
-    """A cloth of an area weight [kg/m²], a mean bending coefficient [N·m] and a damping [s].
+    """Returns a cloth of an area weight [kg/m²], a mean bending coefficient [N·m] and a damping [s].
 
     Args:
         stretching: factor on the fabric's table.
@@ -325,7 +336,8 @@ def cloth(area_weight: float, bending: float, damping: float, *, stretching: flo
 
 
 def mean_bending(material: Material) -> float:
-    """Geometric mean of the bending coefficients [N·m], which takes a coefficient of 0 for a thousandth of the mean."""
+    """Computes the geometric mean of the bending coefficients [N·m]; a coefficient of 0 counts as a thousandth of the
+    mean."""
     table = np.maximum(material.bending, 1e-3 * float(material.bending.mean()))
     return float(np.exp(np.log(table).mean()))
 
@@ -333,14 +345,14 @@ def mean_bending(material: Material) -> float:
 def windows(
     positions: NDArray[np.floating], *, mesh: Mesh, flag: Flag, view: View, rate: float, observables: Sequence[str]
 ) -> FloatArray:
-    """(window, observable) of a flag (frame, vertex, 3) [m] in the wind along +x, seen from a place.
+    """Computes (window, observable) of a flag (frame, vertex, 3) [m] in the wind along +x, seen from a place.
 
     Args:
         rate: frames a second [Hz].
     """
     hoist, free = edges_of(mesh.rest)
     size = round(WINDOW * rate)
-    own: list[Observable] = [OBSERVABLES[name] for name in observables]
+    selected: list[Observable] = [OBSERVABLES[name] for name in observables]
     times = np.arange(size) / rate
     rows = []
     for first in range(0, len(positions) - size + 1, size):
@@ -354,5 +366,5 @@ def windows(
             length=flag.length,
             height=flag.height,
         )
-        rows.append([one.of_cloth(window).value for one in own])
+        rows.append([observable.of_cloth(window).value for observable in selected])
     return np.array(rows)

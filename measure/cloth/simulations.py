@@ -45,14 +45,14 @@ class Simulations:
     corrections: tuple[Correction, ...]
 
     def of(self, places: Sequence[int]) -> Simulations:
-        """Those of some recordings."""
+        """Selects those of some recordings."""
         return replace(
             self,
-            designs=tuple(self.designs[place] for place in places),
-            base=tuple(self.base[place] for place in places),
-            pairs=tuple(self.pairs[place] for place in places),
-            nulls=tuple(self.nulls[place] for place in places),
-            corrections=tuple(self.corrections[place] for place in places),
+            designs=tuple(self.designs[index] for index in places),
+            base=tuple(self.base[index] for index in places),
+            pairs=tuple(self.pairs[index] for index in places),
+            nulls=tuple(self.nulls[index] for index in places),
+            corrections=tuple(self.corrections[index] for index in places),
         )
 
 
@@ -66,7 +66,7 @@ def gathered(
     workers: int = 1,
     stage: Stage | None = None,
 ) -> Simulations:
-    """All that a verdict needs.
+    """Simulates all that a verdict needs.
 
     Args:
         effects: that are weighed.
@@ -78,76 +78,85 @@ def gathered(
     """
     designs = designs_of(recordings, options)
     until = lasting(len(designs))
-    made = [[pairs(design, effect, until=until) for effect in effects] for design in designs]
-    null = nulls(designs, first_of([one.place for one in recordings]), kinds=kinds, seed=options.seed)
+    effect_pairs = [[pairs(design, effect, until=until) for effect in effects] for design in designs]
+    null = nulls(designs, first_of([recording.place for recording in recordings]), kinds=kinds, seed=options.seed)
 
-    def all_of(what: str, batches: list) -> FloatArray:
+    def all_of(label: str, batches: list) -> FloatArray:
         total, done = sum(len(batch.seeds) for batch in batches), 0
 
-        def advance(more: int) -> None:
+        def advance(flags: int) -> None:
             nonlocal done
-            done += more
+            done += flags
             if stage is not None:
-                stage(what, done, total)
+                stage(label, done, total)
 
         return read(batches, folder=folder, workers=workers, advance=advance)[:, 0]
 
     base = [
-        all_of(f"base model, {one.name}", design.batches()) for one, design in zip(recordings, designs, strict=True)
+        all_of(f"base model, {recording.name}", design.batches())
+        for recording, design in zip(recordings, designs, strict=True)
     ]
     finer = [Finer.of(design) for design in designs]
-    fine = [all_of(f"finer meshes, {one.name}", list(own.batches)) for one, own in zip(recordings, finer, strict=True)]
-    beside = []
-    for one, own in zip(recordings, made, strict=True):
-        found = all_of(f"effects, {one.name}", [batch for each in own for batch in each.batches])
-        ends = np.cumsum([len(each.places) for each in own])[:-1]
-        beside.append(tuple(zip(own, np.split(found, ends), strict=True)))
-    read_nulls = [all_of(f"nulls, {one.name}", own) for one, own in zip(recordings, null, strict=True)]
+    fine = [
+        all_of(f"finer meshes, {recording.name}", list(fine_design.batches))
+        for recording, fine_design in zip(recordings, finer, strict=True)
+    ]
+    paired = []
+    for recording, of_effects in zip(recordings, effect_pairs, strict=True):
+        readings = all_of(f"effects, {recording.name}", [batch for pair in of_effects for batch in pair.batches])
+        ends = np.cumsum([len(pair.places) for pair in of_effects])[:-1]
+        paired.append(tuple(zip(of_effects, np.split(readings, ends), strict=True)))
+    read_nulls = [
+        all_of(f"nulls, {recording.name}", batches) for recording, batches in zip(recordings, null, strict=True)
+    ]
     return Simulations(
         designs=tuple(designs),
         base=tuple(base),
-        pairs=tuple(beside),
+        pairs=tuple(paired),
         nulls=tuple(read_nulls),
         kinds=np.repeat(np.arange(kinds), TOGETHER),
         weights=np.concatenate([batch.values["area_weight"] for batch in null[0]]),
-        corrections=tuple(one.correction(own, coarse) for one, own, coarse in zip(finer, fine, base, strict=True)),
+        corrections=tuple(
+            fine_design.correction(fine_readings, coarse)
+            for fine_design, fine_readings, coarse in zip(finer, fine, base, strict=True)
+        ),
     )
 
 
 def shown_by(
     recordings: Sequence[Observed], simulations: Simulations
 ) -> tuple[tuple[Observed, ...], Simulations, tuple[Sight, ...], tuple[Finding, ...]]:
-    """The recordings whose simulations show what they show, their simulations and models, and a warning for each other
-    recording.
+    """Selects recordings whose simulations show what they show, with these and their models, and a warning for each
+    other recording.
 
     Raises:
         InputError: too little is left.
         RefusedError: simulations show nothing of any recording, see `Emulator.fit`.
     """
 
-    def seen(place: int) -> tuple[int, Sight]:
-        (own,) = sights_of([recordings[place]], simulations.of([place]))
-        return place, own
+    def seen(index: int) -> tuple[int, Sight]:
+        (model,) = sights_of([recordings[index]], simulations.of([index]))
+        return index, model
 
-    both, left_out = usable(range(len(recordings)), seen, name=lambda place: recordings[place].name)
-    places = [place for place, _ in both]
-    kept = tuple(recordings[place] for place in places)
-    check_in_all(kept, left_out=left_out)
-    return kept, simulations.of(places), tuple(own for _, own in both), left_out
+    models, left_out = usable(range(len(recordings)), seen, name=lambda index: recordings[index].name)
+    places = [index for index, _ in models]
+    shown_recordings = tuple(recordings[index] for index in places)
+    check_in_all(shown_recordings, left_out=left_out)
+    return shown_recordings, simulations.of(places), tuple(model for _, model in models), left_out
 
 
 def sights_of(
     recordings: Sequence[Observed], simulations: Simulations, *, windows: Sequence[slice] | None = None
 ) -> tuple[Sight, ...]:
-    """Each recording's model; as `sight`.
+    """Fits each recording's model; as `sight`.
 
     Args:
         windows: of each recording a part; None for all of them.
     """
     parts = [None] * len(recordings) if windows is None else windows
     return tuple(
-        sight(*one, windows=part)
-        for *one, part in zip(
+        sight(*entry, windows=part)
+        for *entry, part in zip(
             recordings,
             simulations.designs,
             simulations.base,
@@ -163,42 +172,42 @@ def sight(
     observed: Observed,
     design: Design,
     base: FloatArray,
-    own: Sequence[tuple[Pairs, FloatArray]],
+    effect_readings: Sequence[tuple[Pairs, FloatArray]],
     correction: Correction,
     *,
     windows: slice | None = None,
 ) -> Sight:
-    """A recording's model, fitted to simulations.
+    """Fits a recording's model to simulations.
 
     Args:
         base: (simulation, window, observable) of the base model.
-        own: of each effect the pairs that were simulated, and their readings.
+        effect_readings: of each effect the pairs that were simulated, and their readings.
         correction: of the base model's.
         windows: a part of it, of which means alone are modelled; None for all of it.
 
     Raises:
         RefusedError: as `Emulator.fit`.
     """
-    seen = observed if windows is None else part_of(observed, windows)
-    summaries = with_errors(seen, base if windows is None else base[:, windows], correction, seed=design.seed)
-    changes = seen.projection.changes
+    used_part = observed if windows is None else part_of(observed, windows)
+    summaries = with_errors(used_part, base if windows is None else base[:, windows], correction, seed=design.seed)
+    changes = used_part.projection.changes
     values = design.values()
-    looked = np.tile(shown(seen.readings), 1 + changes)
+    is_shown = np.tile(shown(used_part.readings), 1 + changes)
     if changes:
         # A change with the wind that depends on nothing here widens the scatter of all others.
-        telling = informative(values, summaries, looked, name=observed.name)
-        looked[len(OBSERVED) :] &= telling[len(OBSERVED) :]
-    emulator = Emulator.fit(values, summaries, looked, name=observed.name)
+        is_informative = informative(values, summaries, is_shown, name=observed.name)
+        is_shown[len(OBSERVED) :] &= is_informative[len(OBSERVED) :]
+    emulator = Emulator.fit(values, summaries, is_shown, name=observed.name)
     responses = {}
-    for made, readings in own:
+    for pair, readings in effect_readings:
         count = readings.shape[1]
         projection = Projection(speed=observed.speed[:count], changes=changes)
         with_it = projection.of(readings).reshape(len(readings), -1)
-        without = projection.of(base[made.places][:, :count]).reshape(len(readings), -1)
-        paired = {name: v[made.places] for name, v in values.items()}
-        response = responded(emulator, made.effect, made.strengths, paired, with_it, without)
+        without = projection.of(base[pair.places][:, :count]).reshape(len(readings), -1)
+        paired = {name: v[pair.places] for name, v in values.items()}
+        response = responded(emulator, pair.effect, pair.strengths, paired, with_it, without)
         if response is not None:
-            responses[made.effect.name] = response
+            responses[pair.effect.name] = response
     return Sight(
         emulator=emulator,
         azimuth=design.azimuth,
@@ -209,7 +218,7 @@ def sight(
 
 
 def part_of(observed: Observed, windows: slice) -> Observed:
-    """Some windows of a recording, of which means alone are taken."""
+    """Selects some windows of a recording, of which means alone are taken."""
     return _Part(
         name=observed.name,
         source=observed.source,
@@ -238,17 +247,17 @@ class _Part(Observed):
 
 
 def of_recordings(
-    sights: Sequence[Sight], recordings: Sequence[Observed], weighed: tuple[float, float] | None
+    sights: Sequence[Sight], recordings: Sequence[Observed], scale_weight: tuple[float, float] | None
 ) -> Experiments:
-    """The recordings as the one experiment that they are.
+    """Takes the recordings as the one experiment that they are.
 
     Args:
-        weighed: mean and standard deviation of a stated area weight [kg/m²].
+        scale_weight: mean and standard deviation of a stated area weight [kg/m²].
     """
-    summaries = tuple(own.summary[None, one.used] for one, own in zip(sights, recordings, strict=True))
-    if weighed is None:
+    summaries = tuple(recording.summary[None, model.used] for model, recording in zip(sights, recordings, strict=True))
+    if scale_weight is None:
         return Experiments(summaries=summaries)
-    mean, sigma = weighed
+    mean, sigma = scale_weight
     return Experiments(summaries=summaries, stated=np.array([mean]), sigma=sigma / mean)
 
 
@@ -256,65 +265,69 @@ def of_nulls(
     sights: Sequence[Sight],
     recordings: Sequence[Observed],
     simulations: Simulations,
-    weighed: tuple[float, float] | None,
+    scale_weight: tuple[float, float] | None,
     *,
     seed: int,
 ) -> tuple[Experiments, IntArray]:
-    """Null experiments with errors of pixels and of the scale, those that show all, and their kinds of numerics. Their
-    meshes are about as coarse as the fit's, and are as far from a finer one."""
-    found = []
-    for one, own, seen, correction in zip(sights, recordings, simulations.nulls, simulations.corrections, strict=True):
-        summaries = own.projection.of(seen)
+    """Assembles null experiments with errors of pixels and of the scale, those that show all, and their kinds of
+    numerics. Their meshes are about as coarse as the fit's, and are as far from a finer one."""
+    parts = []
+    for model, recording, readings, correction in zip(
+        sights, recordings, simulations.nulls, simulations.corrections, strict=True
+    ):
+        summaries = recording.projection.of(readings)
         summaries = (
             summaries
             + correction.mean[: summaries.shape[1]]
-            + own.pixels(len(seen), seed=child_seed(seed, "films", "nulls"))
+            + recording.pixels(len(readings), seed=child_seed(seed, "films", "nulls"))
         )
-        found.append(summaries.reshape(len(seen), -1)[:, one.used])
-    whole = np.all([np.isfinite(own).all(axis=1) for own in found], axis=0)
-    made = Experiments(summaries=tuple(own[whole] for own in found))
-    return _weighed(made, simulations.weights, whole, weighed, seed=seed, what="scale"), simulations.kinds[whole]
+        parts.append(summaries.reshape(len(readings), -1)[:, model.used])
+    complete = np.all([np.isfinite(part).all(axis=1) for part in parts], axis=0)
+    experiments = Experiments(summaries=tuple(part[complete] for part in parts))
+    return _weighed(
+        experiments, simulations.weights, complete, scale_weight, seed=seed, stream_name="scale"
+    ), simulations.kinds[complete]
 
 
 def of_base(
     sights: Sequence[Sight],
     recordings: Sequence[Observed],
     simulations: Simulations,
-    weighed: tuple[float, float] | None,
+    scale_weight: tuple[float, float] | None,
     *,
     seed: int,
 ) -> Experiments:
-    """The base model's simulations with errors of numerics, of pixels and of the scale, those that show all. A cloth is
-    the same in all recordings."""
-    found = [
-        with_errors(own, base, correction, seed=design.seed)[:, one.used]
-        for one, own, base, design, correction in zip(
+    """Assembles the base model's simulations with errors of numerics, of pixels and of the scale, those that show all.
+    A cloth is the same in all recordings."""
+    parts = [
+        with_errors(recording, base, correction, seed=design.seed)[:, model.used]
+        for model, recording, base, design, correction in zip(
             sights, recordings, simulations.base, simulations.designs, simulations.corrections, strict=True
         )
     ]
-    whole = np.all([np.isfinite(own).all(axis=1) for own in found], axis=0)
-    made = Experiments(summaries=tuple(own[whole] for own in found))
+    complete = np.all([np.isfinite(part).all(axis=1) for part in parts], axis=0)
+    experiments = Experiments(summaries=tuple(part[complete] for part in parts))
     weights = simulations.designs[0].values()["area_weight"]
-    return _weighed(made, weights, whole, weighed, seed=seed, what="scale of the base model")
+    return _weighed(experiments, weights, complete, scale_weight, seed=seed, stream_name="scale of the base model")
 
 
 def _weighed(
-    made: Experiments,
+    experiments: Experiments,
     weights: FloatArray,
     which: BoolArray,
-    weighed: tuple[float, float] | None,
+    scale_weight: tuple[float, float] | None,
     *,
     seed: int,
-    what: str,
+    stream_name: str,
 ) -> Experiments:
-    """Experiments with their area weights as a scale reads them that is as good as the one of the recordings' cloth.
+    """Gives experiments area weights as a scale reads them that is as good as the one of the recordings' cloth.
 
     Args:
         weights: (n,) of all that were simulated [kg/m²].
         which: (n,) of them the experiments are of.
     """
-    if weighed is None:
-        return made
-    share = weighed[1] / weighed[0]
-    read = weights * np.exp(share * stream(seed, "films", what).standard_normal(len(weights)))
-    return replace(made, stated=read[which], sigma=share)
+    if scale_weight is None:
+        return experiments
+    share = scale_weight[1] / scale_weight[0]
+    read = weights * np.exp(share * stream(seed, "films", stream_name).standard_normal(len(weights)))
+    return replace(experiments, stated=read[which], sigma=share)

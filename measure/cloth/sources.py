@@ -36,7 +36,7 @@ _LOST = 0.2
 
 
 def is_table(source: str) -> bool:
-    """Whether a source is a file of a table of observables, not a recording."""
+    """Returns whether a source is a file of a table of observables, not a recording."""
     path = Path(source)
     return path.suffix.lower() in _TABLES and path.is_file()
 
@@ -62,7 +62,7 @@ class Part:
 
     @classmethod
     def of(cls, film: ConditionedFilm, log: Log, *, source: str, first: float = 0.0, last: float | None = None) -> Part:
-        """From `first` to `last` [s], `LONGEST` at most.
+        """Takes the film from `first` to `last` [s], `LONGEST` at most.
 
         Raises:
             InputError: it is too short, or the log does not cover it.
@@ -81,7 +81,7 @@ class Part:
         return self.end - self.first
 
     def read(self, size: FlagSize, *, advance: Callable[[int], object] | None = None) -> Observed:
-        """What its windows show.
+        """Reads what its windows show.
 
         Args:
             advance: called with the number of windows that were read.
@@ -90,9 +90,11 @@ class Part:
             RefusedError: no flag is found, or the camera moves and cannot be steadied.
         """
         film, first = self.film, self.first
-        seen = watched(film, size, first=first, last=self.end, advance=advance)
+        film_windows = watched(film, size, first=first, last=self.end, advance=advance)
         findings = (*self.findings, *film.findings())
-        if lost := [one for one in findings if one.kind == "camera-lost" and (one.value or 0.0) > _LOST]:
+        if lost := [
+            finding for finding in findings if finding.kind == "camera-lost" and (finding.value or 0.0) > _LOST
+        ]:
             raise RefusedError(
                 f"the camera may move, and cannot be followed: {lost[0].what}",
                 where=film.name,
@@ -101,17 +103,17 @@ class Part:
         nothing = [math.nan] * len(OBSERVED)
         readings = [
             nothing if window is None else [OBSERVABLES[name].of_film(window).value for name in OBSERVED]
-            for window in seen.windows
+            for window in film_windows.windows
         ]
         return Observed(
             name=film.name,
             source=self.source,
             first=first,
             readings=np.array(readings),
-            log=self.log.cut(first, first + len(readings) * seen.seconds),
+            log=self.log.cut(first, first + len(readings) * film_windows.seconds),
             sigma=np.array([OBSERVABLES[name].sigma for name in OBSERVED]),
             findings=findings,
-            excerpt=Excerpt.of(seen.windows),
+            excerpt=Excerpt.of(film_windows.windows),
         )
 
 
@@ -134,10 +136,10 @@ class Opened:
     @property
     def duration(self) -> float:
         """[s]."""
-        return sum(one.duration for one in self.rows) if self.part is None else self.part.duration
+        return sum(row.duration for row in self.rows) if self.part is None else self.part.duration
 
     def read(self, size: FlagSize, *, advance: Callable[[int], object] | None = None) -> tuple[Observed, ...]:
-        """Its recordings; as `Part.read`."""
+        """Reads its recordings; as `Part.read`."""
         return self.rows if self.part is None else (self.part.read(size, advance=advance),)
 
 
@@ -170,26 +172,29 @@ class Sources:
 
     @classmethod
     def of(cls, sources: Sequence[S], opening: Callable[[S], Opened], *, name: Callable[[S], str]) -> Sources:
-        """Open sources and add up how long they are; as `usable`.
+        """Opens sources and adds up how long they are; as `usable`.
 
         Raises:
             InputError: all of them together are too short.
             RefusedError: none of several can be used.
         """
-        found, left_out = usable(sources, opening, name=name)
-        check_in_all(found, left_out=left_out)
-        return cls(opened=tuple(found), left_out=left_out)
+        usable_sources, left_out = usable(sources, opening, name=name)
+        check_in_all(usable_sources, left_out=left_out)
+        return cls(opened=tuple(usable_sources), left_out=left_out)
 
     def read(self, size: FlagSize, *, advance: Callable[[int], object] | None = None) -> Gathered:
-        """Read them, and leave out what cannot be used; as `Opened.read`."""
+        """Reads them, and leaves out what cannot be used; as `Opened.read`."""
 
-        def one(source: Opened) -> tuple[Opened, tuple[Observed, ...]]:
+        def source_rows(source: Opened) -> tuple[Opened, tuple[Observed, ...]]:
             return source, source.read(size, advance=advance)
 
-        found, unread = usable(self.opened, one, name=lambda own: own.name)
-        recordings, left_out = tuple(each for _, own in found for each in own), (*self.left_out, *unread)
+        read_sources, unread = usable(self.opened, source_rows, name=lambda source: source.name)
+        recordings, left_out = (
+            tuple(recording for _, rows in read_sources for recording in rows),
+            (*self.left_out, *unread),
+        )
         check_in_all(recordings, left_out=left_out)
-        parents = dict.fromkeys(source.parent for source, _ in found if source.parent is not None)
+        parents = dict.fromkeys(source.parent for source, _ in read_sources if source.parent is not None)
         return Gathered(recordings=recordings, parents=tuple(parents), left_out=left_out)
 
 
@@ -205,7 +210,7 @@ def opened(
     log: str | None = None,
     offset: Stated | None = None,
 ) -> Opened:
-    """A table or a recording of a lake from `first` to `last` [s], before pictures are read.
+    """Opens a table or a recording of a lake from `first` to `last` [s], before pictures are read.
 
     Args:
         reading: how a film is read.
@@ -246,25 +251,25 @@ def _of_table(
     log: str | None,
     offset: Stated | None,
 ) -> tuple[tuple[Observed, ...], str | None]:
-    beside, parent = None, None
+    wind_log, parent = None, None
     if log is not None:
         if lake is None:
             raise UsageError("a log of no lake", where="--log", fix="name the lake that it was ingested into: --lake")
-        beside, parent = joined(path, size, lake=lake, log=log, at=at, offset=offset)
+        wind_log, parent = joined(path, size, lake=lake, log=log, at=at, offset=offset)
     elif offset is not None:
         raise UsageError(
             "an offset without a log", where="--clock-offset", fix="name the log: --log ARTIFACT --lake LAKE"
         )
-    found = of_table(path, size, beside=beside)
-    if found[0].place is None:
-        return tuple(cut(one, first, last) for one in found), parent
+    recordings = of_table(path, size, wind_log=wind_log)
+    if recordings[0].place is None:
+        return tuple(cut(recording, first, last) for recording in recordings), parent
     if first > 0 or last is not None:
         raise UsageError("rows against wind have no times", where="--start, --end", fix="leave out the rows themselves")
-    return found, parent
+    return recordings, parent
 
 
 def part_of(subject: Subject, *, first: float, last: float | None) -> Part:
-    """The part of a film whose recording holds a log, from `first` to `last` [s].
+    """Returns the part of a film whose recording holds a log, from `first` to `last` [s].
 
     Raises:
         InputError: no log beside it, or one that does not cover the film; too short a part.
@@ -287,7 +292,7 @@ _DESCRIPTIONS = (".toml", ".json")
 def films_among(
     sources: Sequence[str], *, lake: Lake | None, at: str, sized: bool = False, tracked: bool = False
 ) -> tuple[str, ...]:
-    """Those that are films or tables of observables, not markers and meshes.
+    """Selects those that are films or tables of observables, not markers and meshes.
 
     Args:
         sized: whether a flag's size is given, which films need: then what cannot be found was meant as one, if nothing
@@ -297,14 +302,14 @@ def films_among(
     Raises:
         FlagdataError: a table that cannot be read.
     """
-    found = {source: is_film(source, lake=lake, at=at) for source in sources}
-    if sized and not tracked and not any(found.values()):
-        found = {source: is_film(source, lake=lake, at=at, otherwise=True) for source in sources}
-    return tuple(source for source, own in found.items() if own)
+    by_source = {source: is_film(source, lake=lake, at=at) for source in sources}
+    if sized and not tracked and not any(by_source.values()):
+        by_source = {source: is_film(source, lake=lake, at=at, otherwise=True) for source in sources}
+    return tuple(source for source, film in by_source.items() if film)
 
 
 def is_film(source: str, *, lake: Lake | None, at: str, otherwise: bool = False) -> bool:
-    """Whether a source is a film, a recording or clip of a lake, or a table of observables.
+    """Returns whether a source is a film, a recording or clip of a lake, or a table of observables.
 
     Args:
         otherwise: the answer for what is neither a file nor an artifact.

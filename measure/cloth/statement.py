@@ -24,91 +24,93 @@ def stated(
     verdict: Verdict,
     recordings: Sequence[Observed],
     *,
-    weighed: bool,
+    has_weight: bool,
     unseen: tuple[str, ...],
     departing: tuple[Departure, ...],
 ) -> Verdict:
-    """The verdict with all that it says in sentences.
+    """Returns the verdict with all that it says in sentences.
 
     Args:
-        weighed: whether the cloth's area weight was stated.
+        has_weight: whether the cloth's area weight was stated.
         unseen: effects that these recordings would not show.
         departing: what departs from the base model.
     """
     return replace(
         verdict,
         words=lead(verdict),
-        assumptions=assumptions(recordings, weighed=weighed, unseen=unseen),
+        assumptions=assumptions(recordings, has_weight=has_weight, unseen=unseen),
         proposal=missing(departing) if verdict.conclusion not in NOT_REJECTED else "",
-        separating=separating(verdict, weighed=weighed),
+        separating=separating(verdict, has_weight=has_weight),
     )
 
 
-def separating(verdict: Verdict, *, weighed: bool) -> str:
-    """What would decide between several effects.
+def separating(verdict: Verdict, *, has_weight: bool) -> str:
+    """Says what would decide between several effects.
 
     Args:
-        weighed: whether the cloth's area weight was stated.
+        has_weight: whether the cloth's area weight was stated.
     """
     if verdict.conclusion is not Conclusion.ONE_OF:
         return ""
-    return f"a recording in another wind, or {'more minutes of it' if weighed else 'the cloth weighed (--area-weight)'}"
+    return (
+        f"a recording in another wind, or {'more minutes of it' if has_weight else 'the cloth weighed (--area-weight)'}"
+    )
 
 
 def missing(departing: Sequence[Departure]) -> str:
-    """The size of what the base model lacks."""
+    """Says how large is what the base model lacks."""
     if not departing:
         return ""
     parts = []
-    for one in departing[:_MOST]:
-        unit = OBSERVABLES[one.observable].unit
-        sign = "+" if one.off > 0 else ""
+    for departure in departing[:_MOST]:
+        unit = OBSERVABLES[departure.observable].unit
+        sign = "+" if departure.off > 0 else ""
         parts.append(
-            f"{one.observable} {sign}{number(one.off, digits=2)}{'' if unit == '1' else f' {unit}'} "
-            f"({one.recording}; {number(abs(one.deviations), digits=2)} standard deviations of replicates)"
+            f"{departure.observable} {sign}{number(departure.off, digits=2)}{'' if unit == '1' else f' {unit}'} "
+            f"({departure.recording}; {number(abs(departure.deviations), digits=2)} standard deviations of replicates)"
         )
     return f"What the base model as calibrated does not show, observed less predicted: {', '.join(parts)}."
 
 
-def assumptions(recordings: Sequence[Observed], *, weighed: bool, unseen: tuple[str, ...]) -> tuple[str, ...]:
-    """What was taken as given."""
+def assumptions(recordings: Sequence[Observed], *, has_weight: bool, unseen: tuple[str, ...]) -> tuple[str, ...]:
+    """Lists what was taken as given."""
     steady = bool(constant_wind(recordings))
-    made = [
+    sentences = [
         "the flag has the stated size and is held as stated, and the camera is where it is stated to be",
         "area weight, bending and damping are calibrated, so that what only changes them is not an effect",
     ]
-    if not weighed:
-        made.append(
+    if not has_weight:
+        sentences.append(
             "the cloth was not weighed: its weight, the air's density and drag, holes in the cloth, wetness and the "
             "anemometer's gain act alike in a film, so that none of them is found beyond what is assumed of them"
         )
     if steady:
-        made.append(
+        sentences.append(
             "the wind hardly changes: a film in one steady wind shows only the ratio of the air's pressure to the "
             "cloth's weight"
         )
     if unseen:
-        made.append(
+        sentences.append(
             f"even where they are strong, {listed(unseen)} would move what these recordings show by less than two "
             "standard errors beyond what another cloth or view does: they are not excluded"
         )
-    made.append("a wind that is turned from its log looks like another place of the camera, and is not weighed")
-    return tuple(made)
+    sentences.append("a wind that is turned from its log looks like another place of the camera, and is not weighed")
+    return tuple(sentences)
 
 
 _RUNNERS_UP = 3
 
 
 def words(verdict: Verdict) -> str:
-    """The verdict, its test, the errors before and after, what else was weighed and what was assumed; lines of at most
-    100 characters, without a final line break."""
+    """Returns the verdict, its test, the errors before and after, what else was weighed and what was assumed; lines of
+    at most 100 characters, without a final line break."""
     return "\n".join(
         line for label, text in _items(verdict) for line in (item(label, text) if label else wrapped(text))
     )
 
 
 def probability_of(candidate: Candidate) -> str:
-    """The evidence for an effect: `probability 0.97, log Bayes factor 12.3 nat`."""
+    """Phrases the evidence for an effect: `probability 0.97, log Bayes factor 12.3 nat`."""
     return (
         f"probability {share(candidate.probability)}, given that one effect is missing; logarithm of the Bayes factor "
         f"against the base model {number(candidate.gain)} nat; p = {probability(candidate.leftover)} for what remains"
@@ -116,7 +118,7 @@ def probability_of(candidate: Candidate) -> str:
 
 
 def error_text(comparison: Comparison, after: str) -> str:
-    """`error 0.12 rad → 0.02 rad with lift; scatter of replicates 0.015 rad`."""
+    """Phrases errors: `error 0.12 rad → 0.02 rad with lift; scatter of replicates 0.015 rad`."""
     parts = [f"error {estimate_text(comparison.before)}"]
     if known(comparison.after):
         parts[0] += f" → {estimate_text(comparison.after)} {after}"
@@ -158,5 +160,5 @@ def _items(verdict: Verdict) -> Iterator[tuple[str, str]]:
 
 
 def level_of(verdict: Verdict) -> str:
-    """Of the intervals of errors."""
+    """Returns the level of the intervals of errors."""
     return level_text(verdict.comparisons[0].before.level) if verdict.comparisons else ""

@@ -50,7 +50,7 @@ def joined(
     offset: Stated | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> tuple[Beside, str]:
-    """The log of a lake beside a table, and its artifact's id.
+    """Returns the log of a lake beside a table, and its artifact's id.
 
     Args:
         log: a wind artifact by its id, a unique prefix or its name.
@@ -83,7 +83,7 @@ def joined(
 
 
 def declared(table: Columns, offset: Stated, *, names: tuple[str, str]) -> ClockModel:
-    """The table's clock on the log's, by an offset that is given.
+    """Returns the table's clock on the log's, by an offset that is given.
 
     Args:
         names: of the log and the table.
@@ -108,7 +108,7 @@ def estimated(
     search: LagSearch | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> ClockModel:
-    """The table's clock on the log's, by what follows the wind in it.
+    """Estimates the table's clock on the log's, by what follows the wind in it.
 
     Args:
         names: of the log and the table.
@@ -121,11 +121,11 @@ def estimated(
     """
     search = search or LagSearch()
     values = follows(table)
-    there = np.isfinite(values)
+    finite = np.isfinite(values)
     motion = WindSeries(
-        time=instants(table)[there],
-        channels={"wind_speed": values[there]},
-        flags=np.zeros(int(there.sum()), dtype=np.uint16),
+        time=instants(table)[finite],
+        channels={"wind_speed": values[finite]},
+        flags=np.zeros(int(finite.sum()), dtype=np.uint16),
         # A row's time is the middle of its span: nothing precedes it.
         sensor=Sensor(name=names[1], averaging=0.0, distance_constant=0.0),
     )
@@ -147,23 +147,25 @@ def estimated(
         ) from error
     segments = tuple(
         replace(
-            one, offset=one.offset + search.response, sigma_offset=math.hypot(one.sigma_offset, search.response_sigma)
+            segment,
+            offset=segment.offset + search.response,
+            sigma_offset=math.hypot(segment.sigma_offset, search.response_sigma),
         )
-        for one in model.segments
+        for segment in model.segments
     )
     return replace(model, segments=segments)
 
 
 def follows(table: Columns) -> FloatArray:
-    """(n,) of the column that follows the wind most closely, from 0 up.
+    """Returns the column that follows the wind most closely, from 0 up: (n,).
 
     Raises:
         InputError: none does.
     """
     for name in _FOLLOWS:
         if name in table and np.isfinite(table[name]).any():
-            own = math.pi / 2 - table[name] if name == "droop" else table[name]
-            return np.asarray(own - min(0.0, float(np.nanmin(own))), dtype=np.float64)
+            signal = math.pi / 2 - table[name] if name == "droop" else table[name]
+            return np.asarray(signal - min(0.0, float(np.nanmin(signal))), dtype=np.float64)
     raise InputError(
         f"no observable that follows the wind: {', '.join(_FOLLOWS)}",
         where=table.where,

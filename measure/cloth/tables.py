@@ -73,12 +73,12 @@ class Columns:
         return self.values[name]
 
     def of(self, name: str) -> FloatArray:
-        """(n,) of a column, NaN throughout where the table has none."""
+        """Returns a column (n,), NaN throughout where the table has none."""
         return self.values.get(name, np.full(len(self.lines), math.nan))
 
 
 def read_table(path: Path, size: FlagSize) -> Columns:
-    """A table, Parquet or text with a heading, its columns separated by commas, semicolons or tabs.
+    """Reads a table, Parquet or text with a heading, its columns separated by commas, semicolons or tabs.
 
     A heading is a name, perhaps with a unit behind it: `droop`, `droop [deg]`, `droop (°)`. The unit is the
     observable's own where none is stated. What is counted in lengths or heights of the flag may be stated in a length.
@@ -93,7 +93,7 @@ def read_table(path: Path, size: FlagSize) -> Columns:
     check_input(path, limit=_LIMIT)
     where = str(path)
     headings, rows = _cells(path)
-    wanted = [(place, *_parsed(text)) for place, text in enumerate(headings) if not _named(text).endswith(_REASON)]
+    wanted = [(column, *_parsed(text)) for column, text in enumerate(headings) if not _named(text).endswith(_REASON)]
     names = [name for _, name, _ in wanted]
     known_columns(names, where=where)
     if twice := sorted({name for name in names if names.count(name) > 1}):
@@ -101,18 +101,18 @@ def read_table(path: Path, size: FlagSize) -> Columns:
     lines = tuple(number for number, _ in rows)
     values: dict[str, FloatArray] = {}
     origin = 0
-    for place, name, stated in wanted:
-        scale = _scale(name, stated, size, where=where)
-        cells = [row[place].strip() if place < len(row) else "" for _, row in rows]
+    for column, name, stated_unit in wanted:
+        scale = _scale(name, stated_unit, size, where=where)
+        cells = [row[column].strip() if column < len(row) else "" for _, row in rows]
         if name == TIME:
             instants = _converted(cells, lines, name, where, partial(_instant, scale=scale))
             if None in instants or not instants:
                 raise InputError("rows without a time", where=where, fix="leave them out, or fill their times in")
             origin = instants[0] or 0
-            values[name] = np.array([((one or 0) - origin) / NANOSECONDS for one in instants])
+            values[name] = np.array([((instant or 0) - origin) / NANOSECONDS for instant in instants])
         else:
             numbers = _converted(cells, lines, name, where, float)
-            values[name] = np.array([math.nan if one is None else one * scale for one in numbers])
+            values[name] = np.array([math.nan if number is None else number * scale for number in numbers])
     return Columns(where=where, values=values, origin=origin, lines=lines)
 
 
@@ -120,12 +120,12 @@ def known_columns(names: Sequence[str], *, where: str) -> None:
     """Raises:
     InputError: a name that no column of a table of observables has.
     """
-    known = [*_UNITS, *OBSERVABLES, *(f"{name}{SIGMA}" for name in OBSERVABLES)]
-    if unknown := [name for name in names if name not in known]:
+    accepted = [*_UNITS, *OBSERVABLES, *(f"{name}{SIGMA}" for name in OBSERVABLES)]
+    if unknown := [name for name in names if name not in accepted]:
         raise InputError(
             f"columns {', '.join(unknown)} are not known",
             where=where,
-            fix=f"keep, and name, these: {', '.join(known)}; a unit stands behind a name, as in droop [deg]",
+            fix=f"keep, and name, these: {', '.join(accepted)}; a unit stands behind a name, as in droop [deg]",
         )
 
 
@@ -136,7 +136,7 @@ def column_names(path: Path) -> set[str]:
         import pyarrow.parquet as pq
 
         try:
-            return {_named(one) for one in pq.read_schema(path).names}
+            return {_named(heading) for heading in pq.read_schema(path).names}
         except pa.ArrowException:
             return set()
     try:
@@ -146,7 +146,7 @@ def column_names(path: Path) -> set[str]:
 
 
 def _named(heading: str) -> str:
-    """The name in a heading, as the table of observables spells names."""
+    """Returns the name in a heading, as the table of observables spells names."""
     match = _HEADING.fullmatch(heading.strip())
     return re.sub(r"[\s_]+", "-", (match["name"] if match else heading).strip().lower())
 
@@ -154,29 +154,31 @@ def _named(heading: str) -> str:
 def _parsed(heading: str) -> tuple[str, str | None]:
     """Name and unit of a heading."""
     match = _HEADING.fullmatch(heading.strip())
-    stated = None if match is None else match["bracketed"] or match["after"]
-    return _named(heading), stated.strip() if stated else None
+    stated_unit = None if match is None else match["bracketed"] or match["after"]
+    return _named(heading), stated_unit.strip() if stated_unit else None
 
 
-def _scale(name: str, stated: str | None, size: FlagSize, *, where: str) -> float:
-    """What a column's numbers are multiplied by.
+def _scale(name: str, stated_unit: str | None, size: FlagSize, *, where: str) -> float:
+    """Returns what a column's numbers are multiplied by.
 
     Raises:
         InputError: a unit of something else than the column is of.
         UnknownNameError: no unit.
     """
     about = None if name in _UNITS else OBSERVABLES[name.removesuffix(SIGMA)]
-    own = _UNITS[name] if about is None else about.unit
-    if stated is None or stated == own:
+    column_unit = _UNITS[name] if about is None else about.unit
+    if stated_unit is None or stated_unit == column_unit:
         return 1.0
-    found = unit(stated, where=f"{where}, column {name}")
-    if found.si == own:
-        return found.scale
-    if about is not None and found.si == about.measured_in:
-        return found.scale / (size.length if about.counted_in == "length" else size.height)
+    parsed_unit = unit(stated_unit, where=f"{where}, column {name}")
+    if parsed_unit.si == column_unit:
+        return parsed_unit.scale
+    if about is not None and parsed_unit.si == about.measured_in:
+        return parsed_unit.scale / (size.length if about.counted_in == "length" else size.height)
     also = "" if about is None or about.measured_in is None else f" or {about.measured_in}"
     raise InputError(
-        f"the unit {spelled(stated) or stated} of {name}, which is in {own}", where=where, fix=f"give {own}{also}"
+        f"the unit {spelled(stated_unit) or stated_unit} of {name}, which is in {column_unit}",
+        where=where,
+        fix=f"give {column_unit}{also}",
     )
 
 
@@ -195,8 +197,10 @@ def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
             raise InputError(f"no Parquet table: {error}", where=str(path), fix="name a table") from None
         headings = []
         for field in table.schema:
-            stated = (field.metadata or {}).get(b"unit", b"").decode()
-            headings.append(f"{field.name} [{stated}]" if stated and _parsed(field.name)[1] is None else field.name)
+            stated_unit = (field.metadata or {}).get(b"unit", b"").decode()
+            headings.append(
+                f"{field.name} [{stated_unit}]" if stated_unit and _parsed(field.name)[1] is None else field.name
+            )
         columns = [["" if cell is None else str(cell) for cell in column.to_pylist()] for column in table.columns]
         rows = enumerate(map(list, zip(*columns, strict=True)), start=2)
         return headings, [(line, row) for line, row in rows if any(cell.strip() for cell in row)]
@@ -207,24 +211,24 @@ def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
 def _converted(
     cells: Sequence[str], lines: Sequence[int], name: str, where: str, convert: Callable[[str], _Value]
 ) -> list[_Value | None]:
-    """Each cell, `None` where it is blank.
+    """Converts each cell, `None` where it is blank.
 
     Raises:
         InputError: a cell that is no number.
     """
-    found: list[_Value | None] = []
+    values: list[_Value | None] = []
     for line, cell in zip(lines, cells, strict=True):
         try:
-            found.append(convert(cell) if cell else None)
+            values.append(convert(cell) if cell else None)
         except ValueError:
             raise InputError(
                 f"{cell!r} is no number", where=f"{where}, line {line}, column {name}", fix="correct the cell"
             ) from None
-    return found
+    return values
 
 
 def _instant(cell: str, *, scale: float) -> int:
-    """The instant of a UTC stamp, or so many times `scale` seconds [ns].
+    """Returns the instant of a UTC stamp, or so many times `scale` seconds [ns].
 
     Raises:
         ValueError: neither.
@@ -258,22 +262,22 @@ class Beside:
     clock: ClockModel
 
 
-def of_table(path: Path, size: FlagSize, *, beside: Beside | None = None) -> tuple[Observed, ...]:
-    """The recordings of a table: one of rows against time, one a row of rows against wind.
+def of_table(path: Path, size: FlagSize, *, wind_log: Beside | None = None) -> tuple[Observed, ...]:
+    """Reads the recordings of a table: one of rows against time, one a row of rows against wind.
 
     Args:
         size: of the flag.
-        beside: the log, where the table has no wind.
+        wind_log: the log, where the table has no wind.
 
     Raises:
         InputError: no such table, or one whose columns do not say what its rows are of.
         FlagdataError: a file that cannot be read.
     """
-    return of_columns(read_table(path, size), name=path.stem, identity=file_hash(path), beside=beside)
+    return of_columns(read_table(path, size), name=path.stem, identity=file_hash(path), wind_log=wind_log)
 
 
-def of_columns(table: Columns, *, name: str, identity: str, beside: Beside | None) -> tuple[Observed, ...]:
-    """The recordings of a table whose columns were read; as `of_table`.
+def of_columns(table: Columns, *, name: str, identity: str, wind_log: Beside | None) -> tuple[Observed, ...]:
+    """Takes the recordings of a table whose columns were read; as `of_table`.
 
     Args:
         name: of the table.
@@ -282,22 +286,24 @@ def of_columns(table: Columns, *, name: str, identity: str, beside: Beside | Non
     Raises:
         InputError: as `of_table`.
     """
-    if not any(one in table for one in OBSERVED):
+    if not any(observable in table for observable in OBSERVED):
         raise InputError("no column is an observable", where=table.where, fix=f"name one of {', '.join(OBSERVED)}")
-    if (WIND in table) == (beside is not None):
-        what = "no column wind" if beside is None else "a column wind, and a log of the wind beside it"
-        raise InputError(what, where=table.where, fix="give the wind in the table or as a log (--log), in one of them")
+    if (WIND in table) == (wind_log is not None):
+        sentence = "no column wind" if wind_log is None else "a column wind, and a log of the wind beside it"
+        raise InputError(
+            sentence, where=table.where, fix="give the wind in the table or as a log (--log), in one of them"
+        )
     if TIME not in table:
-        if beside is not None:
+        if wind_log is not None:
             raise InputError("no column time to join the log by", where=table.where, fix="add the rows' times")
         return _against_wind(table, name=name, identity=identity)
-    if extra := [one for one in (DURATION, COUNT) if one in table]:
+    if extra := [column for column in (DURATION, COUNT) if column in table]:
         raise InputError(f"columns {TIME} and {', '.join(extra)}", where=table.where, fix="keep one of them")
-    return (_against_time(table, name=name, identity=identity, beside=beside),)
+    return (_against_time(table, name=name, identity=identity, wind_log=wind_log),)
 
 
 def rows_of(path: Path, size: FlagSize) -> Columns:
-    """A table of rows against time, for what joins it to a log.
+    """Reads a table of rows against time, for what joins it to a log.
 
     Raises:
         InputError: as `of_table`; no times, or times that do not ascend.
@@ -310,7 +316,7 @@ def rows_of(path: Path, size: FlagSize) -> Columns:
 
 
 def spacing(table: Columns) -> float:
-    """The usual time between rows [s].
+    """Returns the usual time between rows [s].
 
     Raises:
         InputError: fewer than four rows, or times that do not ascend.
@@ -328,11 +334,11 @@ def spacing(table: Columns) -> float:
 
 
 def instants(table: Columns) -> Instants:
-    """(n,) of its rows on its own clock [UTC ns]."""
+    """Returns the instants of its rows on its own clock, (n,) [UTC ns]."""
     return table.origin + np.round(table[TIME] * NANOSECONDS).astype(np.int64)
 
 
-def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | None) -> Observed:
+def _against_time(table: Columns, *, name: str, identity: str, wind_log: Beside | None) -> Observed:
     step = spacing(table)
     times = table[TIME]
     begin = float(times[0]) - step / 2
@@ -340,18 +346,22 @@ def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | 
     low = np.maximum(times - step / 2, np.concatenate([[begin], middles]))
     high = np.minimum(times + step / 2, np.concatenate([middles, [times[-1] + step / 2]]))
     edges: FloatArray = begin + WINDOW * np.arange(int((float(high[-1]) - begin) / WINDOW + 1e-6) + 1, dtype=np.float64)
-    if beside is None:
-        there = np.isfinite(table[WIND])
-        if there.sum() < _FEWEST_ROWS:
+    if wind_log is None:
+        finite = np.isfinite(table[WIND])
+        if finite.sum() < _FEWEST_ROWS:
             raise InputError("no wind", where=table.where, fix="fill the column in, or give a log beside the table")
-        log = Log(times=times[there] - begin, speed=table[WIND][there], averaging=step)
+        log = Log(times=times[finite] - begin, speed=table[WIND][finite], averaging=step)
     else:
         start = instants(table)[:1] - round(step / 2 * NANOSECONDS)
-        common, sigma = int(beside.clock.to_common(start)[0]), float(beside.clock.sigma(start)[0])
-        log = Log.of(beside.series, start=common, clock=sigma)
+        common, sigma = int(wind_log.clock.to_common(start)[0]), float(wind_log.clock.sigma(start)[0])
+        log = Log.of(wind_log.series, start=common, clock=sigma)
         identity = f"{identity}, its clock {(common - int(start[0])) / NANOSECONDS:+.3f} ± {sigma:.3f} s"
     readings = np.stack(
-        [_windows(edges, low, high, table.of(one), quadratic=OBSERVABLES[one].quadratic) for one in OBSERVED], axis=1
+        [
+            _windows(edges, low, high, table.of(observable), quadratic=OBSERVABLES[observable].quadratic)
+            for observable in OBSERVED
+        ],
+        axis=1,
     )
     return Observed(
         name=name,
@@ -359,32 +369,32 @@ def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | 
         readings=readings,
         log=log,
         findings=_of_rows(table, step),
-        sigma=np.array([_mean(table.of(f"{one}{SIGMA}")) for one in OBSERVED]),
+        sigma=np.array([_mean(table.of(f"{observable}{SIGMA}")) for observable in OBSERVED]),
     )
 
 
 def _windows(
     edges: FloatArray, low: FloatArray, high: FloatArray, values: FloatArray, *, quadratic: bool
 ) -> FloatArray:
-    """(window,) means of values (n,) that hold from `low` to `high`; NaN where they cover too little."""
-    there = np.isfinite(values)
-    if not there.any():
+    """Computes means (window,) of values (n,) that hold from `low` to `high`; NaN where they cover too little."""
+    finite = np.isfinite(values)
+    if not finite.any():
         return np.full(len(edges) - 1, np.nan)
-    low, high, held = low[there], high[there], np.square(values[there]) if quadratic else values[there]
+    low, high, levels = low[finite], high[finite], np.square(values[finite]) if quadratic else values[finite]
     places = np.stack([low, high], axis=1).ravel()
 
     def between(height: FloatArray) -> FloatArray:
-        """Integral of a step function over each window."""
+        """Integrates a step function over each window."""
         total = np.concatenate([[0.0], np.cumsum(height * (high - low))])
         return np.diff(np.interp(edges, places, np.repeat(total, 2)[1:-1]))
 
-    covered, found = between(np.ones_like(held)), between(held)
-    mean = np.where(covered >= _COVERED * WINDOW, found / np.maximum(covered, 1e-9), np.nan)
+    covered, integral = between(np.ones_like(levels)), between(levels)
+    mean = np.where(covered >= _COVERED * WINDOW, integral / np.maximum(covered, 1e-9), np.nan)
     return np.sqrt(np.maximum(mean, 0.0)) if quadratic else mean
 
 
 def _against_wind(table: Columns, *, name: str, identity: str) -> tuple[Observed, ...]:
-    lengths = [one for one in (DURATION, COUNT) if one in table]
+    lengths = [column for column in (DURATION, COUNT) if column in table]
     if len(lengths) != 1:
         raise InputError(
             f"rows against wind with {'both columns' if lengths else 'no column'} {DURATION} and {COUNT}",
@@ -393,10 +403,10 @@ def _against_wind(table: Columns, *, name: str, identity: str) -> tuple[Observed
             f"against time have a column {TIME}",
         )
     windows = table[lengths[0]] / (WINDOW if lengths[0] == DURATION else 1.0)
-    for line, wind, own in zip(table.lines, table[WIND].tolist(), windows.tolist(), strict=True):
-        if not (wind > 0 and own >= LEAST_WINDOWS - 1e-6):
+    for line, wind, row_windows in zip(table.lines, table[WIND].tolist(), windows.tolist(), strict=True):
+        if not (wind > 0 and row_windows >= LEAST_WINDOWS - 1e-6):
             raise InputError(
-                f"a row of {own * WINDOW:g} s in a wind of {wind:g} m/s",
+                f"a row of {row_windows * WINDOW:g} s in a wind of {wind:g} m/s",
                 where=f"{table.where}, line {line}",
                 fix=f"leave out rows in still air or of less than {LEAST_WINDOWS * WINDOW:g} s",
             )
@@ -410,27 +420,28 @@ def _against_wind(table: Columns, *, name: str, identity: str) -> tuple[Observed
                 name=f"{name}, {wind:g} m/s (line {line})",
                 source=f"{identity}, line {line}",
                 place=identity,
-                readings=np.tile([table.of(one)[row] for one in OBSERVED], (count, 1)),
+                readings=np.tile([table.of(observable)[row] for observable in OBSERVED], (count, 1)),
                 log=Log(times=steady, speed=np.full(len(steady), wind), distance=0.0, averaging=WINDOW),
-                sigma=np.array([_mean(table.of(f"{one}{SIGMA}")[row : row + 1]) for one in OBSERVED]),
+                sigma=np.array([_mean(table.of(f"{observable}{SIGMA}")[row : row + 1]) for observable in OBSERVED]),
             )
         )
     return tuple(recordings)
 
 
 def _mean(values: FloatArray) -> float:
-    """Of what is stated; 0 where nothing is."""
+    """Averages what is stated; 0 where nothing is."""
     return float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
 
 
 def _of_rows(table: Columns, step: float) -> tuple[Finding, ...]:
-    """What rows that come faster than a spectrum takes are reported with."""
-    own = [name for name in OBSERVED if name in table and (OBSERVABLES[name].quadratic or name == "frequency")]
-    if step >= _SHORT or not own:
+    """Reports rows that come faster than a spectrum takes."""
+    affected = [name for name in OBSERVED if name in table and (OBSERVABLES[name].quadratic or name == "frequency")]
+    if step >= _SHORT or not affected:
         return ()
-    what = (
-        f"its rows come every {step:.2g} s: their {', '.join(own)} are taken as of spans of {WINDOW:g} s, over which "
+    sentence = (
+        f"its rows come every {step:.2g} s: their {', '.join(affected)} are taken as of spans of {WINDOW:g} s, over "
+        "which "
         "the tracker has to have formed them"
     )
     fix = "check the length of the tracker's own window; give rows of 2.5 s where it is shorter"
-    return (Finding.of("short-rows", what, fix=fix),)
+    return (Finding.of("short-rows", sentence, fix=fix),)

@@ -62,7 +62,7 @@ def compared(
     *,
     effect: Weighable | None,
     control: Weighable | None,
-    weighed: tuple[float, float] | None = None,
+    scale_weight: tuple[float, float] | None = None,
     seed: int,
 ) -> tuple[Comparison, ...]:
     """Comparisons for each observable: on other halves, and on recordings left out.
@@ -71,142 +71,155 @@ def compared(
         sights: of whole recordings.
         effect: that is named; None for none.
         control: the best wrong effect; None for none.
-        weighed: mean and standard deviation of a stated area weight [kg/m²].
+        scale_weight: mean and standard deviation of a stated area weight [kg/m²].
     """
-    found: list[Comparison] = []
+    comparisons: list[Comparison] = []
     for words, tasks in (
         ("other halves", _halves(recordings, simulations)),
         ("recordings left out", _left_out(recordings, sights)),
     ):
         predictions = [
-            one
+            prediction
             for task in tasks
-            for one in _predicted(task, effect=effect, control=control, weighed=weighed, seed=seed)
+            for prediction in _predicted(task, effect=effect, control=control, scale_weight=scale_weight, seed=seed)
         ]
-        for place, name in enumerate(OBSERVED):
-            own = [one for one in predictions if math.isfinite(one.observed[place] + one.before[place])]
-            if own:
-                found.append(_comparison(f"{name}, {words}", name, place, own, control, seed=seed))
-    return tuple(found)
+        for index, name in enumerate(OBSERVED):
+            usable_predictions = [
+                prediction
+                for prediction in predictions
+                if math.isfinite(prediction.observed[index] + prediction.before[index])
+            ]
+            if usable_predictions:
+                comparisons.append(_comparison(f"{name}, {words}", name, index, usable_predictions, control, seed=seed))
+    return tuple(comparisons)
 
 
 def _halves(recordings: Sequence[Observed], simulations: Simulations) -> list[_Task]:
-    """One half of each recording fitted and the other predicted, both ways; none where `halved` gives none."""
+    """Fits one half of each recording and predicts the other, both ways; none where `halved` gives none."""
     return [
-        _Task(fitted=a, predicted=tuple((place, s, o) for place, (s, o) in enumerate(b)))
+        _Task(fitted=a, predicted=tuple((index, s, o) for index, (s, o) in enumerate(b)))
         for a, b in permutations(halved(recordings, simulations), 2)
     ]
 
 
 def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[tuple[tuple[Sight, Observed], ...], ...]:
-    """The models and windows of all first halves, and those of all second halves; nothing of recordings that are too
-    short, or that are rows of a table against wind, whose windows are the same."""
-    if min(len(one.readings) for one in recordings) < 2 * LEAST_WINDOWS or any(one.place for one in recordings):
+    """Returns the models and windows of all first halves, and those of all second halves; nothing of recordings that
+    are too short, or that are rows of a table against wind, whose windows are the same."""
+    if min(len(recording.readings) for recording in recordings) < 2 * LEAST_WINDOWS or any(
+        recording.place for recording in recordings
+    ):
         return ()
-    middles = [len(one.readings) // 2 for one in recordings]
+    middles = [len(recording.readings) // 2 for recording in recordings]
     sides = []
     for halves in ([slice(0, middle) for middle in middles], [slice(middle, None) for middle in middles]):
         models = sights_of(recordings, simulations, windows=halves)
-        parts = [part_of(one, windows) for one, windows in zip(recordings, halves, strict=True)]
+        parts = [part_of(recording, windows) for recording, windows in zip(recordings, halves, strict=True)]
         sides.append(tuple(zip(models, parts, strict=True)))
     return tuple(sides)
 
 
 def _left_out(recordings: Sequence[Observed], sights: Sequence[Sight]) -> list[_Task]:
-    """Each recording predicted by all others."""
-    both = list(zip(sights, recordings, strict=True))
-    if len(both) < 2:
+    """Predicts each recording by all others."""
+    pairs = list(zip(sights, recordings, strict=True))
+    if len(pairs) < 2:
         return []
     return [
-        _Task(fitted=(*both[:place], *both[place + 1 :]), predicted=((None, *both[place]),))
-        for place in range(len(both))
+        _Task(fitted=(*pairs[:index], *pairs[index + 1 :]), predicted=((None, *pairs[index]),))
+        for index in range(len(pairs))
     ]
 
 
 def _predicted(
-    task: _Task, *, effect: Weighable | None, control: Weighable | None, weighed: tuple[float, float] | None, seed: int
+    task: _Task,
+    *,
+    effect: Weighable | None,
+    control: Weighable | None,
+    scale_weight: tuple[float, float] | None,
+    seed: int,
 ) -> list[Prediction]:
-    sights = [one for one, _ in task.fitted]
-    seen = of_recordings(sights, [own for _, own in task.fitted], weighed)
+    sights = [sight for sight, _ in task.fitted]
+    experiments = of_recordings(sights, [recording for _, recording in task.fitted], scale_weight)
     rng = stream(seed, "films", "places")
 
     def means(which: Weighable | None) -> list[FloatArray]:
-        """(observable,) of each predicted sight."""
-        found = fitted(sights, seen, which, seed=seed)
-        own, places, strength = hypothesis(sights, which).values(found.scores[0])
-        made = []
-        for place, one, _ in task.predicted:
+        """Predicts (observable,) of each predicted sight."""
+        fit = fitted(sights, experiments, which, seed=seed)
+        cloth, places, strength = hypothesis(sights, which).values(fit.scores[0])
+        predictions = []
+        for index, sight, _ in task.predicted:
             values = (
-                places[place]
-                if place is not None
-                else {q.name: q.at(rng.random(len(found.weights[0]))) for q in one.quantities}
+                places[index]
+                if index is not None
+                else {q.name: q.at(rng.random(len(fit.weights[0]))) for q in sight.quantities}
             )
-            mean, _ = one.predict({**own, **values}, None if which is None else which.name, strength)
-            full = np.full(len(one.used), np.nan)
-            full[one.used] = found.weights[0] @ mean
-            made.append(full[: len(OBSERVED)])
-        return made
+            mean, _ = sight.predict({**cloth, **values}, None if which is None else which.name, strength)
+            full = np.full(len(sight.used), np.nan)
+            full[sight.used] = fit.weights[0] @ mean
+            predictions.append(full[: len(OBSERVED)])
+        return predictions
 
-    known = all(
-        one is None or all(one.name in s.responses for s in (*sights, *(p for _, p, _ in task.predicted)))
-        for one in (effect, control)
+    has_responses = all(
+        acting is None or all(acting.name in s.responses for s in (*sights, *(p for _, p, _ in task.predicted)))
+        for acting in (effect, control)
     )
     before = means(None)
-    after = means(effect) if effect is not None and known else None
-    wrong = means(control) if control is not None and known else None
+    after = means(effect) if effect is not None and has_responses else None
+    wrong = means(control) if control is not None and has_responses else None
     result = []
-    for number, (_, one, own) in enumerate(task.predicted):
-        scatter = np.full(len(one.used), np.nan)
-        scatter[one.used] = one.emulator.deviations
+    for number, (_, sight, recording) in enumerate(task.predicted):
+        scatter = np.full(len(sight.used), np.nan)
+        scatter[sight.used] = sight.emulator.deviations
         result.append(
             Prediction(
-                observed=own.summary[: len(OBSERVED)],
+                observed=recording.summary[: len(OBSERVED)],
                 before=before[number],
                 after=None if after is None else after[number],
                 control=None if wrong is None else wrong[number],
                 scatter=scatter[: len(OBSERVED)],
-                windows=len(own.readings),
+                windows=len(recording.readings),
             )
         )
     return result
 
 
 def _comparison(
-    words: str, name: str, place: int, own: Sequence[Prediction], control: Weighable | None, *, seed: int
+    words: str, name: str, index: int, predictions: Sequence[Prediction], control: Weighable | None, *, seed: int
 ) -> Comparison:
-    """Root mean squares over the predicted parts, with intervals by the scatter of replicates."""
+    """Compares root mean squares over the predicted parts, with intervals by the scatter of replicates."""
     unit = OBSERVABLES[name].unit
-    observed, scatter = (np.array([getattr(one, key)[place] for one in own]) for key in ("observed", "scatter"))
-    noise = scatter * stream(seed, "films", "unseen", words).standard_normal((_DRAWS, len(own)))
+    observed, scatter = (
+        np.array([getattr(prediction, key)[index] for prediction in predictions]) for key in ("observed", "scatter")
+    )
+    noise = scatter * stream(seed, "films", "unseen", words).standard_normal((_DRAWS, len(predictions)))
 
     def errors(predicted: Sequence[FloatArray]) -> tuple[float, FloatArray]:
-        off = observed - np.array([one[place] for one in predicted])
+        off = observed - np.array([row[index] for row in predicted])
         return float(np.sqrt(np.square(off).mean())), np.sqrt(np.square(off + noise).mean(axis=1))
 
-    before = errors([one.before for one in own])
-    with_effect = [one.after for one in own if one.after is not None]
-    with_control = [one.control for one in own if one.control is not None]
+    before = errors([prediction.before for prediction in predictions])
+    with_effect = [prediction.after for prediction in predictions if prediction.after is not None]
+    with_control = [prediction.control for prediction in predictions if prediction.control is not None]
     after, wrong = errors(with_effect) if with_effect else None, errors(with_control) if with_control else None
     floor = float(np.sqrt(np.square(scatter).mean()))
     reduction = None if after is None else (before[0] - after[0], before[1] - after[1])
-    stated = _estimate(before, unit)
+    before_estimate = _estimate(before, unit)
     return Comparison(
         what=words,
-        frames=sum(one.windows for one in own),
-        before=stated,
+        frames=sum(prediction.windows for prediction in predictions),
+        before=before_estimate,
         after=_estimate(after, unit),
         reduction=_estimate(reduction, unit),
         floor=Estimate(value=floor, low=floor, high=floor, unit=unit, level=CRITERIA.interval),
-        share=None if reduction is None or stated.low <= floor else reduction[0] / (before[0] - floor),
+        share=None if reduction is None or before_estimate.low <= floor else reduction[0] / (before[0] - floor),
         control=None if wrong is None else _estimate(wrong, unit),
         control_name="" if wrong is None or control is None else control.column.effect,
     )
 
 
-def _estimate(found: tuple[float, FloatArray] | None, unit: str) -> Estimate:
-    if found is None:
+def _estimate(value_and_draws: tuple[float, FloatArray] | None, unit: str) -> Estimate:
+    if value_and_draws is None:
         return Estimate(value=math.nan, low=math.nan, high=math.nan, unit=unit, level=CRITERIA.interval)
-    value, draws = found
+    value, draws = value_and_draws
     tails = [(1 - CRITERIA.interval) / 2, (1 + CRITERIA.interval) / 2]
     low, high = np.quantile(draws, tails).tolist()
     return Estimate(value=value, low=min(low, value), high=max(high, value), unit=unit, level=CRITERIA.interval)

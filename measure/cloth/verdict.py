@@ -54,7 +54,7 @@ def close_loop(
     workers: int = 1,
     stage: Stage | None = None,
 ) -> Verdict:
-    """The verdict on recordings of one flag.
+    """Judges recordings of one flag.
 
     Args:
         recordings: each cut to what is to be used; in different winds they say most.
@@ -72,24 +72,24 @@ def close_loop(
 
 
 def verdict_of(outcome: SolvedLoop) -> Verdict:
-    """The verdict in numbers and sentences."""
-    judged, options = outcome.judged, outcome.options
+    """Returns the verdict in numbers and sentences."""
+    judgement, options = outcome.judged, outcome.options
     effects = outcome.weighing.effects
-    named = tuple(dict.fromkeys(effects[place].column.effect for place in judged.named))
-    acting = outcome.best if judged.named else None
-    others = [place for place in np.argsort(-judged.probability) if place not in judged.confident]
+    effects_named = tuple(dict.fromkeys(effects[index].column.effect for index in judgement.named))
+    acting = outcome.best if judgement.named else None
+    alternatives = [index for index in np.argsort(-judgement.probability) if index not in judgement.confident]
     comparisons = compared(
         outcome.recordings,
         outcome.simulations,
         outcome.sights,
         effect=None if acting is None else acting[0],
-        control=effects[others[0]] if others and acting is not None else None,
-        weighed=options.area_weight,
+        control=effects[alternatives[0]] if alternatives and acting is not None else None,
+        scale_weight=options.area_weight,
         seed=options.calibration.seed,
     )
     verdict = Verdict(
-        conclusion=judged.conclusion,
-        named=named,
+        conclusion=judgement.conclusion,
+        named=effects_named,
         words="",
         test=_test(outcome),
         parameters=_parameters(outcome),
@@ -103,18 +103,20 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
             "options": options.recipe(),
         },
         power=_power(outcome),
-        open=judged.open,
+        open=judgement.open,
         findings=tuple((f.kind, f.what) for f in outcome.findings if f.severity is not Severity.NOTE),
     )
     unseen = [
-        one.column.effect for one, errors in zip(effects, outcome.sensitivity.tolist(), strict=True) if errors < SEEN
+        effect.column.effect
+        for effect, errors in zip(effects, outcome.sensitivity.tolist(), strict=True)
+        if errors < SEEN
     ]
     return stated(
         verdict,
         outcome.recordings,
-        weighed=options.area_weight is not None,
+        has_weight=options.area_weight is not None,
         unseen=tuple(dict.fromkeys(unseen)),
-        departing=tuple(one for one in outcome.departures if abs(one.deviations) >= SEEN),
+        departing=tuple(departure for departure in outcome.departures if abs(departure.deviations) >= SEEN),
     )
 
 
@@ -141,43 +143,43 @@ def _test(outcome: SolvedLoop) -> NullTest:
 
 
 def _power(outcome: SolvedLoop) -> tuple[Power, ...]:
-    """Of each effect, the surest first."""
+    """Returns the power of the test against each effect, the surest first."""
     effects, power = outcome.weighing.effects, outcome.judged.scored.power
     return tuple(
         Power(
-            effect=effects[place].column.effect,
-            parameter=effects[place].column.parameter,
-            strength=expected(outcome.sights, effects[place]),
-            unit=effects[place].column.unit,
-            share=float(power[place]),
+            effect=effects[index].column.effect,
+            parameter=effects[index].column.parameter,
+            strength=expected(outcome.sights, effects[index]),
+            unit=effects[index].column.unit,
+            share=float(power[index]),
         )
-        for place in np.argsort(-power, kind="stable").tolist()
+        for index in np.argsort(-power, kind="stable").tolist()
     )
 
 
 def _parameters(outcome: SolvedLoop) -> tuple[Parameter, ...]:
-    """Area weight, bending and damping, of the base model and with the effect."""
+    """Returns area weight, bending and damping, of the base model and with the effect."""
     before = _cloths(outcome, None, outcome.base)
     after = None
     if outcome.judged.named and outcome.best is not None:
         after = _cloths(outcome, *outcome.best)
-    made = []
-    for place, one in enumerate(CLOTH):
-        later = None if after is None else after[place]
-        made.append(
+    parameters = []
+    for index, quantity in enumerate(CLOTH):
+        later = None if after is None else after[index]
+        parameters.append(
             Parameter(
-                name=one.name,
-                before=before[place][0],
+                name=quantity.name,
+                before=before[index][0],
                 after=None if later is None else later[0],
-                shift=None if later is None else (later[0].value - before[place][0].value) / before[place][1],
+                shift=None if later is None else (later[0].value - before[index][0].value) / before[index][1],
             )
         )
-    return tuple(made)
+    return tuple(parameters)
 
 
 def _cloths(outcome: SolvedLoop, effect: Weighable | None, fit: Fit) -> list[tuple[Estimate, float]]:
-    own, _, _ = hypothesis(outcome.sights, effect).values(fit.scores[0])
-    return [_marginal(own[one.name], fit.weights[0], one.unit) for one in CLOTH]
+    cloth, _, _ = hypothesis(outcome.sights, effect).values(fit.scores[0])
+    return [_marginal(cloth[quantity.name], fit.weights[0], quantity.unit) for quantity in CLOTH]
 
 
 def _marginal(values: FloatArray, weights: FloatArray, unit: str) -> tuple[Estimate, float]:
@@ -189,97 +191,101 @@ def _marginal(values: FloatArray, weights: FloatArray, unit: str) -> tuple[Estim
 
 
 def strength_of(effect: Weighable, fit: Fit) -> Estimate:
-    """A strength, its interval widened by what meshes and cloths do to effects, as on trajectories; a bound where the
-    posterior leans on an end of what is assumed of it (`measure.ends`)."""
+    """Returns a strength, its interval widened by what meshes and cloths do to effects, as on trajectories; a bound
+    where the posterior leans on an end of what is assumed of it (`measure.ends`)."""
     shares = ndtr(fit.scores[0][:, -1])  # the last coordinate
-    strengths, whole = effect.prior.at(shares), float(np.exp(CRITERIA.reach * CRITERIA.strength_factor))
-    found, _ = _marginal(strengths, fit.weights[0], effect.column.unit)
-    if (bound := _bound(effect, strengths, shares, fit.weights[0], whole=whole)) is not None:
+    strengths, factor = effect.prior.at(shares), float(np.exp(CRITERIA.reach * CRITERIA.strength_factor))
+    estimate, _ = _marginal(strengths, fit.weights[0], effect.column.unit)
+    if (bound := _bound(effect, strengths, shares, fit.weights[0], factor=factor)) is not None:
         return bound
-    value, size, null = found.value, abs(found.value), effect.column.described.null
-    inward, outward = size * (1 - 1 / whole), size * (whole - 1)
+    value, size, null = estimate.value, abs(estimate.value), effect.column.described.null
+    inward, outward = size * (1 - 1 / factor), size * (factor - 1)
     below, above = (inward, outward) if value > 0 else (outward, inward)
     return Estimate(
         value=null + value,
-        low=null + value - float(np.hypot(below, value - found.low)),
-        high=null + value + float(np.hypot(above, found.high - value)),
-        unit=found.unit,
-        level=found.level,
+        low=null + value - float(np.hypot(below, value - estimate.low)),
+        high=null + value + float(np.hypot(above, estimate.high - value)),
+        unit=estimate.unit,
+        level=estimate.level,
     )
 
 
 def _bound(
-    effect: Weighable, strengths: FloatArray, shares: FloatArray, weights: FloatArray, *, whole: float
+    effect: Weighable, strengths: FloatArray, shares: FloatArray, weights: FloatArray, *, factor: float
 ) -> Estimate | None:
-    """A strength that is known on one side only; None of one with two ends.
+    """Returns a strength that is known on one side only; None where it has two ends.
 
     Args:
         strengths, shares: (n,) of it beyond null, and their places in its prior, of importance samples.
         weights: (n,) of them, of sum 1.
-        whole: factor by which a strength may be off.
+        factor: factor by which a strength may be off.
     """
     even = (np.arange(_EVEN) + 0.5) / _EVEN
     drawn = np.minimum(np.searchsorted(np.cumsum(weights), even), len(weights) - 1)
-    found = span(
+    interval = span(
         strengths[drawn],
         shares[drawn],
         level=CRITERIA.interval,
         limits=(0.0, np.inf) if effect.low > 0 else (-np.inf, np.inf),
         assumed=(effect.low, effect.high),
     )
-    if found.bound is None:
+    if interval.bound is None:
         return None
-    least = found.bound is Bound.LEAST
-    end = found.high if found.bound is Bound.MOST else found.low if least else float(np.median(strengths[drawn]))
+    least = interval.bound is Bound.LEAST
+    end = (
+        interval.high if interval.bound is Bound.MOST else interval.low if least else float(np.median(strengths[drawn]))
+    )
     # A bound gives way by the factor: upwards where it is one from above, and towards zero where it holds a size.
-    wider = end / whole if (end > 0) == least else end * whole
+    wider = end / factor if (end > 0) == least else end * factor
     null = effect.column.described.null
-    ends = {Bound.LEAST: (wider, found.high), Bound.MOST: (found.low, wider)}.get(found.bound, (found.low, found.high))
+    ends = {Bound.LEAST: (wider, interval.high), Bound.MOST: (interval.low, wider)}.get(
+        interval.bound, (interval.low, interval.high)
+    )
     return Estimate(
-        value=null + (end if found.bound is Bound.NOTHING else wider),
+        value=null + (end if interval.bound is Bound.NOTHING else wider),
         low=null + ends[0],
         high=null + ends[1],
         unit=effect.column.unit,
-        level=found.level,
-        bound=found.bound.value,
+        level=interval.level,
+        bound=interval.bound.value,
     )
 
 
 def _ranking(outcome: SolvedLoop) -> tuple[Candidate, ...]:
-    judged, own = outcome.judged, outcome.weighing
-    seen = of_recordings(outcome.sights, outcome.recordings, outcome.options.area_weight)
-    made = []
-    for place in np.argsort(-judged.probability).tolist():
-        effect = own.effects[place]
-        fit = fitted(outcome.sights, seen, effect, seed=outcome.options.calibration.seed)
-        made.append(
+    judgement, weighing = outcome.judged, outcome.weighing
+    observed = of_recordings(outcome.sights, outcome.recordings, outcome.options.area_weight)
+    candidates = []
+    for index in np.argsort(-judgement.probability).tolist():
+        effect = weighing.effects[index]
+        fit = fitted(outcome.sights, observed, effect, seed=outcome.options.calibration.seed)
+        candidates.append(
             Candidate(
                 effect=effect.column.effect,
                 parameter=effect.column.parameter,
                 strength=strength_of(effect, fit),
-                z=float(judged.scored.z[place]),
-                p_value=float(judged.scored.alone[place]),
-                p_family=float(judged.scored.family[place]),
-                gain=float(own.factors[0, place]),
+                z=float(judgement.scored.z[index]),
+                p_value=float(judgement.scored.alone[index]),
+                p_family=float(judgement.scored.family[index]),
+                gain=float(weighing.factors[0, index]),
                 gain_error=float("nan"),
                 behind=0.0,
-                leftover=float(judged.leftover[place]),
+                leftover=float(judgement.leftover[index]),
                 null=effect.column.described.null,
-                probability=float(judged.probability[place]),
-                why_not=_why_not(outcome, place),
+                probability=float(judgement.probability[index]),
+                why_not=_why_not(outcome, index),
             )
         )
-    return tuple(made)
+    return tuple(candidates)
 
 
-def _why_not(outcome: SolvedLoop, place: int) -> str:
-    judged = outcome.judged
-    if place in judged.named:
+def _why_not(outcome: SolvedLoop, index: int) -> str:
+    judgement = outcome.judged
+    if index in judgement.named:
         return ""
-    if judged.conclusion in NOT_REJECTED:
+    if judgement.conclusion in NOT_REJECTED:
         return "the base model is not rejected"
-    if judged.leftover[place] <= outcome.options.level:
+    if judgement.leftover[index] <= outcome.options.level:
         return "what remains with it is larger than in null experiments"
-    if place in judged.confident:
+    if index in judgement.confident:
         return "another effect explains more"
-    return f"its probability is {judged.probability[place]:.1g}, given that one effect is missing"
+    return f"its probability is {judgement.probability[index]:.1g}, given that one effect is missing"

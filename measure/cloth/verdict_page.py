@@ -77,54 +77,57 @@ class SideBySide:
     columns: tuple[Moving, ...]
 
 
-def side_by_side(outcome: SolvedLoop, place: int, *, after: str) -> SideBySide | None:
-    """A recording's window beside what was simulated; None without a film, or where it is too short for halves.
+def side_by_side(outcome: SolvedLoop, index: int, *, after: str) -> SideBySide | None:
+    """Draws a recording's window beside what was simulated; None without a film, or where it is too short for halves.
 
     Args:
-        place: of the recording.
+        index: of the recording.
         after: what the model with the effect is called; empty where no effect is named.
     """
-    observed = outcome.recordings[place]
+    observed = outcome.recordings[index]
     excerpt, halves = observed.excerpt, halved(outcome.recordings, outcome.simulations)
     if excerpt is None or not halves:
         return None
     sights = [sight for sight, _ in halves[0]]
-    seen = of_recordings(sights, [half for _, half in halves[0]], outcome.options.area_weight)
+    experiments = of_recordings(sights, [half for _, half in halves[0]], outcome.options.area_weight)
     film = excerpt.window
     instants = np.arange(round(WINDOW * RATE)) / RATE
-    shown = [
+    panels = [
         _moving("the film", [film.frames[np.abs(film.times - film.times[0] - at).argmin()] for at in instants.tolist()])
     ]
     models: list[tuple[str, Weighable | None, tuple[int, int, int]]] = [("base model", None, _BEFORE_RGB)]
     if after and outcome.best is not None:
         models.append((after, outcome.best[0], _AFTER_RGB))
     for label, effect, colour in models:
-        own = hypothesis(sights, effect)
-        fit = fitted(sights, seen, effect, seed=outcome.options.calibration.seed)
-        cloth, places, strength = own.values(fit.weights[:1] @ fit.scores[0])
-        window, depth = _flown(outcome, place, excerpt.number, {**cloth, **places[place]}, effect, strength)
-        shown.append(_moving(label, drawn(window, depth, film, colour)))
+        model = hypothesis(sights, effect)
+        fit = fitted(sights, experiments, effect, seed=outcome.options.calibration.seed)
+        cloth, places, strength = model.values(fit.weights[:1] @ fit.scores[0])
+        window, depth = _flown(outcome, index, excerpt.number, {**cloth, **places[index]}, effect, strength)
+        panels.append(_moving(label, drawn(window, depth, film, colour)))
     return SideBySide(
-        start=observed.first + excerpt.number * WINDOW, wind=float(observed.speed[excerpt.number]), columns=tuple(shown)
+        start=observed.first + excerpt.number * WINDOW,
+        wind=float(observed.speed[excerpt.number]),
+        columns=tuple(panels),
     )
 
 
 def _flown(
     outcome: SolvedLoop,
-    place: int,
+    index: int,
     number: int,
     values: dict[str, FloatArray],
     effect: Weighable | None,
     strength: FloatArray | None,
 ) -> tuple[ClothWindow, FloatArray]:
-    """One flag in the wind of a window, as its place sees it, and how far away (frame, vertex) its cloth is [m].
+    """Simulates one flag in the wind of a window, as its place sees it; also how far away (frame, vertex) its cloth is
+    [m].
 
     Args:
         values: name → (1,) of the cloth, the place and the anemometer's gain; what is not among them is at the middle
             of its prior.
     """
-    design = outcome.simulations.designs[place]
-    middle = {one.name: one.at(np.array([0.5])) for one in design.quantities()}
+    design = outcome.simulations.designs[index]
+    middle = {quantity.name: quantity.at(np.array([0.5])) for quantity in design.quantities()}
     if design.log.distance is not None:
         middle["distance_constant"] = np.array([design.log.distance])
     values = middle | values
@@ -134,7 +137,7 @@ def _flown(
         flag=design.flag,
         log=replace(design.log.cut(start, start + WINDOW), clock=0.0),
         duration=WINDOW,
-        values={name: own for name, own in values.items() if name not in ("azimuth", "elevation")},
+        values={name: column for name, column in values.items() if name not in ("azimuth", "elevation")},
         places=np.array([[[view.azimuth, view.elevation, view.distance]]]),
         seeds=(child_seed(design.seed, "films", "side by side", number),),
         effects=() if effect is None or strength is None else ((effect.column, strength),),
@@ -174,7 +177,7 @@ def drawn(cloth: ClothWindow, depth: FloatArray, film: FilmWindow, colour: tuple
     bright = 0.45 + 0.55 * np.clip(area / np.quantile(area, 0.95), 0.0, 1.0)
     behind = depth[:, cloth.faces].mean(axis=2)
     pole = round(float(hoist[0]))
-    made = []
+    pictures = []
     for frame, order in enumerate(np.argsort(-behind, axis=1)):
         picture = np.full((_SIDE, _SIDE, 3), _PAPER, np.uint8)
         top = round(float(places[frame, cloth.hoist, 1].min() - 0.1 * scale * cloth.height))
@@ -182,8 +185,8 @@ def drawn(cloth: ClothWindow, depth: FloatArray, film: FilmWindow, colour: tuple
         for face in order:
             shade = tuple(int(part * bright[frame, face]) for part in colour)
             cv2.fillConvexPoly(picture, fixed[frame, cloth.faces[face]], shade, shift=_SUBPIXEL)
-        made.append(picture)
-    return made
+        pictures.append(picture)
+    return pictures
 
 
 def _moving(label: str, frames: Sequence[UInt8Array]) -> Moving:
@@ -196,7 +199,7 @@ _BEFORE, _AFTER, _DOT = "#b4531a", "#1f6f9c", "#444444"
 
 
 def verdict_page(verdict: Verdict, outcome: SolvedLoop) -> str:
-    """The page, HTML."""
+    """Renders the page, HTML."""
     after = sentences.after_label(verdict) if verdict.named else ""
     values = {
         "verdict": verdict,
@@ -213,13 +216,13 @@ def verdict_page(verdict: Verdict, outcome: SolvedLoop) -> str:
         "title": lambda c: sentences.candidate_title(verdict, c),
         "recordings": [
             {
-                "name": one.name,
-                "windows": len(one.readings),
-                "wind": f"{one.speed.mean():.1f}",
-                "picture": _against_wind(outcome, place, named=bool(verdict.named)),
-                "beside": side_by_side(outcome, place, after=after),
+                "name": recording.name,
+                "windows": len(recording.readings),
+                "wind": f"{recording.speed.mean():.1f}",
+                "picture": _against_wind(outcome, index, with_effect=bool(verdict.named)),
+                "beside": side_by_side(outcome, index, after=after),
             }
-            for place, one in enumerate(outcome.recordings)
+            for index, recording in enumerate(outcome.recordings)
         ],
         "provenance": [
             (name, value if isinstance(value, str) else json.dumps(value))
@@ -240,7 +243,7 @@ def bands(
     *,
     seed: int,
 ) -> FloatArray:
-    """(3, window, observable) lower end, middle and upper end of what a model of the posterior shows in the windows'
+    """Computes low end, middle and high end (3, window, observable) of what a posterior's model shows in the windows'
     winds, without the scatter among windows; NaN of observables that are not used. A change with the wind that is not
     used is drawn as none.
 
@@ -251,37 +254,37 @@ def bands(
     rng = stream(seed, "films", "bands")
     rows = rng.choice(len(weights), _DRAWS, p=weights / weights.sum())
     mean, stretch = sight.predict(
-        {name: own[rows] for name, own in values.items()},
+        {name: column[rows] for name, column in values.items()},
         None if effect is None else effect.name,
         None if strength is None else strength[rows],
     )
     mean = mean + (rng.standard_normal(mean.shape) @ sight.emulator.factor.T) * np.sqrt(stretch)[:, None]
-    whole = np.full((_DRAWS, len(sight.used)), np.nan)
-    whole[:, len(OBSERVED) :] = 0.0  # changes that nothing predicts are none
-    whole[:, sight.used] = mean
-    windows = observed.projection.at(whole.reshape(_DRAWS, -1, len(OBSERVED)))
+    summaries = np.full((_DRAWS, len(sight.used)), np.nan)
+    summaries[:, len(OBSERVED) :] = 0.0  # changes that nothing predicts are none
+    summaries[:, sight.used] = mean
+    windows = observed.projection.at(summaries.reshape(_DRAWS, -1, len(OBSERVED)))
     tail = (1 - CRITERIA.interval) / 2
     return np.asarray(np.quantile(windows, [tail, 0.5, 1 - tail], axis=0))
 
 
-def _against_wind(outcome: SolvedLoop, place: int, *, named: bool) -> str:
-    """Each observable of a recording's windows against the wind, with both models' bands."""
-    one, sight = outcome.recordings[place], outcome.sights[place]
-    both: list[tuple[Weighable | None, Fit, str]] = [(None, outcome.base, _BEFORE)]
-    if named and outcome.best is not None:
-        both.append((*outcome.best, _AFTER))
+def _against_wind(outcome: SolvedLoop, index: int, *, with_effect: bool) -> str:
+    """Draws each observable of a recording's windows against the wind, with both models' bands."""
+    recording, sight = outcome.recordings[index], outcome.sights[index]
+    models: list[tuple[Weighable | None, Fit, str]] = [(None, outcome.base, _BEFORE)]
+    if with_effect and outcome.best is not None:
+        models.append((*outcome.best, _AFTER))
     drawn = []
-    for effect, fit, colour in both:
+    for effect, fit, colour in models:
         cloth, places, strength = hypothesis(outcome.sights, effect).values(fit.scores[0])
-        found = bands(
+        limits = bands(
             sight,
-            one,
-            {**cloth, **places[place]},
+            recording,
+            {**cloth, **places[index]},
             fit.weights[0],
             effect,
             strength,
             seed=outcome.options.calibration.seed,
         )
-        drawn.append(Band(found=found, colour=colour))
+        drawn.append(Band(found=limits, colour=colour))
     names = [name for column, name in enumerate(OBSERVED) if np.isfinite(drawn[0].found[:, :, column]).all()]
-    return against_wind(one, names, drawn, dots=_DOT, opacity=0.25)
+    return against_wind(recording, names, drawn, dots=_DOT, opacity=0.25)

@@ -86,7 +86,7 @@ class Log:
 
     @classmethod
     def of(cls, series: WindSeries, *, start: int, clock: float = 0.0) -> Log:
-        """The usable samples of a recording's log.
+        """Takes the usable samples of a recording's log.
 
         Args:
             start: of the film [UTC ns].
@@ -116,7 +116,7 @@ class Log:
         )
 
     def cut(self, start: float, end: float) -> Log:
-        """The part of it that a film from `start` to `end` [s] needs, with its times since `start`.
+        """Cuts out the part that a film from `start` to `end` [s] needs, with its times since `start`.
 
         Raises:
             InputError: it does not cover the film.
@@ -129,8 +129,8 @@ class Log:
                 where="wind log",
                 fix="choose a part of the film that the log covers, with --start and --end",
             )
-        near = (self.times >= start - 60.0) & (self.times <= end + 2 * period)
-        inside = self.times[near]
+        is_inside = (self.times >= start - 60.0) & (self.times <= end + 2 * period)
+        inside = self.times[is_inside]
         widest = float(np.diff(inside).max())
         if widest > max(_LONGEST_GAP, 1.5 * period):
             raise InputError(
@@ -140,19 +140,20 @@ class Log:
             )
         return Log(
             times=inside - start,
-            speed=self.speed[near],
-            turn=None if self.turn is None else self.turn[near],
+            speed=self.speed[is_inside],
+            turn=None if self.turn is None else self.turn[is_inside],
             distance=self.distance,
             averaging=self.averaging,
             clock=self.clock,
         )
 
     def moved(self, late: float) -> Log:
-        """The same samples that much later [s]."""
+        """Moves the same samples that much later [s]."""
         return replace(self, times=self.times + late)
 
     def covers(self, starts: NDArray[np.floating], ends: NDArray[np.floating]) -> BoolArray:
-        """(k,) whether no silence of the log longer than two of its periods, or two seconds, is in a window [s]."""
+        """Returns whether no silence of the log longer than two of its periods, or two seconds, is in each window [s],
+        (k,)."""
         gaps = np.diff(self.times)
         silent = gaps > max(2.0 * float(np.median(gaps)), 2.0)
         begins, stops = self.times[:-1][silent], self.times[1:][silent]
@@ -160,20 +161,21 @@ class Log:
         return np.array(free) & (starts >= self.times[0]) & (ends <= self.times[-1])
 
     def unlagged(self) -> Log:
-        """The same with its instrument's lag undone; itself where that is not known."""
+        """Returns the same with its instrument's lag undone; itself where that is not known."""
         if not self.distance:
             return self
         speed = _undone(self.times, self.speed[:, None], lag=self.distance / float(self.speed.mean()))[:, 0]
         return replace(self, speed=np.maximum(speed, 0.0), distance=0.0)
 
     def velocity(self, distance: float) -> FloatArray:
-        """(n, 2) along the mean wind and to its left at `times`, a lag of that distance constant undone [m/s]."""
+        """Computes the wind (n, 2) along its mean and to the left of it at `times`, a lag of that distance constant
+        undone [m/s]."""
         turn = np.zeros_like(self.speed) if self.turn is None else self.turn
         parts = np.stack([self.speed * np.cos(turn), self.speed * np.sin(turn)], axis=1)
         return _undone(self.times, parts, lag=distance / float(self.speed.mean()))
 
     def mean_speed(self, starts: NDArray[np.floating], ends: NDArray[np.floating]) -> FloatArray:
-        """(k,) mean speed over windows [s], linear between samples [m/s]."""
+        """Computes mean speeds (k,) over windows [s], linear between samples [m/s]."""
         first, last = float(starts.min()), float(ends.max())
         grid = np.arange(0, round((last - first) * WIND_RATE) + 1) / WIND_RATE + first
         values = np.interp(grid, self.times, self.speed)
@@ -181,7 +183,7 @@ class Log:
 
 
 def blown(log: Log, *, before: float, duration: float, distance: float, eddies: float, seed: int) -> FloatArray:
-    """One wind that an anemometer would have logged so.
+    """Draws one wind that an anemometer would have logged so.
 
     Args:
         before: time before the film's start for which it is needed [s]; what the log lacks of it is mirrored.
@@ -195,38 +197,40 @@ def blown(log: Log, *, before: float, duration: float, distance: float, eddies: 
     """
     count = int(np.ceil((before + duration) * WIND_RATE)) + 2
     times = np.arange(count) / WIND_RATE - before
-    seen = log.velocity(distance)
+    logged_velocity = log.velocity(distance)
     mean = float(log.speed.mean())
-    intensity = float(np.clip(seen[:, 0].std() / mean, _LEAST, 0.5))
+    intensity = float(np.clip(logged_velocity[:, 0].std() / mean, _LEAST, 0.5))
     # From the log's own first sample on, so that the instrument's start in balance lies before what is used.
     first = min(float(log.times[0]), -before)
-    whole = np.arange(int(np.ceil((times[-1] - first) * WIND_RATE)) + 1) / WIND_RATE + first
+    fine_times = np.arange(int(np.ceil((times[-1] - first) * WIND_RATE)) + 1) / WIND_RATE + first
     rng = stream(seed, "calibrate", "turbulence")
     drawn = []
     for ratio, length in ((1.0, eddies), (LATERAL, eddies / 2), (VERTICAL, eddies / 2)):
         spectrum = VonKarman(mean=mean, intensity=intensity * ratio, length=length)
-        drawn.append(spectrum.series(rng, duration=len(whole) / WIND_RATE, rate=WIND_RATE)[: len(whole)] - mean)
+        drawn.append(
+            spectrum.series(rng, duration=len(fine_times) / WIND_RATE, rate=WIND_RATE)[: len(fine_times)] - mean
+        )
     turbulence = np.stack(drawn, axis=1)
-    known = 2 if log.turn is not None else 1
-    logged = _read(whole, mean + turbulence[:, :known], log, distance=distance) - mean
+    logged_axes = 2 if log.turn is not None else 1
+    logged = _read(fine_times, mean + turbulence[:, :logged_axes], log, distance=distance) - mean
     again = _undone(log.times, logged, lag=distance / mean)
     out = np.empty((count, 3))
     mirrored = np.abs(times - log.times[0]) + log.times[0]  # before the log begins it runs backwards
     for axis in range(3):
-        free = np.interp(times, whole, turbulence[:, axis])
-        if axis < known:
-            own = np.interp(mirrored, log.times, seen[:, axis])
+        free = np.interp(times, fine_times, turbulence[:, axis])
+        if axis < logged_axes:
+            mirrored_part = np.interp(mirrored, log.times, logged_velocity[:, axis])
             covered = times >= log.times[0]
-            free = np.where(covered, free - np.interp(times, log.times, again[:, axis]), 0.0) + own
+            free = np.where(covered, free - np.interp(times, log.times, again[:, axis]), 0.0) + mirrored_part
         out[:, axis] = free
-    if known == 1:  # a cup logs the horizontal speed, whatever the direction
+    if logged_axes == 1:  # a cup logs the horizontal speed, whatever the direction
         angle = np.arctan2(out[:, 1], mean)
         out[:, :2] = out[:, :1] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return out
 
 
 def _read(times: FloatArray, values: FloatArray, log: Log, *, distance: float) -> FloatArray:
-    """What the instrument of a log reads of winds (n, k) at the log's instants: (m, k)."""
+    """Returns what the instrument of a log reads of winds (n, k) at the log's instants: (m, k)."""
     lagged = AnemometerLag(distance=distance).read(torch.from_numpy(times), torch.from_numpy(values)).numpy()
     size = max(1, round(log.averaging * WIND_RATE))
     if size > 1:
