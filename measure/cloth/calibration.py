@@ -27,13 +27,16 @@ from measure.observables.observable import WINDOW
 ANSWER = 5
 """Raised when the same recordings and options get another answer."""
 DETERMINED = 0.8
-"""Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior."""
+"""Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior. Higher gives
+a value where the film says little; lower withholds more of them."""
 _FOLDS = 8
 _CHECKED = 48
-"""Simulations left out that are weighed to check the intervals."""
+"""Simulations left out that are weighed to check the intervals. More make the check of the intervals surer, and slower
+in proportion."""
 _UNLIKE = 0.01
 """Tail probability of a recording's summary among those that the answer predicts below which the weight is withheld: of
-recordings that are as the model has them one in a hundred."""
+recordings that are as the model has them one in a hundred. Higher withholds more weights of flags that are as the model
+has them."""
 _LOOK = (
     "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, --elevation and "
     "--distance; flagdata close-loop looks for what is missing"

@@ -30,7 +30,8 @@ from measure.cloth.prior import CLOTH, Uncertain
 from measure.refine.metamodel import Metamodel, least
 
 SHOWN_BY = 0.8
-"""Share of the simulations that are to show a summary that is used."""
+"""Share of the simulations that are to show a summary that is used. Higher drops summaries that some flags hide; lower
+leaves fewer complete simulations to fit to."""
 INFORMATIVE = 0.8
 """Error of a summary's emulator, as a share of the summary's spread, from which on it is left out of a weighing: what
 depends on nothing that is regressed on adds noise to the scatter's estimate, and nothing else."""
@@ -164,9 +165,11 @@ def _ends(quantity: Uncertain) -> tuple[float, float]:
 
 
 FEWEST_FREEDOM = 20
-"""Degrees of freedom below which recordings are taken as independent."""
+"""Degrees of freedom below which recordings are taken as independent. Higher does so more often, and leaves out how
+their residuals are correlated."""
 HEAVY = 10.0
-"""Most degrees of freedom of the t distribution: residuals of simulations have a kurtosis of 4, 3 + 6/(ν − 4)."""
+"""Most degrees of freedom of the t distribution: residuals of simulations have a kurtosis of 4, 3 + 6/(ν − 4). Fewer
+allow for larger residuals and widen the intervals; more approach a normal distribution."""
 TAKEN_APART = Finding.of(
     "recordings-taken-apart",
     "too few simulations for so many recordings: the cloth was taken as a different one in each, so that "

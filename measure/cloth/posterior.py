@@ -25,9 +25,10 @@ from measure.cloth.evidence import Hypothesis, hypothesis
 from measure.cloth.sight import Sight
 
 _STARTS = 4096
-"""Draws of the prior among which walkers start."""
+"""Draws of the prior among which walkers start. More start walkers nearer to a narrow posterior, and cost one
+prediction each."""
 _THIN = 10
-"""Steps between draws that are kept."""
+"""Steps between draws that are kept. Fewer keep draws that are correlated; more keep fewer of them."""
 _STRETCH = 2.0
 """Largest factor of a step, and the inverse of the least one (Goodman and Weare's a)."""
 

@@ -33,9 +33,10 @@ from measure.observables.film import FilmWindow
 from measure.observables.observable import WINDOW
 
 SHOWN = 0.6
-"""Share of the windows that are to show an observable."""
+"""Share of the windows that are to show an observable. Higher drops observables that some windows hide; lower lets a
+few windows stand for a recording."""
 LEAST_WINDOWS = 4
-"""Fewest windows of a recording: 10 s."""
+"""Fewest windows of a recording: 10 s. Fewer give means that one gust decides."""
 LEAST_IN_ALL = 8
 """Fewest windows of all recordings of a cloth together: 20 s."""
 

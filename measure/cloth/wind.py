@@ -28,11 +28,13 @@ from sim.effects.anemometer_lag import AnemometerLag
 from sim.wind.spectral import VonKarman
 
 WIND_RATE = 10.0
-"""Samples of the wind that blows in a simulation [Hz]; it is linear between them."""
+"""Samples of the wind that blows in a simulation [Hz]; it is linear between them. Higher fills in smaller eddies; lower
+smooths gusts that move a flag."""
 LATERAL, VERTICAL = 0.78, 0.52
 """Standard deviation across the wind and upwards over that along it, near the ground (ESDU 85020)."""
 _BIN = 1.0
-"""Shortest bin that the lag is undone on [s]: on shorter ones it would raise the log's noise."""
+"""Shortest bin that the lag is undone on [s]: on shorter ones it would raise the log's noise. Longer leaves more of the
+lag in."""
 _LEAST = 0.01
 """Least intensity of turbulence that is filled in: that of a tunnel."""
 STEADY = 0.05

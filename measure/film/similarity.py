@@ -170,7 +170,8 @@ class SizePrior:
 
 
 STRATA = 3
-"""Parts of equal probability that a distribution of sizes is cut into; the model looks at the middle of each."""
+"""Parts of equal probability that a distribution of sizes is cut into; the model looks at the middle of each. More
+follow the size's uncertainty better and take time in proportion."""
 LEAST_SHARE = 0.5
 """Share of the prior that the frame rate must admit."""
 RATE_SLACK = 0.95

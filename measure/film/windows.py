@@ -28,7 +28,8 @@ _BEYOND = 0.05
 """Share of the time between two frames by which an instant may lie beyond the film's last: stamps are rounded to
 milliseconds."""
 _FEWEST = 0.8
-"""Share of the network's frames that a window must have of its own, so that most of its pictures were taken."""
+"""Share of the network's frames that a window must have of its own, so that most of its pictures were taken. Lower lets
+interpolated pictures make up most of a window; higher drops windows with a few lost frames."""
 _LONGEST = 1.75
 """Longest time between two frames that is interpolated, in periods of the film or of the network's frames at the
 largest size considered, whichever is longer: a repeated frame at 30 Hz, but none that is missing at 25 Hz."""
