@@ -134,17 +134,17 @@ class Check:
 
     Attributes:
         count: of them.
-        held: of them, those whose area weight lies in its interval.
+        contained: of them, those whose area weight lies in its interval.
         error: median error of its value, as a share.
     """
 
     count: int
-    held: int
+    contained: int
     error: float
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
-        return {"count": self.count, "held": self.held, "median_error": self.error}
+        return {"count": self.count, "held": self.contained, "median_error": self.error}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,7 +156,7 @@ class Fitted:
         low, middle, high: (window, observable) of simulated flags of the posterior at the level, by the emulator.
         used: (observable,) those whose mean or slope the answer rests on.
         misfit: tail probability of its summary among those that the answer predicts.
-        apart: (2·observable,) summaries less those that the answer predicts, in their standard deviations.
+        deviations: (2·observable,) summaries less those that the answer predicts, in their standard deviations.
         failed: simulations that diverged or hardly show the flag.
     """
 
@@ -166,7 +166,7 @@ class Fitted:
     high: FloatArray
     used: BoolArray
     misfit: float
-    apart: FloatArray
+    deviations: FloatArray
     failed: int
 
     @property
@@ -175,9 +175,11 @@ class Fitted:
         if self.misfit >= _UNLIKE:
             return None
         names = [*OBSERVED, *(f"the change of {name} with the wind" for name in OBSERVED)]
-        order = np.argsort(-np.abs(np.nan_to_num(self.apart)))
+        order = np.argsort(-np.abs(np.nan_to_num(self.deviations)))
         departures = [
-            (names[column], float(self.apart[column])) for column in order.tolist() if abs(self.apart[column]) > _APART
+            (names[column], float(self.deviations[column]))
+            for column in order.tolist()
+            if abs(self.deviations[column]) > _APART
         ]
         if not departures:
             return "its observables together"
@@ -516,7 +518,7 @@ def checked(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Ch
         low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
         contained += int(((low <= truth) & (truth <= high)).sum())
         errors.extend(np.abs(middle / truth - 1).tolist())
-    return Check(count=len(errors), held=contained, error=float(np.median(errors)) if errors else math.nan)
+    return Check(count=len(errors), contained=contained, error=float(np.median(errors)) if errors else math.nan)
 
 
 def _placed(options: CalibrationOptions) -> tuple[Uncertain, ...]:
@@ -556,7 +558,7 @@ def _fitted(
         high=high,
         used=np.asarray(used.reshape(-1, count).any(axis=0)),
         misfit=float((1 + (distance >= observed_distance).sum()) / (1 + len(distance))),
-        apart=deviations,
+        deviations=deviations,
         failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
     )
 
@@ -577,9 +579,9 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     if not calibration.draws.together:
         findings.append(TAKEN_APART)
     check, level = calibration.check, calibration.options.level
-    if check.held < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
+    if check.contained < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
         sentence = (
-            f"of {check.count} simulations left out, the intervals of {check.held} contain the area weight, where "
+            f"of {check.count} simulations left out, the intervals of {check.contained} contain the area weight, where "
             f"{check.count * level:.0f} are expected: they are too narrow"
         )
         fix = "give more simulations with --simulations"

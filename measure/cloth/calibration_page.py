@@ -26,11 +26,11 @@ class Band:
     """What a model shows.
 
     Attributes:
-        found: (low middle high, window, observable).
+        limits: (low middle high, window, observable).
         colour: of the band and of its middle.
     """
 
-    found: FloatArray
+    limits: FloatArray
     colour: str
 
 
@@ -53,7 +53,7 @@ def against_wind(observed: Observed, names: Sequence[str], bands: Sequence[Band]
     for axes, name in zip(cells, names, strict=False):
         column = OBSERVED.index(name)
         for band in bands:
-            low, middle, high = band.found[:, order, column]
+            low, middle, high = band.limits[:, order, column]
             axes.fill_between(speed[order], low, high, color=band.colour, alpha=opacity)
             axes.plot(speed[order], middle, color=band.colour)
         axes.plot(speed, observed.readings[:, column], ".", color=dots)
@@ -99,7 +99,7 @@ def calibration_page(
             }
             for recording, place_quantities in zip(calibration.recordings, calibration.places, strict=True)
         ],
-        "check": {"count": check.count, "held": check.held, "error": f"{check.error:.1%}"},
+        "check": {"count": check.count, "held": check.contained, "error": f"{check.error:.1%}"},
         "sections": list(sections),
         "provenance": {**provenance, "code": code_version()},
     }
@@ -147,5 +147,5 @@ def _posterior(calibration: Calibration) -> str:
 
 def _windows(recording: Fitted) -> str:
     names = [name for name, used in zip(OBSERVED, recording.used, strict=True) if used]
-    band = Band(found=np.stack([recording.low, recording.middle, recording.high]), colour=_RUST)
+    band = Band(limits=np.stack([recording.low, recording.middle, recording.high]), colour=_RUST)
     return against_wind(recording.observed, names, [band], dots=_BLUE, opacity=0.3)

@@ -126,18 +126,18 @@ class Scene:
     """Residuals about the regression on the area weight.
 
     Attributes:
-        own: (1, k) of the recordings.
+        observed: (1, k) of the recordings.
         base, null: (n, k) of simulations and null flags.
         kinds: (null,) of numerics.
-        alike: (null,) whose weight is as that of the recordings.
+        comparable: (null,) whose weight is as that of the recordings.
         changes: (effect, k).
     """
 
-    own: FloatArray
+    observed: FloatArray
     base: FloatArray
     null: FloatArray
     kinds: IntArray
-    alike: Mask
+    comparable: Mask
     changes: FloatArray
     _known: dict[frozenset[int], Axes] = field(default_factory=dict)
 
@@ -153,12 +153,12 @@ class Scene:
             for experiments, log_weight in zip((observed, base, nulls), at, strict=True)
         ]
         return cls(
-            own=residuals[0],
+            observed=residuals[0],
             base=residuals[1],
             null=residuals[2],
             kinds=kinds,
             changes=changes,
-            alike=np.asarray(np.abs(at[2]) < ALIKE, dtype=np.bool_),
+            comparable=np.asarray(np.abs(at[2]) < ALIKE, dtype=np.bool_),
         )
 
     def axes(self, *without: int) -> Axes:
@@ -174,8 +174,8 @@ class Scene:
         excluded = () if without is None else (without,)
         scores = np.concatenate(
             [
-                self.axes(*excluded, kind).z(self.null[self.alike & (self.kinds == kind)])
-                for kind in np.unique(self.kinds[self.alike]).tolist()
+                self.axes(*excluded, kind).z(self.null[self.comparable & (self.kinds == kind)])
+                for kind in np.unique(self.kinds[self.comparable]).tolist()
                 if kind not in excluded
             ]
         )
@@ -197,7 +197,7 @@ class Scored:
         power: (effect,) share of null flags that are beyond the critical value once moved by the effect.
         tested: (effect,) the same of those that are looked for: the suspected one, or all.
         pointed: whether what makes the statistic at the level lies along an effect.
-        alike: (null,) which null flags these are.
+        comparable: (null,) which null flags these are.
     """
 
     z: FloatArray
@@ -209,7 +209,7 @@ class Scored:
     power: FloatArray
     tested: FloatArray
     pointed: bool
-    alike: Mask
+    comparable: Mask
 
     @property
     def p_value(self) -> float:
@@ -237,13 +237,13 @@ def score(
     """
     scene = Scene.of(observed, base, nulls, kinds, directions.changes)
     overall = scene.standing(None)
-    z = overall.of(scene.own)
+    z = overall.of(scene.observed)
     null_z = np.full((len(kinds), len(directions.changes) + 1), np.nan)
-    by_kind = {kind: scene.standing(kind) for kind in np.unique(kinds[scene.alike]).tolist()}
+    by_kind = {kind: scene.standing(kind) for kind in np.unique(kinds[scene.comparable]).tolist()}
     for kind, standing in by_kind.items():
-        of_kind = scene.alike & (kinds == kind)
+        of_kind = scene.comparable & (kinds == kind)
         null_z[of_kind] = standing.of(scene.null[of_kind])
-    null_z, null_kinds = null_z[scene.alike], kinds[scene.alike]
+    null_z, null_kinds = null_z[scene.comparable], kinds[scene.comparable]
     farthest = ClusteredNulls(null=directions.far(null_z).max(axis=1), kinds=null_kinds)
     along, alone = directions.along(z)[0], directions.along(null_z)
     # As the largest of all directions, whichever was suspected.
@@ -266,7 +266,7 @@ def score(
         power=power,
         tested=power if suspected is None else power[suspected[0] : suspected[0] + 1],
         pointed=suspected is not None or bool((family <= level).any()),
-        alike=scene.alike,
+        comparable=scene.comparable,
     )
 
 
@@ -280,7 +280,9 @@ def _power(scene: Scene, by_kind: dict[int, Standing], directions: Directions, c
         if directions.suspected is not None and directions.suspected[0] == index:
             signs = (directions.suspected[1],)
         beyond = [
-            directions.far(standing.of(scene.null[scene.alike & (scene.kinds == kind)] + sign * change)).max(axis=1)
+            directions.far(standing.of(scene.null[scene.comparable & (scene.kinds == kind)] + sign * change)).max(
+                axis=1
+            )
             > critical
             for kind, standing in by_kind.items()
             for sign in signs
@@ -382,7 +384,7 @@ def judge(
         level: of the tests.
         departure: root mean square departure of its observables from the base model fitted to it [their scatters].
     """
-    nulls, kinds = nulls.rows(np.flatnonzero(scored.alike).tolist()), kinds[scored.alike]
+    nulls, kinds = nulls.rows(np.flatnonzero(scored.comparable).tolist()), kinds[scored.comparable]
     factors = weighing.factors[0]
     probability = np.exp(TEMPERED * factors - logsumexp(TEMPERED * factors))
     order = np.argsort(-probability)

@@ -285,6 +285,6 @@ def _against_wind(outcome: SolvedLoop, index: int, *, with_effect: bool) -> str:
             strength,
             seed=outcome.options.calibration.seed,
         )
-        drawn.append(Band(found=limits, colour=colour))
-    names = [name for column, name in enumerate(OBSERVED) if np.isfinite(drawn[0].found[:, :, column]).all()]
+        drawn.append(Band(limits=limits, colour=colour))
+    names = [name for column, name in enumerate(OBSERVED) if np.isfinite(drawn[0].limits[:, :, column]).all()]
     return against_wind(recording, names, drawn, dots=_DOT, opacity=0.25)

@@ -221,12 +221,12 @@ def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: Reading, lake
             raise
         say(f"no reading model: {error.what}" + (f"; {error.fix}" if error.fix else ""))
         return None
-    say(f"the flag as an anemometer {done.found.sentence}")
-    for finding in done.found.findings:
+    say(f"the flag as an anemometer {done.result.sentence}")
+    for finding in done.result.findings:
         if finding.severity is not Severity.NOTE:
             say_finding(finding)
-    if done.place is not None:
-        say(f"{done.place.artifact.id[:SHORT]}  reading model, {done.place.sentence}")
+    if done.placed is not None:
+        say(f"{done.placed.artifact.id[:SHORT]}  reading model, {done.placed.sentence}")
         say(f"for flagdata measure: --model {done.name}")
     return done
 
@@ -236,7 +236,7 @@ def _sections(anemometer: Made | None) -> tuple[Section, ...]:
         return ()
     from measure.anemometer.section import section
 
-    return (section(anemometer.found),)
+    return (section(anemometer.result),)
 
 
 def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
@@ -245,17 +245,17 @@ def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
     from measure.anemometer.section import page
 
     if report is not None:
-        rows = {recording.name: f"recording {recording.identity}" for recording in anemometer.found.recordings}
-        rows |= {"network": f"{anemometer.found.model.network}, SHA-256 {anemometer.found.model.identity}"}
+        rows = {recording.name: f"recording {recording.identity}" for recording in anemometer.result.recordings}
+        rows |= {"network": f"{anemometer.result.model.network}, SHA-256 {anemometer.result.model.identity}"}
         rows |= {} if anemometer.artifact is None else {"artifact": anemometer.artifact}
-        text = page(anemometer.found, anemometer.name, rows)
+        text = page(anemometer.result, anemometer.name, rows)
         with following(f"the reading model {anemometer.artifact}", "writing its report"):
             write_file(report, text, command="calibrate")
             say(f"report: {report}")
     if as_json:
         document("calibrate", {"anemometer": anemometer.as_dict()})
     else:
-        echo(anemometer.found.sentence)
+        echo(anemometer.result.sentence)
 
 
 def _provenance(calibration: Calibration, artifact: str | None) -> dict[str, str]:
@@ -288,7 +288,7 @@ def _print(calibration: Calibration) -> None:
         say(f"  {recording.observed.name}: {fitted}")
     check = calibration.check
     say(
-        f"  intervals of {check.held} of {check.count} simulations left out contain their weight, median error "
+        f"  intervals of {check.contained} of {check.count} simulations left out contain their weight, median error "
         f"{check.error:.1%}"
     )
     for finding in calibration.findings:
