@@ -28,13 +28,14 @@ from measure.gate.reasons import REASONS
 ANSWER = 1
 """Raised when the same recordings give another reading model."""
 LEAST = 60.0
-"""s of film beside a log: three blocks of time."""
+"""s of film beside a log: three blocks of time. Lower, and too few blocks are left to choose a penalty by."""
 ENOUGH = 240.0
 """s of film from which on intervals rest on enough blocks of time."""
 _OFFSETS = np.linspace(-2.0, 2.0, 9)
 """Errors of the clock that are tried, in its standard uncertainties."""
 _CLOCK = 0.05
-"""s below which a clock's uncertainty matters for no window."""
+"""s below which a clock's uncertainty matters for no window. Lower, and offsets are fitted where they change
+nothing."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

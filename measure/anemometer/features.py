@@ -24,7 +24,8 @@ SUMMARY = "summary-"
 VERSION = 1
 """Raised when the same film gives other features."""
 THUMBNAIL = 64
-"""Longer side of the picture by which a place is known again [px]."""
+"""Longer side of the picture by which a place is known again [px]. Larger shows more detail of the place, and more of
+what moves in it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -81,22 +81,22 @@ class Made:
 
     Attributes:
         name: by which `flagdata measure --model` finds it.
-        found: what it is.
-        place: its place among its versions in the lake; None where it is not to be there.
+        result: what it is.
+        placed: its place among its versions in the lake; None where it is not to be there.
     """
 
     name: str
-    found: Calibrated
-    place: Placed | None
+    result: Calibrated
+    placed: Placed | None
 
     @property
     def artifact(self) -> str | None:
         """Its id in the lake; None where it is not to be there."""
-        return None if self.place is None else self.place.artifact.id
+        return None if self.placed is None else self.placed.artifact.id
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
-        return {"name": self.name, "artifact": self.artifact, **self.found.as_dict()}
+        return {"name": self.name, "artifact": self.artifact, **self.result.as_dict()}
 
 
 def made(
@@ -154,5 +154,5 @@ def made(
     result = replace(result, findings=(*unopened, *unread, *result.findings))
     title = name if name is not None else f"{recordings[0].name}-anemometer"
     if lake is None or branch is None:
-        return Made(name=title, found=result, place=None)
-    return Made(name=title, found=result, place=keep(lake, result, title, reading, branch=branch))
+        return Made(name=title, result=result, placed=None)
+    return Made(name=title, result=result, placed=keep(lake, result, title, reading, branch=branch))

@@ -32,13 +32,16 @@ from models.outliers import conformal_p, shrunk_covariance, whitening
 SHIFT, FRAMING, BACKGROUND = 0.45, 0.2, 0.4
 """Levels, fixed on simulated flags of other seeds than those that judge (decision 047)."""
 ENOUGH = 3
-"""Windows of a calibration a feature below which their scatter is not known well enough to recognise the flag."""
+"""Windows of a calibration a feature below which their scatter is not known well enough to recognise the flag. Higher
+asks for longer calibrations; lower compares with a scatter that is noise."""
 LEAST_WINDOWS, LEAST_SHARE = 3, 0.1
 """Windows, and share of the windows, that must read a wind of the calibration."""
 _BLUR = 3.0
-"""Width of what counts as light, not as detail, in a place's picture [px]."""
+"""Width of what counts as light, not as detail, in a place's picture [px]. Wider keeps more of the light in the
+picture, so that the same place in another light looks different."""
 _DETAIL = 1.0
-"""Deviation of the details [gray levels] below which a background shows no place."""
+"""Deviation of the details [gray levels] below which a background shows no place. Higher finds no place in plainer
+backgrounds; lower compares noise."""
 _LEAST_PIXELS = 200
 """Pixels beside the flag that two pictures must share."""
 _DEGREE = 2

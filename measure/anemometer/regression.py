@@ -27,13 +27,15 @@ from numpy.typing import NDArray
 from flagdata.arrays import BoolArray, FloatArray
 
 BLOCK = 20.0
-"""Length of a block [s]: gusts last some seconds."""
+"""Length of a block [s]: gusts last some seconds. Longer makes blocks more independent and leaves fewer of them;
+shorter makes errors look smaller than they are."""
 PENALTIES = tuple(float(v) for v in np.geomspace(1.0, 1e5, 21))
 """Penalties that are tried, in squares of standardised features."""
 WEIGHTS = (1.0, 3.0, 10.0, 30.0)
 """Weights of the named features that are tried: their penalty is over the square."""
 _BESIDE = 2
-"""Windows beside a block that are left out with it: they share its neighbours."""
+"""Windows beside a block that are left out with it: they share its neighbours. With fewer, the fit has seen what it is
+tested on, and errors look smaller."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

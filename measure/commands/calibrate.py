@@ -219,12 +219,12 @@ def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: FilmReading, 
             raise
         say(f"no reading model: {error.what}" + (f"; {error.fix}" if error.fix else ""))
         return None
-    say(f"the flag as an anemometer {done.found.sentence}")
-    for finding in done.found.findings:
+    say(f"the flag as an anemometer {done.result.sentence}")
+    for finding in done.result.findings:
         if finding.severity is not Severity.NOTE:
             say_finding(finding)
-    if done.place is not None:
-        say(f"{done.place.artifact.id[:SHORT]}  reading model, {done.place.sentence}")
+    if done.placed is not None:
+        say(f"{done.placed.artifact.id[:SHORT]}  reading model, {done.placed.sentence}")
         say(f"for flagdata measure: --model {done.name}")
     return done
 
@@ -234,7 +234,7 @@ def _sections(anemometer: Made | None) -> tuple[Section, ...]:
         return ()
     from measure.anemometer.section import section
 
-    return (section(anemometer.found),)
+    return (section(anemometer.result),)
 
 
 def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
@@ -243,17 +243,17 @@ def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
     from measure.anemometer.section import page
 
     if report is not None:
-        rows = {one.name: f"recording {one.identity}" for one in anemometer.found.recordings}
-        rows |= {"network": f"{anemometer.found.model.network}, SHA-256 {anemometer.found.model.identity}"}
+        rows = {one.name: f"recording {one.identity}" for one in anemometer.result.recordings}
+        rows |= {"network": f"{anemometer.result.model.network}, SHA-256 {anemometer.result.model.identity}"}
         rows |= {} if anemometer.artifact is None else {"artifact": anemometer.artifact}
-        text = page(anemometer.found, anemometer.name, rows)
+        text = page(anemometer.result, anemometer.name, rows)
         with following(f"the reading model {anemometer.artifact}", "writing its report"):
             write_file(report, text, command="calibrate")
             say(f"report: {report}")
     if as_json:
         document("calibrate", {"anemometer": anemometer.as_dict()})
     else:
-        echo(anemometer.found.sentence)
+        echo(anemometer.result.sentence)
 
 
 def _provenance(found: Calibration, artifact: str | None) -> dict[str, str]:

@@ -132,10 +132,10 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         Raises:
             UsageError: there are several.
         """
-        found = [source for source in self.sources if source.lower().endswith(_RECIPE)]
-        if len(found) > 1:
-            raise UsageError(f"the sources name {len(found)} recipes", where=found[1], fix="name one")
-        return Path(found[0]) if found else None
+        recipes = [source for source in self.sources if source.lower().endswith(_RECIPE)]
+        if len(recipes) > 1:
+            raise UsageError(f"the sources name {len(recipes)} recipes", where=recipes[1], fix="name one")
+        return Path(recipes[0]) if recipes else None
 
     @property
     def recordings(self) -> tuple[str, ...]:

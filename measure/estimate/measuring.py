@@ -176,7 +176,7 @@ def measure(
     draws, places = answer.joint([kept_looks[k] for k in used], dependence)
     middle = looks[int(np.argsort(gate_verdict.window_p, kind="stable")[len(looks) // 2])]
     of_reading = findings_of(
-        layout, found=len(looks), interpolated=interpolated, frames=distinct.frames, repeated=distinct.repeated
+        layout, windows_read=len(looks), interpolated=interpolated, frames=distinct.frames, repeated=distinct.repeated
     )
     windows = tuple(
         answer.window(look, layout, p)

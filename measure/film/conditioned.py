@@ -46,9 +46,9 @@ class CutOff:
     cut: BoolArray
 
     @classmethod
-    def of(cls, found: Conditioning, times: FloatArray) -> CutOff:
-        """By what was found in the sample of frames of these times."""
-        return cls(times=times, cut=found.cut > CUT)
+    def of(cls, conditioning: Conditioning, times: FloatArray) -> CutOff:
+        """Builds it from what was found in the sample of frames of these times."""
+        return cls(times=times, cut=conditioning.cut > CUT)
 
     @cached_property
     def any(self) -> BoolArray:
@@ -68,19 +68,21 @@ class CutOff:
         return float(np.diff(edges).max())
 
     def left_out(self, time: float) -> bool:
-        """Whether the frame of a time [s] is: beside a frame of the sample that is cut off."""
+        """Returns whether the frame of a time [s] is: next to a frame of the sample that is cut off."""
         if not self.partly:
             return False
         after = int(np.searchsorted(self.times, time))
         return bool(self.any[max(after - 1, 0) : after + 1].any())
 
     def findings(self) -> tuple[Finding, ...]:
-        """One where the flag is cut off."""
+        """Reports where the flag is cut off."""
         share = float(self.any.mean())
         if not share or (share < _REPORTED and not self.partly):
             return ()
         where = ", ".join(
-            f"the {side} edge in {own:.0%}" for side, own in zip(SIDES, self.cut.mean(axis=0), strict=True) if own > 0
+            f"the {side} edge in {side_share:.0%}"
+            for side, side_share in zip(SIDES, self.cut.mean(axis=0), strict=True)
+            if side_share > 0
         )
         done = "; those are left out" if self.partly else ""
         return (
@@ -167,7 +169,7 @@ class ConditionedFilm:
         return self._film.start
 
     def frames(self, first: float, last: float) -> Iterator[TimedFrame]:
-        held: list[TimedFrame] | None = []
+        in_memory: list[TimedFrame] | None = []
         sample: list[TimedFrame] = []
         chosen = _chosen(self.rate, min(last, self.duration) - max(first, 0.0))
         bytes_held = 0
@@ -175,11 +177,11 @@ class ConditionedFilm:
             if chosen(k):
                 sample.append((time, picture))
             bytes_held += picture.nbytes
-            if held is not None:
-                held.append((time, picture))
+            if in_memory is not None:
+                in_memory.append((time, picture))
             if bytes_held > _HELD:
-                held = None
-        source = held if held is not None else self._film.frames(first, last)
+                in_memory = None
+        source = in_memory if in_memory is not None else self._film.frames(first, last)
         if len(sample) < LEAST:
             yield from source
             return
@@ -197,12 +199,12 @@ class ConditionedFilm:
         self._follower, self._watch = follower, watch = Follower(self.found), FilmWatch(rate=self.rate)
         for time, picture in source:
             watch.look(time, picture)
-            shown = follower.show(picture)
+            fit_frame = follower.show(picture)
             if not cut.left_out(time):
-                yield time, shown
+                yield time, fit_frame
 
     def _within(self, shape: tuple[int, ...]) -> tuple[int, int, int, int] | None:
-        """The crop in pixels of frames of this shape."""
+        """Returns the crop in pixels of frames of this shape."""
         if self._crop is None:
             return None
         scale = shape[1] / self._film.width
@@ -210,20 +212,20 @@ class ConditionedFilm:
         return x, y, width, height
 
     def findings(self) -> tuple[Finding, ...]:
-        found, follower, watch, cut = self.found, self._follower, self._watch, self._cut
-        if found is None or follower is None or watch is None or cut is None:
+        conditioning, follower, watch, cut = self.found, self._follower, self._watch, self._cut
+        if conditioning is None or follower is None or watch is None or cut is None:
             return self._film.findings()
-        faults = reasons(watch, found, follower)
+        faults = reasons(watch, conditioning, follower)
         if cut.partly:  # what is left shows the whole flag
             faults = tuple(fault for fault in faults if fault.kind != "cut-off")
-        own = [
-            *_of_camera(found, follower),
-            *_of_flag(found, self.reference, given=self._flag is not None),
-            *_of_aspect(found, self._aspect),
+        of_conditioning = [
+            *_of_camera(conditioning, follower),
+            *_of_flag(conditioning, self.reference, number_given=self._flag is not None),
+            *_of_aspect(conditioning, self._aspect),
         ]
         if all(fault.kind != "cut-off" for fault in faults):
-            own += cut.findings()
-        return (*self._film.findings(), *own, *faults)
+            of_conditioning += cut.findings()
+        return (*self._film.findings(), *of_conditioning, *faults)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -232,58 +234,58 @@ class ConditionedFilm:
         return tuple(finding.what for finding in self.findings()[before:])
 
     def as_dict(self) -> dict[str, Any] | None:
-        """JSON values of what was found; None before a reading."""
+        """Returns JSON values of what was found; None before a reading."""
         if self.found is None or self._follower is None:
             return None
-        found, follower = self.found, self._follower
+        conditioning, follower = self.found, self._follower
         return {
             "camera": {
-                "moves": found.camera.moves,
-                "evidence": found.camera.evidence,
+                "moves": conditioning.camera.moves,
+                "evidence": conditioning.camera.evidence,
                 **follower.motion(),
                 "lost": follower.lost,
             },
             "flags": [
                 {
-                    "box": [edge / found.scale for edge in region.box],
+                    "box": [edge / conditioning.scale for edge in region.box],
                     "share": region.share,
                     "hoist": region.hoist,
                     "aspect": region.aspect,
                 }
-                for region in found.regions
+                for region in conditioning.regions
             ],
-            "chosen": found.chosen + 1 if found.regions else None,
-            "square": [found.square.x, found.square.y, found.square.side],
-            "cut_off": found.cut_share,
+            "chosen": conditioning.chosen + 1 if conditioning.regions else None,
+            "square": [conditioning.square.x, conditioning.square.y, conditioning.square.side],
+            "cut_off": conditioning.cut_share,
         }
 
 
 def _chosen(rate: float, duration: float) -> Callable[[int], bool]:
-    """Which frames of a film belong to a sample of some `SAMPLE`: evenly spread; of a long film in pairs, the frames of
+    """Selects the frames of a sample of some `SAMPLE`: evenly spread; of a long film in pairs, the frames of
     each `MOMENT` apart at most.
 
     Args:
         rate: of the film [Hz].
         duration: of the part that is read [s].
     """
-    every = max(1, math.ceil(duration * rate / SAMPLE))
-    beside = max(1, math.floor(MOMENT * rate))
-    if every <= beside:
-        return lambda k: k % every == 0
-    return lambda k: k % (2 * every) in (0, beside)
+    stride = max(1, math.ceil(duration * rate / SAMPLE))
+    offset = max(1, math.floor(MOMENT * rate))
+    if stride <= offset:
+        return lambda k: k % stride == 0
+    return lambda k: k % (2 * stride) in (0, offset)
 
 
-def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:
-    if not found.camera.known:
+def _of_camera(conditioning: Conditioning, follower: Follower) -> list[Finding]:
+    if not conditioning.camera.known:
         return [
             Finding.of("camera-unknown", "no feature of the background shows the camera's motion; no frame was moved")
         ]
-    if not found.camera.moves:
+    if not conditioning.camera.moves:
         return [
             Finding.of(
                 "camera-still",
-                f"the camera is still: {found.camera.evidence} stay in place",
-                count=found.camera.support,
+                f"the camera is still: {conditioning.camera.evidence} stay in place",
+                count=conditioning.camera.support,
             )
         ]
     motion = follower.motion()
@@ -291,9 +293,9 @@ def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:
         Finding.of(
             "camera-moves",
             f"the camera drifts {motion['drift']:.1f} px and shakes {motion['shake']:.2f} px from frame to frame, "
-            f"by {found.camera.evidence}; the frames were moved back",
+            f"by {conditioning.camera.evidence}; the frames were moved back",
             value=motion["drift"],
-            count=found.camera.support,
+            count=conditioning.camera.support,
         )
     ]
     total = len(follower.path)
@@ -311,55 +313,57 @@ def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:
     return notes
 
 
-def _of_flag(found: Conditioning, reference: UInt8Array | None, *, given: bool) -> list[Finding]:
-    """What was found of the flag; several are no matter where its number was given."""
-    if found.region is None or reference is None:
+def _of_flag(conditioning: Conditioning, reference: UInt8Array | None, *, number_given: bool) -> list[Finding]:
+    """Reports what was found of the flag; several are no matter where its number was given."""
+    if conditioning.region is None or reference is None:
         return []
     height, width = reference.shape
-    left, top, right, bottom = (round(edge / found.scale) for edge in found.region.box)
-    square, beyond = found.square, found.square.beyond(width, height)
+    left, top, right, bottom = (round(edge / conditioning.scale) for edge in conditioning.region.box)
+    square, beyond = conditioning.square, conditioning.square.beyond(width, height)
     notes = [
         Finding.of(
             "flag-found",
-            f"{len(found.regions)} moving {'cloths' if len(found.regions) > 1 else 'cloth'}; number "
-            f"{found.chosen + 1} visits {right - left} × {bottom - top} px and is shown in a square of {square.side} px"
+            f"{len(conditioning.regions)} moving {'cloths' if len(conditioning.regions) > 1 else 'cloth'}; number "
+            f"{conditioning.chosen + 1} visits {right - left} × {bottom - top} px and is shown in a square of "
+            f"{square.side} px"
             + (f", {beyond:.0%} of which lie beyond the picture and were padded" if beyond > 0 else ""),
-            count=len(found.regions),
-            value=found.region.share,
+            count=len(conditioning.regions),
+            value=conditioning.region.share,
         )
     ]
-    if len(found.regions) > 1 and not given:
+    if len(conditioning.regions) > 1 and not number_given:
         notes.append(
             Finding.of(
                 "several-flags-found",
-                f"{len(found.regions)} regions move like cloth; number {found.chosen + 1} was measured, with "
-                f"{found.region.share:.0%} of the motion",
-                count=len(found.regions),
+                f"{len(conditioning.regions)} regions move like cloth; number {conditioning.chosen + 1} was measured, "
+                "with "
+                f"{conditioning.region.share:.0%} of the motion",
+                count=len(conditioning.regions),
                 fix="choose another by --flag, as numbered on the page of --report",
             )
         )
-    if found.size > _ENLARGED * square.side:
+    if conditioning.size > _ENLARGED * square.side:
         notes.append(
             Finding(
                 kind="enlarged",
                 severity=Severity.WARNING,
-                value=found.size / square.side,
-                what=f"the flag fills {square.side} px of the picture and the network takes {found.size} px: it was "
-                f"enlarged {found.size / square.side:.3g}-fold",
+                value=conditioning.size / square.side,
+                what=f"the flag fills {square.side} px of the picture and the network takes {conditioning.size} px: "
+                f"it was enlarged {conditioning.size / square.side:.3g}-fold",
             )
         )
     return notes
 
 
-def _of_aspect(found: Conditioning, given: float | None) -> list[Finding]:
-    region = found.region
-    if given is None or region is None or region.hoist == "top" or region.aspect <= _LONGER * given:
+def _of_aspect(conditioning: Conditioning, stated_aspect: float | None) -> list[Finding]:
+    region = conditioning.region
+    if stated_aspect is None or region is None or region.hoist == "top" or region.aspect <= _LONGER * stated_aspect:
         return []
     return [
         Finding.of(
             "flag-size-contradicted",
             f"the flag's outline is {region.aspect:.2f} times as long as high at the hoist; a flag of the size "
-            f"given would be at most {given:.2f} times",
+            f"given would be at most {stated_aspect:.2f} times",
             value=region.aspect,
             fix="check --flag-size: length along the wind times height along the pole",
         )

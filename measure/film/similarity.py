@@ -63,10 +63,10 @@ FLAG = TRAINED[Cloth.FLAG]
 
 
 def trained_on(targets: Sequence[Target]) -> Trained:
-    """The cloths that a model with these targets is trained on; one that estimates the aspect knows several."""
-    own = TRAINED[targets[0].cloth]
+    """Returns the cloths that a model with these targets is trained on; one that estimates the aspect knows several."""
+    trained = TRAINED[targets[0].cloth]
     ends = [(math.exp(target.low), math.exp(target.high)) for target in targets if target.name == ASPECT]
-    return replace(own, aspects=ends[0]) if ends else own
+    return replace(trained, aspects=ends[0]) if ends else trained
 
 
 _SHORTEST, _LONGEST = 0.1, 20.0  # m
@@ -124,11 +124,11 @@ class FlagSize:
         return self.length / self.height
 
     def scale(self, trained: Trained = FLAG) -> float:
-        """s, the length in lengths of the cloths that the model is trained on."""
+        """Returns s, the length in lengths of the cloths that the model is trained on."""
         return self.length / trained.length
 
     def findings(self, trained: Trained = FLAG) -> tuple[Finding, ...]:
-        """What is to be said of its shape."""
+        """Reports what is to be said of its shape."""
         aspect = self.aspect
         least, most = trained.aspects
         if least * (1 - _ASPECT_SLACK) <= aspect <= most * (1 + _ASPECT_SLACK):
@@ -161,7 +161,7 @@ class SizePrior:
     factor: float = 1.3
 
     def share_above(self, length: float) -> float:
-        """Share of the flags that are longer than `length` [m]."""
+        """Returns the share of the flags that are longer than `length` [m]."""
         return float(ndtr(-math.log(length / self.median) / math.log(self.factor)))
 
     def quantile(self, share: FloatArray) -> FloatArray:
@@ -170,7 +170,8 @@ class SizePrior:
 
 
 STRATA = 3
-"""Parts of equal probability that a distribution of sizes is cut into; the model looks at the middle of each."""
+"""Parts of equal probability that a distribution of sizes is cut into; the model looks at the middle of each. More
+follow the size's uncertainty better and take time in proportion."""
 LEAST_SHARE = 0.5
 """Share of the prior that the frame rate must admit."""
 RATE_SLACK = 0.95
@@ -195,15 +196,15 @@ class Sizes:
     findings: tuple[Finding, ...]
 
     def only(self, places: Sequence[int]) -> Sizes:
-        """Some of the sizes, those at which the film is one that the model can judge."""
+        """Selects some of the sizes, those at which the film is one that the model can judge."""
         chosen = list(places)
-        left_out = [place for place in range(len(self.scale)) if place not in chosen]
+        left_out = [index for index in range(len(self.scale)) if index not in chosen]
         if not left_out:
             return self
         finding = Finding.of(
             "sizes-left-out",
             f"{len(left_out)} of {len(self.scale)} sizes of flag were left out of the answer: at "
-            + " and ".join(f"{self.scale[place]:.2f}" for place in left_out)
+            + " and ".join(f"{self.scale[index]:.2f}" for index in left_out)
             + " times the size of the training's flags the film is unlike what the network was trained on",
             count=len(left_out),
             fix="give --flag-size LENGTHxHEIGHT",
@@ -212,7 +213,7 @@ class Sizes:
 
 
 def sizes(
-    given: FlagSize | None,
+    stated_size: FlagSize | None,
     *,
     rate: float,
     frames_rate: float,
@@ -221,14 +222,14 @@ def sizes(
     prior: SizePrior | None = None,
     trained: Trained = FLAG,
 ) -> Sizes:
-    """The lengths to consider for a film.
+    """Chooses the lengths to consider for a film.
 
     Of an unknown size the prior is cut into `STRATA` parts of equal probability. The model looks at the film as that
     of a flag of each part's median length; what it says in scaled units, which changes slowly with s, is scaled back by
     lengths drawn within the part.
 
     Args:
-        given: None if unknown.
+        stated_size: None if unknown.
         rate: of the film [Hz].
         frames_rate: of the network's frames [Hz].
         draws: for each stratum.
@@ -240,18 +241,22 @@ def sizes(
         RefusedError: the film is too slow for the flag's size, or for half of what is likely where that is unknown.
     """
     prior = prior if prior is not None else SizePrior(median=trained.length)
-    if given is not None:
-        own = given.scale(trained)
-        needed = RATE_SLACK * frames_rate / math.sqrt(own)
+    if stated_size is not None:
+        scale = stated_size.scale(trained)
+        needed = RATE_SLACK * frames_rate / math.sqrt(scale)
         if rate < needed:
             raise RefusedError(
-                f"{REASONS['low-frame-rate'].sentence}: {rate:.4g}, and a {trained.noun} of {given.length:g} m needs "
+                f"{REASONS['low-frame-rate'].sentence}: {rate:.4g}, and a {trained.noun} of {stated_size.length:g} m "
+                "needs "
                 f"{needed:.4g}",
                 where="frame rate",
                 fix=f"film at {math.ceil(10 * needed) / 10:g} frames a second or more",
             )
         return Sizes(
-            given=given, scale=np.array([own]), draws=np.full((1, draws), own), findings=given.findings(trained)
+            given=stated_size,
+            scale=np.array([scale]),
+            draws=np.full((1, draws), scale),
+            findings=stated_size.findings(trained),
         )
     least = trained.length * (RATE_SLACK * frames_rate / rate) ** 2
     admitted = prior.share_above(least)
@@ -268,7 +273,7 @@ def sizes(
     middles = (edges[:-1] + edges[1:]) / 2
     within = edges[:-1, None] + (edges[1:] - edges[:-1])[:, None] * generator.uniform(size=(STRATA, draws))
     low, high = prior.quantile(np.array([below + 0.05 * admitted, 1 - 0.05 * admitted]))
-    found = [
+    findings = [
         Finding.of(
             "size-assumed",
             f"the {trained.noun}'s size was not given: lengths from {low:.2f} to {high:.2f} m (90 %) were taken "
@@ -278,7 +283,7 @@ def sizes(
         )
     ]
     if below > 0.01:
-        found.append(
+        findings.append(
             Finding.of(
                 "small-sizes-left-out",
                 f"at {rate:.4g} frames a second {trained.noun}s shorter than {least:.2f} m cannot be judged; "
@@ -291,17 +296,17 @@ def sizes(
         given=None,
         scale=prior.quantile(middles) / trained.length,
         draws=prior.quantile(within) / trained.length,
-        findings=tuple(found),
+        findings=tuple(findings),
     )
 
 
 def spacing(scale: float, *, rate: float) -> float:
-    """Time between frames at which a flag of scale s looks like the model's at `rate` [s]."""
+    """Returns the time between frames at which a flag of scale s looks like the model's at `rate` [s]."""
     return math.sqrt(scale) / rate
 
 
 def scaled_back(values: NDArray[np.floating], names: Sequence[str], scale: FloatArray | float) -> FloatArray:
-    """What a model said of a flag of scale s, as that flag's own.
+    """Converts what a model said of a flag of scale s to that flag's own.
 
     Args:
         values: (…, target) as the model says them.

@@ -52,11 +52,11 @@ class FilmReading:
         return cls(crop=box_of(chosen.crop), flag=chosen.flag, aspect=None if size is None else size.aspect, **rates)
 
     def conditioned(self, film: WholeFilm) -> ConditionedFilm:
-        """A film, made fit."""
+        """Makes a film fit."""
         return ConditionedFilm(film, crop=self.crop, flag=self.flag, aspect=self.aspect)
 
     def recipe(self) -> dict[str, Any]:
-        """JSON values."""
+        """Returns JSON values."""
         crop = None if self.crop is None else str(self.crop)
         return {"crop": crop, "flag": self.flag, "true_fps": self.true_fps, "sequence_fps": self.sequence_fps}
 
@@ -97,7 +97,7 @@ class Subject:
         return str(self.content_hash()) if self.artifact is None else self.artifact.id
 
     def content_hash(self) -> str | None:
-        """SHA-256 of a plain file, or of the names and hashes of a folder's files; None of an artifact."""
+        """Hashes a plain file, or the names and hashes of a folder's files (SHA-256); None of an artifact."""
         if self.path is None:
             return None
         if self.path.is_file():
@@ -108,10 +108,10 @@ class Subject:
         return total.hexdigest()
 
 
-def size_of(source: object, given: tuple[float, float] | str | None) -> FlagSize | None:
+def size_of(source: object, stated_size: tuple[float, float] | str | None) -> FlagSize | None:
     """Returns the flag's size as it was given, else as an example states it."""
-    example = example_of(source) if given is None and isinstance(source, str | Path) else None
-    sides = given if example is None else example.flag_size
+    example = example_of(source) if stated_size is None and isinstance(source, str | Path) else None
+    sides = stated_size if example is None else example.flag_size
     return None if sides is None else FlagSize.of(sides)
 
 
@@ -132,7 +132,7 @@ def box_of(crop: tuple[int, int, int, int] | str | None) -> CropBox | None:
 def subjects(
     source: str | None, *, query: str | None, lake: Lake | None, at: str | None, reading: FilmReading
 ) -> list[Subject]:
-    """The films that a source or a query names.
+    """Opens the films that a source or a query names.
 
     Args:
         source: a path, or the name, id or beginning of the id of an artifact.
@@ -148,11 +148,11 @@ def subjects(
     if (source is None) == (query is None):
         raise UsageError("name a film or give a query over clips, one of them", fix="see flagdata measure --help")
     if source is not None:
-        film, place = film_at(source, lake=lake, at=at, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps)
+        film, location = film_at(source, lake=lake, at=at, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps)
         fit = reading.conditioned(film)
-        if isinstance(place, Path):
-            return [Subject(film=fit, path=place, example=example_of(source))]
-        return [Subject(film=fit, artifact=place, record=film.record if isinstance(film, RecordFilm) else None)]
+        if isinstance(location, Path):
+            return [Subject(film=fit, path=location, example=example_of(source))]
+        return [Subject(film=fit, artifact=location, record=film.record if isinstance(film, RecordFilm) else None)]
     if lake is None:
         raise NotFoundError("a query needs a lake", fix="name the lake by --lake")
     if reading.true_fps is not None or reading.sequence_fps is not None:
@@ -160,9 +160,9 @@ def subjects(
     rows = matching(lake.rows(query, at=at), {"kind": Kind.CLIP})
     if not rows.num_rows:
         raise NotFoundError("no clip matches", where=query, fix="look with flagdata query --where")
-    found: list[Subject] = []
+    clips: list[Subject] = []
     for row in rows.to_pylist():
         artifact = Artifact.from_row(row)
         film = stored_film(lake, artifact)
-        found.append(Subject(film=reading.conditioned(film), artifact=artifact, record=film.record))
-    return found
+        clips.append(Subject(film=reading.conditioned(film), artifact=artifact, record=film.record))
+    return clips

@@ -28,7 +28,8 @@ _BEYOND = 0.05
 """Share of the time between two frames by which an instant may lie beyond the film's last: stamps are rounded to
 milliseconds."""
 _FEWEST = 0.8
-"""Share of the network's frames that a window must have of its own, so that most of its pictures were taken."""
+"""Share of the network's frames that a window must have of its own, so that most of its pictures were taken. Lower lets
+interpolated pictures make up most of a window; higher drops windows with a few lost frames."""
 _LONGEST = 1.75
 """Longest time between two frames that is interpolated, in periods of the film or of the network's frames at the
 largest size considered, whichever is longer: a repeated frame at 30 Hz, but none that is missing at 25 Hz."""
@@ -194,34 +195,34 @@ class WindowReader:
 
 
 def cut(frames: Iterable[TimedFrame], layout: WindowLayout) -> Iterator[Window]:
-    """The windows of a film, in order; one in which frames are missing is left out.
+    """Cuts out the windows of a film, in order; one in which frames are missing is left out.
 
     Args:
         frames: (time from the film's first frame [s], picture), in order; at most a window of them is held.
     """
-    held: deque[TimedFrame] = deque()
+    buffer: deque[TimedFrame] = deque()
     source, interpolator = iter(frames), Interpolator()
     margin = 2 * layout.period
     ended = False
     for index in range(layout.count):
         start = layout.start(index)
-        while len(held) > 1 and held[1][0] < start - margin:
-            held.popleft()
-        while not ended and (not held or held[-1][0] < start + layout.length + margin):
+        while len(buffer) > 1 and buffer[1][0] < start - margin:
+            buffer.popleft()
+        while not ended and (not buffer or buffer[-1][0] < start + layout.length + margin):
             following = next(source, None)
             if following is None:
                 ended = True
             else:
-                held.append(following)
-        window = _window(held, layout, index, interpolator)
+                buffer.append(following)
+        window = _window(buffer, layout, index, interpolator)
         if window is not None:
             yield window
 
 
-def _window(held: deque[TimedFrame], layout: WindowLayout, index: int, interpolator: Interpolator) -> Window | None:
-    if len(held) < 2:
+def _window(buffer: deque[TimedFrame], layout: WindowLayout, index: int, interpolator: Interpolator) -> Window | None:
+    if len(buffer) < 2:
         return None
-    times = np.array([time for time, _ in held])
+    times = np.array([time for time, _ in buffer])
     start = float(times[np.abs(times - layout.start(index)).argmin()])
     if abs(start - layout.start(index)) > _LONGEST * layout.period:
         return None
@@ -230,47 +231,48 @@ def _window(held: deque[TimedFrame], layout: WindowLayout, index: int, interpola
         instants = start + interval * np.arange(layout.frames)
         before = np.searchsorted(times, instants, side="right").clip(1, len(times) - 1) - 1
         gaps = times[before + 1] - times[before]
-        place = (instants - times[before]) / gaps
-        if place.max() > 1 + _BEYOND or gaps.max() > _LONGEST * max(*layout.spacings, layout.period):
+        fractions = (instants - times[before]) / gaps
+        if fractions.max() > 1 + _BEYOND or gaps.max() > _LONGEST * max(*layout.spacings, layout.period):
             return None
         within = np.count_nonzero((times >= start - 1e-6) & (times < instants[-1]))
         if within < _FEWEST * (layout.frames - 1):
             return None
-        clip, between = at_instants(held, instants, period=layout.period, interpolator=interpolator)
+        clip, between = at_instants(buffer, instants, period=layout.period, interpolator=interpolator)
         clips.append(grained(clip, seed=index))
         interpolated += between
     return Window(index=index, start=start, clips=np.stack(clips), interpolated=interpolated)
 
 
 def findings_of(
-    layout: WindowLayout, *, found: int, interpolated: int, frames: int, repeated: int
+    layout: WindowLayout, *, windows_read: int, interpolated: int, frames: int, repeated: int
 ) -> tuple[Finding, ...]:
-    """What the cutting left out or made between frames.
+    """Reports what the cutting left out or made between frames.
 
     Args:
-        found: windows that were whole.
+        windows_read: windows that were whole.
         interpolated: pictures between two frames, of all windows and sizes.
         frames: of the film that were read.
         repeated: of these, that repeat the one before.
     """
-    shown = found * layout.frames * len(layout.spacings)
+    frames_made = windows_read * layout.frames * len(layout.spacings)
     notes = [
         Finding.of(
             "resampled",
             f"windows of {layout.frames} frames, "
             + " or ".join(f"{spacing * 1e3:.1f}" for spacing in layout.spacings)
-            + f" ms apart, out of a film of {1 / layout.period:.4g} frames a second; {interpolated} of {shown} lie "
+            + f" ms apart, out of a film of {1 / layout.period:.4g} frames a second; {interpolated} of {frames_made} "
+            "lie "
             "between two frames and were interpolated by the motion of the picture",
-            value=interpolated / max(shown, 1),
+            value=interpolated / max(frames_made, 1),
             count=interpolated,
         )
     ]
-    if found < layout.count:
+    if windows_read < layout.count:
         notes.append(
             Finding.of(
                 "windows-left-out",
-                f"{layout.count - found} of {layout.count} windows lack frames and were left out",
-                count=layout.count - found,
+                f"{layout.count - windows_read} of {layout.count} windows lack frames and were left out",
+                count=layout.count - windows_read,
             )
         )
     if repeated:

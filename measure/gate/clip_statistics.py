@@ -17,7 +17,8 @@ SIDE = 112
 """Height and width [px] that pictures are averaged down to; in px of this grid all lengths are given."""
 LEAST_FRAMES = 3
 _NOISES = 4.0
-"""Deviations of the noise that a pixel's must have to be called moving."""
+"""Deviations of the noise that a pixel's must have to be called moving. Higher misses faint motion; lower calls noise
+motion."""
 LEAST_DEVIATION = 1.5
 """Gray levels below which no deviation is called motion: rounding and coding leave up to one."""
 _ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)

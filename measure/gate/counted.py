@@ -17,17 +17,20 @@ from models.conditioning import Conditioning, Follower
 COUNTED = frozenset({"scene-cut", "low-frame-rate", "repeated-frames", "too-dark", "moving-camera", "cut-off", "scale"})
 """Kinds of faults that are counted here, and while the frames are read: no statistic of a window need look for them."""
 _REPEATED = 0.5
-"""Share of frames that look like an earlier one, above which a film loops or stands still."""
+"""Share of frames that look like an earlier one, above which a film loops or stands still. Lower refuses flags that
+swing in a regular way."""
 _DARK, _FLAT = 35.0, 4.0
 """Gray levels: of the brightest hundredth of the picture, and of the contrast, below which it is too dark."""
 _NOISY = 0.35
-"""Noise of a pixel over the picture's contrast, above which cloth is lost in it."""
+"""Noise of a pixel over the picture's contrast, above which cloth is lost in it. Higher lets films through whose cloth
+cannot be told from noise; lower refuses films in dim light."""
 _LOST = 0.1
 """Share of frames in which the background is not found, above which the camera's motion is unknown."""
 _RESTING = 100
 """Pixels of the small copies with an edge at rest, below which nothing in the picture stands still."""
 _AT_EDGE = 0.08
-"""Share of the film in which one edge of the picture cuts the cloth off, above which it cannot be measured."""
+"""Share of the film in which one edge of the picture cuts the cloth off, above which it cannot be measured. Higher
+measures flags of which a part is missing."""
 _GRAIN = 0.38
 """See `FilmWatch.grain`: of nine films of whole flags the least was 0.51, of a tree 0.28."""
 _SMALL = 40.0

@@ -13,9 +13,11 @@ from measure.gate.clip_statistics import SIDE, ClipStatistics
 _EDGE = 3
 """Width [px] of the strip along a side in which motion is called cut off."""
 _SMOOTHING = 3.0
-"""σ [px] by which the motion is smoothed before its regions are separated: folds of one flag are one region."""
+"""σ [px] by which the motion is smoothed before its regions are separated: folds of one flag are one region. Less takes
+folds for regions; more joins two flags to one."""
 _REGION = 0.15
-"""Share of the strongest smoothed motion above which a pixel belongs to a region."""
+"""Share of the strongest smoothed motion above which a pixel belongs to a region. Lower joins what moves faintly to the
+flag; higher breaks a flag with a calm part in two."""
 LEAST_AREA = 1 / SIDE**2
 
 

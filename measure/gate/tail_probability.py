@@ -11,7 +11,8 @@ from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 
 BODY = 0.8
-"""Share of the plain clips below the start of a tail."""
+"""Share of the plain clips below the start of a tail. Higher leaves fewer clips to estimate a tail from; lower takes
+for a tail what is not yet one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

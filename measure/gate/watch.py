@@ -23,9 +23,10 @@ _RATE = 25.0
 _THUMB = 40
 """Longer side [px] of the thumbnails."""
 _COMPARED = 500
-"""Frames at most of which each is compared with each other, for loops: the first 20 s."""
+"""Frames at most of which each is compared with each other, for loops: the first 20 s. More find longer loops; memory
+and time grow with their square."""
 _APART = 4
-"""Least number of frames between two that are alike."""
+"""Least number of frames between two that are alike. Fewer takes slow motion for a repeated frame."""
 _CUT, _CUT_TIMES = 6.0, 3.0
 """Mean change of the thumbnail [gray levels], and its ratio to the largest change about it, from which on it is a cut:
 a camera that turns changes many frames."""
@@ -33,7 +34,8 @@ _ABOUT = 5
 """Changes before and after a cut that it is compared with."""
 _TWIN = 0.1
 """Distance of a frame's nearest twin, over the median distance of frames, below which it repeats that one. Chosen on
-the films with defects of even number and the films without defects."""
+the films with defects of even number and the films without defects. Higher takes motion that nearly repeats for a loop;
+lower misses loops that were coded again."""
 _SAMPLED = 10
 """Every so many-th frame that is looked at is kept as it is, up to `_KEPT`."""
 _KEPT = 40

@@ -12,7 +12,8 @@ from measure.observables.unseen import EDGE_ON, NO_SILHOUETTE, UnseenError
 Window = FilmWindow | ClothWindow
 """Both have `times`, `free_edge`, `middle`, `silhouettes`, `length` and `height`."""
 _NARROWEST = 0.12
-"""Share of the flat area that is seen below which the view is along the flag: one that hangs in folds shows more."""
+"""Share of the flat area that is seen below which the view is along the flag: one that hangs in folds shows more. Lower
+reads chords that are noise; higher refuses flags that droop in folds."""
 
 
 def chord(window: Window) -> FloatArray:

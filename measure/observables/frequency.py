@@ -11,7 +11,8 @@ from measure.observables.observable import Observable
 from measure.observables.unseen import NO_MOTION, UnseenError
 
 _STILL = 0.004
-"""Root mean square motion of the free edge, in flag lengths, below which there is no spectrum but of noise."""
+"""Root mean square motion of the free edge, in flag lengths, below which there is no spectrum but of noise. Lower reads
+the frequency of noise."""
 
 
 def moving(window: Window) -> tuple[FloatArray, FloatArray]:

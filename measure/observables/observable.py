@@ -15,7 +15,8 @@ __all__ = ["Observable", "UnseenError", "WindowReading"]
 
 _Window = TypeVar("_Window")
 WINDOW = 2.5
-"""Length of a window [s]: some flutter periods, and short beside the changes of a wind's mean."""
+"""Length of a window [s]: some flutter periods, and short beside the changes of a wind's mean. Longer averages over
+more flutter and over more change of the wind."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,9 +12,11 @@ from flagdata.arrays import BoolArray, FloatArray
 from flagdata.errors import InputError
 
 _TAIL = 0.06
-"""Share of a silhouette's area that stands for its free end."""
+"""Share of a silhouette's area that stands for its free end. Larger moves the free end toward the middle of the cloth;
+smaller follows single pixels."""
 BESIDE = 0.15
-"""Share of the chord next to the hoist that counts as held, not as free."""
+"""Share of the chord next to the hoist that counts as held, not as free. Larger leaves less outline to measure the
+speed of; smaller counts what the pole holds."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,9 +20,11 @@ from models.conditioning.stills import halved
 CHUNK = 30.0
 """Length of film [s] that one still picture is of: light and shade change over longer ones."""
 _EXPECTED = 0.9
-"""Least coefficient of Dice with the true silhouette that is expected of a mask."""
+"""Least coefficient of Dice with the true silhouette that is expected of a mask. Higher keeps fewer masks, and better
+ones."""
 _STEADY = 0.4
-"""Share by which a mask's area may differ from the window's median: a flag does not change as much in a window."""
+"""Share by which a mask's area may differ from the window's median: a flag does not change as much in a window. Lower
+drops frames in which the flag folds away from the camera; higher keeps masks that lost a part."""
 _LEAST_HOIST = 5.0
 """Length of the hoist in the picture [px] below which nothing is read."""
 _FEWEST = 10

@@ -14,7 +14,8 @@ from measure.observables.unseen import EDGE_ON, NO_WAVE, UnseenError
 _SECTIONS = np.linspace(0.35, 0.85, 6)
 """Of the mean chord, where the middle line is followed."""
 _COHERENT = 0.5
-"""Share of the power at neighbouring sections whose phases belong together from which on there is a wave."""
+"""Share of the power at neighbouring sections whose phases belong together from which on there is a wave. Lower reads
+waves into flags that swing as a whole or flutter without order."""
 _LONGEST = 3.0
 """Length [flag lengths] of a wave above which all of the chord moves together, and no wave is seen."""
 

@@ -109,7 +109,7 @@ def test_uneven_stamps_are_no_gap_and_a_missing_frame_is() -> None:
     assert len(list(cut(numbered(uneven), layout))) == layout.count == 4
     windows = list(cut(numbered(np.delete(times, 14)), layout))
     assert [window.index for window in windows] == [0, 2, 3]
-    findings = findings_of(layout, found=3, interpolated=0, frames=40, repeated=0)
+    findings = findings_of(layout, windows_read=3, interpolated=0, frames=40, repeated=0)
     assert {finding.kind: finding.count for finding in findings}["windows-left-out"] == 1
 
 

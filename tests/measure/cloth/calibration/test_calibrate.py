@@ -104,7 +104,7 @@ def test_a_second_recording_with_an_error_of_its_own_narrows_the_weight(plain: C
 def test_simulations_left_out_lie_in_their_intervals(plain: Calibration) -> None:
     check = plain.check
     assert check.count == 48
-    assert 34 <= check.held <= 48  # so few walkers leave 0.8 to 0.9
+    assert 34 <= check.contained <= 48  # so few walkers leave 0.8 to 0.9
     assert 0.01 < check.error < 0.08
 
 

@@ -170,10 +170,10 @@ def test_null_flags_of_another_weight_do_not_judge_a_cloth_that_was_weighed() ->
     assert own.stated is not None
     null = flags(stream(1, "score test"), BASE + KINDS * EACH)
     assert null.stated is not None
-    assert 0.3 < found.alike.mean() < 0.8
-    assert len(found.nulls.null) == found.alike.sum()
+    assert 0.3 < found.comparable.mean() < 0.8
+    assert len(found.nulls.null) == found.comparable.sum()
     unweighed = replace(own, stated=None)
-    assert judged(unweighed).alike.all()
+    assert judged(unweighed).comparable.all()
     assert ALIKE == 1.0
 
 
