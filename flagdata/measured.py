@@ -10,6 +10,7 @@ from flagdata.arrays import FloatArray
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
 from flagdata.html import table
+from flagdata.wind_elsewhere import WindComparison
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,6 +99,7 @@ class Measured:
         figures: of how the film was made fit: camera, flags, crop; as in `--json` under "conditioning". None of a film
             that is too short for that.
         given: the answer; None where it is not shown: of a refused film, unless it was asked for `anyway`.
+        elsewhere: how the wind differs from one that was stated as `wind`; None where none was, or no answer is shown.
     """
 
     film: str
@@ -110,6 +112,7 @@ class Measured:
     findings: tuple[Finding, ...]
     figures: Mapping[str, Any] | None
     given: Answer | None
+    elsewhere: WindComparison | None = None
 
     @property
     def answer(self) -> Answer:

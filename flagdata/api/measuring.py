@@ -64,6 +64,14 @@ class Measuring(OfFilm, Drawn, BesideLake):
         section=OF_FLAG,
         metavar="NAME",
     )
+    wind: float | tuple[float, float] | str | Stated | None = option(
+        "A wind from elsewhere [m/s], of a station or an app, as in 3±1: the answer is compared with it, and not "
+        "changed by it.",
+        default=None,
+        section=HOW,
+        type=STATED,
+        metavar="M/S",
+    )
     step: float | None = option(
         "A wind series, one window every so often [s], as in 1.2s; by default windows follow each other.",
         "--windows",

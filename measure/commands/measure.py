@@ -21,6 +21,7 @@ from flagdata.shared_options import FILM, HOW, WRITTEN, AsJson, Keeping
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
+    from flagdata.wind_elsewhere import WindComparison
     from measure.anemometer.networks import Network
     from measure.commands.measure_film import Request
     from measure.estimate.measuring import Measurement, Options
@@ -131,6 +132,7 @@ class _Done:
     artifact: str | None
     subject: Subject
     refinement: Refinement | None
+    elsewhere: WindComparison | None
 
     def as_dict(self, *, anyway: bool) -> dict[str, Any]:
         shown = self.measured.shown(anyway=anyway)
@@ -141,6 +143,7 @@ class _Done:
             "source": None if self.subject.artifact is None else self.subject.artifact.id,
             "artifact": self.artifact,
             "refinement": None if self.refinement is None else self.refinement.as_dict(),
+            "wind_elsewhere": None if self.elsewhere is None else self.elsewhere.as_dict(),
             "conditioning": self.subject.film.as_dict(),
             "simulated_with": {name: known[name] for name in self.measured.names if name in known} or None,
         }
@@ -160,7 +163,7 @@ class _Job:
         """Measure one film; commit and write what is to be shown."""
         from flagdata.lake.results import placed
         from flagdata.outputs import fresh_folder, write_file
-        from measure.commands.measure_film import run
+        from measure.commands.measure_film import run, wind_elsewhere
         from measure.commands.measurement_artifact import artifact as artifact_of
         from measure.commands.measurement_artifact import keep, write
         from measure.estimate.series import beside
@@ -214,7 +217,14 @@ class _Job:
             with writing("its report"):
                 write_file(self.chosen.report, text, command="measure")
                 say(f"report: {self.chosen.report}")
-        return _Done(measured=measured, series=series, artifact=artifact, subject=subject, refinement=refinement)
+        return _Done(
+            measured=measured,
+            series=series,
+            artifact=artifact,
+            subject=subject,
+            refinement=refinement,
+            elsewhere=wind_elsewhere(measured, self.chosen),
+        )
 
     def refuse(self, done: _Done) -> None:
         """Raises:
@@ -330,6 +340,9 @@ def _report(done: _Done, *, series: bool) -> None:
     for finding in measured.bounds:
         if finding.severity is Severity.NOTE:
             say(f"  {finding.what}; {finding.fix}")
+    if done.elsewhere is not None:
+        echo(f"  {done.elsewhere.sentence}")
+        say(f"  {done.elsewhere.advice}")
     if done.refinement is not None:
         echo(f"{mark}refined: {done.refinement.sentence}")
     if not series:

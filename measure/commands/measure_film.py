@@ -16,6 +16,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.lake import Lake
 from flagdata.measured import Answer, Estimate, Measured, Windows
 from flagdata.stated import Stated
+from flagdata.wind_elsewhere import WindComparison, compared
 from measure.anemometer.measuring import measure_by
 from measure.anemometer.networks import Network, gate_beside, network
 from measure.estimate.answer import Quantity
@@ -138,6 +139,21 @@ def measured(chosen: Measuring) -> Measured:
         findings=found.noticed(anyway=chosen.anyway),
         figures=subject.film.as_dict(),
         given=_answer(found) if found.shown(anyway=chosen.anyway) else None,
+        elsewhere=wind_elsewhere(found, chosen),
+    )
+
+
+def wind_elsewhere(found: Measurement, chosen: Measuring) -> WindComparison | None:
+    """Compares the measured wind with the one that was stated beside it; None where none was, or nothing is shown."""
+    if chosen.wind is None or not found.shown(anyway=chosen.anyway):
+        return None
+    (wind,) = (quantity for quantity in found.quantities if quantity.name == "wind_speed")
+    return compared(
+        found.draws[:, found.names.index("wind_speed")],
+        Stated.of(chosen.wind),
+        is_bound=wind.span.bound is not None,
+        level=found.options.level,
+        seed=found.options.seed,
     )
 
 

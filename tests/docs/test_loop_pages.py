@@ -172,7 +172,7 @@ def test_every_command_of_proposing_runs(folder: Path, tmp_path: Path, monkeypat
     assert len(first) > 100
     assert plain["options"].bank is None
     assert str(known["options"].bank) == "bank"
-    assert [str(column.effect) for column in known["known"]] == ["vertical-wind"]
+    assert [str(column.effect) for column in known["acting_columns"]] == ["vertical-wind"]
     assert len(tried) == 1
     assert len(tested["controls"]) == len(first)
     assert len(entries(made / "proposals.json")) == 3
