@@ -10,11 +10,11 @@ from griffe import Docstring, Extension, Function, Parameter, ParameterKind, Par
 
 
 class Called(Extension):
-    """Gives a function that `flagdata.options.called` made the parameters and the docstring that it has at run time."""
+    """Gives a function that `flagdata.options.called` or `verb` made the parameters and docstring of run time."""
 
     def on_function(self, *, func: Function, **_: Any) -> None:
         """Replaces them; called by griffe, which reads source and runs none."""
-        if not any("called(" in str(one.value) for one in func.decorators):
+        if not any(str(one.value).startswith(("called(", "verb(")) for one in func.decorators):
             return
         call = getattr(import_module(func.module.path), func.name)
         func.parameters = Parameters(*map(_parameter, inspect.signature(call).parameters.values()))

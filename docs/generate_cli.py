@@ -83,7 +83,8 @@ def _row(option: click.Option, context: click.Context) -> str:
         about.append("Required.")
     if option.multiple:
         about.append("May be repeated.")
-    default = _default(option.to_info_dict()["default"]) if option.show_default else ""
+    written = option.show_default if isinstance(option.show_default, str) else option.to_info_dict()["default"]
+    default = _default(written) if option.show_default else ""
     if default:
         about.append(f"Default: `{default}`.")
     return f"| {names}{value} | {' '.join(about)} |"

@@ -19,35 +19,71 @@ from flagdata.installed_names import step_aside
 from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from flagdata.api.lake_verbs import export, query, tag
+    from flagdata.api.lake_verbs import branch, export, query, tag
     from flagdata.api.lakes import open, pairs  # noqa: A004  read as flagdata.open
+    from flagdata.api.learning import build, evaluate, train
     from flagdata.api.measuring import calibrate, close_loop, measure, observe
     from flagdata.api.physics import render, simulate
-    from flagdata.api.recording_verbs import align, ingest
+    from flagdata.api.recording_verbs import align, ingest, realign
     from flagdata.api.recordings import frames, meshes, motion, wind
+    from flagdata.commands.artifacts import ls, show
+    from flagdata.commands.catalog import catalog
+    from flagdata.commands.declare import declare
+    from flagdata.commands.declare_cloths import declare_cloths
+    from flagdata.commands.label import label
+    from flagdata.commands.lake import diff, init, log, merge, withdraw
+    from flagdata.commands.looking import du, lineage
+    from flagdata.commands.transfer import clone, pull, push
+    from flagdata.commands.upkeep import doctor, expire, gc, recover, verify
     from flagdata.examples import example
 
 step_aside()
 
 __all__ = [
     "align",
+    "branch",
+    "build",
     "calibrate",
+    "catalog",
+    "clone",
     "close_loop",
+    "declare",
+    "declare_cloths",
+    "diff",
+    "doctor",
+    "du",
+    "evaluate",
     "example",
+    "expire",
     "export",
     "frames",
+    "gc",
     "ingest",
+    "init",
+    "label",
+    "lineage",
+    "log",
+    "ls",
     "measure",
+    "merge",
     "meshes",
     "motion",
     "observe",
     "open",
     "pairs",
+    "pull",
+    "push",
     "query",
+    "realign",
+    "recover",
     "render",
+    "show",
     "simulate",
     "tag",
+    "train",
+    "verify",
     "wind",
+    "withdraw",
 ]
 
 _exported = lazy_exports(__name__, __file__)

@@ -168,7 +168,8 @@ class LazyGroup(click.Group):
         if cmd_name not in self.verbs:
             return None
         module, _, attribute = self.verbs[cmd_name][0].partition(":")
-        return getattr(import_module(module), attribute)
+        found = getattr(import_module(module), attribute)
+        return getattr(found, "command", found)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

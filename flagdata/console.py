@@ -16,7 +16,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -26,8 +26,6 @@ from flagdata.extras import missing
 from flagdata.findings import Finding
 from flagdata.printable import printable, printable_lines
 from flagdata.storage import Place, StoreError
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 class LocalPath(click.Path):
@@ -51,34 +49,6 @@ class LakePlace(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Place:
         return lake_place(value)
-
-
-def json_option(command: F) -> F:
-    """Adds `--json` (argument `as_json`); errors are then printed as JSON too."""
-    return click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")(command)
-
-
-def lake_option(command: F) -> F:
-    """Adds `--lake DIR` (argument `lake_path`), also read from the environment variable FLAGDATA_LAKE."""
-    return click.option(
-        "--lake",
-        "lake_path",
-        envvar="FLAGDATA_LAKE",
-        default=".",
-        show_default=True,
-        metavar="DIR",
-        help="The lake's folder, or s3://bucket/prefix; also FLAGDATA_LAKE.",
-    )(command)
-
-
-def at_option(command: F) -> F:
-    """Adds `--at REF`."""
-    return click.option(
-        "--at",
-        metavar="REF",
-        help="Tag, branch, version number, commit, or main at a time: 2026-11-26 (its end, UTC), 3.days.ago; the head "
-        "of main by default.",
-    )(command)
 
 
 def document(tag: str, content: Mapping[str, Any]) -> None:

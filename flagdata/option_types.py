@@ -9,8 +9,9 @@ import click
 from flagdata.errors import UsageError
 from flagdata.stated import Stated, parse
 
-_SECONDS = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86_400.0, "day": 86_400.0}
-_WRITTEN = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(ms|s|min|h|day|d)\s*")
+_SECONDS = {"ms": 1e-3, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86_400.0, "day": 86_400.0}
+_CENTURY = 36_525 * 86_400.0  # s
+_WRITTEN = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(ms|s|min|m|h|day|d)\s*")
 
 
 def written_seconds(text: str) -> float | None:
@@ -31,6 +32,8 @@ class Duration(click.ParamType):
         seconds = written_seconds(str(value))
         if seconds is None:
             self.fail(f"{value!r} is not a length of time; give a number and ms, s, min, h or d, e.g. 10s", param, ctx)
+        if seconds > _CENTURY:
+            self.fail(f"{value!r} is more than a century", param, ctx)
         return seconds
 
 

@@ -10,20 +10,32 @@
 
 A verb's arguments are what its Python call takes by position. What several verbs share is a class that theirs inherit;
 what only the command has, as the form of what it prints, is a class that inherits that of the call.
+
+Where command and call differ in nothing but that, one function makes both. It yields its result, which the call returns
+and `--json` prints; what it does afterwards prints the result for people.
+
+    @verb(Listing, example='flagdata.ls(lake="field.lake")["artifacts"]')
+    def ls(chosen: Listing) -> Iterator[Result]:
+        rows = chosen.opened().rows()
+        yield Result("ls", {"artifacts": rows})
+        table(HEADER, rows)
 """
 
 from __future__ import annotations
 
 import functools
 import inspect
+import sys
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from dataclasses import MISSING, Field, dataclass, field, fields
 from typing import Any, ParamSpec, TypeVar, dataclass_transform
 
 import click
 from click.core import ParameterSource
 
+from flagdata.console import document
 from flagdata.errors import FlagdataError
 
 P = ParamSpec("P")
@@ -170,6 +182,13 @@ class LongCommand(click.Command):
                 formatter.write_dl(records)
 
 
+@options
+class AsJson:
+    """What every command can print."""
+
+    as_json: bool = option("One JSON document on stdout.", "--json", default=False)
+
+
 def command(
     form: type[Any], *, cls: type[LongCommand] = LongCommand
 ) -> Callable[[Callable[[Any], object]], LongCommand]:
@@ -188,7 +207,7 @@ def command(
             return run(_with_typed(form(**values), frozenset(names)))
 
         return cls(
-            name=run.__name__.replace("_", "-"),
+            name=run.__name__.strip("_").replace("_", "-"),
             params=[_parameter(key, *row) for key, row in described(form).items()],
             callback=callback,
             help=inspect.getdoc(run),
@@ -252,6 +271,70 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
         head, raised, rest = (inspect.getdoc(run) or "").partition("\nRaises:")
         vars(call).update(converts=frozenset(converts), __signature__=shown)
         call.__doc__ = f"{head}\nArgs:\n{_arguments(rows)}\n{raised}{rest}"
+        return call
+
+    return made
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a verb gives back.
+
+    Attributes:
+        tag: of its JSON document, see `flagdata.console.document`.
+        content: of it.
+        exit_code: of the command.
+    """
+
+    tag: str
+    content: Mapping[str, Any]
+    exit_code: int = 0
+
+
+_NOTHING = Result("", {})
+
+
+def verb(
+    form: Callable[P, object], *, example: str
+) -> Callable[[Callable[[Any], Iterator[Result]]], Callable[P, Mapping[str, Any]]]:
+    """Makes the Python call of a verb from the class of its options and the function that runs it.
+
+    Its attribute `command` is the command of the same name, which has `--json` beside the options of the class, and
+    `result` takes an object of the class. The function's docstring is the help. A function that yields nothing leaves
+    the result to another process.
+
+    Args:
+        example: of the call, in place of the command lines of the help.
+    """
+
+    def made(run: Callable[[Any], Iterator[Result]]) -> Callable[P, Mapping[str, Any]]:
+        @functools.wraps(run)
+        def printed(chosen: Any) -> None:
+            steps = run(chosen)
+            result = next(steps, None)
+            if result is None:
+                return
+            if chosen.as_json:
+                document(result.tag, result.content)
+            else:
+                for _ in steps:
+                    pass
+            if result.exit_code:
+                sys.exit(result.exit_code)
+
+        @functools.wraps(run)
+        def result(chosen: Any) -> Mapping[str, Any]:
+            with closing(run(chosen)) as steps:  # type: ignore[type-var]  a generator
+                return next(steps, _NOTHING).content
+
+        shown = command(options(type(run.__name__, (form, AsJson), {"__module__": run.__module__})))(printed)
+        name = str(shown.name)
+        about = (part for part in (inspect.getdoc(run) or "").split("\n\n") if not part.startswith("\b"))
+        shows = (f"```python\n{example}\n```", f"Returns:\n    What `flagdata {name} --json` prints.")
+        result.__doc__ = "\n\n".join((*about, *shows))
+        result.__annotations__ = {"return": "Mapping[str, Any]"}
+        call = called(form)(result)
+        vars(call).update(command=shown, result=result)
         return call
 
     return made

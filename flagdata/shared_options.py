@@ -9,6 +9,7 @@ import click
 from flagdata.console import LakePlace
 from flagdata.option_types import DURATION, POSITIVE, SHARE, STATED
 from flagdata.options import option, options
+from flagdata.workload import cores
 
 if TYPE_CHECKING:
     from flagdata.dataset.source import AnyLake
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from flagdata.stated import Stated
 
 LAKE = "The lake's folder, or s3://bucket/prefix."
+RECORDING = "The recording"
 FILM = "The film"
 FLAG = "The flag and the camera"
 HOW = "How it is done"
@@ -23,17 +25,20 @@ WRITTEN = "What is written"
 
 
 @options
-class AsJson:
-    """What every command can print."""
-
-    as_json: bool = option("One JSON document on stdout.", "--json", default=False)
-
-
-@options
 class OnLake:
     """The lake that a verb is about."""
 
     lake: AnyLake = option(LAKE, default=".", envvar="FLAGDATA_LAKE", metavar="DIR")
+
+    def opened(self) -> Lake:
+        """Opens the lake.
+
+        Raises:
+            NotFoundError: there is none.
+        """
+        from flagdata.dataset.source import opened
+
+        return opened(self.lake).lake
 
 
 @options
@@ -46,6 +51,78 @@ class AtVersion:
         default=None,
         metavar="REF",
     )
+
+
+@options
+class NamedRecording:
+    """What a recording is called."""
+
+    name: str | None = option(
+        "What to call the recording; the camera's name by default.", default=None, section=RECORDING
+    )
+    session: str | None = option(
+        "One set-up at one place, for splits; the parents' by default.", default=None, section=RECORDING
+    )
+
+
+@options
+class Reasoned:
+    """Why a commit is made, for the log."""
+
+    message: str | None = option("Why.", "--message", "-m", default=None)
+
+
+@options
+class Rehearsed:
+    """Whether something is only looked at."""
+
+    dry_run: bool = option("Say what would be done; commit and delete nothing.", default=False)
+
+
+@options
+class OfGarbage:
+    """What is garbage."""
+
+    grace: float = option(
+        "How old something must be, with nothing referring to it, to be garbage [s], as in 24h.",
+        "--older-than",
+        default=86_400.0,
+        type=DURATION,
+        show_default="24h",
+        metavar="AGE",
+    )
+
+
+@options
+class InFull:
+    """How much of many relatives is listed."""
+
+    whole: bool = option("All columns and all relatives, also where there are many.", "--all", default=False)
+
+
+@options
+class Shared:
+    """Among how many processes or threads work is shared."""
+
+    workers: int | None = option(
+        "Number of processes or threads; by default one for each core.",
+        default=None,
+        section=HOW,
+        type=POSITIVE,
+        metavar="N",
+    )
+
+    @property
+    def processes(self) -> int:
+        """How many processes or threads compute."""
+        return self.workers or cores()
+
+
+@options
+class Computed(Shared):
+    """Where something is computed."""
+
+    device: str = option("Where to compute: cpu, cuda, cuda:1.", default="cpu", section=HOW)
 
 
 @options

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 _SHORT = 90.0  # s
 
 
@@ -16,6 +18,11 @@ def announced(what: str, seconds: float, *, workers: int = 1, kept: str | None =
     """
     cores = "one idle core" if workers == 1 else f"{workers} idle cores"
     return f"{what} takes {_length(seconds / workers)} on {cores}{'' if kept is None else f'; {kept}'}"
+
+
+def cores() -> int:
+    """Counts the cores that the process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _length(seconds: float) -> str:

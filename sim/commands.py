@@ -2,44 +2,29 @@
 
 from __future__ import annotations
 
-import os
-import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import click
-
-from flagdata.console import document, echo, in_steps, json_option, lake_option, progress, say
+from flagdata.api.physics import Members
+from flagdata.console import echo, in_steps, progress, say
+from flagdata.options import Result, argument, options, verb
 from flagdata.printable import counted
+from flagdata.shared_options import Computed, OnBranch, OnLake
 
 if TYPE_CHECKING:
     from sim.run import RunReport
 
 
-@click.command()
-@click.argument("recipe", metavar="RECIPE")
-@click.option("--count", type=click.IntRange(min=1), metavar="N", help="How many members, instead of the recipe's.")
-@click.option("--batch", type=click.IntRange(min=1), metavar="N", help="How many at a time, instead of the recipe's.")
-@click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda, cuda:1.")
-@click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Batches at a time; by default one for each core.",
-)
-@click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
-@json_option
-@lake_option
-def simulate(
-    recipe: str,
-    count: int | None,
-    batch: int | None,
-    device: str,
-    workers: int | None,
-    branch: str,
-    as_json: bool,
-    lake_path: str,
-) -> None:
+@options
+class SimulateCommand(Members, Computed, OnBranch, OnLake):
+    """How many members of a recipe are simulated, and where they go."""
+
+    recipe: str = argument("A recipe, a scene or a model.", "RECIPE")
+
+
+@verb(SimulateCommand, example='flagdata.simulate("flag-gusts", count=4)')
+def simulate(chosen: SimulateCommand) -> Iterator[Result]:
     """Simulate cloth in the wind: mesh sequences, with their parameters, seeds and energies.
 
     RECIPE is a TOML file, a recipe of the catalog by name, an ArcSim scene (.json), which is run with ArcSim's own
@@ -53,31 +38,22 @@ def simulate(
       flagdata simulate flag-search-space --lake lake --count 200
       flagdata simulate my-flag.toml --lake lake --batch 64 --device cuda
     """
-    from flagdata.lake import Lake
     from flagdata.lake.merging import added_since
     from sim.run import simulate as run
     from sim.run.models import load
 
-    lake = Lake.open(lake_path)
+    branch, device = chosen.branch, chosen.device
+    lake = chosen.opened()
     lake.check_writable()
-    loaded = load(recipe, lake, branch=branch)
-    loaded = replace(loaded, count=count or loaded.count, batch=batch or loaded.batch)
+    loaded = load(chosen.recipe, lake, branch=branch)
+    loaded = replace(loaded, count=chosen.count or loaded.count, batch=chosen.batch or loaded.batch)
+    workers = chosen.processes if device.startswith("cpu") else chosen.workers or 1  # others take a batch at a time
     steps = in_steps(added_since(lake, branch))
     with steps, progress(loaded.count, label=loaded.name, unit="flag") as advance:
-        report = run(lake, loaded, branch=branch, device=device, workers=workers or _cores(device), progress=advance)
-    if as_json:
-        document("simulate", {"lake": str(lake.path), "recipe": loaded.name, **report.as_dict()})
-    else:
-        _print(report)
-    if report.failed:
-        sys.exit(1)
-
-
-def _cores(device: str) -> int:
-    """Counts the cores that the process may use; 1 on any other device, which takes one batch at a time."""
-    if not device.startswith("cpu"):
-        return 1
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        report = run(lake, loaded, branch=branch, device=device, workers=workers, progress=advance)
+    content = {"lake": str(lake.path), "recipe": loaded.name, **report.as_dict()}
+    yield Result("simulate", content, 1 if report.failed else 0)
+    _print(report)
 
 
 def _print(report: RunReport) -> None:

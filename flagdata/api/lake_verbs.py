@@ -106,14 +106,38 @@ def tag(chosen: Naming) -> tuple[Ref, ...]:
         NotFoundError: no such lake, version or tag.
         UsageError: options that contradict each other.
     """
-    from flagdata.dataset.source import opened
-
-    lake = opened(chosen.lake).lake
+    lake = chosen.opened()
     if chosen.name is None:
         return tuple(lake.refs.tags().values())
     if not chosen.delete:
         return (lake.tag(chosen.name, at=chosen.at),)
     lake.delete_tag(chosen.name, chosen.message, discard=chosen.discard)
+    return ()
+
+
+@called(Naming)
+def branch(chosen: Naming) -> tuple[Ref, ...]:
+    """Begins a line of work in a lake, as `flagdata branch` does; without a name, lists the branches.
+
+    ```python
+    (trial,) = flagdata.branch("trial", lake="field.lake", at="v2")
+    flagdata.ingest("flag.mp4", lake="field.lake", branch="trial")
+    ```
+
+    Returns:
+        The branch that was begun, or all; none where one was deleted.
+
+    Raises:
+        ConflictError: the name is taken, or was.
+        NotFoundError: no such lake, version or branch.
+        UsageError: options that contradict each other.
+    """
+    lake = chosen.opened()
+    if chosen.name is None:
+        return tuple(lake.refs.branches().values())
+    if not chosen.delete:
+        return (lake.branch(chosen.name, at=chosen.at),)
+    lake.delete_branch(chosen.name, chosen.message, discard=chosen.discard)
     return ()
 
 

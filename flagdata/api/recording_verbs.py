@@ -15,17 +15,17 @@ from flagdata.console import LocalPath
 from flagdata.option_types import DURATION
 from flagdata.options import argument, called, option, options
 from flagdata.parts import call
-from flagdata.shared_options import OnBranch, OnLake
+from flagdata.shared_options import RECORDING, NamedRecording, OnBranch, OnLake, Rehearsed
 
 if TYPE_CHECKING:
     from flagdata.align.methods import ClockOptions
     from flagdata.ingest.store import IngestResult
 
-CLOCK, RECORDING = "The clock", "The recording"
+CLOCK = "The clock"
 
 
 @options
-class ByClock(OnBranch, OnLake):
+class ByClock(NamedRecording, Rehearsed, OnBranch, OnLake):
     """How a clock model is found, and what the recording that it makes is called."""
 
     by: str = option(
@@ -76,13 +76,6 @@ class ByClock(OnBranch, OnLake):
         type=DURATION,
         metavar="TIME",
     )
-    name: str | None = option(
-        "What to call the recording; the camera's name by default.", default=None, section=RECORDING
-    )
-    session: str | None = option(
-        "One set-up at one place, for splits; the parents' by default.", default=None, section=RECORDING
-    )
-    dry_run: bool = option("Find the clock model, commit nothing.", default=False)
 
     def clock(self) -> ClockOptions:
         """Returns how to come by the clock model.
@@ -140,6 +133,33 @@ def align(chosen: Aligning) -> Mapping[str, Any]:
         UsageError: options that contradict each other.
     """
     return call("flagdata.commands.align:aligned", chosen).content
+
+
+@options
+class Realigning(ByClock):
+    """Which recording is written anew."""
+
+    recording: str = argument("A recording of the lake by its name or id.", "RECORDING")
+
+
+@called(Realigning)
+def realign(chosen: Realigning) -> Mapping[str, Any]:
+    """Writes a recording anew with another clock model, from the same artifacts, as `flagdata realign` does.
+
+    ```python
+    flagdata.realign("flag", lake="field.lake", by="given", offset=-0.35, offset_sigma=0.05)
+    ```
+
+    Returns:
+        What `flagdata realign --json` prints.
+
+    Raises:
+        NotFoundError: no such lake.
+        RefusedError: an estimate that is not certain; nothing is committed.
+        UnknownNameError: no such recording.
+        UsageError: options that contradict each other.
+    """
+    return call("flagdata.commands.align:realigned", chosen).content
 
 
 SOURCE, CAMERA, ANEMOMETER = "What the source is", "Camera", "Anemometer"

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flagdata.api.recording_verbs import Aligning, ByClock
+from flagdata.api.recording_verbs import Aligning, ByClock, Realigning
 from flagdata.console import LocalPath, document, echo, progress, say, say_finding
-from flagdata.options import argument, command, option, options
+from flagdata.options import AsJson, command, option, options
 from flagdata.printable import SHORT
-from flagdata.shared_options import AsJson
 from flagdata.timebase import NANOSECONDS
 
 if TYPE_CHECKING:
@@ -31,11 +30,13 @@ class Report:
         tag: of the JSON document.
         content: JSON values.
         lines: for people.
+        superseded: the recording that was written anew; empty where there was none.
     """
 
     tag: str
     content: Mapping[str, Any]
     lines: tuple[str, ...]
+    superseded: str = ""
 
     def shown(self, *, as_json: bool) -> None:
         """Prints it."""
@@ -64,10 +65,8 @@ class AlignCommand(Plotting, Aligning):
 
 
 @options
-class RealignCommand(Plotting, ByClock):
-    """Which recording is written anew."""
-
-    recording: str = argument("The recording.", "RECORDING")
+class RealignCommand(Plotting, Realigning):
+    """The same on the command line."""
 
 
 @command(AlignCommand)
@@ -87,17 +86,32 @@ def realign(chosen: RealignCommand) -> None:
     The window of the ground truth stays what it was unless --window says otherwise. The old recording and its clips
     stay until `flagdata withdraw` takes them off the branch; tags keep them.
     """
+    report = realigned(chosen, plot=chosen.plot)
+    report.shown(as_json=chosen.as_json)
+    if not chosen.dry_run:
+        old = f"the recording {report.superseded[:SHORT]} it supersedes is still on {chosen.branch}"
+        say(f"{old}; flagdata withdraw takes it off")
+
+
+def realigned(chosen: Realigning, *, plot: Path | None = None) -> Report:
+    """Writes a recording anew.
+
+    Args:
+        plot: file of a picture of the search; None for none.
+
+    Raises:
+        FlagdataError: see `flagdata.realign`.
+    """
     from flagdata.align.recording import Pair, parents_of, truth_recipe, truth_window
 
-    lake, clock = _opened(chosen, chosen.plot)
+    lake, clock = _opened(chosen, plot)
     old, parents = parents_of(lake, chosen.recording, at=chosen.branch)
     pair = Pair.of(lake, *parents, at=chosen.branch)
     window = truth_window(old.recipe) if chosen.window is None else chosen.window
     recipe = {**clock.recipe(), **truth_recipe(window), "supersedes": old.id}
     names = {"name": chosen.name or old.name, "session": chosen.session or old.session}
-    _of_film(chosen, lake, pair, clock, recipe=recipe, plot=chosen.plot, **names).shown(as_json=chosen.as_json)
-    if not chosen.dry_run:
-        say(f"the recording {old.id[:SHORT]} it supersedes is still on {chosen.branch}; flagdata withdraw takes it off")
+    report = _of_film(chosen, lake, pair, clock, recipe=recipe, plot=plot, **names)
+    return replace(report, superseded=old.id)
 
 
 def aligned(chosen: Aligning, *, plot: Path | None = None) -> Report:
@@ -131,11 +145,9 @@ def aligned(chosen: Aligning, *, plot: Path | None = None) -> Report:
 
 def _opened(chosen: ByClock, plot: Path | None) -> tuple[Lake, ClockOptions]:
     """Opens the lake, which can be written unless nothing is to be; with how to come by the clock model."""
-    from flagdata.dataset.source import opened
-
     clock = chosen.clock()
     _check_plot(plot, clock)
-    lake = opened(chosen.lake).lake
+    lake = chosen.opened()
     if not chosen.dry_run:
         lake.check_writable()
     return lake, clock

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from flagdata.console import at_option, document, echo, json_option, lake_option, say, table
+from flagdata.console import echo, say, table
+from flagdata.options import Result, argument, option, options, verb
 from flagdata.printable import SHORT, counted, size_text
+from flagdata.shared_options import AtVersion, InFull, OnLake
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -22,39 +22,40 @@ _INNER = ("recipe", "parameters", "clock_model", "recipe_hash")
 """Columns that are JSON or hashes, for --all."""
 
 
-@click.command()
-@click.option("--kind", metavar="KIND", help="Only this kind: camera, wind, recording, clip, meshes, …")
-@at_option
-@json_option
-@lake_option
-def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
+@options
+class Listing(AtVersion, OnLake):
+    """Which artifacts are listed."""
+
+    kind: str | None = option("Only this kind: camera, wind, recording, clip, meshes, …", default=None, metavar="KIND")
+
+
+@verb(Listing, example='flagdata.ls(lake="field.lake", kind="wind")["artifacts"]')
+def ls(chosen: Listing) -> Iterator[Result]:
     """List artifacts, clips counted only (--kind clip lists them); filters and SQL are `flagdata query`'s."""
     from flagdata.errors import UnknownNameError
-    from flagdata.lake import Lake
     from flagdata.lake.matching import matching
     from flagdata.lake.naming import superseded
     from flagdata.lake.removal import lost
     from flagdata.schema import Kind
 
+    kind, at = chosen.kind, chosen.at
     if kind is not None and kind not in list(Kind):
         raise UnknownNameError.of("kind", kind, [k.value for k in Kind])
-    lake = Lake.open(lake_path)
+    lake = chosen.opened()
     found = lake.rows(None if kind is None else {"kind": kind}, at=at, columns=["name", "object"])
     rows = lake.rows("kind <> 'clip'" if kind is None else {"kind": kind}, at=at).to_pylist()
     gone = lost(lake, found)
     older = superseded(row for row in rows if row["kind"] in (Kind.MEASUREMENT, Kind.MODEL))
     clips = found.num_rows - len(rows)
-    if as_json:
-        listed = [
-            {
-                **_plain(row),
-                "data": "lost" if row["object"] in gone else "there",
-                "superseded": row["artifact"] in older,
-            }
-            for row in rows
-        ]
-        document("ls", {"at": at, "artifacts": listed, "clips_not_listed": clips})
-        return
+    listed = [
+        {
+            **_plain(row),
+            "data": "lost" if row["object"] in gone else "there",
+            "superseded": row["artifact"] in older,
+        }
+        for row in rows
+    ]
+    yield Result("ls", {"at": at, "artifacts": listed, "clips_not_listed": clips})
     header = ("artifact", "kind", "name", "start", "frames", "wind [m/s]", "size", "quality")
     if rows:
         lines = [_line(row, lost=row["object"] in gone, superseded=row["artifact"] in older) for row in rows]
@@ -66,13 +67,15 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
         say(f"without data: {', '.join(names)}: {why.what}")
 
 
-@click.command()
-@click.argument("artifact")
-@click.option("--all", "whole", is_flag=True, help="All columns, with their JSON, and all that was made from it.")
-@at_option
-@json_option
-@lake_option
-def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: str) -> None:
+@options
+class Showing(InFull, AtVersion, OnLake):
+    """Which artifact is looked at."""
+
+    artifact: str = argument("Its id, name or file.", "ARTIFACT")
+
+
+@verb(Showing, example='flagdata.show("flag", lake="field.lake")["parents"]')
+def show(chosen: Showing) -> Iterator[Result]:
     """Show one artifact: what it says, what it was made from and what was made from it.
 
     ARTIFACT is an id or its beginning, a name, the file it came from, or NAME@TAG. Of a verdict or a measurement its
@@ -80,13 +83,12 @@ def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: s
     """
     from flagdata.cells import said
     from flagdata.ingest.before import unconfirmed
-    from flagdata.lake import Lake
     from flagdata.lake.labels import PREFIX
     from flagdata.lake.lineage import labels_of
     from flagdata.lake.results import versions
 
-    lake = Lake.open(lake_path)
-    found = lake.artifact(artifact, at=at)
+    lake, at, whole = chosen.opened(), chosen.at, chosen.whole
+    found = lake.artifact(chosen.artifact, at=at)
     row = _plain(found.row())
     for column in ("recipe", "parameters", "clock_model", "report"):
         row[column] = json.loads(row[column]) if row[column] else None
@@ -101,20 +103,18 @@ def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: s
         {"version": number, "artifact": one.id, "code_version": one.code_version}
         for number, one in enumerate(versions(lake, found, at=at), start=1)
     ]
-    if as_json:
-        document(
-            "show",
-            {
-                "artifact": row,
-                "labels": labels,
-                "path": str(path) if path else None,
-                "parents": parents,
-                "children": children,
-                "versions": stated,
-                "findings": [finding.as_dict() for finding in doubts],
-            },
-        )
-        return
+    yield Result(
+        "show",
+        {
+            "artifact": row,
+            "labels": labels,
+            "path": str(path) if path else None,
+            "parents": parents,
+            "children": children,
+            "versions": stated,
+            "findings": [finding.as_dict() for finding in doubts],
+        },
+    )
     for name, text in _gist(lake, row):
         echo(f"{name:<15} {text}")
     left_out = ("parents", "report") if whole else ("parents", "report", *_INNER)

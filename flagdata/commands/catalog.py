@@ -5,30 +5,35 @@ from __future__ import annotations
 import json
 import sys
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 
-import click
-
-from flagdata.console import document, echo, echo_lines, json_option, say, table
+from flagdata.console import echo, echo_lines, say, table
 from flagdata.errors import MissingExtraError, UnknownNameError
 from flagdata.extras import explained
+from flagdata.options import Result, argument, options, verb
 from flagdata.recipes import Shelf
 from flagdata.registry import PlugInError, Registry
 
 
-@click.command()
-@click.argument("kind", required=False)
-@json_option
-def catalog(kind: str | None, as_json: bool) -> None:
+@options
+class Named:
+    """Names of which kind are listed."""
+
+    kind: str | None = argument("Of the names; all kinds by default.", "[KIND]", default=None)
+
+
+@verb(Named, example='flagdata.catalog("effects")["kinds"]')
+def catalog(chosen: Named) -> Iterator[Result]:
     """List the names that come with flagdata: scenes, materials, effects, sensors, data sets, models and more.
 
     With KIND that kind alone, a line on each name. What a lake holds is listed by `flagdata ls`.
     """
     from flagdata.cli import NAMES
 
+    kind = chosen.kind
     if kind is not None and kind not in NAMES:
         raise UnknownNameError.of("kind of name", kind, NAMES)
     kinds = NAMES if kind is None else {kind: NAMES[kind]}
@@ -41,10 +46,9 @@ def catalog(kind: str | None, as_json: bool) -> None:
             if kind is not None:
                 raise
             say(f"{name} are left out: {error.what}; {error.fix}", mark="note")
-    if as_json:
-        listed = [{"kind": name, "taken_by": kinds[name][1], "names": names} for name, names in found.items()]
-        document("catalog", {"kinds": listed})
-    elif kind is not None:
+    listed = [{"kind": name, "taken_by": kinds[name][1], "names": names} for name, names in found.items()]
+    yield Result("catalog", {"kinds": listed})
+    if kind is not None:
         table((kind, "what it is"), found[kind].items())
     else:
         for name, names in found.items():

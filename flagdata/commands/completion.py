@@ -5,7 +5,8 @@ from __future__ import annotations
 import click
 from click.shell_completion import BashComplete, FishComplete, ZshComplete
 
-from flagdata.console import document, echo_lines, json_option, say
+from flagdata.console import document, echo_lines, say
+from flagdata.options import AsJson, argument, command, options
 
 _SHELLS = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
 _WHERE = {
@@ -15,11 +16,15 @@ _WHERE = {
 }
 
 
-@click.command()
-@click.argument("shell", type=click.Choice(list(_SHELLS)))
-@json_option
-@click.pass_context
-def completion(context: click.Context, shell: str, as_json: bool) -> None:
+@options
+class Completing(AsJson):
+    """Which shell completes."""
+
+    shell: str = argument("The shell.", "{bash|zsh|fish}", type=click.Choice(list(_SHELLS)))
+
+
+@command(Completing)
+def completion(chosen: Completing) -> None:
     """Print what completes commands and options in SHELL: bash, zsh or fish.
 
     \b
@@ -27,8 +32,9 @@ def completion(context: click.Context, shell: str, as_json: bool) -> None:
       eval "$(flagdata completion zsh)"           in ~/.zshrc, after compinit
       flagdata completion fish > ~/.config/fish/completions/flagdata.fish
     """
-    script = _SHELLS[shell](context.find_root().command, {}, "flagdata", "_FLAGDATA_COMPLETE").source()
-    if as_json:
+    shell, root = chosen.shell, click.get_current_context().find_root().command
+    script = _SHELLS[shell](root, {}, "flagdata", "_FLAGDATA_COMPLETE").source()
+    if chosen.as_json:
         document("completion", {"shell": shell, "script": script})
         return
     echo_lines(script)

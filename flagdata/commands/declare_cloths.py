@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
-import click
+from flagdata.addresses import local_path
+from flagdata.console import LocalPath, echo, in_steps, progress
+from flagdata.options import Result, argument, option, options, verb
+from flagdata.shared_options import OnBranch, OnLake
 
-from flagdata.console import LocalPath, document, echo, in_steps, json_option, lake_option, progress
+
+@options
+class DeclaringCloths(OnBranch, OnLake):
+    """Which films show which cloths."""
+
+    table: Path | str = argument("A CSV file, one row a film.", "TABLE", type=LocalPath())
+    crop: str = option(
+        "Region of all films: x,y,width,height [px] of upright images; whole, square, or auto.",
+        default="square",
+        metavar="BOX",
+    )
 
 
-@click.command("declare-cloths")
-@click.argument("table", type=LocalPath())
-@click.option(
-    "--crop",
-    default="square",
-    show_default=True,
-    metavar="BOX",
-    help="Region of all films: x,y,width,height [px] of upright images; whole, square, or auto.",
-)
-@click.option("--branch", default="main", show_default=True, help="Branch to commit on.")
-@json_option
-@lake_option
-def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path: str) -> None:
+@verb(DeclaringCloths, example='flagdata.declare_cloths("fabrics.csv", lake="field.lake")["recordings"]')
+def declare_cloths(chosen: DeclaringCloths) -> Iterator[Result]:
     """Ingest the films that TABLE names, with the area weight and stiffness that were measured of their cloths.
 
     TABLE is a CSV file, one row a film: film (a path from the table's folder on), fabric, area_weight [kg/m²], and as
@@ -38,13 +41,12 @@ def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path
     from flagdata.ingest.camera.start import UNKNOWN
     from flagdata.ingest.cloths import read_cloths
     from flagdata.ingest.store import CameraIngest, Labels, ingest_camera
-    from flagdata.lake import Lake
     from flagdata.lake.merging import added_since
 
-    box = parse_crop(crop)
-    lake = Lake.open(lake_path)
+    box, branch = parse_crop(chosen.crop), chosen.branch
+    lake = chosen.opened()
     lake.check_writable()
-    cloths = read_cloths(table)
+    cloths = read_cloths(local_path(chosen.table))
     made = []
     with in_steps(added_since(lake, branch)), progress(len(cloths), label="films", unit="film") as advance:
         for cloth in cloths:
@@ -52,21 +54,8 @@ def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path
             film = ingest_camera(lake, cloth.film, options, labels=Labels(session=cloth.fabric), branch=branch)
             made.append((cloth, cloth_recording(lake, film.artifact, cloth, branch=branch)))
             advance(1)
-    if as_json:
-        document(
-            "declare-cloths",
-            {
-                "recordings": [
-                    {
-                        **one.as_dict(),
-                        "parameters": cloth.parameters,
-                        "wind": cloth.wind,
-                    }
-                    for cloth, one in made
-                ]
-            },
-        )
-        return
+    recordings = [{**one.as_dict(), "parameters": cloth.parameters, "wind": cloth.wind} for cloth, one in made]
+    yield Result("declare-cloths", {"recordings": recordings})
     for cloth, one in made:
         healed = "" if one.healed is None else f"; {one.healed.sentence}"
         echo(f"{one.recording.id}  {cloth.fabric}, {cloth.density:g} kg/m², {len(one.clips)} clips{healed}")

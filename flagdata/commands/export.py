@@ -8,8 +8,7 @@ from typing import Any
 
 from flagdata.api.lake_verbs import Exporting
 from flagdata.console import document, echo, progress, say
-from flagdata.options import command, options
-from flagdata.shared_options import AsJson
+from flagdata.options import AsJson, command, options
 
 
 @options

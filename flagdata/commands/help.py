@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import click
 
-from flagdata.console import json_option, print_help
+from flagdata.console import print_help
 from flagdata.errors import UnknownNameError
+from flagdata.options import AsJson, argument, command, options
 
 
-@click.command("help")
-@click.argument("verb", required=False)
-@json_option
-@click.pass_context
-def help_(context: click.Context, verb: str | None, as_json: bool) -> None:
+@options
+class Helping(AsJson):
+    """Whose help is shown."""
+
+    verb: str | None = argument("A command.", "[VERB]", default=None)
+
+
+@command(Helping)
+def help_(chosen: Helping) -> None:
     """Show the help of flagdata, or of the command VERB.
 
     \b
       flagdata help
       flagdata help measure
     """
-    shown = context.find_root()
+    shown, verb = click.get_current_context().find_root(), chosen.verb
     if verb is not None:
         known = shown.command.list_commands(shown) if isinstance(shown.command, click.Group) else []
         found = shown.command.get_command(shown, verb) if isinstance(shown.command, click.Group) else None
         if found is None:
             raise UnknownNameError.of("command", verb, known, where=shown.command_path)
         shown = click.Context(found, info_name=verb, parent=shown)
-    print_help(shown, as_json=as_json)
+    print_help(shown, as_json=chosen.as_json)

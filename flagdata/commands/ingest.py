@@ -14,8 +14,7 @@ from flagdata.commands.ingest_options import SNIFF, Given
 from flagdata.commands.ingest_sources import ingest_sources, sniff_sources
 from flagdata.console import LocalPath
 from flagdata.errors import UsageError
-from flagdata.options import LongCommand, argument, command, described, option, options, typed
-from flagdata.shared_options import AsJson
+from flagdata.options import AsJson, LongCommand, argument, command, described, option, options, typed
 
 
 @options
@@ -137,10 +136,8 @@ def ingest(chosen: IngestCommand) -> None:
 
 
 def _ingest(chosen: IngestCommand | FilmCommand | WindCommand | FramesCommand, *, kind: str | None = None) -> None:
-    from flagdata.dataset.source import opened
-
     accept = chosen.accept if isinstance(chosen, FromAnemometer) else None
     given = Given.of(chosen, kind=kind, confirm=on_command_line(accept, as_json=chosen.as_json))
-    lake = opened(chosen.lake).lake
+    lake = chosen.opened()
     lake.check_writable()
     ingest_sources(lake, given, as_json=chosen.as_json)

@@ -2,53 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING
-
-import click
-from click.core import ParameterSource
 
 from flagdata.api.lake_verbs import Naming
 from flagdata.commands.artifacts import relative
-from flagdata.console import document, echo, json_option, lake_option, say, table
+from flagdata.console import document, echo, say, table
 from flagdata.errors import UsageError
-from flagdata.options import command, options
+from flagdata.option_types import POSITIVE
+from flagdata.options import AsJson, Result, argument, command, option, options, typed, verb
 from flagdata.printable import SHORT, counted
-from flagdata.shared_options import AsJson
+from flagdata.shared_options import OnBranch, OnLake, Reasoned
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
     from flagdata.lake.refs import Ref
 
 
-@click.command()
-@click.argument("folder", required=False)
-@json_option
-@lake_option
-@click.pass_context
-def init(context: click.Context, folder: str | None, as_json: bool, lake_path: str) -> None:
+@options
+class Making(OnLake):
+    """Where a lake is made."""
+
+    folder: Path | str | None = argument(
+        "A folder, or s3://bucket/prefix; by default what lake says.", "[FOLDER]", default=None
+    )
+
+
+@verb(Making, example='flagdata.init("field.lake")')
+def init(chosen: Making) -> Iterator[Result]:
     """Create an empty lake in FOLDER, which may be s3://bucket/prefix, or where --lake says."""
     from flagdata.lake import Lake
     from flagdata.schema import FORMAT_VERSION
 
-    if folder is not None and context.get_parameter_source("lake_path") is ParameterSource.COMMANDLINE:
+    if chosen.folder is not None and "lake" in typed(chosen):
         raise UsageError("two folders for one lake", fix="give FOLDER or --lake, not both")
-    lake = Lake.create(folder if folder is not None else lake_path)
-    if as_json:
-        document("init", {"lake": str(lake.path), "format_version": FORMAT_VERSION})
-    else:
-        echo(lake.path)
+    lake = Lake.create(str(chosen.lake) if chosen.folder is None else chosen.folder)
+    yield Result("init", {"lake": str(lake.path), "format_version": FORMAT_VERSION})
+    echo(lake.path)
 
 
-@click.command()
-@click.option("--limit", type=click.IntRange(min=1), help="The newest commits only.")
-@json_option
-@lake_option
-def log(limit: int | None, as_json: bool, lake_path: str) -> None:
+@options
+class Logging(OnLake):
+    """How many commits are listed."""
+
+    limit: int | None = option("The newest commits only.", default=None, type=POSITIVE)
+
+
+@verb(Logging, example='flagdata.log(lake="field.lake", limit=10)["commits"]')
+def log(chosen: Logging) -> Iterator[Result]:
     """List commits, newest first."""
-    from flagdata.lake import Lake
-
     entries = [
         {
             "version": entry["version"],
@@ -60,13 +64,11 @@ def log(limit: int | None, as_json: bool, lake_path: str) -> None:
             "message": entry.get("message"),
             "code_version": entry.get("code_version"),
         }
-        for entry in Lake.open(lake_path).catalog.history(limit)
+        for entry in chosen.opened().catalog.history(chosen.limit)
     ]
-    if as_json:
-        document("log", {"commits": entries})
-    else:
-        columns = ("version", "commit", "time", "branch", "added", "withdrawn", "message")
-        table(columns, [[entry[column] for column in columns] for entry in entries])
+    yield Result("log", {"commits": entries})
+    columns = ("version", "commit", "time", "branch", "added", "withdrawn", "message")
+    table(columns, [[entry[column] for column in columns] for entry in entries])
 
 
 @options
@@ -80,9 +82,7 @@ def tag(chosen: NamingCommand) -> None:
 
     The name of a tag that was deleted never shows anything else.
     """
-    from flagdata.dataset.source import opened
-
-    lake = opened(chosen.lake).lake
+    lake = chosen.opened()
     if chosen.name is not None and chosen.delete:
         version = lake.delete_tag(chosen.name, chosen.message, discard=chosen.discard)
         _report_deletion("tag", chosen.name, version, as_json=chosen.as_json)
@@ -97,9 +97,7 @@ def branch(chosen: NamingCommand) -> None:
 
     A branch that is deleted leaves its commits to the log, to its tags and to branches made from it.
     """
-    from flagdata.dataset.source import opened
-
-    lake = opened(chosen.lake).lake
+    lake = chosen.opened()
     if chosen.name is not None and chosen.delete:
         version = lake.delete_branch(chosen.name, chosen.message, discard=chosen.discard)
         _report_deletion("branch", chosen.name, version, as_json=chosen.as_json)
@@ -108,57 +106,57 @@ def branch(chosen: NamingCommand) -> None:
     _print_refs("branches", refs, as_json=chosen.as_json)
 
 
-@click.command()
-@click.argument("branch_name", metavar="BRANCH")
-@click.option("--into", default="main", show_default=True, help="The branch that takes the rows.")
-@click.option("--message", "-m", help="What is merged and why.")
-@json_option
-@lake_option
-def merge(branch_name: str, into: str, message: str | None, as_json: bool, lake_path: str) -> None:
+@options
+class Merging(Reasoned, OnLake):
+    """Which branch is merged."""
+
+    branch: str = argument("The branch whose changes are taken over.", "BRANCH")
+    into: str = option("The branch that takes the rows.", default="main")
+
+
+@verb(Merging, example='flagdata.merge("trial", lake="field.lake")["added"]')
+def merge(chosen: Merging) -> Iterator[Result]:
     """Commit on main what BRANCH changed since the two were last the same: what it added, and what it withdrew.
 
     What main withdrew meanwhile stays withdrawn, and is listed where the branch still has it.
     """
     from dataclasses import asdict
 
-    from flagdata.lake import Lake
-
-    result = Lake.open(lake_path).merge(branch_name, message or f"merge {branch_name}", into=into)
-    if as_json:
-        document("merge", asdict(result))
-        return
+    result = chosen.opened().merge(chosen.branch, chosen.message or f"merge {chosen.branch}", into=chosen.into)
+    yield Result("merge", asdict(result))
     for artifact, version in result.left_out.items():
-        say(f"stays withdrawn from {into}: {artifact[:SHORT]}, since version {version}")
+        say(f"stays withdrawn from {chosen.into}: {artifact[:SHORT]}, since version {version}")
     for artifact, version in result.brought_back.items():
-        say(f"comes back to {into}: {artifact[:SHORT]}, which version {version} had withdrawn")
+        say(f"comes back to {chosen.into}: {artifact[:SHORT]}, which version {version} had withdrawn")
     if result.commit is None:
-        echo(f"nothing new on {branch_name}")
+        echo(f"nothing new on {chosen.branch}")
         return
     withdrawn = f", {len(result.withdrawn)} withdrawn" if result.withdrawn else ""
     echo(f"version {result.version}: {len(result.added)} added, {len(result.existing)} were there{withdrawn}")
 
 
-@click.command()
-@click.argument("before")
-@click.argument("after", required=False)
-@json_option
-@lake_option
-def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
+@options
+class Comparing(OnLake):
+    """Which versions are compared."""
+
+    before: str = argument("A tag, branch, version number or commit.", "BEFORE")
+    after: str | None = argument("Another; by default the head of main.", "[AFTER]", default=None)
+
+
+@verb(Comparing, example='flagdata.diff("v1", lake="field.lake")["added"]')
+def diff(chosen: Comparing) -> Iterator[Result]:
     """Rows and objects that AFTER has and BEFORE has not (+), and the other way round (-).
 
     Both are tags, branches, version numbers or commits; AFTER is the head of main by default.
     """
-    from flagdata.lake import Lake
     from flagdata.lake.merging import difference
 
-    found = difference(Lake.open(lake_path), before, after)
+    found = difference(chosen.opened(), chosen.before, chosen.after)
     added = [relative(row) for row in found.added.to_pylist()]
     removed = [relative(row) for row in found.removed.to_pylist()]
-    if as_json:
-        content = {"before": before, "after": after, "added": added, "removed": removed}
-        objects = {"objects_added": list(found.objects_added), "objects_removed": list(found.objects_removed)}
-        document("diff", {**content, **objects})
-        return
+    content = {"before": chosen.before, "after": chosen.after, "added": added, "removed": removed}
+    changed = {"objects_added": list(found.objects_added), "objects_removed": list(found.objects_removed)}
+    yield Result("diff", {**content, **changed})
     for sign, rows, objects in (("+", added, found.objects_added), ("-", removed, found.objects_removed)):
         for row in rows:
             echo(f"{sign} {row['kind']:<11} {row['artifact'][:SHORT]} {row['name']}")
@@ -167,52 +165,39 @@ def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
     say(f"{counted(len(added), 'row')} added, {len(removed)} removed")
 
 
-@click.command()
-@click.argument("artifacts", nargs=-1, required=True)
-@click.option("--message", "-m", required=True, help="Why.")
-@click.option("--branch", "branch_name", default="main", show_default=True, help="The branch to take them off.")
-@click.option("--with-descendants", is_flag=True, help="Hide all that was made from them as well, directly or not.")
-@click.option(
-    "--everywhere",
-    is_flag=True,
-    help="Off every branch, and delete their data at once, also where tags and older versions show them.",
-)
-@json_option
-@lake_option
-@click.pass_context
-def withdraw(
-    context: click.Context,
-    artifacts: tuple[str, ...],
-    message: str,
-    branch_name: str,
-    with_descendants: bool,
-    everywhere: bool,
-    as_json: bool,
-    lake_path: str,
-) -> None:
+@options
+class Withdrawing(OnBranch, OnLake):
+    """What is hidden, from where and why."""
+
+    artifacts: Sequence[str] = argument("Names or ids.", "ARTIFACTS...", nargs=-1)
+    message: str = option("Why.", "--message", "-m")
+    with_descendants: bool = option("Hide all that was made from them as well, directly or not.", default=False)
+    everywhere: bool = option(
+        "Off every branch, and delete their data at once, also where tags and older versions show them.", default=False
+    )
+
+
+@verb(Withdrawing, example='flagdata.withdraw(["flag"], message="out of focus", lake="field.lake")')
+def withdraw(chosen: Withdrawing) -> Iterator[Result]:
     """Hide artifacts from a branch, a recording with its clips.
 
     Tags, and the branch that this one began from, keep showing them; gc frees what no ref shows any more. With
     --everywhere the data are erased, and the rows that tags and older versions keep say by which version.
     """
-    from flagdata.lake import Lake
-
-    lake = Lake.open(lake_path)
-    if everywhere:
-        if context.get_parameter_source("branch_name") is ParameterSource.COMMANDLINE:
+    lake, branch = chosen.opened(), chosen.branch
+    if chosen.everywhere:
+        if "branch" in typed(chosen):
             raise UsageError(
                 "--everywhere cannot be combined with --branch", fix="leave out --branch: every branch is meant"
             )
-        _erase(lake, artifacts, message, with_descendants=with_descendants, as_json=as_json)
+        yield from _erasing(lake, chosen)
         return
-    named = {lake.identity(artifact, at=branch_name) for artifact in artifacts}
-    made = lake.descendants(named, at=branch_name) if with_descendants else frozenset()
-    done = lake.withdraw(sorted(named | made), message, branch=branch_name)
-    if as_json:
-        along = {"clips": list(done.clips), "descendants": sorted(made)}
-        document("withdraw", {"version": done.version, "withdrawn": sorted(named), **along})
-        return
-    parts = [f"{len(named)} withdrawn from {branch_name}"]
+    named = {lake.identity(artifact, at=branch) for artifact in chosen.artifacts}
+    made = lake.descendants(named, at=branch) if chosen.with_descendants else frozenset()
+    done = lake.withdraw(sorted(named | made), chosen.message, branch=branch)
+    along = {"clips": list(done.clips), "descendants": sorted(made)}
+    yield Result("withdraw", {"version": done.version, "withdrawn": sorted(named), **along})
+    parts = [f"{len(named)} withdrawn from {branch}"]
     if done.clips:
         parts.append(f"{counted(len(done.clips), 'clip')} went along")
     if made:
@@ -220,15 +205,14 @@ def withdraw(
     echo(f"version {done.version}: {', '.join(parts)}")
 
 
-def _erase(lake: Lake, artifacts: tuple[str, ...], message: str, *, with_descendants: bool, as_json: bool) -> None:
+def _erasing(lake: Lake, chosen: Withdrawing) -> Iterator[Result]:
     from dataclasses import asdict
 
     from flagdata.lake.removal import BEYOND
 
-    done = lake.erase([_anywhere(lake, one) for one in artifacts], message, with_descendants=with_descendants)
-    if as_json:
-        document("erasure", {**asdict(done), "not_reached": list(BEYOND)})
-        return
+    artifacts = [_anywhere(lake, name) for name in chosen.artifacts]
+    done = lake.erase(artifacts, chosen.message, with_descendants=chosen.with_descendants)
+    yield Result("erasure", {**asdict(done), "not_reached": list(BEYOND)})
     for name, why in done.kept.items():
         say(f"its bytes stay: {name}: {why}")
     say(f"not reached from here: {'; '.join(BEYOND)}")

@@ -13,41 +13,44 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.commands.upkeep import grace_option
-from flagdata.console import LocalPath, at_option, document, echo, json_option, lake_option, say, table
+from flagdata.console import LocalPath, document, echo, say, table
 from flagdata.errors import UsageError
+from flagdata.options import AsJson, Result, argument, command, option, options, verb
 from flagdata.printable import SHORT, printable, size_text
+from flagdata.shared_options import AtVersion, InFull, OfGarbage, OnLake
 
 if TYPE_CHECKING:
     from flagdata.lake.ancestry import Ancestry, Line, Relative
 
 
-@click.command()
-@click.argument("artifact")
-@click.option("--details", is_flag=True, help="With recipe hash, code version and seed.")
-@click.option("--all", "whole", is_flag=True, help="List all relatives, also where there are many of a kind.")
-@click.option("--picture", metavar="FILE", type=LocalPath(), help="Write the lineage as a picture, too: .svg or .png.")
-@at_option
-@json_option
-@lake_option
-def lineage(
-    artifact: str, details: bool, whole: bool, picture: Path | None, at: str | None, as_json: bool, lake_path: str
-) -> None:
+@options
+class Tracing(InFull, AtVersion, OnLake):
+    """Whose relatives are shown, and how."""
+
+    artifact: str = argument("Its id, name or file.", "ARTIFACT")
+    details: bool = option("With recipe hash, code version and seed.", default=False)
+    picture: Path | None = option(
+        "Write the lineage as a picture, too: .svg or .png.", default=None, type=LocalPath(), metavar="FILE"
+    )
+
+
+@verb(Tracing, example='flagdata.lineage("flag", lake="field.lake")["edges"]')
+def lineage(chosen: Tracing) -> Iterator[Result]:
     """Show what an artifact was made from and what was made from it, over all generations."""
-    from flagdata.lake import Lake
     from flagdata.lake.ancestry import ancestry
     from flagdata.outputs import check_file, write_file
     from flagdata.pages.lineage import MOST, graph
     from flagdata.pages.lineage import picture as drawn
 
+    picture, details = chosen.picture, chosen.details
     kind = "" if picture is None else picture.suffix.lower()
     if picture is not None:
         if kind not in (".svg", ".png"):
             raise UsageError("a lineage is drawn as SVG or PNG", where=str(picture), fix="name a .svg or .png file")
         check_file(picture)
-    lake = Lake.open(lake_path)
-    found = ancestry(lake.table(lake.view(at)), lake.identity(artifact, at=at))
-    most = None if whole else MOST
+    lake, at = chosen.opened(), chosen.at
+    found = ancestry(lake.table(lake.view(at)), lake.identity(chosen.artifact, at=at))
+    most = None if chosen.whole else MOST
     if picture is not None:
         if kind == ".png":
             from flagdata.pages.graph_png import png
@@ -55,10 +58,8 @@ def lineage(
             write_file(picture, png(*graph(found, details=details, most=most)))
         else:
             write_file(picture, drawn(found, details=details, most=most))
-    if as_json:
-        relatives = [asdict(relative) for relative in found.relatives.values()]
-        document("lineage", {"at": at, "artifact": found.artifact, "relatives": relatives, "edges": found.edges})
-        return
+    relatives = [asdict(relative) for relative in found.relatives.values()]
+    yield Result("lineage", {"at": at, "artifact": found.artifact, "relatives": relatives, "edges": found.edges})
     for text in _lines(found, details=details, most=most):
         echo(text)
 
@@ -93,26 +94,25 @@ def _relative(relative: Relative, *, details: bool) -> str:
     return f"{relative.artifact[:SHORT]} {relative.kind} {printable(relative.name or '')}{more}"
 
 
-@click.command()
-@grace_option
-@at_option
-@json_option
-@lake_option
-def du(grace: timedelta, at: str | None, as_json: bool, lake_path: str) -> None:
+@options
+class Weighing(OfGarbage, AtVersion, OnLake):
+    """Of which version it is told what takes space."""
+
+
+@verb(Weighing, example='flagdata.du(lake="field.lake")["total"]  # bytes')
+def du(chosen: Weighing) -> Iterator[Result]:
     """Show what takes space: by kind, by branch and tag, shared or own, and what gc would free.
 
     With --at the kinds are those of that version alone. A version's own bytes are those that no other branch or tag
     shows.
     """
-    from flagdata.lake import Lake
     from flagdata.lake.collection import usage
 
-    found = usage(Lake.open(lake_path), at=at, grace=grace)
-    if as_json:
-        versions = [{**asdict(version), "shared": version.share.size - version.own} for version in found.versions]
-        shares = {name: asdict(share) for name, share in found.kinds.items()}
-        document("du", {"at": at, "total": found.total, "kinds": shares, "versions": versions, "gc_frees": found.freed})
-        return
+    found = usage(chosen.opened(), at=chosen.at, grace=timedelta(seconds=chosen.grace))
+    versions = [{**asdict(version), "shared": version.share.size - version.own} for version in found.versions]
+    shares = {name: asdict(share) for name, share in found.kinds.items()}
+    sums = {"total": found.total, "kinds": shares, "versions": versions, "gc_frees": found.freed}
+    yield Result("du", {"at": chosen.at, **sums})
     kinds = [(name, one.artifacts or "", one.objects or "", size_text(one.size)) for name, one in found.kinds.items()]
     whole = sum(one.size for one in found.kinds.values())
     table(("kind", "artifacts", "objects", "size"), [*kinds, ("total", "", "", size_text(whole))])
@@ -135,30 +135,35 @@ def du(grace: timedelta, at: str | None, as_json: bool, lake_path: str) -> None:
     say(f"{size_text(found.total)} in all; gc would free {size_text(found.freed)} (flagdata gc --dry-run lists it)")
 
 
-@click.command()
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="On loopback; a free one where none is given.")
-@click.option("--open", "opens", is_flag=True, help="Open the page in the browser.")
-@json_option
-@lake_option
-def view(port: int, opens: bool, as_json: bool, lake_path: str) -> None:
+@options
+class Viewing(AsJson, OnLake):
+    """How a lake is served."""
+
+    port: int = option(
+        "On loopback; a free one where none is given.", default=0, type=click.IntRange(0, 65535), show_default=False
+    )
+    opens: bool = option("Open the page in the browser.", "--open", default=False)
+
+
+@command(Viewing)
+def view(chosen: Viewing) -> None:
     """Look at a lake in the browser: artifacts, films beside their winds, alignments, lineages, SQL.
 
     Prints the address of a page that only this machine can open, and only by the whole address; Ctrl-C ends it. The
     page changes nothing, loads nothing from elsewhere, and shows what other processes commit when it is reloaded.
     """
-    from flagdata.lake import Lake
     from flagdata.view.server import Server
 
-    lake = Lake.open(lake_path)
+    lake = chosen.opened()
     lake.catalog.head()
-    with Server(lake, port=port) as server:
-        if as_json:
+    with Server(lake, port=chosen.port) as server:
+        if chosen.as_json:
             document("view", {"address": server.address})
         else:
             echo(server.address)
             say("only this machine can open it; Ctrl-C ends it")
         sys.stdout.flush()
-        if opens:
+        if chosen.opens:
             webbrowser.open(server.address)
         with suppress(KeyboardInterrupt):
             server.serve_forever()

@@ -14,9 +14,8 @@ from flagdata.api.lake_verbs import Querying
 from flagdata.cells import plain
 from flagdata.console import LocalPath, csv_rows, document, say, table
 from flagdata.errors import UsageError
-from flagdata.options import command, option, options
+from flagdata.options import AsJson, command, option, options
 from flagdata.printable import SHORT
-from flagdata.shared_options import AsJson
 from flagdata.sql_process import sql_process
 
 if TYPE_CHECKING:

@@ -2,22 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import click
-
-from flagdata.console import document, echo, json_option, lake_option, progress, say, say_finding
+from flagdata.console import echo, progress, say, say_finding
+from flagdata.options import Result, argument, options, verb
 from flagdata.printable import counted, size_text
+from flagdata.shared_options import OnLake
 
 if TYPE_CHECKING:
     from flagdata.lake.copying import Transfer
 
 
-@click.command()
-@click.argument("target")
-@json_option
-@lake_option
-def push(target: str, as_json: bool, lake_path: str) -> None:
+@options
+class Pushing(OnLake):
+    """Where versions go."""
+
+    target: str = argument("Another lake: a folder, or s3://bucket/prefix.", "TARGET")
+
+
+@options
+class Pulling(OnLake):
+    """Where versions come from."""
+
+    source: str = argument("Another lake: a folder, or s3://bucket/prefix.", "SOURCE")
+
+
+@options
+class Cloning:
+    """Which lake is copied, and where to."""
+
+    source: str = argument("A lake: a folder, or s3://bucket/prefix.", "SOURCE")
+    target: str = argument("The new lake.", "TARGET")
+
+
+@verb(Pushing, example='flagdata.push("s3://bucket/field", lake="field.lake")["versions"]')
+def push(chosen: Pushing) -> Iterator[Result]:
     """Move the versions that TARGET lacks to it, with their tags, branches and data.
 
     TARGET is a folder or s3://bucket/prefix with a clone of this lake, or the lake that this one is a clone of. Data
@@ -26,28 +46,22 @@ def push(target: str, as_json: bool, lake_path: str) -> None:
     from flagdata.lake import Lake
     from flagdata.lake.copying import transfer
 
-    lake = Lake.open(target)
-    _report("push", str(lake.path), transfer(Lake.open(lake_path), lake, bars=progress), as_json=as_json)
+    lake = Lake.open(chosen.target)
+    yield from _reporting("push", str(lake.path), transfer(chosen.opened(), lake, bars=progress))
 
 
-@click.command()
-@click.argument("source")
-@json_option
-@lake_option
-def pull(source: str, as_json: bool, lake_path: str) -> None:
+@verb(Pulling, example='flagdata.pull("s3://bucket/field", lake="field.lake")["versions"]')
+def pull(chosen: Pulling) -> Iterator[Result]:
     """Bring the versions of SOURCE that this lake lacks in, with their tags, branches and data; push's opposite."""
     from flagdata.lake import Lake
     from flagdata.lake.copying import transfer
 
-    lake = Lake.open(lake_path)
-    _report("pull", str(lake.path), transfer(Lake.open(source), lake, bars=progress), as_json=as_json)
+    lake = chosen.opened()
+    yield from _reporting("pull", str(lake.path), transfer(Lake.open(chosen.source), lake, bars=progress))
 
 
-@click.command()
-@click.argument("source")
-@click.argument("target")
-@json_option
-def clone(source: str, target: str, as_json: bool) -> None:
+@verb(Cloning, example='flagdata.clone("s3://bucket/field", "field.lake")["head"]')
+def clone(chosen: Cloning) -> Iterator[Result]:
     """Make a lake at TARGET with all versions, tags and branches of SOURCE; each a folder or s3://bucket/prefix.
 
     Where it was stopped, flagdata push TARGET --lake SOURCE goes on with it.
@@ -55,27 +69,25 @@ def clone(source: str, target: str, as_json: bool) -> None:
     from flagdata.lake import Lake
     from flagdata.lake.copying import clone as cloned
 
-    lake, done = cloned(Lake.open(source), target, bars=progress)
-    _report("clone", str(lake.path), done, as_json=as_json)
+    lake, done = cloned(Lake.open(chosen.source), chosen.target, bars=progress)
+    yield from _reporting("clone", str(lake.path), done)
 
 
-def _report(tag: str, place: str, done: Transfer, *, as_json: bool) -> None:
-    if as_json:
-        document(
-            tag,
-            {
-                "lake": place,
-                "head": done.head,
-                "versions": done.versions,
-                "objects": list(done.objects),
-                "bytes": done.size,
-                "refs": list(done.refs),
-                "findings": [finding.as_dict() for finding in done.findings],
-            },
-        )
-        return
+def _reporting(tag: str, address: str, done: Transfer) -> Iterator[Result]:
+    yield Result(
+        tag,
+        {
+            "lake": address,
+            "head": done.head,
+            "versions": done.versions,
+            "objects": list(done.objects),
+            "bytes": done.size,
+            "refs": list(done.refs),
+            "findings": [finding.as_dict() for finding in done.findings],
+        },
+    )
     for finding in done.findings:
         say_finding(finding)
     refs = f", {counted(len(done.refs), 'ref')} ({', '.join(done.refs)})" if done.refs else ""
     say(f"{counted(done.versions, 'version')}, {counted(len(done.objects), 'object')}, {size_text(done.size)}{refs}")
-    echo(f"{place} is at version {done.head}")
+    echo(f"{address} is at version {done.head}")

@@ -2,107 +2,84 @@
 
 from __future__ import annotations
 
-import re
-import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from pathlib import Path
 
-import click
-
 from flagdata.addresses import local_path
-from flagdata.console import LocalPath, document, echo, json_option, lake_option, progress, say, table
+from flagdata.console import LocalPath, echo, progress, say, table
 from flagdata.errors import UsageError
 from flagdata.files import check_input
 from flagdata.findings import Finding, Severity
+from flagdata.option_types import DURATION, POSITIVE
+from flagdata.options import Result, argument, option, options, verb
 from flagdata.printable import counted, size_text
+from flagdata.shared_options import OfGarbage, OnLake, Reasoned, Rehearsed
 from flagdata.timebase import iso
 
 _GATE_NOT_MET = 3
-_CENTURY = 36_525 * 86_400  # s
-_UNITS = {"s": 1, "m": 60, "h": 3600, "d": 86_400}
 
 
-class Duration(click.ParamType):
-    """A time span on the command line: a number and s, m, h or d ("24h", "0s")."""
+@options
+class Verifying(OnLake):
+    """How much of a lake is re-hashed."""
 
-    name = "duration"
-
-    def convert(self, value: str | timedelta, param: click.Parameter | None, ctx: click.Context | None) -> timedelta:
-        if isinstance(value, timedelta):
-            return value
-        match = re.fullmatch(r"(\d{1,9}(?:\.\d+)?)([smhd])", value.strip())
-        if match is None:
-            self.fail(f"{value!r} is not a duration; write it as 24h, 30m, 7d or 0s", param, ctx)
-        seconds = float(match[1]) * _UNITS[match[2]]
-        if seconds > _CENTURY:
-            self.fail(f"{value!r} is more than a century", param, ctx)
-        return timedelta(seconds=seconds)
+    sample: int | None = option("So many objects drawn at random, instead of all.", default=None, type=POSITIVE)
 
 
-grace_option = click.option(
-    "--older-than",
-    "grace",
-    type=Duration(),
-    default="24h",
-    show_default=True,
-    metavar="AGE",
-    help="How old something must be, with nothing referring to it, to be garbage.",
-)
-
-
-@click.command()
-@click.option("--sample", type=click.IntRange(min=1), help="So many objects drawn at random, instead of all.")
-@json_option
-@lake_option
-def verify(sample: int | None, as_json: bool, lake_path: str) -> None:
+@verb(Verifying, example='flagdata.verify(lake="field.lake")["healthy"]')
+def verify(chosen: Verifying) -> Iterator[Result]:
     """Re-hash the catalog's files and every object; exits with 3 when one is missing or has changed."""
-    from flagdata.lake import Lake
     from flagdata.lake.health import object_names, read_refs, sampled, verify_catalog
     from flagdata.lake.health import verify as verified
 
-    lake = Lake.open(lake_path)
+    lake = chosen.opened()
     refs = read_refs(lake)
     findings = verify_catalog(lake, refs)
     names = object_names(lake, refs)
-    chosen = names if sample is None else sampled(names, sample)
-    with progress(len(chosen), label="verify", unit="object") as advance:
-        findings += verified(lake, chosen, refs, advance=advance)
-    hashed = len(chosen) - sum(finding.kind == "object-missing" for finding in findings)
-    _conclude("verify", findings, f"{hashed} of {counted(len(names), 'object')} re-hashed", as_json=as_json)
+    drawn = names if chosen.sample is None else sampled(names, chosen.sample)
+    with progress(len(drawn), label="verify", unit="object") as advance:
+        findings += verified(lake, drawn, refs, advance=advance)
+    hashed = len(drawn) - sum(finding.kind == "object-missing" for finding in findings)
+    yield from _concluding("verify", findings, f"{hashed} of {counted(len(names), 'object')} re-hashed")
 
 
-@click.command()
-@click.argument("source", required=False, type=LocalPath())
-@click.option("--deep", is_flag=True, help="Re-hash the catalog's files and every object, too.")
-@grace_option
-@json_option
-@lake_option
-def doctor(source: Path | None, deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
+@options
+class Examining(OfGarbage, OnLake):
+    """What is examined, and how thoroughly."""
+
+    source: Path | str | None = argument(
+        "An MCAP file or a LeRobot data set, instead of a lake.", "[SOURCE]", default=None, type=LocalPath()
+    )
+    deep: bool = option("Re-hash the catalog's files and every object, too.", default=False)
+
+
+@verb(Examining, example='flagdata.doctor(lake="field.lake")["findings"]')
+def doctor(chosen: Examining) -> Iterator[Result]:
     """Find and explain what is wrong with a lake; exits with 3 when there is something to act on.
 
     With SOURCE, an MCAP file or a LeRobot data set of another program, that is examined instead: stamps in order,
     rates, gaps, and what an ingest would leave out.
     """
-    if source is not None:
-        if deep:
+    if chosen.source is not None:
+        if chosen.deep:
             raise UsageError("--deep cannot be combined with a SOURCE", fix="leave it out: stamps are all that is read")
-        _examine(source, as_json=as_json)
+        yield from _examining(local_path(chosen.source))
         return
     from flagdata.ingest.before import unconfirmed
-    from flagdata.lake import Artifact, Lake
+    from flagdata.lake import Artifact
     from flagdata.lake.health import catalog_files, read_refs
     from flagdata.lake.health import doctor as examined
     from flagdata.lake.health import verify as verified
     from flagdata.schema import Kind
 
-    lake = Lake.open(lake_path)
-    findings = examined(lake, grace=grace)
+    lake = chosen.opened()
+    findings = examined(lake, grace=timedelta(seconds=chosen.grace))
     if all(f.severity is not Severity.ERROR for f in findings):  # else rows may not be readable
         winds = lake.rows({"kind": Kind.WIND}).to_pylist()
         findings += unconfirmed(Artifact.from_row(row) for row in winds)
     checked = "structure checked, contents not (flagdata verify)"
-    if deep:
+    if chosen.deep:
         findings += tuple(f for f in catalog_files(lake) if f.kind not in {found.kind for found in findings})
         names = [stored.name for stored in lake.objects]
         with progress(len(names), label="re-hash", unit="object") as advance:
@@ -110,19 +87,17 @@ def doctor(source: Path | None, deep: bool, grace: timedelta, as_json: bool, lak
             found = verified(lake, names, read_refs(lake), advance=advance)
             findings += tuple(f for f in found if (f.kind, f.where) not in known)
         checked = f"structure checked, {counted(len(names), 'object')} re-hashed"
-    _conclude("doctor", findings, checked, as_json=as_json)
+    yield from _concluding("doctor", findings, checked)
 
 
-def _examine(source: Path, *, as_json: bool) -> None:
+def _examining(source: Path) -> Iterator[Result]:
     from flagdata.ingest.foreign import as_dict, examine
     from flagdata.lake.health import is_healthy
 
     found = examine(source)
-    if as_json:
-        document("foreign", {"source": str(source), **as_dict(found), "healthy": is_healthy(found.findings)})
-        if not is_healthy(found.findings):
-            sys.exit(_GATE_NOT_MET)
-        return
+    healthy = is_healthy(found.findings)
+    content = {"source": str(source), **as_dict(found), "healthy": healthy}
+    yield Result("foreign", content, 0 if healthy else _GATE_NOT_MET)
     header = ("stream", "holds", "messages", "rate [Hz]", "from", "to")
     rows = [
         (
@@ -136,33 +111,31 @@ def _examine(source: Path, *, as_json: bool) -> None:
         for one in found.streams
     ]
     table(header, rows)
-    _conclude("doctor", found.findings, f"{found.format}: {counted(len(rows), 'stream')} examined", as_json=False)
+    _print_health(found.findings, f"{found.format}: {counted(len(rows), 'stream')} examined")
 
 
-@click.command()
-@grace_option
-@click.option("--dry-run", is_flag=True, help="Say what would be deleted, delete nothing.")
-@json_option
-@lake_option
-def gc(grace: timedelta, dry_run: bool, as_json: bool, lake_path: str) -> None:
+@options
+class Collecting(OfGarbage, Rehearsed, OnLake):
+    """What is deleted."""
+
+
+@verb(Collecting, example='flagdata.gc(lake="field.lake", dry_run=True)["bytes"]')
+def gc(chosen: Collecting) -> Iterator[Result]:
     """Delete what no branch, tag or running transaction refers to."""
-    from flagdata.lake import Lake
     from flagdata.lake.collection import collect, garbage
 
-    lake = Lake.open(lake_path)
-    found = garbage(lake, grace=grace) if dry_run else collect(lake, grace=grace)
-    if as_json:
-        document(
-            "gc",
-            {
-                "deleted": not dry_run,
-                "objects": list(found.objects),
-                "leftovers": [str(path) for path in found.leftovers],
-                "uploads": [str(upload) for upload in found.uploads],
-                "bytes": found.size,
-            },
-        )
-        return
+    dry_run, grace = chosen.dry_run, timedelta(seconds=chosen.grace)
+    found = (garbage if dry_run else collect)(chosen.opened(), grace=grace)
+    yield Result(
+        "gc",
+        {
+            "deleted": not dry_run,
+            "objects": list(found.objects),
+            "leftovers": [str(path) for path in found.leftovers],
+            "uploads": [str(upload) for upload in found.uploads],
+            "bytes": found.size,
+        },
+    )
     for name in (*found.objects, *map(str, found.leftovers), *map(str, found.uploads)):
         echo(name)
     verb = "would be deleted" if dry_run else "deleted"
@@ -174,16 +147,18 @@ def gc(grace: timedelta, dry_run: bool, as_json: bool, lake_path: str) -> None:
         say(f"the store does not say which uploads are unfinished: {found.unlisted.strerror}", mark="note")
 
 
-@click.command()
-@click.option("--older-than", type=Duration(), metavar="AGE", help="Versions that another replaced so long ago: 30d.")
-@click.option("--keep", type=click.IntRange(min=1), metavar="N", help="All but the newest N versions.")
-@click.option("--message", "-m", help="Why.")
-@click.option("--dry-run", is_flag=True, help="Say what would go, delete nothing.")
-@json_option
-@lake_option
-def expire(
-    older_than: timedelta | None, keep: int | None, message: str | None, dry_run: bool, as_json: bool, lake_path: str
-) -> None:
+@options
+class Expiring(Reasoned, Rehearsed, OnLake):
+    """Which versions expire."""
+
+    older_than: float | None = option(
+        "Versions that another replaced so long ago [s]: 30d.", default=None, type=DURATION, metavar="AGE"
+    )
+    keep: int | None = option("All but the newest N versions.", default=None, type=POSITIVE, metavar="N")
+
+
+@verb(Expiring, example='flagdata.expire(lake="field.lake", keep=20)["objects"]')
+def expire(chosen: Expiring) -> Iterator[Result]:
     """Let old versions expire: delete the data that no other version, branch or tag shows, at once.
 
     The log keeps which versions expired, why, and what went; ls, export and doctor say so. With both options the
@@ -191,17 +166,16 @@ def expire(
     """
     from dataclasses import asdict
 
-    from flagdata.lake import Lake
     from flagdata.lake.removal import expire as expiring
     from flagdata.lake.removal import last_version
 
-    if older_than is None and keep is None:
+    if chosen.older_than is None and chosen.keep is None:
         raise UsageError("which versions expire is not given", fix="give --older-than AGE, --keep N, or both")
-    lake = Lake.open(lake_path)
-    found = expiring(lake, last_version(lake, older_than=older_than, keep=keep), message, dry_run=dry_run)
-    if as_json:
-        document("expire", {**asdict(found), "deleted": not dry_run})
-        return
+    lake, dry_run = chosen.opened(), chosen.dry_run
+    older_than = None if chosen.older_than is None else timedelta(seconds=chosen.older_than)
+    last = last_version(lake, older_than=older_than, keep=chosen.keep)
+    found = expiring(lake, last, chosen.message, dry_run=dry_run)
+    yield Result("expire", {**asdict(found), "deleted": not dry_run})
     for name in found.objects:
         echo(name)
     if found.up_to < 0:
@@ -212,44 +186,50 @@ def expire(
     say(f"versions up to {found.up_to} {by}: {gone}, {'would go' if dry_run else 'deleted'}")
 
 
-@click.command()
-@click.argument("source")
-@click.argument("target", type=LocalPath())
-@json_option
-@lake_option
-def recover(source: str, target: Path, as_json: bool, lake_path: str) -> None:
+@options
+class Recovering(OnLake):
+    """What is salvaged, and where it goes."""
+
+    source: Path | str = argument("An .mcap file, or an object of the lake (mcap/…).", "SOURCE")
+    target: Path | str = argument("The new file.", "TARGET", type=LocalPath())
+
+
+@verb(Recovering, example='flagdata.recover("cut.mcap", "whole.mcap")["findings"]')
+def recover(chosen: Recovering) -> Iterator[Result]:
     """Salvage what a cut-off or damaged record still holds.
 
     SOURCE is an .mcap file or an object of the lake (mcap/…); all that can be read goes to the new file TARGET.
     """
-    from flagdata.lake import Lake
     from flagdata.lake.artifact import OBJECT_NAME
     from flagdata.outputs import fresh_file
     from flagdata.record import salvage
 
-    path = Lake.open(lake_path).object_path(source) if OBJECT_NAME.fullmatch(source) else local_path(source)
+    source, target = str(chosen.source), local_path(chosen.target)
+    path = chosen.opened().object_path(source) if OBJECT_NAME.fullmatch(source) else local_path(source)
     check_input(path, noun="record")
     with fresh_file(target) as scratch:
         findings = salvage(path, scratch)
-    if as_json:
-        document("recover", {"source": str(path), "target": str(target), "findings": [f.as_dict() for f in findings]})
-        return
+    found = [finding.as_dict() for finding in findings]
+    yield Result("recover", {"source": str(path), "target": str(target), "findings": found})
     _print(findings)
     echo(target)
 
 
-def _conclude(tag: str, findings: Sequence[Finding], checked: str, *, as_json: bool) -> None:
+def _concluding(tag: str, findings: Sequence[Finding], checked: str) -> Iterator[Result]:
     from flagdata.lake.health import is_healthy
 
     healthy = is_healthy(findings)
-    if as_json:
-        document(tag, {"healthy": healthy, "checked": checked, "findings": [f.as_dict() for f in findings]})
-    else:
-        _print(findings)
-        echo("healthy" if healthy else "not healthy")
-        say(checked)
-    if not healthy:
-        sys.exit(_GATE_NOT_MET)
+    content = {"healthy": healthy, "checked": checked, "findings": [finding.as_dict() for finding in findings]}
+    yield Result(tag, content, 0 if healthy else _GATE_NOT_MET)
+    _print_health(findings, checked)
+
+
+def _print_health(findings: Sequence[Finding], checked: str) -> None:
+    from flagdata.lake.health import is_healthy
+
+    _print(findings)
+    echo("healthy" if is_healthy(findings) else "not healthy")
+    say(checked)
 
 
 def _print(findings: Sequence[Finding]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +14,7 @@ from flagdata.findings import Finding
 from flagdata.option_types import POSITIVE, SHARE
 from flagdata.options import option, options
 from flagdata.printable import printable
+from flagdata.shared_options import Shared
 from measure.closing.findings import checked, finding_text
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ TEST = "The test"
 
 
 @options
-class ByNulls:
+class ByNulls(Shared):
     """By which null experiments is tested, and at which level."""
 
     level: float | None = option(
@@ -45,14 +45,6 @@ class ByNulls:
         type=LocalPath(exists=True),
     )
     seed: int = option("Seed of the simulated nulls.", default=0, section=TEST, type=click.IntRange(min=0))
-    workers: int | None = option(
-        "Number of processes; by default one for each core.", default=None, section=TEST, type=POSITIVE
-    )
-
-    @property
-    def processes(self) -> int:
-        """How many processes simulate."""
-        return self.workers or len(os.sched_getaffinity(0))
 
 
 def nulls_given(recipe: ExperimentRecipe | None, chosen: ByNulls, *, level: float | None) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,10 +13,9 @@ from flagdata.console import LocalPath, document, echo, following, progress, say
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.examples import check_without_lake
 from flagdata.findings import Severity
-from flagdata.option_types import POSITIVE
-from flagdata.options import argument, command, described, option, options, typed
+from flagdata.options import AsJson, argument, command, described, option, options, typed
 from flagdata.printable import SHORT
-from flagdata.shared_options import FLAG, HOW, WRITTEN, AsJson, Keeping
+from flagdata.shared_options import FLAG, HOW, WRITTEN, Keeping, Shared
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -29,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @options
-class CalibrateCommand(AsJson, Calibrating, Keeping):
+class CalibrateCommand(AsJson, Shared, Calibrating, Keeping):  # pyright: ignore[reportIncompatibleVariableOverride]  all cores
     """The same on the command line, the reading model that is made beside, and what is written."""
 
     recordings: tuple[str, ...] = argument("Recordings of one flag; see `flagdata.calibrate`.", "RECORDING...")
@@ -55,9 +53,6 @@ class CalibrateCommand(AsJson, Calibrating, Keeping):
         default=None,
         section=HOW,
         metavar="NAME|FOLDER|ID",
-    )
-    workers: int | None = option(  # pyright: ignore[reportIncompatibleVariableOverride]  all cores
-        "Number of processes that simulate; by default one for each core.", default=None, section=HOW, type=POSITIVE
     )
     report: Path | None = option(
         "Write a page that needs no other.", default=None, section=WRITTEN, type=LocalPath(), metavar="FILE.html"
@@ -121,7 +116,7 @@ def calibrate(chosen: CalibrateCommand) -> None:
         if anemometer is not None:
             _report(anemometer, chosen.report, as_json=chosen.as_json)
         return
-    workers = chosen.workers or os.cpu_count() or 1
+    workers = chosen.processes
     with progress(None, label="observe", unit="window") as advance:
         gathered = weighable.read(size, advance=advance)
     observed, parents = gathered.recordings, gathered.parents

@@ -13,8 +13,8 @@ from flagdata.commands.confirm import on_command_line
 from flagdata.console import LocalPath, document, echo, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.option_types import POSITIVE
-from flagdata.options import argument, command, option, options, typed
-from flagdata.shared_options import AsJson, NamedLake, OnBranch
+from flagdata.options import AsJson, argument, command, option, options, typed
+from flagdata.shared_options import NamedLake, OnBranch
 from measure.closing.command_line import TEST, nulls_given, refuse, stage_bars
 from measure.closing.findings import with_warnings
 from measure.cloth.command_line import JudgingFilms, refuse_of_others

@@ -15,9 +15,9 @@ from flagdata.console import LocalPath, csv_rows, document, echo, following, pro
 from flagdata.errors import RefusedError, UsageError
 from flagdata.examples import check_without_lake
 from flagdata.findings import Finding, Severity
-from flagdata.options import argument, command, option, options
+from flagdata.options import AsJson, argument, command, option, options
 from flagdata.printable import SHORT
-from flagdata.shared_options import FILM, HOW, WRITTEN, AsJson, Keeping
+from flagdata.shared_options import FILM, HOW, WRITTEN, Keeping
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake

@@ -9,9 +9,9 @@ from flagdata.api.measuring import Observing
 from flagdata.console import LocalPath, document, echo, progress, say
 from flagdata.errors import RefusedError, UsageError
 from flagdata.examples import check_without_lake
-from flagdata.options import command, option, options
+from flagdata.options import AsJson, command, option, options
 from flagdata.printable import SHORT
-from flagdata.shared_options import WRITTEN, AsJson, Keeping
+from flagdata.shared_options import WRITTEN, Keeping
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake

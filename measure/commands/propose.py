@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flagdata.console import LocalPath, document, echo_lines, say
-from flagdata.options import argument, command, option, options
-from flagdata.shared_options import AsJson, NamedLake
+from flagdata.options import AsJson, argument, command, option, options
+from flagdata.shared_options import NamedLake
 from measure.closing.command_line import ByNulls, nulls_given, refuse, stage_bars
 
 if TYPE_CHECKING:

@@ -12,7 +12,9 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import LocalPath, document, json_option, say
+from flagdata.console import LocalPath, document, say
+from flagdata.errors import UsageError
+from flagdata.options import AsJson, command, option, options
 from flagdata.pages.render import render
 from flagdata.provenance import code_version
 from measure.demo.cards import Card
@@ -46,38 +48,36 @@ MINUTES = {Story.SHORT: 3, Story.FULL: 10, Story.MARKERS: 5}
 """That each takes at most on two idle cores."""
 
 
-@click.command()
-@click.option(
-    "--out",
-    "out",
-    type=LocalPath(),
-    default=Path("out/demo"),
-    show_default=True,
-    help="Folder for the pages and the data. What an earlier demonstration wrote there is replaced, unless it was "
-    "changed or anything else lies beside it.",
-)
-@click.option("--seed", type=click.IntRange(min=0), default=2026, show_default=True, help="Seed of all that is random.")
-@click.option(
-    "--short",
-    "story",
-    flag_value=Story.SHORT.value,
-    default=True,
-    help="Film, log, clocks and the wind; 3 minutes at most on two idle cores. What is done by default.",
-)
-@click.option(
-    "--full",
-    "story",
-    flag_value=Story.FULL.value,
-    help="Then weigh the cloth and find what its model lacks, from the same film; 10 minutes at most.",
-)
-@click.option(
-    "--markers",
-    "story",
-    flag_value=Story.MARKERS.value,
-    help="Instead find what the model of another flag lacks, from tracked markers; 5 minutes at most.",
-)
-@json_option
-def demo(out: Path, seed: int, story: str, as_json: bool) -> None:
+@options
+class Showing(AsJson):
+    """What is shown, and where the pages go."""
+
+    out: Path = option(
+        "Folder for the pages and the data. What an earlier demonstration wrote there is replaced, unless it was "
+        "changed or anything else lies beside it.",
+        default=Path("out/demo"),
+        type=LocalPath(),
+    )
+    seed: int = option("Seed of all that is random.", default=2026, type=click.IntRange(min=0))
+    full: bool = option(
+        "Then weigh the cloth and find what its model lacks, from the same film; 10 minutes at most.", default=False
+    )
+    markers: bool = option(
+        "Instead find what the model of another flag lacks, from tracked markers; 5 minutes at most.", default=False
+    )
+
+    def __post_init__(self) -> None:
+        if self.full and self.markers:
+            raise UsageError("--full cannot be combined with --markers", fix="show one after the other, each in a folder of its own")
+
+    @property
+    def story(self) -> Story:
+        """The demonstration that is shown."""
+        return Story.MARKERS if self.markers else Story.FULL if self.full else Story.SHORT
+
+
+@command(Showing)
+def demo(chosen: Showing) -> None:
     """Film a simulated flag beside an anemometer, on which something acts that no file states, and take the two files
     through the steps of a recording of one's own, to pages to open.
 
@@ -89,21 +89,21 @@ def demo(out: Path, seed: int, story: str, as_json: bool) -> None:
     # FOLD
     from measure.demo.story import field_steps, loop_step, markers_step, weighing_step
 
-    chosen = Story(story)
+    out, seed, story = chosen.out, chosen.seed, chosen.story
     began = time.monotonic()
-    say(f"This takes up to {MINUTES[chosen]} minutes on two idle cores.")
+    say(f"This takes up to {MINUTES[story]} minutes on two idle cores.")
     with fresh_folder(out, schema=SCHEMA) as scratch:
-        shell = Transcript(folder=scratch, aside=as_json)
+        shell = Transcript(folder=scratch, aside=chosen.as_json)
         shell.show("init", "lake")
-        if chosen is Story.MARKERS:
+        if story is Story.MARKERS:
             markers_step(shell, seed)
         else:
             recording = field_steps(shell, seed)
-            if chosen is Story.FULL:
+            if story is Story.FULL:
                 weighing_step(shell, recording)
                 loop_step(shell, recording)
         write_index(scratch, shell.cards, seconds=time.monotonic() - began)
-    if as_json:
+    if chosen.as_json:
         document("demo", {"page": str(out / "index.html")})
     else:
         say("")

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from flagdata.addresses import lake_place
-from flagdata.caches import beside
-from flagdata.console import LocalPath, document, echo_lines, progress, say
+from flagdata.addresses import local_path
+from flagdata.api.learning import Evaluating
+from flagdata.console import echo_lines, progress, say
 from flagdata.errors import InputError
-from flagdata.option_types import POSITIVE, STATED
-from flagdata.options import argument, command, option, options
-from flagdata.shared_options import AsJson, OnLake
+from flagdata.options import Result, verb
+from flagdata.stated import Stated
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
     from flagdata.dataset import Pairs, Source
     from flagdata.lake import Artifact
-    from flagdata.stated import Stated
     from models.crops import Cropping
     from models.estimator import Estimator
     from models.evaluation.curves import FramesPoint, LearningPoint
@@ -37,66 +32,8 @@ _BEFORE: dict[str, tuple[str, ...]] = {"train": (), "validation": ("train",), "t
 """Side → the sides that a network has learned from, or was selected by, before it is judged on it."""
 
 
-JUDGED, MORE = "What is judged", "More in the table"
-
-
-@options
-class Evaluating(AsJson, OnLake):
-    """Which networks are judged, on what, and what the table holds."""
-
-    models: tuple[str, ...] = argument("Networks.", "MODEL...")
-    dataset: str = option("Data set whose clips are judged.", default="flagsim-wide", section=JUDGED)
-    side: str = option(
-        "Side of the data set.", default="test", section=JUDGED, type=click.Choice(("train", "validation", "test"))
-    )
-    at: str | None = option(
-        "Tag, branch or version of the lake; by default its head.", default=None, section=JUDGED, metavar="REF"
-    )
-    reference: str | None = option(
-        "Model that the others are compared with; by default the best.", default=None, section=JUDGED, metavar="LABEL"
-    )
-    area_weight: Stated | None = option(
-        "Area weight of all clips, if it is known [kg/m²]: 0.284, 0.284±0.01 or 0.10:0.17.",
-        default=None,
-        section=JUDGED,
-        type=STATED,
-        metavar="VALUE",
-    )
-    handmade: bool = option("Add ridge and gradient boosting on hand-made features.", default=False, section=MORE)
-    frames: tuple[int, ...] = option(
-        "Also report triplet accuracy for clips of N frames (networks on maps only); may be repeated.",
-        default=(),
-        section=MORE,
-        type=click.IntRange(min=4),
-        metavar="N",
-    )
-    linear: bool = option(
-        "Also report how well a linear model predicts cloth parameters from each embedding.",
-        default=False,
-        section=MORE,
-    )
-    tsne: str | None = option("Model whose embedding is drawn by t-SNE.", default=None, section=MORE, metavar="LABEL")
-    out: Path = option(
-        "Where the page, the table in Markdown and the JSON go.",
-        default=Path("evaluation"),
-        type=LocalPath(),
-        metavar="DIR",
-    )
-    name: str = option("Name of the files, without their endings.", default="evaluation")
-    cache: Path | None = option(
-        "Where prepared inputs are kept; by default beside the lake, LAKE.inputs.",
-        default=None,
-        type=LocalPath(),
-        metavar="DIR",
-    )
-    seed: int = option("Seed of the draws and of the bootstrap.", default=0, type=click.IntRange(min=0))
-    workers: int | None = option(
-        "Number of threads; by default one for each core.", default=None, type=POSITIVE, metavar="N"
-    )
-
-
-@command(Evaluating)
-def evaluate(chosen: Evaluating) -> None:
+@verb(Evaluating, example='flagdata.evaluate(["flow", "sdn"], lake="lake", at="v1")')
+def evaluate(chosen: Evaluating) -> Iterator[Result]:
     """Judge trained networks on one side of a data set and write the table.
 
     MODEL is a network of the lake by its name (all seeds of it) or the beginning of its id, or "shipped" for the one
@@ -106,16 +43,16 @@ def evaluate(chosen: Evaluating) -> None:
     \b
       flagdata evaluate flow sdn --at v1 --lake lake --out evaluation
     """
-    import flagdata
+    from flagdata.dataset.source import opened
     from models.evaluation import report
     from models.evaluation.evaluation import as_document
 
-    report.check(chosen.out, name=chosen.name)
-    place = lake_place(str(chosen.lake))
-    source = flagdata.open(place)
-    folder = chosen.cache if chosen.cache is not None else beside(place, ".inputs")
-    workers = chosen.workers or os.cpu_count() or 1
-    desk = _Desk(source, chosen.dataset, chosen.at, folder, workers, chosen.seed, chosen.area_weight)
+    out = local_path(chosen.out)
+    report.check(out, name=chosen.name)
+    source = opened(chosen.lake)
+    folder = chosen.inputs(source.lake)
+    weight = None if chosen.area_weight is None else Stated.of(chosen.area_weight)
+    desk = _Desk(source, chosen.dataset, chosen.at, folder, chosen.processes, chosen.seed, weight)
     evaluation = desk.evaluation(
         chosen.models,
         side=chosen.side,
@@ -125,13 +62,11 @@ def evaluate(chosen: Evaluating) -> None:
         frames=chosen.frames,
         linear=chosen.linear,
     )
-    page, text, data = report.write(evaluation, chosen.out, name=chosen.name)
-    if chosen.as_json:
-        document("evaluation", as_document(evaluation))
-    else:
-        echo_lines(report.markdown(evaluation))
-        for written in (page, text, data):
-            say(str(written))
+    page, text, data = report.write(evaluation, out, name=chosen.name)
+    yield Result("evaluation", as_document(evaluation))
+    echo_lines(report.markdown(evaluation))
+    for written in (page, text, data):
+        say(str(written))
 
 
 def refuse_learned(catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: str, side: str) -> None:

@@ -6,26 +6,23 @@ A trained model as an artifact of the lake: weights and card in one object, its 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from flagdata.addresses import lake_place
-from flagdata.caches import beside
+from flagdata.api.learning import Training
 from flagdata.checksums import write_sums
-from flagdata.console import LocalPath, document, echo, json_option, lake_option, progress, say
+from flagdata.console import echo, progress, say
 from flagdata.dataset import Pairs
 from flagdata.errors import ConflictError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.healing import Healing
+from flagdata.options import Result, verb
 from flagdata.provenance import canonical, code_version
 from flagdata.schema import Kind
-from flagdata.storage import Place
 from flagdata.workload import announced
 from models.storage import WEIGHTS, write_card, write_tensors
 from models.training.recipe import TrainingRecipe
@@ -137,41 +134,8 @@ if TYPE_CHECKING:
     from models.training.recipe import TrainingRecipe
 
 
-@click.command()
-@click.argument("recipe", metavar="RECIPE")
-@click.option("--at", metavar="REF", help="Tag, branch or version of the lake to learn from; by default its head.")
-@click.option("--seed", type=click.IntRange(min=0), help="Seed of weights, crops and orders, instead of the recipe's.")
-@click.option("--sequences", type=click.IntRange(min=2), metavar="N", help="Simulations to learn from, instead of all.")
-@click.option(
-    "--cache",
-    type=LocalPath(),
-    metavar="DIR",
-    help="Where prepared inputs are kept, outside the lake; by default beside it, LAKE.inputs.",
-)
-@click.option(
-    "--run",
-    type=LocalPath(),
-    metavar="DIR",
-    help="Where the checkpoint is kept while it trains; by default in the cache.",
-)
-@click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
-@click.option("--device", default="cpu", show_default=True, help="Where the network computes: cpu, cuda.")
-@click.option("--branch", default="main", show_default=True, help="The line of work to commit the model on.")
-@json_option
-@lake_option
-def train(
-    recipe: str,
-    at: str | None,
-    seed: int | None,
-    sequences: int | None,
-    cache: Path | None,
-    run: Path | None,
-    workers: int | None,
-    device: str,
-    branch: str,
-    as_json: bool,
-    lake_path: str,
-) -> None:
+@verb(Training, example='flagdata.train("flow", lake="lake", at="v1")')
+def train(chosen: Training) -> Iterator[Result]:
     """Train a network on the clips of a lake and commit it as an artifact.
 
     RECIPE is a TOML file, or a recipe of the catalog: flow, wave, sdn and the networks they are compared with. Each
@@ -182,33 +146,17 @@ def train(
       flagdata train flow --at v1 --lake lake
       torchrun --nproc-per-node 2 -m flagdata.cli train flow --at v1 --lake lake
     """
-    from dataclasses import replace
-
     from models.training.recipe import load
 
-    loaded = load(recipe)
-    if seed is not None:
-        loaded = replace(loaded, seed=seed)
-    if sequences is not None:
-        loaded = replace(loaded, data=replace(loaded.data, sequences=sequences))
-    lake = lake_place(lake_path)
-    folder = cache if cache is not None else beside(lake, ".inputs")
-    report = trained(
-        loaded,
-        lake,
-        at=at,
-        cache=folder,
-        run=run,
-        workers=workers or os.cpu_count() or 1,
-        device=device,
-        branch=branch,
-        bars=progress,
-    )
+    loaded = load(str(chosen.recipe))
+    if chosen.seed is not None:
+        loaded = replace(loaded, seed=chosen.seed)
+    if chosen.sequences is not None:
+        loaded = replace(loaded, data=replace(loaded.data, sequences=chosen.sequences))
+    report = trained(loaded, chosen, bars=progress)
     if report is None:  # another rank of a torchrun reports
         return
-    if as_json:
-        document("train", report)
-        return
+    yield Result("train", report)
     best = report["best"]
     say(
         f"{report['epochs']} epochs of {report['seconds'] / max(1, report['epochs']):.0f} s; the best was "
@@ -219,14 +167,8 @@ def train(
 
 def trained(
     recipe: TrainingRecipe,
-    lake_path: Place,
+    chosen: Training,
     *,
-    at: str | None,
-    cache: Path,
-    run: Path | None,
-    workers: int,
-    device: str,
-    branch: str,
     bars: Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]],
 ) -> dict[str, Any] | None:
     """Prepares, trains and publishes; returns what the command reports, or None in all ranks but the first.
@@ -237,7 +179,7 @@ def trained(
     import torch
     from torch import distributed as ranks
 
-    import flagdata
+    from flagdata.dataset.source import opened
     from flagdata.lake.healing import present, said
     from flagdata.locks import alone_in
     from flagdata.provenance import digest
@@ -247,13 +189,15 @@ def trained(
     from models.training.inputs import complete_truth, film_rows, prepare_clips, prepare_films
 
     # FOLD
-    from models.training.steps import Training
+    from models.training.steps import Training as Steps
 
     recipe.check()
-    if run is not None:
-        check_folder(run)
-    source = flagdata.open(lake_path)
+    at, branch, workers, device = chosen.at, chosen.branch, chosen.processes, chosen.device
+    if chosen.run is not None:
+        check_folder(chosen.run)
+    source = opened(chosen.lake)
     source.lake.check_writable()
+    cache = chosen.inputs(source.lake)
     train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
     data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
     recordings = recordings_of(train_pairs, validation_pairs)
@@ -275,7 +219,7 @@ def trained(
     several = "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
     if several:
         ranks.init_process_group("gloo" if device == "cpu" else "nccl")
-    folder = run if run is not None else cache / f"run-{recipe.name}-{digest(wanted)[:12]}"
+    folder = chosen.run if chosen.run is not None else cache / f"run-{recipe.name}-{digest(wanted)[:12]}"
     locks = ExitStack()
     try:
         first = not several or ranks.get_rank() == 0
@@ -312,7 +256,7 @@ def trained(
         if several and first:
             ranks.barrier()
         identity = {"recipe": recipe.identity(), "train": data["train"], "validation": data["validation"]}
-        training = Training(
+        training = Steps(
             recipe=recipe,
             train=train_inputs.in_memory(),
             validation=validation_inputs.in_memory(),

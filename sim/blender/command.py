@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
+from flagdata.console import LocalPath, document, echo, say
+from flagdata.options import AsJson, command, option, options
 
-from flagdata.console import LocalPath, document, echo, json_option, say
+
+@options
+class SettingUp(AsJson):
+    """Where Blender's environment is made, and by which Python."""
+
+    folder: Path | None = option(
+        "Where the environment is made; by default the folder blender of flagdata's cache.",
+        default=None,
+        type=LocalPath(file_okay=False),
+        metavar="DIR",
+    )
+    python: str | None = option(
+        "A Python 3.11 to make it with; by default one that is found.", default=None, metavar="PYTHON"
+    )
+    check: bool = option("Only say which environment is used, and whether it works.", default=False)
 
 
-@click.command("blender-setup")
-@click.option(
-    "--folder",
-    type=LocalPath(file_okay=False),
-    metavar="DIR",
-    help="Where the environment is made; by default the folder blender of flagdata's cache.",
-)
-@click.option("--python", metavar="PYTHON", help="A Python 3.11 to make it with; by default one that is found.")
-@click.option("--check", "only_check", is_flag=True, help="Only say which environment is used, and whether it works.")
-@json_option
-def blender_setup(folder: Path | None, python: str | None, only_check: bool, as_json: bool) -> None:
+@command(SettingUp)
+def blender_setup(chosen: SettingUp) -> None:
     """Make the environment that the renderers cycles and workbench run in.
 
     Blender's module needs Python 3.11 and NumPy 1. It gets a virtual environment of its own, so that flagdata's is free
@@ -37,18 +43,19 @@ def blender_setup(folder: Path | None, python: str | None, only_check: bool, as_
     from flagdata.errors import UsageError
     from sim.blender import environment
 
-    if only_check and (folder or python):
+    folder, python = chosen.folder, chosen.python
+    if chosen.check and (folder or python):
         raise UsageError(
             "--check looks at the environment that is used",
             where="flagdata blender-setup",
             fix="leave out --folder and --python",
         )
-    if only_check:
+    if chosen.check:
         installed = environment.check(environment.find())
     else:
         installed = environment.create(folder or environment.default_folder(), python=python, say=say)
     content = {"python": str(installed.python), "blender": installed.blender, "numpy": installed.numpy}
-    if as_json:
+    if chosen.as_json:
         document("blender", {**content, "python_version": installed.python_version})
         return
     echo(f"Blender {installed.blender}, Python {installed.python_version}, NumPy {installed.numpy}: {installed.python}")

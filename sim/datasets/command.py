@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from flagdata.addresses import lake_place
-from flagdata.console import (
-    LocalPath,
-    document,
-    echo,
-    following,
-    in_steps,
-    json_option,
-    lake_option,
-    progress,
-    say,
-    say_beside_bars,
-    table,
-)
+from flagdata.api.learning import Building
+from flagdata.console import echo, following, in_steps, progress, say, say_beside_bars, table
+from flagdata.options import Result, verb
 from flagdata.printable import counted
 
 if TYPE_CHECKING:
@@ -29,34 +17,8 @@ if TYPE_CHECKING:
     from sim.datasets.plan import Plan
 
 
-@click.command()
-@click.argument("recipe", metavar="RECIPE")
-@click.option("--plan", "only_plan", is_flag=True, help="Print counts, bytes and hours, and make nothing.")
-@click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler, tcp://HOST:PORT; without it, this machine.")
-@click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Processes on this machine; by default one a core.",
-)
-@click.option("--renderer", metavar="NAME", help="raster, cycles or workbench, instead of the recipe's.")
-@click.option("--device", default="cpu", show_default=True, help="Where workers compute: cpu, cuda.")
-@click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
-@click.option("--card", type=LocalPath(), metavar="FILE", help="Where the card goes; by default cards/.")
-@json_option
-@lake_option
-def build(
-    recipe: str,
-    only_plan: bool,
-    scheduler: str | None,
-    workers: int | None,
-    renderer: str | None,
-    device: str,
-    branch: str,
-    card: Path | None,
-    as_json: bool,
-    lake_path: str,
-) -> None:
+@verb(Building, example='flagdata.build("flagsim-small", lake="lake", workers=2)')
+def build(chosen: Building) -> Iterator[Result]:
     """Build a data set: simulate its sequences, film them, and lay both into the lake with their ground truth.
 
     RECIPE is a TOML file, or a recipe of the catalog: flagsim, flagsim-small, clothsim, field, outdoor. The lake is
@@ -73,19 +35,19 @@ def build(
     from flagdata.errors import UsageError
     from sim.datasets.reading import load, with_renderer
 
-    loaded = load(recipe)
-    if renderer is not None:
-        loaded = with_renderer(loaded, renderer)
-    if scheduler is not None and workers is not None:
+    branch, device, scheduler = chosen.branch, chosen.device, chosen.scheduler
+    loaded = load(str(chosen.recipe))
+    if chosen.renderer is not None:
+        loaded = with_renderer(loaded, chosen.renderer)
+    if scheduler is not None and chosen.workers is not None:
         raise UsageError("--workers with --scheduler", fix="start more workers at the scheduler")
-    if only_plan:
+    lake = _lake(chosen)
+    if chosen.plan:
         from sim.datasets.plan import plan
 
-        planned = plan(loaded, _lake(lake_path), workers=_workers(scheduler, workers), branch=branch, device=device)
-        if as_json:
-            document("build-plan", planned.as_dict())
-        else:
-            _print_plan(planned)
+        planned = plan(loaded, lake, workers=_workers(chosen), branch=branch, device=device)
+        yield Result("build-plan", planned.as_dict())
+        _print_plan(planned)
         return
 
     from flagdata.lake.merging import added_since
@@ -94,22 +56,20 @@ def build(
     from sim.datasets.cluster import connected
     from sim.datasets.plan import length
 
-    cards.check(card)
-    lake = _lake(lake_path) or _made(lake_path)
+    cards.check(chosen.card)
+    lake = lake or _made(str(chosen.lake))
     lake.check_writable()
-    lasting = length(loaded, lake, workers=_workers(scheduler, workers), branch=branch, device=device)
+    lasting = length(loaded, lake, workers=_workers(chosen), branch=branch, device=device)
     if lasting is not None:
         say(lasting)
-    with in_steps(added_since(lake, branch)), connected(scheduler, workers=workers or _cores()) as client:
+    with in_steps(added_since(lake, branch)), connected(scheduler, workers=chosen.processes) as client:
         report = Build(
             lake=lake, recipe=loaded, client=client, bars=progress, say=say_beside_bars, branch=branch, device=device
         ).run()
     written = None
     with following(f"the data set {loaded.name}", "writing its card"):
-        written = str(cards.write_card(lake, loaded, branch=branch, path=card))
-    if as_json:
-        document("build", {"lake": str(lake.path), "recipe": loaded.name, "card": written, **vars(report)})
-        return
+        written = str(cards.write_card(lake, loaded, branch=branch, path=chosen.card))
+    yield Result("build", {"lake": str(lake.path), "recipe": loaded.name, "card": written, **vars(report)})
     for failure in report.failed:
         say(f"replaced: {failure}")
     replaced = f"; {counted(report.healed, 'damaged or missing object')} replaced" if report.healed else ""
@@ -121,14 +81,13 @@ def build(
         echo(written)
 
 
-def _lake(path: str) -> Lake | None:
-    """Opens the lake at a path; None where nothing exists."""
-    from flagdata.lake import Lake
-
-    location = lake_place(path)
-    if not (any(True for _ in location.iterdir()) if location.is_dir() else location.exists()):
-        return None
-    return Lake.open(location)
+def _lake(chosen: Building) -> Lake | None:
+    """Opens the lake; returns None where nothing is at its path."""
+    if isinstance(chosen.lake, str | Path):
+        location = lake_place(chosen.lake)
+        if not (any(True for _ in location.iterdir()) if location.is_dir() else location.exists()):
+            return None
+    return chosen.opened()
 
 
 def _made(path: str) -> Lake:
@@ -138,17 +97,13 @@ def _made(path: str) -> Lake:
     return Lake.create(path)
 
 
-def _workers(scheduler: str | None, workers: int | None) -> int:
-    if scheduler is None:
-        return workers or _cores()
+def _workers(chosen: Building) -> int:
+    if chosen.scheduler is None:
+        return chosen.processes
     from sim.datasets.cluster import connected, threads
 
-    with connected(scheduler, workers=0) as client:
+    with connected(chosen.scheduler, workers=0) as client:
         return max(1, threads(client))
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _print_plan(planned: Plan) -> None:

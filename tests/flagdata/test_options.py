@@ -12,8 +12,8 @@ import click
 import pytest
 
 import flagdata
-from flagdata.api import lake_verbs, measuring, recording_verbs
-from flagdata.cli import root
+from flagdata.api import lake_verbs, learning, measuring, recording_verbs
+from flagdata.cli import VERBS, root
 from flagdata.errors import UsageError
 from flagdata.option_types import DURATION
 from flagdata.options import LongCommand, argument, called, command, described, option, options, typed
@@ -21,14 +21,19 @@ from flagdata.provenance import recipe_hash
 
 FORMS = {
     "align": recording_verbs.Aligning,
+    "branch": lake_verbs.Naming,
+    "build": learning.Building,
     "calibrate": measuring.Calibrating,
     "close_loop": measuring.Closing,
+    "evaluate": learning.Evaluating,
     "export": lake_verbs.Exporting,
     "ingest": recording_verbs.Ingesting,
     "measure": measuring.Measuring,
     "observe": measuring.Observing,
     "query": lake_verbs.Querying,
+    "realign": recording_verbs.Realigning,
     "tag": lake_verbs.Naming,
+    "train": learning.Training,
 }
 OTHERWISE = {
     "calibrate": {"workers"},  # a notebook begins no processes of its own accord
@@ -56,6 +61,14 @@ def test_a_call_takes_what_its_command_takes_with_the_same_defaults(name: str) -
         if (there or None) != (parameter.default or None):
             wrong[key] = (parameter.default, there)
     assert wrong == {}
+
+
+OF_THE_TERMINAL = {"blender-setup", "completion", "demo", "help", "propose", "view"}
+"""Commands that no call does: what they are about is a shell, a browser, an installation or a folder of pages."""
+
+
+def test_every_other_verb_is_a_call() -> None:
+    assert {name for name in VERBS if name.replace("-", "_") not in flagdata.__all__} == OF_THE_TERMINAL
 
 
 def typed_words(name: str, form: type, *words: str) -> Any:

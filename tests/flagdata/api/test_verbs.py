@@ -44,6 +44,27 @@ def test_a_recording_is_brought_in_aligned_tagged_and_exported(
     assert flagdata.tag(lake=lake) == ()
 
 
+def test_a_verb_of_a_lake_returns_what_its_command_prints_as_json(lake: Lake, video: Path, run: Run) -> None:
+    flagdata.ingest(video, lake=lake, name="film", start="2026-05-01T12:00:00Z")
+    made = flagdata.declare("film", speed=4, sigma=0.2, name="tunnel", lake=lake)
+    assert run("ls", "--kind", "recording", "--json").document["artifacts"][0]["artifact"] == made["recording"]
+    labelled = flagdata.label(["tunnel", "usable=true"], lake=lake)
+    assert (labelled["artifacts"], labelled["labels"]) == ([made["recording"]], {"usable": True})
+    for found, words in (
+        (flagdata.ls(lake=lake, kind="clip"), ("ls", "--kind", "clip")),
+        (flagdata.show("film", lake=lake), ("show", "film")),
+        (flagdata.lineage("film", lake=lake), ("lineage", "film")),
+        (flagdata.log(lake=lake, limit=2), ("log", "--limit", 2)),
+        (flagdata.diff("0", lake=lake), ("diff", 0)),
+        (flagdata.verify(lake=lake, sample=1), ("verify", "--sample", 1)),
+        (flagdata.gc(lake=lake, grace=0, dry_run=True), ("gc", "--older-than", "0s", "--dry-run")),
+        (flagdata.expire(lake=lake, keep=1, dry_run=True), ("expire", "--keep", 1, "--dry-run")),
+    ):
+        printed = run(*words, "--json").document
+        assert {key: value for key, value in printed.items() if key != "schema"} == dict(found)
+        assert found
+
+
 def test_options_that_contradict_each_other_are_refused_in_calls_as_in_commands(lake: Lake, wind_log: Path) -> None:
     with pytest.raises(UsageError, match="without a NAME"):
         flagdata.tag(lake=lake, at="main")
@@ -51,6 +72,10 @@ def test_options_that_contradict_each_other_are_refused_in_calls_as_in_commands(
         flagdata.export("csv", lake=lake, to="out", salt="x")
     with pytest.raises(UsageError, match="--crop means nothing for an anemometer log"):
         flagdata.ingest(wind_log, lake=lake, crop="auto")
+    with pytest.raises(UsageError, match="give a list"):
+        flagdata.withdraw("film", message="why", lake=lake)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="which versions expire"):
+        flagdata.expire(lake=lake)
     assert lake.rows().num_rows == 0
 
 

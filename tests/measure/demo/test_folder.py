@@ -50,7 +50,7 @@ def test_it_replaces_what_it_wrote_and_lists_it(
     out = tmp_path / "out" / "demo"
     assert demo(out, "--full") == 0
     assert f"Open {out}/index.html" in capsys.readouterr().err
-    assert demo(out, "--short", "--seed", "7") == 0
+    assert demo(out, "--seed", "7") == 0
     assert names(out) == ["index.html", "lake/lake.json", "manifest.json", "recording.html"]
     assert (out / "recording.html").read_text() == "seed 7"
     listed = [entry["path"] for entry in json.loads((out / "manifest.json").read_text())["files"]]

@@ -97,7 +97,7 @@ _WHOLE = {
 from flagdata.commands.artifacts import ls
 lap()
 with redirect_stdout(StringIO()):
-    ls.main(["--lake", sys.argv[1]], standalone_mode=False)""",
+    ls.command.main(["--lake", sys.argv[1]], standalone_mode=False)""",
     "merge": """
 lake.branch("side")
 with lake.transaction("one row", branch="side") as tx:

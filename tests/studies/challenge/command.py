@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import LakePlace, LocalPath, document, echo, echo_lines, json_option, progress, say
+from flagdata.console import LakePlace, LocalPath, document, echo, echo_lines, progress, say
 from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from tests.studies.challenge.filing import Filing
 
 _FOLDER = click.argument("folder", metavar="DIR", type=LocalPath())
+json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
 _ONLY = click.option("--only", multiple=True, metavar="SET", help="Take this set only; may be repeated.")
 
 

@@ -1,0 +1,185 @@
+"""Data sets built and networks trained on them, in Python.
+
+The options of each call are stated in a class, from which the command of the same name is made, too. The packages
+behind the calls are named by strings: flagdata imports none of those that rest on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flagdata.addresses import lake_place
+from flagdata.caches import beside
+from flagdata.console import LocalPath
+from flagdata.option_types import STATED
+from flagdata.options import argument, called, option, options
+from flagdata.parts import attribute
+from flagdata.shared_options import AtVersion, Computed, OnBranch, OnLake, Shared
+
+if TYPE_CHECKING:
+    from flagdata.lake import Lake
+    from flagdata.stated import Stated
+
+JUDGED, MORE = "What is judged", "More in the table"
+
+
+@options
+class Building(Computed, OnBranch, OnLake):
+    """Which data set is built, and where."""
+
+    recipe: Path | str = argument("A TOML file, or the name of a recipe of the catalog.", "RECIPE")
+    plan: bool = option("Print counts, bytes and hours, and make nothing.", default=False)
+    scheduler: str | None = option(
+        "A Dask scheduler, tcp://HOST:PORT; without it, this machine.", default=None, metavar="ADDRESS"
+    )
+    renderer: str | None = option("raster, cycles or workbench, instead of the recipe's.", default=None, metavar="NAME")
+    card: Path | None = option(
+        "Where the card goes; by default cards/.", default=None, type=LocalPath(), metavar="FILE"
+    )
+
+
+@called(Building)
+def build(chosen: Building) -> Mapping[str, Any]:
+    """Builds a data set in a lake, as `flagdata build` does: its sequences, films, ground truth and card.
+
+    ```python
+    planned = flagdata.build("flagsim-small", lake="lake", plan=True)
+    built = flagdata.build("flagsim-small", lake="lake", workers=2)
+    ```
+
+    Returns:
+        What `flagdata build --json` prints.
+
+    Raises:
+        MissingExtraError: torch or Dask is not installed.
+        UnknownNameError: no such recipe or renderer.
+        UsageError: options that contradict each other.
+    """
+    return attribute("sim.datasets.command:build").result(chosen)
+
+
+@options
+class OfInputs(AtVersion, OnLake):
+    """Where prepared inputs of networks are kept."""
+
+    cache: Path | None = option(
+        "Where prepared inputs are kept, outside the lake; by default beside it, LAKE.inputs.",
+        default=None,
+        type=LocalPath(),
+        metavar="DIR",
+    )
+
+    def inputs(self, lake: Lake) -> Path:
+        """Returns the folder of prepared inputs."""
+        folder = lake_place(self.lake) if isinstance(self.lake, str | Path) else lake.path
+        return beside(folder, ".inputs") if self.cache is None else self.cache
+
+
+@options
+class Training(OfInputs, Computed, OnBranch):
+    """Which network is trained, and on what."""
+
+    recipe: Path | str = argument("A TOML file, or the name of a recipe of the catalog.", "RECIPE")
+    seed: int | None = option(
+        "Seed of weights, crops and orders, instead of the recipe's.", default=None, type=click.IntRange(min=0)
+    )
+    sequences: int | None = option(
+        "Simulations to learn from, instead of all.", default=None, type=click.IntRange(min=2), metavar="N"
+    )
+    run: Path | None = option(
+        "Where the checkpoint is kept while it trains; by default in the cache.",
+        default=None,
+        type=LocalPath(),
+        metavar="DIR",
+    )
+
+
+@called(Training)
+def train(chosen: Training) -> Mapping[str, Any]:
+    """Trains a network on the clips of a lake and commits it as an artifact, as `flagdata train` does.
+
+    ```python
+    trained = flagdata.train("flow", lake="lake", at="v1")
+    trained["artifact"], trained["best"]["validation"]  # id, loss
+    ```
+
+    Returns:
+        What `flagdata train --json` prints; nothing in all ranks of a torchrun but the first.
+
+    Raises:
+        ConflictError: another training is under way in the folder.
+        MissingExtraError: torch is not installed.
+        NotFoundError: no such lake or version.
+        RefusedError: the sides of the data set leak, or one is empty.
+        UnknownNameError: no such recipe, or the lake has no such data set.
+    """
+    return attribute("models.training.command:train").result(chosen)
+
+
+@options
+class Evaluating(OfInputs, Shared):
+    """Which networks are judged, on what, and what the table holds."""
+
+    models: Sequence[str] = argument(
+        "Networks of the lake by name or id, shipped, or shipped/NAME.", "MODEL...", nargs=-1
+    )
+    dataset: str = option("Data set whose clips are judged.", default="flagsim-wide", section=JUDGED)
+    side: str = option(
+        "Side of the data set.", default="test", section=JUDGED, type=click.Choice(("train", "validation", "test"))
+    )
+    reference: str | None = option(
+        "Model that the others are compared with; by default the best.", default=None, section=JUDGED, metavar="LABEL"
+    )
+    area_weight: float | tuple[float, float] | str | Stated | None = option(
+        "Area weight of all clips, if it is known [kg/m²]: 0.284, 0.284±0.01 or 0.10:0.17.",
+        default=None,
+        section=JUDGED,
+        type=STATED,
+        metavar="VALUE",
+    )
+    handmade: bool = option("Add ridge and gradient boosting on hand-made features.", default=False, section=MORE)
+    frames: tuple[int, ...] = option(
+        "Also report triplet accuracy for clips of N frames (networks on maps only); may be repeated.",
+        default=(),
+        section=MORE,
+        type=click.IntRange(min=4),
+        metavar="N",
+    )
+    linear: bool = option(
+        "Also report how well a linear model predicts cloth parameters from each embedding.",
+        default=False,
+        section=MORE,
+    )
+    tsne: str | None = option("Model whose embedding is drawn by t-SNE.", default=None, section=MORE, metavar="LABEL")
+    out: Path | str = option(
+        "Where the page, the table in Markdown and the JSON go.",
+        default=Path("evaluation"),
+        type=LocalPath(),
+        metavar="DIR",
+    )
+    name: str = option("Name of the files, without their endings.", default="evaluation")
+    seed: int = option("Seed of the draws and of the bootstrap.", default=0, type=click.IntRange(min=0))
+
+
+@called(Evaluating)
+def evaluate(chosen: Evaluating) -> Mapping[str, Any]:
+    """Judges trained networks on one side of a data set and writes the table, as `flagdata evaluate` does.
+
+    ```python
+    judged = flagdata.evaluate(["flow", "sdn"], lake="lake", at="v1", out="evaluation")
+    ```
+
+    Returns:
+        What `flagdata evaluate --json` prints.
+
+    Raises:
+        MissingExtraError: torch is not installed.
+        NotFoundError: no such lake or version.
+        RefusedError: a clip that a network has learned from.
+        UnknownNameError: no such network or data set.
+    """
+    return attribute("models.evaluation.command:evaluate").result(chosen)
