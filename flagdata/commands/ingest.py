@@ -10,7 +10,7 @@ import click
 
 from flagdata.api.recording_verbs import SOURCE, FromAnemometer, FromCamera, FromFrames, Ingesting
 from flagdata.commands.confirm import on_command_line
-from flagdata.commands.ingest_options import SNIFF, Given
+from flagdata.commands.ingest_options import SNIFF, IngestRequest
 from flagdata.commands.ingest_sources import ingest_sources, sniff_sources
 from flagdata.console import LocalPath
 from flagdata.errors import UsageError
@@ -131,13 +131,13 @@ def ingest(chosen: IngestCommand) -> None:
     for name in sorted(typed(chosen) - {*SNIFF, "as_json", "lake"}):
         spelled = described(type(chosen))[name][1].spelled(name)
         raise UsageError(f"{spelled} means nothing to --sniff", fix="leave it out")
-    given = Given.of(chosen, confirm=on_command_line(chosen.accept, as_json=chosen.as_json))
+    given = IngestRequest.of(chosen, confirm=on_command_line(chosen.accept, as_json=chosen.as_json))
     sniff_sources(given, as_json=chosen.as_json)
 
 
 def _ingest(chosen: IngestCommand | FilmCommand | WindCommand | FramesCommand, *, kind: str | None = None) -> None:
     accept = chosen.accept if isinstance(chosen, FromAnemometer) else None
-    given = Given.of(chosen, kind=kind, confirm=on_command_line(accept, as_json=chosen.as_json))
+    given = IngestRequest.of(chosen, kind=kind, confirm=on_command_line(accept, as_json=chosen.as_json))
     lake = chosen.opened()
     lake.check_writable()
     ingest_sources(lake, given, as_json=chosen.as_json)

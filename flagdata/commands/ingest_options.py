@@ -54,7 +54,7 @@ ONE_SOURCE = ("start", "date", "name", "crop_picture", "accept")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Given:
+class IngestRequest:
     """The options of an ingest, read.
 
     Attributes:
@@ -79,7 +79,7 @@ class Given:
     confirm: Confirm
 
     @classmethod
-    def of(cls, chosen: Recorded, *, kind: str | None = None, confirm: Confirm) -> Given:
+    def of(cls, chosen: Recorded, *, kind: str | None = None, confirm: Confirm) -> IngestRequest:
         """Reads the options.
 
         Args:
@@ -278,7 +278,7 @@ def _length_unit(name: str | None) -> str:
     return "m" if name is None or unit(name, where="--unit").si == "m/s" else name
 
 
-def check_applies(kinds: Sequence[str | None], given: Given) -> None:
+def check_applies(kinds: Sequence[str | None], given: IngestRequest) -> None:
     """Refuses options that mean nothing for any source, or that time or name more than one, before anything is written.
 
     Args:

@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from flagdata.api.recording_verbs import FromCamera, Ingesting
-from flagdata.commands.ingest_options import KINDS, Given, check_applies
+from flagdata.commands.ingest_options import KINDS, IngestRequest, check_applies
 from flagdata.console import document, echo, echo_lines, fail, progress, say
 from flagdata.errors import FlagdataError, InputError, UsageError
 from flagdata.findings import Finding
@@ -173,7 +173,7 @@ Recognised = TypeVar("Recognised")
 Done = TypeVar("Done")
 
 
-def ingest_sources(lake: Lake, given: Given, *, as_json: bool) -> None:
+def ingest_sources(lake: Lake, given: IngestRequest, *, as_json: bool) -> None:
     """Brings each source into the lake and reports it; exits with 1 where one of several failed.
 
     Raises:
@@ -206,7 +206,7 @@ def ingested(chosen: Ingesting) -> tuple[IngestResult, ...]:
 
     lake = opened(chosen.lake).lake
     lake.check_writable()
-    kinds, given = _kinds(Given.of(chosen, confirm=Accepting(accept=chosen.accept)))
+    kinds, given = _kinds(IngestRequest.of(chosen, confirm=Accepting(accept=chosen.accept)))
     results: list[IngestResult] = []
     for source, kind in zip(given.sources, kinds, strict=True):
         if isinstance(kind, FlagdataError):
@@ -215,7 +215,7 @@ def ingested(chosen: Ingesting) -> tuple[IngestResult, ...]:
     return tuple(results)
 
 
-def _kinds(given: Given) -> tuple[list[Guess | FlagdataError], Given]:
+def _kinds(given: IngestRequest) -> tuple[list[Guess | FlagdataError], IngestRequest]:
     """Returns what each source is, or why it is not recognised; with the options as they are then read.
 
     Raises:
@@ -272,7 +272,7 @@ def _check_joined(paths: Sequence[Path], kind_of: Callable[[Path], Guess]) -> No
 _NOT_JOINED = {"anemometer": "a wind log", "meshes": "a folder of meshes", "markers": "a table of markers"}
 
 
-def sniff_sources(given: Given, *, as_json: bool) -> None:
+def sniff_sources(given: IngestRequest, *, as_json: bool) -> None:
     """Reports what each source seems to be; exits with 1 where one of several is not recognised.
 
     Raises:
@@ -293,7 +293,7 @@ def sniff_sources(given: Given, *, as_json: bool) -> None:
     _exit_on(failures, given.sources)
 
 
-def _completed(source: Path, ranked: tuple[Guess, ...], given: Given) -> tuple[Guess, ...]:
+def _completed(source: Path, ranked: tuple[Guess, ...], given: IngestRequest) -> tuple[Guess, ...]:
     """The guesses, a draft among them completed by the options beside --sniff."""
     from flagdata.ingest.anemometer import completed
 
@@ -306,7 +306,7 @@ def _completed(source: Path, ranked: tuple[Guess, ...], given: Given) -> tuple[G
     return (completed(source, wind) or ranked[0], *ranked[1:])
 
 
-def _look(source: Path, ranked: Sequence[Guess], given: Given) -> dict[str, Any]:
+def _look(source: Path, ranked: Sequence[Guess], given: IngestRequest) -> dict[str, Any]:
     """Guesses at a source; of a camera file, what its headers say and the crop if one was asked for."""
     from flagdata.ingest.camera import probe, propose_crop
 
@@ -394,7 +394,7 @@ def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[P
         sys.exit(codes.pop() if len(codes) == 1 else 1)
 
 
-def _one(lake: Lake, source: Path, kind: Guess, given: Given) -> tuple[IngestResult, ...]:
+def _one(lake: Lake, source: Path, kind: Guess, given: IngestRequest) -> tuple[IngestResult, ...]:
     """Artifacts of a source: of a table of markers one a recording, of any other one."""
     from flagdata.ingest.markers.store import ingest_markers
     from flagdata.ingest.records import ingest_record
@@ -424,17 +424,17 @@ def _one(lake: Lake, source: Path, kind: Guess, given: Given) -> tuple[IngestRes
     return (result,)
 
 
-def _picture(given: Given) -> Path | None:
+def _picture(given: IngestRequest) -> Path | None:
     """The file of the picture that shows where the motion is."""
     return given.chosen.crop_picture if isinstance(given.chosen, FromCamera) else None
 
 
-def _with(given: Given, answers: Answers) -> Given:
+def _with(given: IngestRequest, answers: Answers) -> IngestRequest:
     """The options with the answers that were typed."""
     return replace(given, wind=replace(given.wind, wind=replace(given.wind.wind, **dict(answers))))  # type: ignore[arg-type]
 
 
-def _winds(lake: Lake, source: Path, given: Given) -> tuple[IngestResult, ...]:
+def _winds(lake: Lake, source: Path, given: IngestRequest) -> tuple[IngestResult, ...]:
     """The artifact of a log; of a table that holds several anemometers one of each, named by its label.
 
     An anemometer none of whose values can be used is left out, and the report of the first of the others says so.
@@ -477,7 +477,7 @@ def _winds(lake: Lake, source: Path, given: Given) -> tuple[IngestResult, ...]:
     return (replace(first, report=report), *results[1:])
 
 
-def _meshes(lake: Lake, source: Path, kind: Guess, given: Given) -> IngestResult:
+def _meshes(lake: Lake, source: Path, kind: Guess, given: IngestRequest) -> IngestResult:
     from flagdata.ingest.meshes.store import ingest_meshes
 
     with progress(None, label=source.name, unit="mesh") as advance:

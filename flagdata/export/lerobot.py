@@ -27,7 +27,7 @@ from PIL import Image
 
 from flagdata.arrays import AnyArray, Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
-from flagdata.export.source import FILMED, Entry, Source, label_units
+from flagdata.export.source import FILMED, Entry, ExportRows, label_units
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 
@@ -70,7 +70,7 @@ class LeRobot:
         if self.frames not in ("av1", "png"):
             raise UsageError(f"frames {self.frames!r} in LeRobot", where="--frames", fix="choose av1 or png")
 
-    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         rate = common_rate([row for row in source.rows["rate"].to_pylist() if row is not None])
         with ExitStack() as stack:
             data = stack.enter_context(_Data(folder, self.frames))
@@ -117,7 +117,7 @@ class _Made:
     total: int = 0
     worst: float = 0.0
     size: tuple[int, int] | None = None
-    tallies: dict[str, list[_Tally]] = field(default_factory=dict)
+    tallies: dict[str, list[_FeatureSums]] = field(default_factory=dict)
 
     def add(self, entry: Entry, data: _Data, film: _Films | None) -> None:
         """Write an episode."""
@@ -135,13 +135,13 @@ class _Made:
             **_wind(entry),
         }
         file_columns: dict[str, Any] = {}
-        pictures = _Tally.empty()
+        pictures = _FeatureSums.empty()
         if film is not None:
             file_columns = film.episode(self._sized(entry, pictures))
             where = data.episode(columns, None)
         else:
             where = data.episode(columns, [_png(image) for image in self._sized(entry, pictures)])
-        tallies = {name: _Tally.of(columns[name]) for name in _NUMBERS} | {CAMERA: pictures}
+        tallies = {name: _FeatureSums.of(columns[name]) for name in _NUMBERS} | {CAMERA: pictures}
         for name, tally in tallies.items():
             self.tallies.setdefault(name, []).append(tally)
         label = entry.label()
@@ -183,7 +183,7 @@ class _Made:
             )
         return farthest
 
-    def _sized(self, entry: Entry, tally: _Tally) -> Iterator[UInt8Array]:
+    def _sized(self, entry: Entry, tally: _FeatureSums) -> Iterator[UInt8Array]:
         """Yields the pictures of an entry one by one, (height, width) uint8, counted.
 
         Raises:
@@ -207,7 +207,7 @@ class _Made:
         table = pa.Table.from_pylist(self.episodes)
         pq.write_table(table, meta / "episodes" / "chunk-000" / "file-000.parquet", compression="snappy")
         pq.write_table(_tasks(), meta / "tasks.parquet")
-        stats = {name: _Tally.joined(parts).stats(name == CAMERA) for name, parts in self.tallies.items()}
+        stats = {name: _FeatureSums.joined(parts).stats(name == CAMERA) for name, parts in self.tallies.items()}
         _json(meta / "stats.json", stats)
         height, width = self.size or (0, 0)
         features: dict[str, Any] = {
@@ -254,7 +254,7 @@ class _Made:
 
 
 @dataclass(kw_only=True)
-class _Tally:
+class _FeatureSums:
     """Sums of the values of a feature that are numbers; of pictures of all their pixels, 0 to 1."""
 
     count: int
@@ -264,17 +264,17 @@ class _Tally:
     squares: float
 
     @classmethod
-    def empty(cls) -> _Tally:
+    def empty(cls) -> _FeatureSums:
         return cls(count=0, low=np.inf, high=-np.inf, total=0.0, squares=0.0)
 
     @classmethod
-    def of(cls, values: AnyArray) -> _Tally:
+    def of(cls, values: AnyArray) -> _FeatureSums:
         tally = cls.empty()
         tally.take(values[np.isfinite(values)].astype(np.float64))
         return tally
 
     @classmethod
-    def joined(cls, parts: Sequence[_Tally]) -> _Tally:
+    def joined(cls, parts: Sequence[_FeatureSums]) -> _FeatureSums:
         return cls(
             count=sum(part.count for part in parts),
             low=min(part.low for part in parts),

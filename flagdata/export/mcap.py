@@ -22,7 +22,7 @@ import pyarrow.parquet as pq
 
 from flagdata.dataset.truth import HISTORY
 from flagdata.errors import CorruptError
-from flagdata.export.source import FILMED, Entry, Source, label_units
+from flagdata.export.source import FILMED, Entry, ExportRows, label_units
 from flagdata.record import Coding, messages
 from flagdata.record.checksums import ChecksummedFile
 from flagdata.record.container import Messages, check_parts, read_exact, read_messages, read_summary
@@ -42,7 +42,7 @@ class Mcap:
 
     kinds: ClassVar[frozenset[Kind]] = FILMED | {Kind.WIND}
 
-    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         frames = 0
         pq.write_table(source.rows, folder / ROWS, compression="zstd")
         with ExitStack() as stack:

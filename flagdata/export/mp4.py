@@ -21,7 +21,7 @@ from av.video.stream import VideoStream
 from flagdata.arrays import IntArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.export.csv_text import cell, write_csv
-from flagdata.export.source import FILMED, IDENTITY, TRUTH, Entry, Source
+from flagdata.export.source import FILMED, IDENTITY, TRUTH, Entry, ExportRows
 from flagdata.schema import CATALOG, CHANNELS, FRAME_RATE, Kind
 from flagdata.timebase import iso
 
@@ -47,7 +47,7 @@ class Mp4:
         if not 0 <= self.crf <= 51:
             raise UsageError(f"H.264 has no rate factor of {self.crf}", where="--crf", fix="give 0 (lossless) to 51")
 
-    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         frames = 0
         index: list[list[Any]] = []
         for entry in source.entries():

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from flagdata.documents import column_json
 from flagdata.errors import CorruptError
-from flagdata.export.source import Source
+from flagdata.export.source import ExportRows
 from flagdata.ingest.meshes import write_folder
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, read_meshes
 from flagdata.schema import FRAME_RATE, Kind
@@ -27,7 +27,7 @@ class ObjFolders:
 
     kinds: ClassVar[frozenset[Kind]] = frozenset({Kind.MESHES})
 
-    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         frames = 0
         for row in source.rows.to_pylist():
             if row["object"] is None:

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from flagdata.errors import UsageError
-from flagdata.export.source import FILMED, Source
+from flagdata.export.source import FILMED, ExportRows
 from flagdata.schema import CATALOG, Kind, catalog_schema
 
 FRAME_COLUMNS = (
@@ -52,7 +52,7 @@ class Parquet:
     def kinds(self) -> frozenset[Kind]:
         return frozenset(Kind) if self.frames == "none" else FILMED
 
-    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         (folder / ROWS).mkdir()
         units = {name: f.unit for name, f in CATALOG.items() if f.unit}
         if self.frames == "none":
@@ -74,7 +74,7 @@ class Parquet:
                 advance(len(rows))
         return {"rows": len(source), "frames": total, "units": {**units, "frame_times": "ns"}}
 
-    def _groups(self, source: Source) -> Iterator[tuple[list[dict[str, Any]], int, int]]:
+    def _groups(self, source: ExportRows) -> Iterator[tuple[list[dict[str, Any]], int, int]]:
         """Rows by the row group, with the bytes and the number of their frames."""
         limit = min(_ROW_GROUP_BYTES, self.shard_bytes)
         rows: list[dict[str, Any]] = []

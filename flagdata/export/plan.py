@@ -21,7 +21,7 @@ from flagdata.dataset.resolve import clips_on_side
 from flagdata.dataset.splits import HashedSplit
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.export.croissant import write_croissant
-from flagdata.export.source import Source
+from flagdata.export.source import ExportRows
 from flagdata.lake import Lake
 from flagdata.lake.labels import columns
 from flagdata.lake.lineage import labels_of, with_labels
@@ -98,7 +98,7 @@ class Exporter(Protocol):
         """The kinds of rows that it can write with these options."""
         ...
 
-    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         """Write `source` into the empty `folder`, the same bytes for the same rows; call `advance` by rows done.
 
         Returns:
@@ -166,7 +166,7 @@ class Prepared:
     request: Export
     exporter: Exporter
     version: int
-    source: Source
+    source: ExportRows
     superseded: Mapping[str, str]
 
     def __len__(self) -> int:
@@ -241,7 +241,7 @@ def prepare(lake: Lake, request: Export) -> Prepared:
     labels = labels_of(catalog)
     for name, values in columns(with_labels(rows, labels)).items():
         rows = rows.append_column(name, values)
-    source = Source(lake=lake, rows=rows, labels=labels)
+    source = ExportRows(lake=lake, rows=rows, labels=labels)
     return Prepared(request=request, exporter=exporter, version=version, source=source, superseded=replaced)
 
 

@@ -157,7 +157,7 @@ def _strict(value: Any) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class ExportRows:
     """The rows of one export, in their order.
 
     Attributes:

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from flagdata.errors import LimitError, UsageError
-from flagdata.export.source import FILMED, Entry, Source, label_units
+from flagdata.export.source import FILMED, Entry, ExportRows, label_units
 from flagdata.rng import stream
 from flagdata.schema import Kind
 
@@ -52,7 +52,7 @@ class WebDataset:
                 f"shards of {self.shard_bytes} bytes", where="--shard-bytes", fix=f"give at least {_RECORD}"
             )
 
-    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         order = None
         if self.shuffle is not None:
             order = stream(self.shuffle, "export", "webdataset").permutation(len(source))

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from flagdata.errors import InputError
 from flagdata.export.csv_text import cell, write_csv
-from flagdata.export.source import Entry, Source
+from flagdata.export.source import Entry, ExportRows
 from flagdata.schema import CHANNELS, Kind, SampleFlag
 from flagdata.signals import WindSeries
 from flagdata.timebase import iso
@@ -28,7 +28,7 @@ class WindCsv:
 
     kinds: ClassVar[frozenset[Kind]] = frozenset({Kind.WIND, Kind.RECORDING})
 
-    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         samples = 0
         channels: dict[str, None] = {}
         for entry in source.entries():

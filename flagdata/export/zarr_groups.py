@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import xarray
 
 from flagdata.arrays import AnyArray, IntArray, UInt8Array
-from flagdata.export.source import IDENTITY, TRUTH, Entry, Source, label_units
+from flagdata.export.source import IDENTITY, TRUTH, Entry, ExportRows, label_units
 from flagdata.schema import CHANNELS, Kind
 
 _STANDARD = {
@@ -36,7 +36,7 @@ class ZarrGroups:
 
     kinds: ClassVar[frozenset[Kind]] = frozenset({Kind.CLIP, Kind.RECORDING, Kind.CAMERA, Kind.WIND})
 
-    def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         for entry in source.entries():
             target = folder / f"{entry.key}.zarr"
             data = _numbers(entry)

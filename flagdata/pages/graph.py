@@ -71,7 +71,7 @@ class Place:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Layout:
+class GraphLayout:
     """Where everything is.
 
     Attributes:
@@ -85,7 +85,7 @@ class Layout:
     ways: Sequence[Sequence[tuple[int, Place]]]
 
 
-def layout(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> Layout:
+def layout(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> GraphLayout:
     """Places for boxes and lines; arguments as of `svg`."""
     tall = _FIRST + NEXT * max(len(box.lines) for box in boxes)
     columns, ways = _placed(boxes, edges, tall)
@@ -97,7 +97,7 @@ def layout(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> Layout:
             box_place.y = y + box_place.height / 2
             y += box_place.height + _GAP_Y
     at = {box_place.key: (number, box_place) for number, column in enumerate(columns) for box_place in column}
-    return Layout(
+    return GraphLayout(
         size=(2 * _MARGIN + len(columns) * WIDTH + (len(columns) - 1) * _GAP_X, 2 * _MARGIN + height),
         at=at,
         ways=[[at[key] for key in way] for way in ways],

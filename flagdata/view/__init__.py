@@ -13,6 +13,6 @@ from flagdata.lazy import lazy_exports
 if TYPE_CHECKING:
     from flagdata.view.media import Media
     from flagdata.view.pages import Site
-    from flagdata.view.server import Answer, Server, answer
+    from flagdata.view.server import Server, ServerAnswer, answer
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -32,7 +32,7 @@ _AZIMUTH, _HEIGHT = np.radians(-60.0), np.radians(20.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Film:
+class FilmStrip:
     """Pictures in order.
 
     Attributes:
@@ -51,7 +51,7 @@ class Film:
         return len(self.times)
 
 
-def film_of(lake: Lake, row: Mapping[str, Any], opened: Callable[[str], Record]) -> Film | None:
+def film_of(lake: Lake, row: Mapping[str, Any], opened: Callable[[str], Record]) -> FilmStrip | None:
     """Finds what moves in an artifact; `None` where nothing does.
 
     Args:
@@ -70,7 +70,7 @@ def film_of(lake: Lake, row: Mapping[str, Any], opened: Callable[[str], Record])
         if not entry.count:
             return None
         first = entry.first
-        return Film(
+        return FilmStrip(
             times=entry.frame_times,
             jpegs=lambda at, count: entry.record.jpegs(first + at, count),
             record=entry.record,
@@ -85,7 +85,7 @@ def film_of(lake: Lake, row: Mapping[str, Any], opened: Callable[[str], Record])
     return _meshes(lake, name) if kind == Kind.MESHES else _markers(lake, name)
 
 
-def _meshes(lake: Lake, name: str) -> Film:
+def _meshes(lake: Lake, name: str) -> FilmStrip:
     sequence = read_meshes(lake.object_path(name))
     project = _camera(sequence.positions.reshape(-1, 3))
 
@@ -93,10 +93,10 @@ def _meshes(lake: Lake, name: str) -> Film:
         mesh = sequence.frame(index)
         return _jpeg(_cloth(project(mesh.positions), mesh.positions, mesh.faces))
 
-    return Film(times=sequence.time, jpegs=lambda at, count: [drawn(index) for index in range(at, at + count)])
+    return FilmStrip(times=sequence.time, jpegs=lambda at, count: [drawn(index) for index in range(at, at + count)])
 
 
-def _markers(lake: Lake, name: str) -> Film:
+def _markers(lake: Lake, name: str) -> FilmStrip:
     sequence = read_markers(lake.object_path(name))
     project = _camera(sequence.positions.reshape(-1, 3))
 
@@ -108,7 +108,7 @@ def _markers(lake: Lake, name: str) -> Film:
             pen.ellipse((x - 2, y - 2, x + 2, y + 2), fill=_INK)
         return _jpeg(image)
 
-    return Film(times=sequence.time, jpegs=lambda at, count: [drawn(index) for index in range(at, at + count)])
+    return FilmStrip(times=sequence.time, jpegs=lambda at, count: [drawn(index) for index in range(at, at + count)])
 
 
 def _camera(points: AnyArray) -> Callable[[AnyArray], FloatArray]:
@@ -149,7 +149,7 @@ def _jpeg(image: Image.Image) -> bytes:
     return encode_jpeg(np.asarray(image))
 
 
-def thumbnail(film: Film, *, side: int) -> bytes:
+def thumbnail(film: FilmStrip, *, side: int) -> bytes:
     """Draws the middle picture of a film, as a JPEG of at most `side` pixels either way."""
     (picture,) = film.jpegs(len(film) // 2, 1)
     with Image.open(io.BytesIO(picture)) as image:

@@ -22,7 +22,7 @@ from flagdata.lake.removal import explained
 from flagdata.record import Record
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
-from flagdata.view.films import DRAWN, Film, film_of, thumbnail
+from flagdata.view.films import DRAWN, FilmStrip, film_of, thumbnail
 
 FRAMES_AT_ONCE = 64
 POINTS = 2000
@@ -42,9 +42,9 @@ class Media:
         self._busy = threading.BoundedSemaphore(_AT_ONCE)
         self._thumbnails: OrderedDict[str, bytes] = OrderedDict()
         self._records: OrderedDict[str, Record] = OrderedDict()
-        self._drawn: dict[str, Film | None] = {}
+        self._drawn: dict[str, FilmStrip | None] = {}
 
-    def film(self, row: Mapping[str, Any]) -> Film:
+    def film(self, row: Mapping[str, Any]) -> FilmStrip:
         """Finds what moves in an artifact.
 
         Raises:
@@ -154,7 +154,7 @@ class Media:
         if self.is_lost(row):
             raise explained(self._lake, name, self._lake.objects.missing(name))
 
-    def _film(self, row: Mapping[str, Any]) -> Film | None:
+    def _film(self, row: Mapping[str, Any]) -> FilmStrip | None:
         self._check_there(row)
         if row["kind"] not in DRAWN:
             return film_of(self._lake, row, self._record)

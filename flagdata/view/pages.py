@@ -126,7 +126,7 @@ class Site:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class PageTable:
     """Rows of a query's answer, ready to be shown.
 
     Attributes:
@@ -215,7 +215,7 @@ def sql(site: Site, text: str | None) -> tuple[str, FlagdataError | None]:
     Raises:
         NotFoundError: no such version.
     """
-    table, error = Table(), None
+    table, error = PageTable(), None
     if text:
         try:
             table = _answer(site, text)
@@ -334,7 +334,7 @@ def _is_fact(name: str, value: object) -> bool:
     return name not in _ASIDE and value is not None and value != []
 
 
-def _answer(site: Site, text: str) -> Table:
+def _answer(site: Site, text: str) -> PageTable:
     if len(text) > CHARACTERS:
         raise UsageError(f"SQL of {len(text):,} characters", fix=f"write at most {CHARACTERS:,}")
     rows = site.rows()
@@ -345,7 +345,7 @@ def _answer(site: Site, text: str) -> Table:
     ids = rows["artifact"]
     identities = set(ids.filter(pc.is_in(ids, value_set=pa.array(sorted(texts), pa.string()))).to_pylist())  # type: ignore[attr-defined]
     columns = [[_cell(site, value, identities) for value in column] for column in values]
-    return Table(
+    return PageTable(
         header=[printable(name) for name in answer.column_names],
         rows=list(zip(*columns, strict=True)),
         total=selection.total(),

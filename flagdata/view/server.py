@@ -51,7 +51,7 @@ _STATUS: tuple[tuple[type[FlagdataError], HTTPStatus], ...] = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Answer:
+class ServerAnswer:
     """What goes back: status, media type and bytes."""
 
     status: HTTPStatus
@@ -59,11 +59,11 @@ class Answer:
     content: bytes
 
 
-Route = Callable[[Site, tuple[str, ...], Mapping[str, str]], Answer]
+Route = Callable[[Site, tuple[str, ...], Mapping[str, str]], ServerAnswer]
 """Answers a request: the site at its version, the parts of the path in brackets, the fields of the query."""
 
 
-def answer(site: Site, target: str) -> Answer:
+def answer(site: Site, target: str) -> ServerAnswer:
     """Answers a request for an address.
 
     Args:
@@ -77,7 +77,7 @@ def answer(site: Site, target: str) -> Answer:
         return refusal(site, foreseen(error))
 
 
-def refusal(site: Site, error: FlagdataError, status: HTTPStatus | None = None) -> Answer:
+def refusal(site: Site, error: FlagdataError, status: HTTPStatus | None = None) -> ServerAnswer:
     """Renders the page of an error.
 
     Args:
@@ -105,58 +105,62 @@ def _route_of(site: Site, target: str) -> tuple[Site, Route, tuple[str, ...], Ma
     raise NotFoundError("there is no such page", fix="go back to the overview")
 
 
-def _overview(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+def _overview(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
     page = fields.get("page", "0")
     if not re.fullmatch("[0-9]{1,9}", page, flags=re.ASCII):
         raise UsageError(f"{page!r} is no number of a page", fix="go back to the overview")
     return _html(pages.overview(site, kind=fields.get("kind"), name=fields.get("name"), page=int(page)))
 
 
-def _query(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+def _query(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
     text, error = pages.sql(site, fields.get("sql"))
     return _html(text, HTTPStatus.OK if error is None else HTTPStatus.BAD_REQUEST)
 
 
-def _artifact(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+def _artifact(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
     return _html(pages.artifact(site, groups[0]))
 
 
-def _thumbnail(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
-    return Answer(status=HTTPStatus.OK, media_type="image/jpeg", content=site.media.thumbnail(site.row(groups[0])))
+def _thumbnail(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
+    return ServerAnswer(
+        status=HTTPStatus.OK, media_type="image/jpeg", content=site.media.thumbnail(site.row(groups[0]))
+    )
 
 
-def _frames(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+def _frames(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
     content = site.media.frames(site.row(groups[0]), int(groups[1]))
-    return Answer(status=HTTPStatus.OK, media_type="application/octet-stream", content=content)
+    return ServerAnswer(status=HTTPStatus.OK, media_type="application/octet-stream", content=content)
 
 
-def _series(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+def _series(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
     return _json(site.media.series(site.row(groups[0])))
 
 
-def _evidence(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
+def _evidence(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
     return _json(site.media.evidence(site.row(groups[0])))
 
 
-def _style(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
-    return Answer(status=HTTPStatus.OK, media_type="text/css; charset=utf-8", content=pages.style())
+def _style(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
+    return ServerAnswer(status=HTTPStatus.OK, media_type="text/css; charset=utf-8", content=pages.style())
 
 
-def _script(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
-    return Answer(status=HTTPStatus.OK, media_type="text/javascript; charset=utf-8", content=pages.script())
+def _script(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
+    return ServerAnswer(status=HTTPStatus.OK, media_type="text/javascript; charset=utf-8", content=pages.script())
 
 
-def _icon(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Answer:
-    return Answer(status=HTTPStatus.OK, media_type="image/svg+xml", content=pages.ICON)
+def _icon(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
+    return ServerAnswer(status=HTTPStatus.OK, media_type="image/svg+xml", content=pages.ICON)
 
 
-def _html(text: str, status: HTTPStatus = HTTPStatus.OK) -> Answer:
-    return Answer(status=status, media_type="text/html; charset=utf-8", content=text.encode(errors="backslashreplace"))
+def _html(text: str, status: HTTPStatus = HTTPStatus.OK) -> ServerAnswer:
+    return ServerAnswer(
+        status=status, media_type="text/html; charset=utf-8", content=text.encode(errors="backslashreplace")
+    )
 
 
-def _json(content: Mapping[str, Any]) -> Answer:
+def _json(content: Mapping[str, Any]) -> ServerAnswer:
     text = json.dumps(content, allow_nan=False, ensure_ascii=False)
-    return Answer(status=HTTPStatus.OK, media_type="application/json", content=text.encode())
+    return ServerAnswer(status=HTTPStatus.OK, media_type="application/json", content=text.encode())
 
 
 _ARTIFACT_ID = "([0-9a-f]{32})"
@@ -220,7 +224,7 @@ class Server(ThreadingHTTPServer):
         return f"http://{HOST}:{self.server_address[1]}{self.site.base}"
 
 
-def respond(server: Server, method: str, target: str, headers: Message) -> Answer:
+def respond(server: Server, method: str, target: str, headers: Message) -> ServerAnswer:
     """Answers a request, or refuses one that may not be made.
 
     Args:

@@ -8,13 +8,13 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.cloth.arrays import options_of, sources_of
-    from measure.cloth.calibration import Calibration, CalibrationOptions, designs_of, with_errors
+    from measure.cloth.calibration import Calibration, CalibrationOptions, designs_of
     from measure.cloth.command import simulations_of
     from measure.cloth.design import TOGETHER, Design, announced, lasting, nulls, pairs, simulated, weighable
     from measure.cloth.emulator import Emulator, informative
     from measure.cloth.evidence import Experiments
     from measure.cloth.loop import FilmLoopOptions, solve
-    from measure.cloth.numerics import FLAGS, MEASURED, Finer
+    from measure.cloth.numerics import FLAGS, MEASURED, Finer, with_errors
     from measure.cloth.posterior import weighed
     from measure.cloth.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, TABLES, Normal, Uncertain, draws
     from measure.cloth.recording import LEAST_WINDOWS, Observed, Projection, constant_wind, usable

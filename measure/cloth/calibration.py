@@ -16,7 +16,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
 from measure.cloth.design import FAR, Design, simulated
 from measure.cloth.emulator import TAKEN_APART, Emulator, informative
-from measure.cloth.numerics import Correction, corrected
+from measure.cloth.numerics import Correction, corrected, with_errors
 from measure.cloth.posterior import Posterior, Sight, posterior, weighed
 from measure.cloth.prior import AZIMUTH, CLOTH, ELEVATION, FABRIC, NUISANCES, Fabric, Uncertain
 from measure.cloth.recording import LEAST_IN_ALL, LEFT_OUT, Observed, check_in_all, constant_wind, shown, usable
@@ -450,15 +450,9 @@ def _answered(
     )
     findings = (*left_out, *_findings(calibration))
     if calibration.withheld is not None:
-        calibration = replace(calibration, cloth=tuple(_assumed(q, options.level) for q in CLOTH))
+        assumed = np.linspace(0.0, 1.0, 1001)
+        calibration = replace(calibration, cloth=tuple(quantity(q, q.at(assumed), options.level) for q in CLOTH))
     return replace(calibration, findings=findings)
-
-
-def with_errors(observed: Observed, readings: FloatArray, correction: Correction, *, seed: int) -> FloatArray:
-    """Returns (simulation, summary) of readings (simulation, window, observable) with errors of numerics and of
-    pixels."""
-    summaries = correction.of(observed.projection.of(readings), seed=seed)
-    return (summaries + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
 
 
 def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
@@ -479,11 +473,6 @@ def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
         assumed=(assumed[0], assumed[1]),
         range=about.ends,
     )
-
-
-def _assumed(about: Uncertain, level: float) -> Quantity:
-    """Returns what is assumed of a quantity, where nothing is found."""
-    return quantity(about, about.at(np.linspace(0.0, 1.0, 1001)), level)
 
 
 def checked(made: Sequence[_Simulated], options: CalibrationOptions) -> Check:

@@ -18,6 +18,7 @@ import numpy as np
 from flagdata.arrays import FloatArray, IntArray
 from flagdata.rng import stream
 from measure.cloth.design import Design, read
+from measure.cloth.recording import Observed
 from measure.cloth.simulation import Discretisation, FlagBatch
 
 FLAGS = 32
@@ -121,6 +122,13 @@ class Finer:
         estimated = count >= FEWEST
         first = np.where(estimated, mean, MEASURED.mean[0]), np.where(estimated, np.sqrt(variance), MEASURED.sigma[0])
         return Correction(mean=np.stack([first[0], MEASURED.mean[1]]), sigma=np.stack([first[1], MEASURED.sigma[1]]))
+
+
+def with_errors(observed: Observed, readings: FloatArray, correction: Correction, *, seed: int) -> FloatArray:
+    """Returns (simulation, summary) of readings (simulation, window, observable) with errors of numerics and of
+    pixels."""
+    summaries = correction.of(observed.projection.of(readings), seed=seed)
+    return (summaries + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
 
 
 def corrected(

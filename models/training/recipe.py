@@ -254,7 +254,7 @@ def load(source: str) -> TrainingRecipe:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Form:
+class _TrainingTables:
     """The tables of a training recipe."""
 
     title: str = ""
@@ -287,7 +287,7 @@ class _Input:
 
 def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> TrainingRecipe:
     """Parses a recipe from its text; raises as `load`."""
-    form = read(_Form, parsed(text, where=where), where=where)
+    form = read(_TrainingTables, parsed(text, where=where), where=where)
     front_end, cropping = _input(form.input, where=f"{where} [input]")
     return TrainingRecipe(
         name=name,

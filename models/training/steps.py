@@ -177,7 +177,7 @@ _EVALUATED = 64  # clips at a time
 Bars: TypeAlias = Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]]
 
 
-class DivergedError(FlagdataError):
+class TrainingDivergedError(FlagdataError):
     """The loss is no longer a number."""
 
     kind = ErrorKind.TRAINING_DIVERGED
@@ -341,7 +341,7 @@ class Training:
         limit = spec.clip_norm if spec.clip_norm is not None else math.inf
         norm = nn.utils.clip_grad_norm_(standing.learner.parameters(), limit)
         if not math.isfinite(float(loss.detach())) or not math.isfinite(float(norm)):
-            raise DivergedError(
+            raise TrainingDivergedError(
                 f"the loss is {float(loss.detach())} in epoch {len(standing.course.epochs) + 1}, "
                 f"its gradient's norm {float(norm)}",
                 where=str(self.run),

@@ -14,7 +14,7 @@ from flagdata.lazy import lazy_exports
 if TYPE_CHECKING:
     from sim.datasets.anemometer import logged, velocities
     from sim.datasets.cast import Cast, Roll, casts
-    from sim.datasets.films import EPOCH, Film, Sequences
+    from sim.datasets.films import EPOCH, PlannedFilm, Sequences
     from sim.datasets.picture import coded, settings
     from sim.datasets.reading import DATASETS, load, parse
     from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, Truth

@@ -27,7 +27,7 @@ _NAME = "simulated"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class SimulatedLog:
     """What an anemometer logged.
 
     Attributes:
@@ -39,7 +39,7 @@ class Reading:
     parameters: Mapping[str, float]
 
 
-def read(spec: AnemometerSpec, crew: Crew, member: Member, *, instrument: int, seed: int, begin: int) -> Reading:
+def read(spec: AnemometerSpec, crew: Crew, member: Member, *, instrument: int, seed: int, begin: int) -> SimulatedLog:
     """Simulates the log of one recording.
 
     The instrument stands at the middle of the hoist in undisturbed air: effects that change the wind from place to
@@ -63,7 +63,7 @@ def logged(
     instrument: int,
     seed: int,
     begin: int,
-) -> Reading:
+) -> SimulatedLog:
     """Simulates what an anemometer logs of air at velocity (n, 3) [m/s] at times (n,) [s]; the others as of `read`."""
     drawn = {
         name: {key: _drawn(value, instrument, "anemometer", name, key) for key, value in parameters.items()}
@@ -95,7 +95,7 @@ def logged(
         ),
     )
     parameters = {f"{name}.{key}": value for name, values in drawn.items() for key, value in values.items()}
-    return Reading(series=series, parameters={**parameters, "anemometer.noise": noise})
+    return SimulatedLog(series=series, parameters={**parameters, "anemometer.noise": noise})
 
 
 def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[FloatArray, FloatArray]:

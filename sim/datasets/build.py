@@ -25,7 +25,7 @@ from flagdata.timebase import NANOSECONDS
 from sim.datasets import jobs
 from sim.datasets.cast import Cast, Roll, casts
 from sim.datasets.cluster import Job, results
-from sim.datasets.films import Film, Sequences
+from sim.datasets.films import PlannedFilm, Sequences
 from sim.datasets.jobs import Filmed, Simulated
 from sim.datasets.recipe import DatasetRecipe
 from sim.run.publish import publish, whole
@@ -150,7 +150,7 @@ class Build:
 
     # Films
 
-    def films(self, rolls: Iterable[Roll]) -> list[Film]:
+    def films(self, rolls: Iterable[Roll]) -> list[PlannedFilm]:
         """Returns all films of the data set in the order they are rendered: small sides first, so that a network's
         validation films exist while its training films are still being rendered."""
         members: dict[str, list[tuple[Cast, int, str]]] = {side.name: [] for side in self.recipe.sides}
@@ -162,7 +162,7 @@ class Build:
             for film in Sequences(recipe=self.recipe, side=side, members=tuple(side_members)).films()
         ]
 
-    def _film(self, rolls: Iterable[Roll]) -> list[Film]:
+    def _film(self, rolls: Iterable[Roll]) -> list[PlannedFilm]:
         films = self.films(rolls)
         self._refuse_other_names(films)
         film_ids = {film.artifact().id for film in films}
@@ -197,7 +197,7 @@ class Build:
                 fix="give the recipe another name, or build on another branch",
             )
 
-    def _refuse_other_names(self, films: Sequence[Film]) -> None:
+    def _refuse_other_names(self, films: Sequence[PlannedFilm]) -> None:
         """Make sure that no film of this recipe is there under another data set's name, where it would stay."""
         film_ids = [film.artifact().id for film in films]
         columns = ["artifact", "dataset"]
@@ -210,7 +210,7 @@ class Build:
                 fix="use that data set, or give the recipe another seed",
             )
 
-    def _shots(self, films: Sequence[Film]) -> Iterator[Job]:
+    def _shots(self, films: Sequence[PlannedFilm]) -> Iterator[Job]:
         rows = self.lake.rows("kind = 'meshes'", at=self.branch, columns=["artifact", "object"]).to_pylist()
         objects = {row["artifact"]: row["object"] for row in rows}
         for film in films:

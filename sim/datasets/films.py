@@ -22,7 +22,7 @@ _APART = 900 * NANOSECONDS  # from one recording of a session to the next
 
 
 @dataclass(frozen=True, kw_only=True)
-class Film:
+class PlannedFilm:
     """A recording to be made.
 
     Attributes:
@@ -83,7 +83,7 @@ class Sequences:
     def filming(self) -> dict[str, Any]:
         return self.recipe.filming()
 
-    def films(self) -> Iterator[Film]:
+    def films(self) -> Iterator[PlannedFilm]:
         """Yields films in the order of their names, which is shuffled so that neighbours are unrelated."""
         recipe, renders = self.recipe, self.recipe.side(self.side).renders
         order = stream(recipe.seed, "order", self.side).permutation(renders).tolist()
@@ -92,7 +92,7 @@ class Sequences:
             take = number // len(self.members)
             seed = child_seed(recipe.seed, "film", self.side, number)
             look = seed if cast.session is None else child_seed(cast.simulation.seed, "look", take)
-            yield Film(
+            yield PlannedFilm(
                 name=f"{recipe.name}-{self.side}-{position:05d}",
                 dataset=recipe.name,
                 cast=cast,

@@ -17,11 +17,11 @@ from flagdata.lake.meshes import MeshSequence
 from flagdata.provenance import canonical
 from sim.assets import Assets
 from sim.datasets import anemometer, picture
-from sim.datasets.films import Film
+from sim.datasets.films import PlannedFilm
 from sim.datasets.recipe import DatasetRecipe
 from sim.datasets.record import Content, parameters_of, record_bytes, texts_of
 from sim.render import RENDERERS, Meshes, RenderParameters
-from sim.run.batch import Outcome, Stepper, run
+from sim.run.batch import BatchOutcome, Stepper, run
 from sim.run.members import Crew
 from sim.run.recipe import Recipe as Simulation
 from sim.run.recipe import Shape
@@ -41,7 +41,7 @@ class Simulated:
     """
 
     name: str
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[BatchOutcome, ...]
     step: float
 
 
@@ -56,7 +56,7 @@ class Filmed:
         parameters: θ, ζ and the instruments' draws: canonical JSON.
     """
 
-    film: Film
+    film: PlannedFilm
     data: bytes
     start: int
     end: int
@@ -74,7 +74,7 @@ def simulate(simulation: Simulation, base: int, indices: Sequence[int], device: 
     return Simulated(name=simulation.name, outcomes=tuple(outcomes), step=steppers[base].step)
 
 
-def film(recipe: DatasetRecipe, job: Film, sequence: MeshSequence, device: str) -> Filmed:
+def film(recipe: DatasetRecipe, job: PlannedFilm, sequence: MeshSequence, device: str) -> Filmed:
     """Films a sequence.
 
     Raises:
@@ -112,7 +112,13 @@ def film(recipe: DatasetRecipe, job: Film, sequence: MeshSequence, device: str) 
 
 
 def shot(
-    recipe: DatasetRecipe, job: Film, sequence: MeshSequence, zeta: RenderParameters, assets: Assets, *, device: str
+    recipe: DatasetRecipe,
+    job: PlannedFilm,
+    sequence: MeshSequence,
+    zeta: RenderParameters,
+    assets: Assets,
+    *,
+    device: str,
 ) -> torch.Tensor:
     """Frames (n, height, width, 3) uint8."""
     simulation = job.cast.simulation

@@ -56,7 +56,7 @@ _GROUPS = {"height": PositiveQuantity, "rates": tuple[float, ...], "attachments"
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Form:
+class _DatasetTables:
     """The tables of a data set's recipe; those that depend on others are read after them."""
 
     title: str = ""
@@ -119,7 +119,7 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
     Raises:
         UnknownNameError, InputError, UsageError: as `load`.
     """
-    form = read(_Form, parsed(text, where=where), where=where)
+    form = read(_DatasetTables, parsed(text, where=where), where=where)
     if form.sessions is not None and form.groups is not None:
         raise UsageError("both sessions and groups are given", where=where, fix="keep one of the tables")
     scene = form.simulation.scene

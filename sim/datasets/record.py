@@ -12,7 +12,7 @@ from flagdata.record import RecordWriter
 from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
 from flagdata.signals import CameraInfo, Instants, WindSeries
 from flagdata.timebase import NANOSECONDS
-from sim.datasets.films import Film
+from sim.datasets.films import PlannedFilm
 from sim.datasets.recipe import CameraSpec, Truth
 from sim.render.parameters import RenderParameters
 from sim.run.members import Member, Parameter
@@ -36,7 +36,7 @@ class Content:
         camera: its coding; the record's length is a whole multiple of its slot.
     """
 
-    film: Film
+    film: PlannedFilm
     times: Instants
     frames: Sequence[bytes]
     wind: WindSeries

@@ -11,7 +11,7 @@ import numpy as np
 from flagdata.errors import InputError, UsageError
 from flagdata.recipes import parsed
 from flagdata.simulated import Simulated
-from sim.run.batch import Outcome, Stepper
+from sim.run.batch import BatchOutcome, Stepper
 from sim.run.members import Crew
 from sim.run.publish import batches, check_device, outcomes
 from sim.run.reading import SCENES, of_content
@@ -60,7 +60,7 @@ def recipe_of(recipe: str | Content | None, overrides: Content) -> Recipe:
     return of_content(content, name=name, folder=folder, where=where)
 
 
-def _answer(recipe: Recipe, members: list[Outcome]) -> Simulated:
+def _answer(recipe: Recipe, members: list[BatchOutcome]) -> Simulated:
     complete = [member for member in members if member.sequence is not None]
     failed = {member.member.index: member.failure[1] for member in members if member.failure is not None}
     if not complete:

@@ -122,7 +122,7 @@ STEPS_LIMIT = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class BatchOutcome:
     """What became of a member.
 
     Attributes:
@@ -211,7 +211,7 @@ def run(
     size: int,
     device: torch.device | str = "cpu",
     progress: Callable[[int], object] | None = None,
-) -> list[Outcome]:
+) -> list[BatchOutcome]:
     """Simulates members of one material together.
 
     The batch always has `size` members, the last repeated as often as it takes: results then depend on a member and
@@ -242,7 +242,7 @@ def run(
     }
     positions, velocities = torch.stack(frames).numpy(), np.stack(winds)
     first = [round((time.settling + i) / time.rate * NANOSECONDS) for i in range(time.frames)]
-    outcomes: list[Outcome] = []
+    outcomes: list[BatchOutcome] = []
     for index, member in enumerate(members):
         diagnosis = monitor.of(index)
         failure = failures.get(index) or _crumpled(diagnosis)
@@ -256,7 +256,9 @@ def run(
                 attributes=_attributes(crew, stepper, member, diagnosis, velocities[..., index]),
             )
         outcomes.append(
-            Outcome(member=member, sequence=sequence, wind=velocities[..., index], diagnosis=diagnosis, failure=failure)
+            BatchOutcome(
+                member=member, sequence=sequence, wind=velocities[..., index], diagnosis=diagnosis, failure=failure
+            )
         )
     return outcomes
 

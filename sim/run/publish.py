@@ -21,7 +21,7 @@ from flagdata.lake.meshes import write_meshes
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from sim.compiler import library
-from sim.run.batch import Outcome, Stepper, run
+from sim.run.batch import BatchOutcome, Stepper, run
 from sim.run.members import Crew
 from sim.run.recipe import Recipe
 
@@ -145,14 +145,14 @@ def outcomes(
     device: str,
     workers: int,
     progress: Progress | None,
-) -> Iterator[tuple[Stepper, list[Outcome]]]:
+) -> Iterator[tuple[Stepper, list[BatchOutcome]]]:
     """Yields the batches' outcomes as they come, one batch waiting beside those that run.
 
     Leaving the iteration early stops what is still running.
     """
     ticks = _Ticks(progress, crew.recipe.time.total)
 
-    def simulate_batch(stepper: Stepper, indices: list[int]) -> tuple[Stepper, list[Outcome]]:
+    def simulate_batch(stepper: Stepper, indices: list[int]) -> tuple[Stepper, list[BatchOutcome]]:
         members = [crew.member(index) for index in indices]
         tick = ticks.of_batch(len(members))
         return stepper, run(crew, stepper, members, size=crew.recipe.batch, device=device, progress=tick)
@@ -185,7 +185,7 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[Outcome], *, step: float, branch: str) -> CommitResult:
+def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, step: float, branch: str) -> CommitResult:
     """Publish the outcomes that have meshes in one commit.
 
     Args:
@@ -216,7 +216,9 @@ def member_artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, see
     )
 
 
-def _published(recipe: Recipe, identity: Mapping[str, Any], outcome: Outcome, step: float, *, stored: str) -> Artifact:
+def _published(
+    recipe: Recipe, identity: Mapping[str, Any], outcome: BatchOutcome, step: float, *, stored: str
+) -> Artifact:
     member, diagnosis = outcome.member, outcome.diagnosis
     report = {
         "schema": "flagdata.simulation-report/1",
@@ -237,7 +239,7 @@ def _published(recipe: Recipe, identity: Mapping[str, Any], outcome: Outcome, st
     )
 
 
-def failure_of(outcome: Outcome) -> dict[str, Any]:
+def failure_of(outcome: BatchOutcome) -> dict[str, Any]:
     kind, reason = outcome.failure or ("failed", "it failed")
     return {"index": outcome.member.index, "seed": outcome.member.seed, "kind": kind, "what": reason}
 

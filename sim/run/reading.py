@@ -124,7 +124,7 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Form:
+class _SimulationTables:
     """The tables of a recipe; those that depend on others are read after them."""
 
     title: str = ""
@@ -223,7 +223,7 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
     Raises:
         UnknownNameError, InputError: as `load`.
     """
-    form = read(_Form, content, where=where)
+    form = read(_SimulationTables, content, where=where)
     scene = _scene(form.scene, folder, where=f"{where} [scene]")
     arcsim = None if scene.arcsim is None else scene.arcsim.scene
     limits = arcsim and arcsim.limits

@@ -156,7 +156,7 @@ def test_a_calibration_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pyte
 
 def test_an_ingest_is_asked_for_alike_and_keeps_its_recipes(monkeypatch: pytest.MonkeyPatch) -> None:
     from flagdata.commands.ingest import IngestCommand
-    from flagdata.commands.ingest_options import Given
+    from flagdata.commands.ingest_options import IngestRequest
     from flagdata.ingest import UNASKED
 
     words = "a.mp4 b.csv --rate 10 --archive h264 --crop 1,2,30,40 --start 2026-05-01T12:00:00Z --unit km/h"
@@ -176,7 +176,7 @@ def test_an_ingest_is_asked_for_alike_and_keeps_its_recipes(monkeypatch: pytest.
         monkeypatch,
     )
     for chosen in (of_command, of_call):
-        given = Given.of(chosen, confirm=UNASKED)
+        given = IngestRequest.of(chosen, confirm=UNASKED)
         assert given.sources == (Path("a.mp4"), Path("b.csv"))
         assert recipe_hash(given.camera.recipe()) == "0865a8d1b241b73349372d493e34d8430681f7c6adea4966ca7dc67af043158e"
         assert recipe_hash(given.wind.recipe()) == "ec606ac40db61fd876fbb82587158da201defaca1b29b73a5a0450999f589f6e"

@@ -18,7 +18,7 @@ from flagdata.rng import child_seed
 from models.estimator import Estimator
 from models.training import DataSpec, FitFilm
 from sim.assets import Assets
-from sim.datasets import EPOCH, Cast, DatasetRecipe, Film, jobs, load, picture
+from sim.datasets import EPOCH, Cast, DatasetRecipe, PlannedFilm, jobs, load, picture
 from sim.datasets.cast import of_group
 from sim.datasets.record import parameters_of
 from sim.run import Crew, Recipe
@@ -111,7 +111,7 @@ def _batch(
             continue
         member = outcome.member
         seed = child_seed(simulation.seed, "film", member.index)
-        job = Film(
+        job = PlannedFilm(
             name=f"{simulation.name}-{member.index}",
             dataset=recipe.name,
             cast=cast,

@@ -245,7 +245,7 @@ class _Expect:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Form:
+class _SensorTables:
     """The tables of a complete recipe."""
 
     name: str
@@ -320,7 +320,7 @@ def of_data(data: Mapping[str, Any], *, where: str) -> Recipe:
         UnknownNameError: a key, channel, unit or zone that is not known, with the nearest.
     """
     try:
-        form = tables.read(_Form, data, where=where)
+        form = tables.read(_SensorTables, data, where=where)
         return Recipe(
             name=form.name,
             about=form.about,

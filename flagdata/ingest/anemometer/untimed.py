@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.draft.shape import Shape, shape_of
+from flagdata.ingest.anemometer.draft.shape import TableShape, shape_of
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.formats.serial_lines import NOTHING, split_stamp
 from flagdata.ingest.anemometer.instants.stamps import ENGLISH
@@ -270,7 +270,7 @@ def _lines_from(source: TextFile, first: int) -> Iterator[str]:
         yield from (line for at, line in enumerate(lines, start=number) if at >= first and line.strip())
 
 
-def _points(row: Sequence[str], layout: Shape) -> list[str]:
+def _points(row: Sequence[str], layout: TableShape) -> list[str]:
     """Cells with decimal points."""
     if layout.decimal == ".":
         return list(row)

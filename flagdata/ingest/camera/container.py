@@ -368,7 +368,7 @@ def _edit_list(shows: str) -> Finding:
 
 
 @dataclass(kw_only=True)
-class _Tally:
+class _PacketStamps:
     """What the packets of a stream state.
 
     Attributes:
@@ -392,8 +392,8 @@ class _Tally:
         return len(self.stamps) + len(self.missing)
 
 
-def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: Limits) -> _Tally:
-    tally = _Tally()
+def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: Limits) -> _PacketStamps:
+    tally = _PacketStamps()
     pixels = max(1, stream.codec_context.width * stream.codec_context.height)
     counter = _counter(container, stream)
     try:
@@ -428,7 +428,7 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
     return tally
 
 
-def _before_restart(tally: _Tally, *, tick: Fraction) -> _Tally:
+def _before_restart(tally: _PacketStamps, *, tick: Fraction) -> _PacketStamps:
     """Returns the packets up to where the clock starts anew; all where it never does."""
     index = restart(np.frombuffer(tally.stamps, dtype=np.int64), tick=tick)
     if index is None:
@@ -447,7 +447,7 @@ def _timing(
     options: CameraOptions,
     container: InputContainer,
     stream: VideoStream,
-    tally: _Tally,
+    tally: _PacketStamps,
 ) -> Timing:
     if container.format.name in UNTIMED:
         if options.sequence_fps is None:

@@ -83,7 +83,7 @@ def cameras(info: Mapping[str, Any]) -> dict[str, str]:
 
 
 class EpisodeSource:
-    """The pictures of one camera in one episode. See `flagdata.ingest.camera.source.Source`.
+    """The pictures of one camera in one episode. See `flagdata.ingest.camera.source.PictureSource`.
 
     Raises:
         InputError: several episodes or cameras and none is named, or none of its pictures can be decoded.

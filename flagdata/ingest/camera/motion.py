@@ -23,7 +23,7 @@ from flagdata.arrays import BoolArray, Float32Array, UInt8Array
 from flagdata.errors import RefusedError
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
 from flagdata.ingest.camera.options import CropBox
-from flagdata.ingest.camera.source import Picture, Source
+from flagdata.ingest.camera.source import Picture, PictureSource
 
 _RUNS = 10
 _PER_RUN = 8
@@ -58,7 +58,7 @@ class CropProposal:
     picture: bytes
 
 
-def propose(source: Source, *, rate: float, where: str) -> CropProposal:
+def propose(source: PictureSource, *, rate: float, where: str) -> CropProposal:
     """Proposes the crop that the motion in `source` suggests.
 
     Args:
@@ -125,7 +125,7 @@ def cut_off(crop: CropBox, proposal: CropProposal, *, wide: int) -> dict[str, in
     return {edge: pixels for edge, pixels in beyond.items() if pixels > least}
 
 
-def _small(picture: Picture, source: Source, uncropped: CropBox, size: int) -> UInt8Array:
+def _small(picture: Picture, source: PictureSource, uncropped: CropBox, size: int) -> UInt8Array:
     """Scales the whole upright picture to `size` along its longer side, without padding."""
     facts, luma = source.facts, picture.luma()
     geometry = Geometry(

@@ -60,7 +60,7 @@ class Picture:
     luma: Callable[[], Luma]
 
 
-class Source(Protocol):
+class PictureSource(Protocol):
     """A camera file or image sequence, open."""
 
     @property

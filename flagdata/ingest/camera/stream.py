@@ -20,7 +20,7 @@ from flagdata.ingest.camera.joined import JoinedSource, check_films
 from flagdata.ingest.camera.motion import CropProposal, cut_off, propose
 from flagdata.ingest.camera.options import CameraOptions, CropBox, exact
 from flagdata.ingest.camera.sequence import SequenceSource
-from flagdata.ingest.camera.source import Picture, Source
+from flagdata.ingest.camera.source import Picture, PictureSource
 from flagdata.ingest.camera.stamps import StampRepair, nanoseconds
 from flagdata.ingest.camera.start import find_start
 from flagdata.ingest.camera.video import VideoSource
@@ -40,7 +40,7 @@ class CameraStream:
         proposal: the crop found from motion, with its picture; `None` unless `options.crop` is "auto".
     """
 
-    def __init__(self, source: Source, path: Path, options: CameraOptions) -> None:
+    def __init__(self, source: PictureSource, path: Path, options: CameraOptions) -> None:
         self._source = source
         self._options = options
         self._opening: list[Finding] = list(source.facts.findings)
@@ -349,7 +349,7 @@ def open_camera(path: Path | str, options: CameraOptions | None = None) -> Camer
         raise
 
 
-def open_source(path: Path, options: CameraOptions) -> Source:
+def open_source(path: Path, options: CameraOptions) -> PictureSource:
     """The reader for `path`: a folder is a LeRobot data set, a bag or an image sequence, an MCAP file a topic of it,
     anything else a video file.
 

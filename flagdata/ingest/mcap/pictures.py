@@ -69,7 +69,7 @@ def of_pictures(present: Sequence[Topic]) -> tuple[Topic, ...]:
 
 
 class TopicSource:
-    """The pictures of one topic, of a file or of the parts of a bag. See `flagdata.ingest.camera.source.Source`.
+    """The pictures of one topic, of a file or of the parts of a bag. See `flagdata.ingest.camera.source.PictureSource`.
 
     A picture's instant is the one that its message states, else the one at which it was logged. Pictures come in the
     order of their instants; compressed video in that in which it was recorded, as its decoder needs it.

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from flagdata.lake import Lake
-from flagdata.view import Answer, pages, server
+from flagdata.view import ServerAnswer, pages, server
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 _PATIENCE = 60.0  # s
@@ -70,21 +70,21 @@ def asked(
     answers: list[dict[str, Any]] = []
     answered = threading.Event()
 
-    def held(*_: object) -> Answer:
+    def held(*_: object) -> ServerAnswer:
         answered.wait(_PATIENCE)
-        return Answer(status=HTTPStatus.OK, media_type="image/svg+xml", content=pages.ICON)
+        return ServerAnswer(status=HTTPStatus.OK, media_type="image/svg+xml", content=pages.ICON)
 
-    def found(site: object, groups: object, fields: Mapping[str, str]) -> Answer:
+    def found(site: object, groups: object, fields: Mapping[str, str]) -> ServerAnswer:
         answers.append(json.loads(fields["is"]))
         answered.set()
-        return Answer(status=HTTPStatus.OK, media_type="text/plain", content=b"")
+        return ServerAnswer(status=HTTPStatus.OK, media_type="text/plain", content=b"")
 
     script = pages.script() + _ASKED.replace("QUESTION", question).encode()
 
-    def framed(*_: object) -> Answer:
+    def framed(*_: object) -> ServerAnswer:
         frame = f'<!doctype html><body style="margin:0"><iframe src="{path or "./"}" width="{width}" height="{height}" '
         content = f'{frame}style="border:0"></iframe>'.encode()
-        return Answer(status=HTTPStatus.OK, media_type="text/html", content=content)
+        return ServerAnswer(status=HTTPStatus.OK, media_type="text/html", content=content)
 
     with pytest.MonkeyPatch.context() as patch, server.Server(lake) as served:
         patch.setattr(pages, "script", lambda: script)

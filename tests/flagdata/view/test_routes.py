@@ -15,7 +15,7 @@ from PIL import Image
 
 from flagdata.lake import Artifact, Lake, keep
 from flagdata.schema import Kind
-from flagdata.view import Answer, answer
+from flagdata.view import ServerAnswer, answer
 from tests.flagdata.view.conftest import CURVE, NAME, Shown
 
 
@@ -30,7 +30,7 @@ def cards(page: str) -> list[str]:
     return re.findall(r'class="card k-\w+" href="/key/artifact/(\w+)', page)
 
 
-def pictures(found: Answer) -> list[bytes]:
+def pictures(found: ServerAnswer) -> list[bytes]:
     """The JPEGs of an answer, each behind its length."""
     stream, parts = io.BytesIO(found.content), []
     while head := stream.read(4):

@@ -24,7 +24,7 @@ from models.frontend import FrontEnd
 from models.learner import Learner, Loss
 from models.training import Augment, DataSpec, Prepared, TrainingRecipe, checkpoint
 from models.training.recipe import LossSpec, NetworkSpec, OptimiserSpec, Precision, Schedule
-from models.training.steps import Batches, DivergedError, Trained, Training, learning_rate
+from models.training.steps import Batches, Trained, Training, TrainingDivergedError, learning_rate
 
 SIZE = 24
 FRONT_END = FrontEnd(maps="wave-maps", size=SIZE)
@@ -160,7 +160,7 @@ def test_a_loss_that_is_no_number_is_an_error_and_the_last_checkpoint_stays(tmp_
     before = (tmp_path / "last" / "card.json").read_bytes()
     bad = prepared(40, seed=1)
     bad.maps[:] = np.nan
-    with pytest.raises(DivergedError, match="epoch 1"):
+    with pytest.raises(TrainingDivergedError, match="epoch 1"):
         training(tmp_path, recipe(), train=bad).complete()
     assert (tmp_path / "last" / "card.json").read_bytes() == before
 

@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.timebase import iso
-from sim.datasets import DatasetRecipe, Film, Roll, Sequences, casts, load
+from sim.datasets import DatasetRecipe, PlannedFilm, Roll, Sequences, casts, load
 
 
-def films(recipe: DatasetRecipe, side: str) -> list[Film]:
+def films(recipe: DatasetRecipe, side: str) -> list[PlannedFilm]:
     rolls = [Roll(cast=cast) for cast in casts(recipe) if cast.side.name == side]
     members = tuple((roll.cast, index, roll.id(index)) for roll in rolls for index in roll.chosen)
     return list(Sequences(recipe=recipe, side=side, members=members).films())
@@ -51,7 +51,7 @@ def test_sessions_keep_camera_and_day_and_no_day_is_on_two_sides() -> None:
     recipe = load("field")
     days: dict[str, set[str]] = {}
     for side in ("train", "validation", "test"):
-        by_session: dict[str | None, list[Film]] = {}
+        by_session: dict[str | None, list[PlannedFilm]] = {}
         for film in films(recipe, side):
             by_session.setdefault(film.session, []).append(film)
         assert len(by_session) == recipe.side(side).sessions

@@ -13,7 +13,7 @@ import pytest
 
 from flagdata.errors import ConflictError, InputError
 from flagdata.lake import Artifact, Lake
-from sim.datasets import DatasetRecipe, Film, Roll, casts, load
+from sim.datasets import DatasetRecipe, PlannedFilm, Roll, casts, load
 from sim.datasets.build import Build
 from sim.datasets.card import write_card
 from sim.run import member_artifact
@@ -28,11 +28,11 @@ def build_of(lake: Lake, recipe: DatasetRecipe) -> Build:
     return Build(lake=lake, recipe=recipe, client=nobody, bars=lambda *_: nullcontext(lambda _: None), say=print)
 
 
-def films(lake: Lake, recipe: DatasetRecipe) -> list[Film]:
+def films(lake: Lake, recipe: DatasetRecipe) -> list[PlannedFilm]:
     return build_of(lake, recipe).films(Roll(cast=cast) for cast in casts(recipe))
 
 
-def sequence_of(film: Film) -> Artifact:
+def sequence_of(film: PlannedFilm) -> Artifact:
     """The row of the sequence that a film is of."""
     simulation = film.cast.simulation
     return member_artifact(simulation, simulation.identity(), film.index, film.sequence_seed)

@@ -13,7 +13,7 @@ import pytest
 from flagdata.dataset import clip_rows
 from flagdata.lake import Artifact
 from flagdata.record import CAMERA, PROVENANCE, Record
-from sim.datasets import DatasetRecipe, Film, Sequences, anemometer, casts, jobs
+from sim.datasets import DatasetRecipe, PlannedFilm, Sequences, anemometer, casts, jobs
 from sim.run import Crew, one_thread
 
 
@@ -22,7 +22,7 @@ class Shown:
     """A film in gusts, its record and its clips."""
 
     recipe: DatasetRecipe
-    film: Film
+    film: PlannedFilm
     record: Record
     clips: list[Artifact]
     crew: Crew

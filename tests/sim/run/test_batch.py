@@ -14,17 +14,17 @@ from flagdata.errors import UsageError
 from sim import membrane
 from sim.integrate import BackwardEuler, Symplectic
 from sim.material import named
-from sim.run import Crew, Outcome, Stepper, parse, principal_strains, run
+from sim.run import BatchOutcome, Crew, Stepper, parse, principal_strains, run
 from sim.scene import assemble, flag
 
 SIZE = 4
 
 
-def bits(outcome: Outcome) -> bytes | None:
+def bits(outcome: BatchOutcome) -> bytes | None:
     return None if outcome.sequence is None else outcome.sequence.positions.tobytes()
 
 
-def all_bits(outcomes: Sequence[Outcome]) -> list[bytes | None]:
+def all_bits(outcomes: Sequence[BatchOutcome]) -> list[bytes | None]:
     return [bits(outcome) for outcome in outcomes]
 
 

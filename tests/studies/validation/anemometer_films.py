@@ -26,7 +26,7 @@ from flagdata.schema import Kind
 from flagdata.tables import Range
 from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
-from sim.datasets import EPOCH, Cast, DatasetRecipe, Film, Roll, Sequences, casts, jobs, load
+from sim.datasets import EPOCH, Cast, DatasetRecipe, PlannedFilm, Roll, Sequences, casts, jobs, load
 from sim.render import RenderPrior
 from sim.run import Crew, MaterialSpec
 from sim.run import Recipe as Simulation
@@ -65,7 +65,7 @@ class Shot:
     """
 
     recipe: DatasetRecipe
-    film: Film
+    film: PlannedFilm
     frames: int
 
 

@@ -28,7 +28,7 @@ from measure.refine import DrawnView
 from models import estimator
 from models.restriction import Known
 from sim.assets import Assets
-from sim.datasets import DatasetRecipe, Film, Sequences, casts, jobs, load
+from sim.datasets import DatasetRecipe, PlannedFilm, Sequences, casts, jobs, load
 from sim.datasets.recipe import Side
 from sim.render import Meshes, Raster
 from sim.run import IntegratorSpec
@@ -151,7 +151,7 @@ def filmed(recipe: DatasetRecipe, *, folder: Path | None = None) -> Iterator[tup
         yield frames, stated
 
 
-def _frames(recipe: DatasetRecipe, film: Film, sequence: MeshSequence) -> tuple[UInt8Array, dict[str, Any]]:
+def _frames(recipe: DatasetRecipe, film: PlannedFilm, sequence: MeshSequence) -> tuple[UInt8Array, dict[str, Any]]:
     done = jobs.film(recipe, film, sequence, "cpu")
     with tempfile.NamedTemporaryFile(suffix=".mcap") as kept:
         kept.write(done.data)

@@ -17,7 +17,7 @@ import numpy as np
 from flagdata import compass
 from flagdata.ingest.anemometer.draft.given import GivenColumns, given_columns
 from flagdata.ingest.anemometer.draft.questions import ZONE, Open
-from flagdata.ingest.anemometer.draft.shape import Shape, is_missing, is_number, shape_of
+from flagdata.ingest.anemometer.draft.shape import TableShape, is_missing, is_number, shape_of
 from flagdata.ingest.anemometer.draft.times import (
     TimeFields,
     counts_of,
@@ -45,7 +45,7 @@ class ChannelText:
 
 
 def recipe_text(
-    shape: Shape,
+    shape: TableShape,
     *,
     time: Sequence[int] | None,
     form: str | None,
@@ -232,7 +232,7 @@ def draft(
     )
 
 
-def _mixed(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
+def _mixed(parts: _Parts, shape: TableShape, meanings: Sequence[Meaning]) -> None:
     """Asks where a column names several sites or units, whose rows must not be mixed."""
     for index, heading in enumerate(meanings):
         values = sorted(set(shape.column(index)) - {""})
@@ -244,7 +244,7 @@ def _mixed(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
             parts.open.append(Open(key="sensor", question=question, example="FILE.toml", lines=lines))
 
 
-def _cutting(shape: Shape, lines: Sequence[str]) -> Fact:
+def _cutting(shape: TableShape, lines: Sequence[str]) -> Fact:
     delimiter = {" ": "blanks", "\t": "tabs"}.get(shape.delimiter, repr(shape.delimiter))
     value = f"divided by {delimiter}, decimal {shape.decimal!r}"
     plain = shape.delimiter in ",\t" and shape.decimal == "." and shape.preamble == 0 and shape.header == 1
@@ -257,7 +257,7 @@ def _cutting(shape: Shape, lines: Sequence[str]) -> Fact:
 
 def _time(
     parts: _Parts,
-    shape: Shape,
+    shape: TableShape,
     meanings: Sequence[Meaning],
     user_columns: GivenColumns | None,
     options: WindOptions,
@@ -325,7 +325,7 @@ def _time(
     return time
 
 
-def _of_user(parts: _Parts, shape: Shape, user_columns: GivenColumns) -> tuple[str, ...]:
+def _of_user(parts: _Parts, shape: TableShape, user_columns: GivenColumns) -> tuple[str, ...]:
     for channel, (index, unit) in user_columns.channels.items():
         towards = channel == "wind_direction" and user_columns.towards
         parts.used.add(index)
@@ -336,7 +336,7 @@ def _of_user(parts: _Parts, shape: Shape, user_columns: GivenColumns) -> tuple[s
 
 
 def _of_wind(
-    parts: _Parts, shape: Shape, meanings: Sequence[Meaning], options: WindOptions
+    parts: _Parts, shape: TableShape, meanings: Sequence[Meaning], options: WindOptions
 ) -> tuple[tuple[str, ...], bool]:
     """Labels of the anemometers; the facts of the one that is read are added to `parts`."""
     numeric = {i for i in range(len(meanings)) if _numeric(shape.column(i))}
@@ -395,7 +395,7 @@ def _of_wind(
 
 def _measured(
     parts: _Parts,
-    shape: Shape,
+    shape: TableShape,
     meanings: Sequence[Meaning],
     channel: str,
     index: int,
@@ -427,7 +427,7 @@ _STATED: Origin = "stated"
 _GIVEN: Origin = "given"
 
 
-def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: int) -> int | None:
+def _direction(parts: _Parts, shape: TableShape, meanings: Sequence[Meaning], speed: int) -> int | None:
     """Finds the direction that belongs to a speed: of the same height, the only one of the table; its column, if
     numeric."""
     candidates = [
@@ -473,7 +473,7 @@ def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: 
     return index if points is None else None
 
 
-def _other_quantities(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
+def _other_quantities(parts: _Parts, shape: TableShape, meanings: Sequence[Meaning]) -> None:
     """Adds temperature, humidity and pressure whose unit is stated."""
     for index, heading in enumerate(meanings):
         channel = _BESIDE.get(heading.kind)
@@ -510,7 +510,7 @@ _APART, _TOGETHER, _LEAST = 30.0, 0.9, 5
 """Degrees between a direction and its components, length of the mean of unit vectors, and rows that show it."""
 
 
-def gust_factor(shape: Shape, meanings: Sequence[Meaning], speed: int) -> Open | None:
+def gust_factor(shape: TableShape, meanings: Sequence[Meaning], speed: int) -> Open | None:
     """Asks about a speed whose gusts are no gusts of it; `None` where there are none, or they are."""
     speed_heading = meanings[speed]
     for index, gust_heading in enumerate(meanings):
@@ -538,7 +538,7 @@ def gust_factor(shape: Shape, meanings: Sequence[Meaning], speed: int) -> Open |
     return None
 
 
-def contradicted(shape: Shape, axes: tuple[int, int], direction: int, unit: str) -> Open | None:
+def contradicted(shape: TableShape, axes: tuple[int, int], direction: int, unit: str) -> Open | None:
     """Asks about a direction that components towards east and north beside it contradict.
 
     Args:
@@ -560,7 +560,7 @@ def contradicted(shape: Shape, axes: tuple[int, int], direction: int, unit: str)
     return Open(key="expect", question=question, example="components")
 
 
-def _numbers(shape: Shape, index: int) -> Series:
+def _numbers(shape: TableShape, index: int) -> Series:
     """Reads (n,) cells of a column in the first rows as numbers; NaN where one is no number."""
     cells = (cell.replace(",", ".") for cell in shape.column(index))
     return np.array([float(cell) if is_number(cell) else np.nan for cell in cells])

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from flagdata.ingest.anemometer.draft.shape import Shape
+from flagdata.ingest.anemometer.draft.shape import TableShape
 from flagdata.ingest.anemometer.instants.stamps import ELAPSED
 from flagdata.schema import CHANNELS
 from flagdata.units import canonical
@@ -54,7 +54,7 @@ class GivenColumns:
     towards: bool
 
 
-def given_columns(text: str, shape: Shape) -> GivenColumns:
+def given_columns(text: str, shape: TableShape) -> GivenColumns:
     """Reads the columns of a table as one line gives them.
 
     Raises:
@@ -104,7 +104,7 @@ def _form(times: list[tuple[int, str, str]]) -> str:
     return " ".join(details) if all(details) else ""
 
 
-def _index(column: str, shape: Shape) -> int:
+def _index(column: str, shape: TableShape) -> int:
     if column in shape.names:
         if shape.names.count(column) > 1:
             raise InputError(f"{column!r} heads several columns", where=_WHERE, fix="give its number (from 1)")

@@ -28,7 +28,7 @@ _SIGNS = re.compile(MISSING_SIGNS)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shape:
+class TableShape:
     """A table as its first lines show it.
 
     Attributes:
@@ -83,7 +83,7 @@ def is_missing(cell: str) -> bool:
     return cell.lower() in MISSING or _SIGNS.fullmatch(cell) is not None
 
 
-def shape_of(lines: Sequence[str]) -> Shape | None:
+def shape_of(lines: Sequence[str]) -> TableShape | None:
     """Finds the table that the first lines of a file hold; `None` where they hold none of two columns."""
     filled = [(number, line) for number, line in enumerate(lines, start=1) if line.strip(" \t\x00\x1a")]
     tail = [line for _, line in filled[len(filled) // 2 :]][-_TAIL:]
@@ -101,7 +101,7 @@ def shape_of(lines: Sequence[str]) -> Shape | None:
     numbers = [number for (number, _), is_data in zip(filled[first:], is_row[first:], strict=True) if is_data]
     names, units, preamble = _heading([line for line, _ in filled[:first]], cut[:first], width)
     header = numbers[0] - 1 - preamble if names else 0
-    return Shape(
+    return TableShape(
         delimiter=delimiter,
         decimal=_decimal(rows, numeric, delimiter),
         header=header,

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flagdata.ingest.anemometer.draft.shape import Shape, is_number
+from flagdata.ingest.anemometer.draft.shape import TableShape, is_number
 from flagdata.ingest.anemometer.draft.words import Meaning, words_of
 from flagdata.ingest.anemometer.instants import stamps
 from flagdata.ingest.anemometer.instants.dates import is_time_of_day, parse
@@ -69,7 +69,7 @@ class TimeFields:
         return self.forms[0] if len(self.forms) == 1 else None
 
 
-def find_time(shape: Shape, meanings: Sequence[Meaning], order: str | None) -> TimeFields | None:
+def find_time(shape: TableShape, meanings: Sequence[Meaning], order: str | None) -> TimeFields | None:
     """Finds the time of a table, by its headings and its cells; `None` where no column reads as one.
 
     A time of day is none beside a date that does not read: its days would be lost.
@@ -91,7 +91,9 @@ def find_time(shape: Shape, meanings: Sequence[Meaning], order: str | None) -> T
     return None
 
 
-def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: str | None = None) -> TimeFields | None:
+def of_columns(
+    shape: TableShape, columns: tuple[int, ...], order: str | None, form: str | None = None
+) -> TimeFields | None:
     """Reads these columns as a time, in `form` or in all forms that fit; `None` where none does."""
     texts = [" ".join(row[i] for i in columns) for row in shape.rows]
     texts = [text for text in texts if text.strip()]
@@ -127,7 +129,7 @@ def counts_of(text: str) -> str:
     return " or ".join(dates)
 
 
-def unread_count(shape: Shape, meanings: Sequence[Meaning]) -> str:
+def unread_count(shape: TableShape, meanings: Sequence[Meaning]) -> str:
     """Describes what the first number may be that stands below the heading of a time and that no form reads."""
     for index, meaning in enumerate(meanings):
         cell = shape.rows[0][index]

@@ -40,7 +40,7 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading, described
 from flagdata.ingest.anemometer.recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.rowclock import Given
+from flagdata.ingest.anemometer.table.rowclock import StatedTime
 from flagdata.ingest.anemometer.table.table import Table, read_table, with_horizontal
 from flagdata.ingest.anemometer.text.rows import RowReader, cells_of_lines
 from flagdata.ingest.anemometer.text.source import TextFile
@@ -123,7 +123,7 @@ class Described:
             done.recipe,
             where=where,
             zone_name=options.zone,
-            stamp_options=Given(clock=options.clock),
+            stamp_options=StatedTime(clock=options.clock),
             extra=extra,
         )
 

@@ -15,7 +15,7 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.rowclock import Given
+from flagdata.ingest.anemometer.table.rowclock import StatedTime
 from flagdata.ingest.anemometer.table.table import read_table, with_horizontal
 from flagdata.ingest.anemometer.text.source import TextFile
 
@@ -75,7 +75,7 @@ class HostStamped:
         rows = HostRows(source, recipe)
         where = str(source.path)
         reading = read_table(
-            rows, recipe, where=where, zone_name=options.zone, stamp_options=Given(clock=options.clock)
+            rows, recipe, where=where, zone_name=options.zone, stamp_options=StatedTime(clock=options.clock)
         ).reading
         return with_horizontal(reading, options.azimuth, where=where)
 

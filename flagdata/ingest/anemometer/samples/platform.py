@@ -39,7 +39,7 @@ _RENAMED = {"wind_speed": "apparent_wind_speed", "wind_direction": "apparent_win
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class PlatformMotion:
     """What a log says of its platform's motion.
 
     Attributes:
@@ -69,7 +69,7 @@ def extent(latitude: FloatArray, longitude: FloatArray) -> float:
     return float(np.hypot(*(high - low))) * EARTH
 
 
-def motion(reading: Reading, positions: Mapping[str, FloatArray]) -> Motion | None:
+def motion(reading: Reading, positions: Mapping[str, FloatArray]) -> PlatformMotion | None:
     """Finds the motion that a log shows; `None` where it shows none.
 
     Args:
@@ -79,11 +79,11 @@ def motion(reading: Reading, positions: Mapping[str, FloatArray]) -> Motion | No
     if speed is not None and np.isfinite(speed).any():
         median = float(np.nanmedian(speed))
         if median > MOVING * UNITS["kn"].scale:
-            return Motion(text=f"moves at {median:.2g} m/s over ground in the median", speed=median)
+            return PlatformMotion(text=f"moves at {median:.2g} m/s over ground in the median", speed=median)
     if {"latitude", "longitude"} <= set(positions):
         reach = extent(positions["latitude"], positions["longitude"])
         if reach > RANGE:
-            return Motion(text=f"moves: its positions reach over {reach:.0f} m", speed=None)
+            return PlatformMotion(text=f"moves: its positions reach over {reach:.0f} m", speed=None)
     return None
 
 

@@ -20,7 +20,7 @@ from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.samples import platform
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
-from flagdata.ingest.anemometer.table.rowclock import Given
+from flagdata.ingest.anemometer.table.rowclock import StatedTime
 from flagdata.ingest.anemometer.table.table import read_table, with_horizontal
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
@@ -78,7 +78,7 @@ def _by_recipe(source: TextFile, recipe: Recipe, options: WindOptions, azimuth: 
     if recipe.time.format == "excel-days":
         recipe = replace(recipe, time=replace(recipe.time, format=source.serial_days))
     columns = platform.position_columns(rows.header or ()) or ()
-    stamp_options = Given(start=options.start, date=options.date, clock=options.clock)
+    stamp_options = StatedTime(start=options.start, date=options.date, clock=options.clock)
     table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns, stamp_options=stamp_options)
     reading = with_horizontal(table.reading, azimuth, where=where)
     positions = {name: table.extra[column] for name, column in zip(platform.POSITION, columns, strict=False)}

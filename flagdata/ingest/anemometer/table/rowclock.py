@@ -30,7 +30,7 @@ Order: TypeAlias = slice | IntArray
 
 
 @dataclass(frozen=True, kw_only=True)
-class Given:
+class StatedTime:
     """What the user says about time beside the zone.
 
     Attributes:
@@ -99,7 +99,7 @@ class RowClock:
         return np.arange(len(wall))[order][sorting[0]], (*findings, sorting[1])
 
     def instants(
-        self, order: Order, *, line: IntArray, zone_name: str | None, where: str, stamp_options: Given
+        self, order: Order, *, line: IntArray, zone_name: str | None, where: str, stamp_options: StatedTime
     ) -> tuple[Instants, tuple[Finding, ...]]:
         """Converts the stamps to instants and reports what was odd; the blocks are released."""
         wall, utc = self.ns.view()[order], self.utc.view()[order]

@@ -19,7 +19,7 @@ from flagdata.ingest.anemometer.instants.stamps import YEARS
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
 from flagdata.ingest.anemometer.samples import rules
-from flagdata.ingest.anemometer.table.rowclock import Block, Given, Order, RowClock, cells_of
+from flagdata.ingest.anemometer.table.rowclock import Block, Order, RowClock, StatedTime, cells_of
 from flagdata.ingest.anemometer.text.cells import Cell, Growing, numbers
 from flagdata.ingest.anemometer.text.columns import Columns
 from flagdata.schema import CHANNELS, SampleFlag
@@ -220,7 +220,7 @@ def read_table(
     where: str,
     zone_name: str | None,
     extra: Sequence[str] = (),
-    stamp_options: Given | None = None,
+    stamp_options: StatedTime | None = None,
 ) -> Table:
     """Read cells by a recipe.
 
@@ -253,7 +253,7 @@ def read_table(
         gathered.add(line, block, recipe)
     pa.default_memory_pool().release_unused()  # the text of the last blocks
     findings = [*rows.findings(), *_stamp_findings(gathered, rows, recipe, where)]
-    stamp_options = stamp_options or Given()
+    stamp_options = stamp_options or StatedTime()
     order, new_findings = gathered.clock.order(gathered.line(), stamp_options.clock)
     line = gathered.line()[order]
     findings.extend(new_findings)
@@ -276,7 +276,9 @@ def read_table(
         findings.extend(zones.contradiction("the heading, or the recipe, says", recipe.time.zone, zone_given, time))
     host_time = None
     if gathered.host is not None:
-        host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, stamp_options=Given())
+        host_time, _ = gathered.host.instants(
+            order, line=line, zone_name=zone_name, where=where, stamp_options=StatedTime()
+        )
     channels: dict[str, FloatArray] = {}
     flags = np.zeros(len(line), dtype=np.uint16)
     states = {name: column.state(order) for name, column in gathered.channels.items()}

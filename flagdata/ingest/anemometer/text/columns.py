@@ -65,7 +65,7 @@ class Columns:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shape:
+class LineShape:
     """What a regular line looks like.
 
     Attributes:
@@ -99,7 +99,7 @@ class Lines:
     start: IntArray
     end: IntArray
     regular: BoolArray
-    shape: Shape
+    shape: LineShape
 
     def text(self, index: int, encoding: str) -> str:
         """Decodes a line as text."""
@@ -137,13 +137,13 @@ class Lines:
         return b"".join(self.data[bounds[low] : bounds[high]] for low, high in zip(begins, ends, strict=True))
 
 
-def shape_of(line: bytes, *, delimiter: str, names: int | None, comment: str | None, ascii_only: bool) -> Shape:
+def shape_of(line: bytes, *, delimiter: str, names: int | None, comment: str | None, ascii_only: bool) -> LineShape:
     """Finds the shape of a file of which `line` is a row and whose header names `names` cells, if it has one."""
     mark = ord(delimiter)
     cells = line.count(mark) + 1
     beyond = cells - names if names is not None else 0
     empty = beyond if beyond > 0 and line.endswith(beyond * delimiter.encode()) else 0
-    return Shape(
+    return LineShape(
         delimiter=mark,
         cells=cells if names is None or empty else names,
         empty=empty,
@@ -152,7 +152,7 @@ def shape_of(line: bytes, *, delimiter: str, names: int | None, comment: str | N
     )
 
 
-def lines_of(data: bytes, shape: Shape) -> Lines | None:
+def lines_of(data: bytes, shape: LineShape) -> Lines | None:
     """Splits a block that ends with a line end or with the file into lines; `None` where that takes a closer look.
 
     It does where a CR alone ends a line, and where Arrow would take a cell's first character for a byte-order mark.
@@ -180,7 +180,7 @@ def lines_of(data: bytes, shape: Shape) -> Lines | None:
     return Lines(data=data, start=start, end=end, regular=regular, shape=shape)
 
 
-def _with(data: bytes, byte: UInt8Array, feeds: IntArray, start: IntArray, shape: Shape) -> BoolArray:
+def _with(data: bytes, byte: UInt8Array, feeds: IntArray, start: IntArray, shape: LineShape) -> BoolArray:
     """Lines that hold nothing but blanks, or a byte that has to be looked at: NUL, Ctrl-Z, beyond ASCII."""
     odd_lines = np.zeros(len(feeds), dtype=bool)
     odd = (byte == 0) | (byte == 0x1A) if 0 in data or b"\x1a" in data else None

@@ -14,7 +14,7 @@ from flagdata.arrays import IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.recipe import FileLayout
-from flagdata.ingest.anemometer.text.columns import Columns, Lines, Shape, lines_of, shape_of
+from flagdata.ingest.anemometer.text.columns import Columns, Lines, LineShape, lines_of, shape_of
 from flagdata.ingest.anemometer.text.source import TextFile
 
 _PLAIN = ("utf-8", "utf-8-sig", "latin-1")
@@ -126,7 +126,7 @@ class RowReader:
                 yield where, columns
             first += len(lines.start)
 
-    def _shape(self, data: bytes) -> Shape | None:
+    def _shape(self, data: bytes) -> LineShape | None:
         """Finds the shape of the file's regular lines by its first row; `None` where the block has no row."""
         at = -1
         for _ in range(self.first_line - 1):
