@@ -33,7 +33,7 @@ def init(context: click.Context, folder: str | None, as_json: bool, lake_path: s
     from flagdata.schema import FORMAT_VERSION
 
     if folder is not None and context.get_parameter_source("lake_path") is ParameterSource.COMMANDLINE:
-        raise UsageError("two folders for one lake", fix="give FOLDER or --lake, not both")
+        raise UsageError("two folders are given for one lake", fix="give FOLDER or --lake, not both")
     lake = Lake.create(folder if folder is not None else lake_path)
     if as_json:
         document("init", {"lake": str(lake.path), "format_version": FORMAT_VERSION})

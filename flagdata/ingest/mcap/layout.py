@@ -211,7 +211,7 @@ class _Scan:
             check_stated(size, where=str(self.path))
         if max(length, size) > CHUNK_LIMIT:
             fix = f"at most {CHUNK_LIMIT} are read at once: write smaller chunks"
-            raise LimitError(f"a chunk of {max(length, size)} bytes", where=str(self.path), fix=fix)
+            raise LimitError(f"a chunk has {max(length, size)} bytes", where=str(self.path), fix=fix)
         self.blocks.append(Block(at=start, length=RECORD_HEAD + length, chunk=True, counts=None))
 
     def _index(self, length: int) -> None:

@@ -284,7 +284,9 @@ def index(
     for message in messages(path, topic):
         if len(states_instant) == limit:
             raise LimitError(
-                f"more than {limit} messages in {topic}", where=str(path), fix="cut the file, or raise the limit"
+                f"there are more than {limit} messages in {topic}",
+                where=str(path),
+                fix="cut the file, or raise the limit",
             )
         stamp, logged = message.said, checked(message.log_time)
         states_instant.append(stamp.instant is not None)

@@ -350,7 +350,7 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
     distance_note = f"; {distant} of them are {years}: a clock that was not set" if distant else ""
     if count == 0 and not bad and recipe.rows is not None:
         raise InputError(
-            f"no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site",
+            f"there is no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site",
             where=where,
             fix=f"name a site as the file writes it: {_listed(gathered.others)}",
         )
