@@ -113,7 +113,8 @@ def since(attributes: Mapping[str, Any], *, where: str) -> Since:
 
 
 def instants(values: AnyArray, attributes: Mapping[str, Any], *, where: str) -> tuple[IntArray, tuple[Finding, ...]]:
-    """(n,) UTC nanoseconds of a variable as it is stored, `NOT_A_TIME` for missing ones and years beyond 1970 to 2199.
+    """Converts a variable as it is stored to (n,) UTC nanoseconds, `NOT_A_TIME` for missing ones and years beyond 1970
+    to 2199.
 
     Raises:
         TimeError: see `since`.

@@ -151,7 +151,7 @@ class Described:
 def complete(
     open_recipe: OpenRecipe, lines: Sequence[str], options: WindOptions, *, where: str, rename: Any = None
 ) -> Completed:
-    """Complete a recipe by the heading of a file.
+    """Completes a recipe by the heading of a file.
 
     Args:
         lines: the first lines of the file.
