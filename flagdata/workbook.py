@@ -89,9 +89,11 @@ def _tables(calamine: Any, where: str, rows: int) -> Iterator[tuple[str, str]]:
 
 def _text(sheet: Any, rows: int, where: str) -> str:
     if sheet.total_height >= rows:
-        raise LimitError(f"more than {rows} rows", where=where, fix="split the sheet")
+        raise LimitError(f"the sheet has more than {rows} rows", where=where, fix="split the sheet")
     if sheet.total_width >= _WIDEST:
-        raise LimitError(f"more than {_WIDEST} columns", where=where, fix="save the columns needed as CSV")
+        raise LimitError(
+            f"the sheet has more than {_WIDEST} columns", where=where, fix="save the columns needed as CSV"
+        )
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     if sheet.start is not None:  # there is a cell; rows come from the sheet's first, columns from that of the cells

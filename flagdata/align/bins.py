@@ -54,7 +54,9 @@ class LagBins:
         period = round(wind.period * NANOSECONDS)
         step = round(period / STEPS)
         if len(wind.time) == 0 or np.count_nonzero(np.isfinite(motion.energy)) < 2:
-            raise InputError("no wind bins or no motion to compare", fix="check both inputs; see their reports")
+            raise InputError(
+                "there are no wind bins or no motion to compare", fix="check both inputs; see their reports"
+            )
         spacing = float(np.median(np.diff(motion.time)))
         if spacing * 2 > period:
             raise InputError(
@@ -77,7 +79,7 @@ class LagBins:
         if np.any(np.abs(time - time[0] - index * period) > _OFF_GRID * period):
             raise InputError("the wind bins are not on one regular grid", fix="average the wind series anew")
         if np.any(np.diff(index) < 1):
-            raise InputError("two wind bins at one time", fix="average the wind series anew")
+            raise InputError("two wind bins are at one time", fix="average the wind series anew")
         scores = np.full(int(index[-1]) + 1, np.nan)
         scores[index] = normal_scores(speed)
         first = int(time[0]) - highest * step

@@ -70,7 +70,7 @@ def stamp_step(time: Instants) -> float:
         InputError: no stamps.
     """
     if len(time) == 0:
-        raise InputError("no stamps to look at", fix="check the log's report")
+        raise InputError("there are no stamps to look at", fix="check the log's report")
     for step in _STEPS:
         if not np.any(time % round(step * NANOSECONDS)):
             return step

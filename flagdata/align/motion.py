@@ -90,7 +90,7 @@ def motion_energy(frames: Iterable[tuple[int, UInt8Array]]) -> MotionSeries:
             before_shape = image.shape
         if image.shape != before_shape:
             raise InputError(
-                f"a frame of {image.shape} after frames of {before_shape}", fix="crop all frames to one size"
+                f"a frame has shape {image.shape} after frames of {before_shape}", fix="crop all frames to one size"
             )
         reduced = _reduce(image, block)
         if before is not None:

@@ -37,7 +37,7 @@ def init(chosen: Making) -> Iterator[Result]:
     from flagdata.schema import FORMAT_VERSION
 
     if chosen.folder is not None and "lake" in typed(chosen):
-        raise UsageError("two folders for one lake", fix="give FOLDER or --lake, not both")
+        raise UsageError("two folders are given for one lake", fix="give FOLDER or --lake, not both")
     lake = Lake.create(str(chosen.lake) if chosen.folder is None else chosen.folder)
     yield Result("init", {"lake": str(lake.path), "format_version": FORMAT_VERSION})
     echo(lake.path)

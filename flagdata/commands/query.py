@@ -161,7 +161,7 @@ def as_document(selection: Selection, *, at: str | None, version: int) -> dict[s
     ]
     names = [field["name"] for field in fields]
     if len(set(names)) < len(names):
-        raise UsageError("two columns of one name", fix="name them apart in the SQL, by AS")
+        raise UsageError("two columns have one name", fix="name them apart in the SQL, by AS")
     not_finite: dict[str, int] = {}
     rows = []
     for source in result.to_pylist():

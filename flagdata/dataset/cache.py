@@ -64,7 +64,7 @@ class DecodedCache:
         self.path = local_path(path).absolute()
         self.limit = limit
         if limit < 1:
-            raise UsageError(f"a cache of {limit} bytes", fix="give a limit above zero")
+            raise UsageError(f"the limit of the cache is {limit} bytes", fix="give a limit above zero")
         for folder in (self.path, *self.path.parents):
             if (folder / "lake.json").exists():
                 raise UsageError(
@@ -78,7 +78,9 @@ class DecodedCache:
                 is_of_cache = _NAME.fullmatch(entry.name) or entry.name in (_TALLY, _WRITING)
                 if not is_of_cache and not is_beside(entry.name):
                     raise UsageError(
-                        "a cache among other files", where=entry.path, fix="give it a new or empty folder of its own"
+                        "the cache lies among other files",
+                        where=entry.path,
+                        fix="give it a new or empty folder of its own",
                     )
         self._verified: set[str] = set()
 

@@ -130,7 +130,7 @@ def collate(samples: Sequence[Sample]) -> Batch:
         InputError: no sample, or clips of different shapes.
     """
     if not samples:
-        raise InputError("a batch of no samples", fix="give at least one")
+        raise InputError("the batch has no samples", fix="give at least one")
     shapes = {tuple(sample.clip.shape) for sample in samples}
     if len(shapes) > 1:
         raise InputError(

@@ -143,7 +143,7 @@ class ExplicitSplit:
 
     def __post_init__(self) -> None:
         if not self.where:
-            raise UsageError("an explicit split without sides", fix="name at least one side and its filter")
+            raise UsageError("the explicit split has no sides", fix="name at least one side and its filter")
 
     @property
     def sides(self) -> tuple[str, ...]:

@@ -137,7 +137,7 @@ class TruthSeries:
         speed = over_ground(series)
         if speed is None:
             raise InputError(
-                "no wind over ground among the channels " + ", ".join(sorted(series.channels)),
+                "there is no wind over ground among the channels " + ", ".join(sorted(series.channels)),
                 where=series.sensor.name,
                 fix="give a log with wind_speed, or wind_x and wind_y; apparent wind is not ground truth",
             )

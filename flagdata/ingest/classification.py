@@ -100,7 +100,7 @@ def classify(
     if by_content or best.kind == "anemometer":
         return best
     raise InputError(
-        f"no video, wind log, folder of meshes or table of markers: {'; '.join(best.reasons)}",
+        f"this is no video, wind log, folder of meshes or table of markers: {'; '.join(best.reasons)}",
         where=str(path),
         fix=best.fix or "see flagdata ingest --sniff",
     )

@@ -46,7 +46,9 @@ def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
     table = small_table(plain_text(path.read_bytes(), noun="table", where=str(path)), where=str(path))
     names = table.names
     if not table.rows:
-        raise InputError("no rows", where=str(path), fix=f"give a heading with {', '.join(COLUMNS)}, and a row a film")
+        raise InputError(
+            "there are no rows", where=str(path), fix=f"give a heading with {', '.join(COLUMNS)}, and a row a film"
+        )
     check_columns(
         names, needed=COLUMNS, optional=OPTIONAL, where=str(path), fix=f"give {', '.join(COLUMNS)}, each once"
     )
@@ -85,7 +87,7 @@ def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
     speed, sigma = (_number(row, name, where, unit="m/s") for name in ("wind_speed", "wind_sigma"))
     if (speed is None) != (sigma is None) or sigma == 0:
         raise InputError(
-            "a wind without its uncertainty, or the other way round",
+            "a wind is given without its uncertainty, or the other way round",
             where=where,
             fix="give wind_speed and wind_sigma (above 0), in m/s, or neither",
         )

@@ -46,7 +46,7 @@ class SmallTable:
         return self.delimiter != "," and any(map(_COMMA.fullmatch, cells)) and not any(map(_POINT.fullmatch, cells))
 
     def number(self, cell: str) -> str:
-        """A cell with the decimal point of programs."""
+        """Writes a cell with the decimal point of programs."""
         return cell.replace(",", ".") if self.delimiter != "," and _COMMA.fullmatch(cell) else cell
 
 

@@ -21,13 +21,13 @@ class Source:
         hash: SHA-256 of the file, or of the names and hashes of the folder's files; see `files.is_beside` for
             those that do not count.
         state: name, size and time of change of each file.
-        others: each further file of the source, with its state.
+        further: each further file of the source, with its state.
     """
 
     path: Path
     hash: str
     state: tuple[tuple[str, int, int], ...]
-    others: tuple[tuple[Path, tuple[tuple[str, int, int], ...]], ...] = ()
+    further: tuple[tuple[Path, tuple[tuple[str, int, int], ...]], ...] = ()
 
     @property
     def name(self) -> str:
@@ -55,7 +55,7 @@ class Source:
         if with_files:
             parts = [file_hash(file) for file in (path, *with_files)]
             _check_distinct((path, *with_files), parts)
-            return cls(path=path, hash=digest("\n".join(parts)), state=before, others=_states(with_files))
+            return cls(path=path, hash=digest("\n".join(parts)), state=before, further=_states(with_files))
         if path.is_dir():
             parts = [f"{os.fsencode(name).hex()} {file_hash(path / name)}" for name, _, _ in before]
             return cls(path=path, hash=digest("\n".join(parts)), state=before)
@@ -70,7 +70,7 @@ class Source:
         Raises:
             ConflictError: something was.
         """
-        for path, state in ((self.path, self.state), *self.others):
+        for path, state in ((self.path, self.state), *self.further):
             if _state(path) != state:
                 raise ConflictError(
                     "the file changed while it was read", where=str(path), fix="ingest it when it is complete"

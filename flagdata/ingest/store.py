@@ -252,7 +252,7 @@ def ingest_winds(
     unseen = [
         (reading_of_log.log, reading_of_log.options.wind)
         for reading_of_log in new
-        if reading_of_log.there.artifact is None
+        if reading_of_log.present.artifact is None
     ]
     how = confirmed(path, source.hash, unseen, confirm) if unseen else None
     with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
@@ -271,7 +271,7 @@ class _Read:
     """A log that was read, and is to be written.
 
     Attributes:
-        there: what the lake has of it: nothing, or an artifact whose object is damaged or missing.
+        present: what the lake has of it: nothing, or an artifact whose object is damaged or missing.
         log: what was read.
         options, labels: of it.
         recipe: of its artifact.
@@ -285,7 +285,7 @@ class _Read:
     recipe: Mapping[str, Any]
     findings: tuple[Finding, ...]
     paired: PairedClocks | None
-    there: Present
+    present: Present
 
 
 def _read(
@@ -317,7 +317,7 @@ def _read(
     findings = (*findings, *_shifted_logs(lake, log.series, labels.session, artifacts))
     findings = (*findings, *other_readings(artifacts, source.hash, recipe))
     return _Read(
-        log=log, options=options, labels=labels, recipe=recipe, findings=findings, paired=paired, there=present
+        log=log, options=options, labels=labels, recipe=recipe, findings=findings, paired=paired, present=present
     )
 
 
@@ -352,7 +352,7 @@ def _staged(
     time = log.series.time
     staged = transaction.staging(".mcap")
     with RecordWriter(
-        staged, metadata={PROVENANCE: source.provenance(recipe, code=reading_of_log.there.code)}
+        staged, metadata={PROVENANCE: source.provenance(recipe, code=reading_of_log.present.code)}
     ) as record:
         record.wind(log.series)
         if is_bag(path):
@@ -370,7 +370,9 @@ def _staged(
             record.attach("drafted.recipe.toml", drafted, media_type="application/toml", log_time=int(time[0]))
     source.check_unchanged()
     report = wind_report(log, findings, recipe_file=reading_of_log.options.wind.recipe)
-    before = {} if reading_of_log.there.artifact is None else json.loads(reading_of_log.there.artifact.report or "{}")
+    before = (
+        {} if reading_of_log.present.artifact is None else json.loads(reading_of_log.present.artifact.report or "{}")
+    )
     if (confirmed_by := before.get("confirmed", how)) is not None:
         report["confirmed"] = confirmed_by
     if reading_of_log.paired is not None:

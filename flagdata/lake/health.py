@@ -116,7 +116,7 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
 def verify(
     lake: Lake, names: Sequence[str], marked: Marked | None = None, *, advance: Callable[[int], None] = lambda _: None
 ) -> tuple[Finding, ...]:
-    """Re-hashes the objects called `names`; reports each that is missing or has changed. Damage is noted beside the
+    """Hashes the objects called `names` again; reports each that is missing or has changed. Damage is noted beside the
     object, so that what makes it again replaces it without comparing all its bytes, see `Objects.note_damage`.
 
     Args:
@@ -158,8 +158,7 @@ def read_refs(lake: Lake) -> Marked:
 
 
 def verify_catalog(lake: Lake, marked: Marked | None = None) -> tuple[Finding, ...]:
-    """Re-hashes the catalog's files and reads every ref; reports what is missing, damaged, a link, or cannot be
-    checked."""
+    """Hashes the catalog's files again and reads every ref; reports what is missing, damaged, a link or unchecked."""
     foreign = [path for path in _foreign(lake) if path.parent.name not in STORES]  # objects are `verify`'s
     findings = (*map(_linked, foreign), *(marked or read_refs(lake)).findings, *catalog_files(lake))
     return tuple(dict.fromkeys(findings))  # an entry that cannot be read stops both

@@ -212,7 +212,9 @@ def _plain(path: Path) -> IO[str]:
     except OSError as error:
         if error.errno != errno.ELOOP:
             raise
-        raise LinkError("a link where a lock of the lake belongs", where=str(path), fix="delete the link") from None
+        raise LinkError(
+            "there is a link where a lock of the lake belongs", where=str(path), fix="delete the link"
+        ) from None
     return os.fdopen(descriptor, encoding="utf-8")
 
 

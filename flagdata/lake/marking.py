@@ -92,8 +92,8 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
 
 
 def catalog_files(lake: Store) -> tuple[Finding, ...]:
-    """Re-hashes the files of the catalog, of all its versions: an error for each that is missing or has changed, a note
-    on how many were written before hashes were noted."""
+    """Hashes the files of the catalog again, of all its versions: an error for each that is missing or has changed, a
+    note on how many were written before hashes were noted."""
     try:
         hashes = lake.catalog.file_hashes()
         changed = lake.catalog.changed_entries()

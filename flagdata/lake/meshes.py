@@ -296,7 +296,9 @@ def _layout(group: zarr.Group, path: Path) -> str:
     with store_errors(path, "this is not a Zarr store"):
         head = check_format(group.attrs.get(_HEAD), MESHES_FORMAT, path, noun="meshes")
     if head.get("layout") not in ("fixed", "ragged"):
-        raise CorruptError("a Zarr store, but not of meshes", where=str(path), fix="open it with zarr or xarray")
+        raise CorruptError(
+            "this is a Zarr store, but not of meshes", where=str(path), fix="open it with zarr or xarray"
+        )
     return head["layout"]
 
 

@@ -223,7 +223,7 @@ class Objects:
         return True
 
     def check(self, name: str) -> None:
-        """Re-hashes one object.
+        """Hashes one object again.
 
         Raises:
             NotFoundError: it is not there.

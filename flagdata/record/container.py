@@ -436,7 +436,9 @@ def _message_index(file: Bytes, at: int, channel: int, end: int, *, where: str) 
     opcode, length, owner, size = _INDEX.unpack(read_exact(file, _INDEX.size, at, where=where))
     is_sound = size + 6 == length and size % _INDEX_ENTRY == 0
     if opcode != Opcode.MESSAGE_INDEX or owner != channel or not is_sound or at + size > end:
-        raise CorruptError("no message index where the summary says", where=f"{where}, byte {at}", fix=_RECOVER)
+        raise CorruptError(
+            "there is no message index where the summary says", where=f"{where}, byte {at}", fix=_RECOVER
+        )
     pairs = np.frombuffer(read_exact(file, size, at + _INDEX.size, where=where), dtype="<u8").astype(np.int64)
     return pairs[0::2], pairs[1::2]
 

@@ -196,7 +196,7 @@ def _varint(data: bytes | memoryview, at: int) -> tuple[int, int]:
             return value, at
         shift += 7
         if shift > 63:
-            raise CorruptError("a protobuf varint of more than ten bytes", fix="run flagdata verify")
+            raise CorruptError("a protobuf varint has more than ten bytes", fix="run flagdata verify")
 
 
 _FIXED: Mapping[int, int] = {1: 8, 5: 4}

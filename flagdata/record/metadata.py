@@ -37,7 +37,7 @@ def sensor_of(metadata: Mapping[str, Mapping[str, str]], *, where: str) -> Senso
     """
     written = dict(metadata.get(SENSOR, {}))
     if "name" not in written:
-        raise CorruptError("a wind record without its sensor", where=where, fix="ingest the log again")
+        raise CorruptError("the record has a wind without its sensor", where=where, fix="ingest the log again")
     name = written.pop("name")
     names = {field.name for field in dataclasses.fields(Sensor)}
     try:

@@ -566,7 +566,7 @@ def _whole_records(
 
 def _read_message(length: int) -> Callable[[Any], Message]:
     if length < MESSAGE_HEAD - RECORD_HEAD:
-        raise CorruptError(f"a message of {length} bytes", fix="run `flagdata recover` on the file")
+        raise CorruptError(f"a message has {length} bytes", fix="run `flagdata recover` on the file")
     return lambda stream: Message.read(stream, length)
 
 

@@ -99,7 +99,7 @@ def calibrated(chosen: Calibrating) -> Calibrated:
     several = chosen.recordings
     several = [several] if isinstance(several, Mapping | Path | str) else list(several)
     if not several:
-        raise InputError("no recordings", where="recordings", fix="give at least one")
+        raise InputError("no recordings are given", where="recordings", fix="give at least one")
     size = FlagSize.of(chosen.flag_size)
     drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
     options = options_of(chosen, size, **drawn)

@@ -207,7 +207,7 @@ def solve(
 ) -> SolvedLoop:
     """Finds what a verdict is made from; as `close_loop`."""
     if not recordings:
-        raise InputError("no recordings", where="close-loop", fix="give one or more")
+        raise InputError("no recordings are given", where="close-loop", fix="give one or more")
     effects, seed = options.effects, options.calibration.seed
     simulations = gathered(
         recordings, options.calibration, effects, kinds=options.kinds, folder=folder, workers=workers, stage=stage

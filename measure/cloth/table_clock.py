@@ -169,7 +169,7 @@ def follows(table: Columns) -> FloatArray:
             series = math.pi / 2 - table[name] if name == "droop" else table[name]
             return np.asarray(series - min(0.0, float(np.nanmin(series))), dtype=np.float64)
     raise InputError(
-        f"no observable that follows the wind: {', '.join(_FOLLOWS)}",
+        f"there is no observable that follows the wind: {', '.join(_FOLLOWS)}",
         where=table.where,
         fix="state the offset of the clocks: --clock-offset 0.3±0.1",
     )

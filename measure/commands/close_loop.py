@@ -184,7 +184,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     recipe = None if chosen.recipe is None else recipes.parse(chosen.recipe)
     in_recipe = recipe is not None and bool(recipe.recordings)
     if not in_recipe and not chosen.recordings:
-        raise UsageError("no recordings", where="SOURCE", fix="name them, or a recipe that does")
+        raise UsageError("no recordings are given", where="SOURCE", fix="name them, or a recipe that does")
     check_files(chosen.out, *dict.fromkeys((*FILES, *JOINT)), command="close-loop")
     lake, branch, name, out = lake_of(chosen.lake), chosen.branch, chosen.name, chosen.out
     if lake is not None:

@@ -112,7 +112,9 @@ class Gate:
         """
         missing = DISTORTIONS.keys() - distorted.keys()
         if missing:
-            raise InputError(f"no clips of {', '.join(sorted(missing))}", fix="make them by measure.gate.distortions")
+            raise InputError(
+                f"there are no clips of {', '.join(sorted(missing))}", fix="make them by measure.gate.distortions"
+            )
         learned = round(_LEARNING * len(plain))
         first, rest = plain[:learned], plain[learned:]
         low, centre, high = np.quantile(first, (0.25, 0.5, 0.75), axis=0)

@@ -173,7 +173,9 @@ def _next(client: Client, running: as_completed, say: Callable[[str], None]) -> 
             lost_at = now
             say(f"all workers are gone; waiting {PATIENCE:g} s for new ones")
         elif now - lost_at > PATIENCE:
-            raise WorkerError(f"no workers for {PATIENCE:g} s", where="dask", fix=f"see that workers run, {_AGAIN}")
+            raise WorkerError(
+                f"there were no workers for {PATIENCE:g} s", where="dask", fix=f"see that workers run, {_AGAIN}"
+            )
     return cast("tuple[Future, Any]", next(running))
 
 

@@ -229,7 +229,7 @@ def _check(recipe: DatasetRecipe, *, where: str) -> None:
     samples = anemometer.rate * (anemometer.before + time.settle + time.frames / time.rate)
     if samples > SAMPLES_LIMIT:
         raise LimitError(
-            f"an anemometer of {samples:.3g} samples a recording",
+            f"the anemometer takes {samples:.3g} samples a recording",
             where=where,
             fix=f"have at most {SAMPLES_LIMIT}: lower its rate, or `before`",
         )

@@ -254,14 +254,14 @@ class Recipe:
         vertices = self.scene.vertices
         if vertices > VERTICES_LIMIT:
             raise LimitError(
-                f"a mesh of {vertices:.3g} vertices",
+                f"the mesh has {vertices:.3g} vertices",
                 where=f"{self.name} [scene]",
                 fix=f"have at most {VERTICES_LIMIT}: lower columns, or mind the ratio of width and height",
             )
         size = 12 * vertices * self.time.frames * min(self.batch, self.count)
         if size > BATCH_BYTES_LIMIT:
             raise LimitError(
-                f"a batch that keeps {size:.3g} bytes of positions",
+                f"a batch keeps {size:.3g} bytes of positions",
                 where=self.name,
                 fix=f"have at most {BATCH_BYTES_LIMIT}: fewer members a batch, frames or columns",
             )

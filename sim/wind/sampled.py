@@ -140,7 +140,7 @@ def usable(series: WindSeries, *, start: int, where: str) -> tuple[FloatArray, F
         InputError: a log without speeds.
     """
     if "wind_speed" not in series.channels:
-        raise InputError("no channel wind_speed", where=where, fix="give a log of a wind speed")
+        raise InputError("there is no channel wind_speed", where=where, fix="give a log of a wind speed")
     speed, direction = series.channels["wind_speed"], series.channels.get("wind_direction")
     good = ((series.flags & UNUSABLE) == 0) & np.isfinite(speed)
     if direction is not None:

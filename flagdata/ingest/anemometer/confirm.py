@@ -50,7 +50,7 @@ class Drafted:
         return digest(canonical(content))[:_HASH]
 
     def sentences(self) -> tuple[str, ...]:
-        """One row of each reading as a sentence."""
+        """Describes one row of each reading in a sentence."""
         several = len(self.readings) > 1
         return tuple(_sentence(log, f" at {log.series.sensor.name!r}" if several else "") for log, _ in self.readings)
 

@@ -161,7 +161,9 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     platform.check_corrected(reading, options.platform, where=str(path))
     reading = reading.with_findings(source.findings)
     if len(reading.time) == 0:
-        raise InputError("no samples in the file", where=str(path), fix="check that the logger recorded anything")
+        raise InputError(
+            "there are no samples in the file", where=str(path), fix="check that the logger recorded anything"
+        )
     zero.check(reading, options.zero_offset, where=str(path))
     choice = options.zero_offset if options.zero_offset is not None else reading.rules.zero_offset
     ordered = in_order(reading, where=str(path), choice=options.clock)

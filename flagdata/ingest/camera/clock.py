@@ -41,7 +41,7 @@ class Counter:
         self._shift = 0
 
     def run_on(self, packet: av.Packet) -> None:
-        """Replace the stamps of the next packet of the file."""
+        """Replaces the stamps of the next packet of the file."""
         if self._length is None:
             return
         packet.pts, packet.dts = (self._counted(stamp, self._length) for stamp in (packet.pts, packet.dts))

@@ -16,7 +16,7 @@ class Damage:
         corrupt: frames that came out marked as damaged, or of packets marked so.
         suspect: frames shown between damage and the next key frame.
         resized: frames of another size than the first.
-        shown: frames that came out at all.
+        decoded: frames that came out at all.
     """
 
     packets: int = 0
@@ -24,7 +24,7 @@ class Damage:
     corrupt: int = 0
     suspect: int = 0
     resized: int = 0
-    shown: int = 0
+    decoded: int = 0
 
     def refuse(self, packet: int) -> None:
         self.packets += 1
@@ -62,12 +62,12 @@ class Damage:
                 )
             )
         findings += resized(self.resized, fix="bring all frames to one size: ffmpeg -i IN -vf scale=WIDTH:HEIGHT OUT")
-        missing = expected - self.packets - self.shown
+        missing = expected - self.packets - self.decoded
         if missing > 0:
             findings.append(
                 Finding.of(
                     "frames-undecoded",
-                    f"the file announces {expected} frames, the decoder gave {self.shown}",
+                    f"the file announces {expected} frames, the decoder gave {self.decoded}",
                     count=missing,
                 )
             )

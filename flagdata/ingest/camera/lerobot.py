@@ -65,7 +65,7 @@ def described(folder: Path) -> Mapping[str, Any]:
         raise InputError(f"the LeRobot data set has version {version}, not {VERSION}", where=str(where), fix=fix)
     if stored != "parquet":
         fix = "write it as Parquet and MP4 by LeRobot's own tools"
-        raise InputError(f"a LeRobot data set stored as {stored}", where=str(where), fix=fix)
+        raise InputError(f"the LeRobot data set is stored as {stored}", where=str(where), fix=fix)
     fps = info.get("fps")
     is_complete = isinstance(info.get("features"), dict) and isinstance(info.get("data_path"), str)
     if not is_complete or not isinstance(fps, int | float) or fps <= 0:
@@ -189,7 +189,9 @@ class EpisodeSource:
                     stored = (self._folder / _inside(str(value["path"]), self._where)).read_bytes()
                 image = Image.open(io.BytesIO(stored), formats=STILLS)
                 if image.width * image.height > self._limits.frame_pixels:
-                    raise LimitError("a picture beyond the limit of pixels", where=self._where, fix="raise the limit")
+                    raise LimitError(
+                        "a picture is beyond the limit of pixels", where=self._where, fix="raise the limit"
+                    )
                 image.load()
             except BROKEN:
                 continue
@@ -288,7 +290,9 @@ def _chosen(streams: Mapping[str, str], wanted: str | None, where: str) -> tuple
 def _episode(folder: Path, wanted: int | None) -> dict[str, Any]:
     files = tables(folder / "meta" / "episodes")
     if not files:
-        raise CorruptError("no table of episodes", where=str(folder / "meta" / "episodes"), fix="copy it again")
+        raise CorruptError(
+            "there is no table of episodes", where=str(folder / "meta" / "episodes"), fix="copy it again"
+        )
     rows: list[dict[str, Any]] = []
     for path in files:
         names = [name for name in _reading(path, pq.read_schema).names if not name.startswith("stats/")]

@@ -55,7 +55,7 @@ class CameraProbe:
     findings: tuple[Finding, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values, the start as ISO 8601 text."""
+        """Returns JSON values, the start as ISO 8601 text."""
         fields = {k: v for k, v in asdict(self).items() if k not in ("start", "findings")}
         return {
             **fields,

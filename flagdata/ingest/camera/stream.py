@@ -350,8 +350,8 @@ def open_camera(path: Path | str, options: CameraOptions | None = None) -> Camer
 
 
 def open_source(path: Path, options: CameraOptions) -> PictureSource:
-    """The reader for `path`: a folder is a LeRobot data set, a bag or an image sequence, an MCAP file a topic of it,
-    anything else a video file.
+    """Opens the reader for `path`: a LeRobot data set, a bag or an image sequence for a folder, a topic of it for an
+    MCAP file, a video file for anything else.
 
     Raises:
         UsageError: a topic or an episode of what has none, or what cannot be joined.

@@ -352,8 +352,8 @@ class VideoSource:
                 packet_stamp = frame.pts if frame.pts is not None else frame.dts
                 presented = ordered.shown(packet_stamp) if ordered is not None else packet_stamp
                 if form in UNTIMED:  # FFmpeg's numbers are at its own rate, or none
-                    presented = self._damage.shown + self._damage.packets
-                self._damage.shown += 1
+                    presented = self._damage.decoded + self._damage.packets
+                self._damage.decoded += 1
                 if frame.is_corrupt or (flagged and packet_stamp in flagged):
                     self._damage.corrupt += 1
                     continue

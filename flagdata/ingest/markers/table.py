@@ -100,7 +100,7 @@ def read_table(path: Path, options: MarkerOptions | None = None) -> Mapping[str,
     _check_columns(names, options, str(path))
     table = _rows(path, names)
     if not table.num_rows:
-        raise InputError("no rows", where=str(path), fix="export the table with its tracks")
+        raise InputError("there are no rows", where=str(path), fix="export the table with its tracks")
     if "recording" not in names:
         return {"": _sequence(table, options, str(path))}
     column = table["recording"]
@@ -167,7 +167,7 @@ def _rows(path: Path, names: list[str]) -> pa.Table:
         )
     except (pa.ArrowException, UnicodeError) as error:  # the second of a file in UTF-16
         raise InputError(
-            f"not a table of numbers: {str(error).splitlines()[0]}",
+            f"this is not a table of numbers: {str(error).splitlines()[0]}",
             where=str(path),
             fix="write numbers with a decimal point, and leave cells empty that have none",
         ) from None
@@ -189,7 +189,7 @@ def _parquet(path: Path) -> pyarrow.parquet.ParquetFile:
     rows, size = sum(group.num_rows for group in groups), sum(group.total_byte_size for group in groups)
     if rows > POSITIONS_LIMIT or size > SIZE_LIMIT:
         raise LimitError(
-            f"a table of {rows} rows and {size} bytes unpacked",
+            f"the table has {rows} rows and {size} bytes unpacked",
             where=str(path),
             fix=f"at most {POSITIONS_LIMIT} rows and {SIZE_LIMIT} bytes are read",
         )

@@ -65,7 +65,7 @@ class Layout:
         schemas, channels: by number.
         blocks: in the order of the file.
         counts: messages that are there, by channel.
-        stated: messages that the summary states, by channel; empty where it states none.
+        announced: messages that the summary states, by channel; empty where it states none.
     """
 
     path: Path
@@ -74,11 +74,11 @@ class Layout:
     channels: Mapping[int, Channel]
     blocks: tuple[Block, ...]
     counts: Mapping[int, int]
-    stated: Mapping[int, int]
+    announced: Mapping[int, int]
 
     def missing(self, channels: Collection[int]) -> int:
         """Messages of some channels that the summary states and the file does not have."""
-        return sum(max(0, self.stated.get(channel, 0) - self.counts.get(channel, 0)) for channel in channels)
+        return sum(max(0, self.announced.get(channel, 0) - self.counts.get(channel, 0)) for channel in channels)
 
     def undefined(self) -> tuple[Finding, ...]:
         """Reports messages whose channel the file does not define; empty where there are none."""
@@ -143,7 +143,7 @@ class _Scan:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     blocks: list[Block] = field(default_factory=list)
-    stated: dict[int, int] = field(default_factory=dict)
+    announced: dict[int, int] = field(default_factory=dict)
     run_at: int = 0
     run_counts: Counter[int] = field(default_factory=Counter)
 
@@ -211,7 +211,7 @@ class _Scan:
             check_stated(size, where=str(self.path))
         if max(length, size) > CHUNK_LIMIT:
             fix = f"at most {CHUNK_LIMIT} are read at once: write smaller chunks"
-            raise LimitError(f"a chunk of {max(length, size)} bytes", where=str(self.path), fix=fix)
+            raise LimitError(f"a chunk has {max(length, size)} bytes", where=str(self.path), fix=fix)
         self.blocks.append(Block(at=start, length=RECORD_HEAD + length, chunk=True, counts=None))
 
     def _index(self, length: int) -> None:
@@ -230,7 +230,7 @@ class _Scan:
         elif opcode in _DEFINED:
             self._define(opcode, self.stream.read(length))
         elif opcode == Opcode.STATISTICS:
-            self.stated = dict(parse(Statistics.read, self.stream.read(length), where=where).channel_message_counts)
+            self.announced = dict(parse(Statistics.read, self.stream.read(length), where=where).channel_message_counts)
 
     def _define(self, opcode: int, record: bytes | memoryview) -> None:
         """Take the definition of a schema or channel.
@@ -289,7 +289,7 @@ class _Scan:
             channels=self.channels,
             blocks=tuple(self.blocks),
             counts=counts,
-            stated=self.stated,
+            announced=self.announced,
         )
 
     def _counted(self) -> Counter[int]:

@@ -312,7 +312,7 @@ _Shown = tuple[int, int, int, str, str, Callable[[], Luma]]
 
 
 def _data(values: Mapping[str, Any]) -> bytes | None:
-    """The bytes of a picture's message; in JSON they are base64. None where there are none."""
+    """Returns the bytes of a picture's message; in JSON they are base64. None where there are none."""
     data = values.get("data")
     try:
         if isinstance(data, str):

@@ -91,13 +91,13 @@ class Decoded:
     """A message.
 
     Attributes:
-        place: number of its file, of its block there, and its offset in that.
+        position: number of its file, of its block there, and its offset in that.
         log_time: when it was recorded [UTC ns].
         values: of its fields.
         dated: its instant by its topic's `Index` [UTC ns]; `None` where that was not asked.
     """
 
-    place: tuple[int, int, int] = (0, 0, 0)
+    position: tuple[int, int, int] = (0, 0, 0)
     log_time: int
     dated: int | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -130,7 +130,7 @@ class Index:
 
     Attributes:
         rows: (n,) number of each in the order of the file.
-        places: (n, 3) as `Decoded.place`.
+        places: (n, 3) as `Decoded.position`.
         stamps, logged: (n,) when each was measured and when it was logged [UTC ns].
         in_time: whether they are in the order of their instants, to within a slip where that of the file stands.
         findings: what to report of their order, their clocks and of those that are missing.
@@ -173,7 +173,7 @@ def topics(path: Path) -> tuple[Topic, ...]:
     for part, layout in enumerate(layouts):
         for number, channel in layout.channels.items():
             count = layout.counts.get(number, 0)
-            if not count and not layout.stated.get(number):
+            if not count and not layout.announced.get(number):
                 continue
             schema = layout.schemas.get(channel.schema_id)
             key = (channel.topic, schema.name if schema is not None else "")
@@ -242,7 +242,7 @@ def messages(path: Path, topic: str, *, picked: Index | None = None) -> Iterator
                 channel = layouts[part].channels[message.channel]
                 decoders[key] = _decoder(layouts[part].schemas.get(channel.schema_id), channel)
             position = (part, message.block, message.offset)
-            return Decoded(place=position, log_time=message.log_time, values=decoders[key](message.data))
+            return Decoded(position=position, log_time=message.log_time, values=decoders[key](message.data))
 
         if picked is not None:
             for (part, block, offset), dated in zip(picked.places.tolist(), picked.stamps.tolist(), strict=True):
@@ -284,12 +284,14 @@ def index(
     for message in messages(path, topic):
         if len(states_instant) == limit:
             raise LimitError(
-                f"more than {limit} messages in {topic}", where=str(path), fix="cut the file, or raise the limit"
+                f"there are more than {limit} messages in {topic}",
+                where=str(path),
+                fix="cut the file, or raise the limit",
             )
         stamp, logged = message.said, checked(message.log_time)
         states_instant.append(stamp.instant is not None)
         has_field.append(stamp.field)
-        numbers.extend((*message.place, logged if stamp.instant is None else stamp.instant, logged))
+        numbers.extend((*message.position, logged if stamp.instant is None else stamp.instant, logged))
         if visit is not None:
             visit(message)
     table = np.array(numbers, dtype=np.int64).reshape(-1, 5)

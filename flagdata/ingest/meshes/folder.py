@@ -102,7 +102,9 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
     if not frames_of_cloths:
         frames_of_cloths = _numbered([entry for entry in entries if entry.suffix.lower() == ".obj"], path)
     if len(frames_of_cloths) > FRAME_LIMIT:
-        raise LimitError(f"{len(frames_of_cloths)} frames", where=str(path), fix=f"at most {FRAME_LIMIT} are read")
+        raise LimitError(
+            f"the folder has {len(frames_of_cloths)} frames", where=str(path), fix=f"at most {FRAME_LIMIT} are read"
+        )
     cloths = {cloth for _, cloth, _ in frames_of_cloths}
     if cloths != {0}:
         raise InputError(
@@ -119,14 +121,16 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
         )
     if len(set(numbers)) < len(numbers):
         twice = next(a for a, b in pairwise(numbers) if a == b)
-        raise InputError("two files for one frame", where=f"{path}, frame {twice:04d}", fix="keep one of them")
+        raise InputError(
+            "there are two files for one frame", where=f"{path}, frame {twice:04d}", fix="keep one of them"
+        )
     return frames
 
 
 def _numbered(entries: list[Path], path: Path) -> list[tuple[int, int, Path]]:
     """Frames of other programs: names that differ in one number."""
     if not entries:
-        raise NotFoundError("no .obj files", where=str(path), fix=FIX)
+        raise NotFoundError("there are no .obj files", where=str(path), fix=FIX)
     split = [re.split(r"(\d+)", entry.stem) for entry in entries]
     texts = {tuple(parts[::2]): entry.name for parts, entry in zip(split, entries, strict=True)}
     numbers = np.array([len(parts) // 2 for parts in split])

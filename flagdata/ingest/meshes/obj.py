@@ -74,13 +74,13 @@ def ears(points: Points) -> Triples:
     """
     count = len(points)
     if count > CORNERS:
-        raise ValueError(f"not convex and of {count} corners, {CORNERS} at most")
+        raise ValueError(f"it is not convex and has more than {CORNERS} corners")
     doubled = float(_cross(points, np.roll(points, -1, axis=0)).sum())
     flat = _FLAT * float(_extent(points[None])[0])
     if abs(doubled) <= flat:
-        raise ValueError("that has no area")
+        raise ValueError("it has no area")
     if _crosses(points):
-        raise ValueError("whose edges cross or touch each other")
+        raise ValueError("its edges cross or touch each other")
     sign = np.sign(doubled)
     rest, triangles, at = list(range(count)), [], 1
     while len(rest) > 3:
@@ -90,7 +90,7 @@ def ears(points: Points) -> Triples:
             if _is_ear(points, corners, rest, sign=sign, flat=flat):
                 break
         else:
-            raise ValueError("with corners too close to a line to be split")
+            raise ValueError("its corners are too close to a line")
         triangles.append(corners)
         rest.pop(corner)
         at = corner
@@ -201,7 +201,7 @@ def read_obj(path: Path) -> Obj:
                 velocities[len(positions) // 3 - 1] = _numbers(values, 3, where)
             elif keyword == "f":
                 if len(values) < 3:
-                    raise InputError("a face of fewer than three corners", where=where, fix="give at least three")
+                    raise InputError("a face has fewer than three corners", where=where, fix="give at least three")
                 for word in values:
                     corners.extend(_corner(word, len(positions) // 3, len(texture) // 2, where))
                 sizes.append(len(values))
@@ -211,7 +211,7 @@ def read_obj(path: Path) -> Obj:
                     f"the keyword {keyword!r} is unknown", where=where, fix="is this a Wavefront OBJ file?"
                 )
     if not corners:
-        raise InputError("a mesh without faces", where=str(path), fix="export triangles")
+        raise InputError("the mesh has no faces", where=str(path), fix="export triangles")
     faces = _Faces(
         path=path,
         corners=np.frombuffer(corners, dtype=np.int64).reshape(-1, 2),
@@ -294,7 +294,7 @@ class _Faces:
                     split = ears(flat[index])
                 except ValueError as error:
                     raise InputError(
-                        f"a face of {size} corners {error}",
+                        f"a face of {size} corners cannot be split: {error}",
                         where=f"{self.path}, line {self.lines[face]}",
                         fix="triangulate the mesh in the program that made it",
                     ) from None

@@ -233,7 +233,7 @@ def test_a_steady_wind_is_refused_and_nothing_is_committed(tmp_path: Path) -> No
     ("options", "what"),
     [
         (["--by", "given"], "needs an offset"),
-        (["--offset", "3"], "takes no offset"),
+        (["--offset", "3"], "needs no offset"),
         (["--by", "given", "--offset", "3"], "needs the uncertainty"),
         (["--by", "stamps"], "needs the uncertainty"),
         (["--offset-sigma", "1"], "is estimated"),

@@ -118,7 +118,7 @@ def test_a_gate_of_too_few_clips_for_the_rate_is_refused_and_lets_nothing_pass()
 
 
 def test_a_verdict_without_reasons_or_a_false_alarm_rate_is_an_error() -> None:
-    with pytest.raises(InputError, match="without a reason"):
+    with pytest.raises(InputError, match="has no reason"):
         verdict([[[]]], false_alarm=0.05, level=exact)
     with pytest.raises(InputError, match="false-alarm"):
         verdict([[reason(0.5)]], false_alarm=0.0, level=exact)

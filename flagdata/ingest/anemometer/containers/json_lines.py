@@ -43,7 +43,7 @@ def as_table(source: TextFile) -> TableText:
     lines = out.getvalue().splitlines()
     if len(lines) < 2:
         raise InputError(
-            "no row in the JSON lines", where=str(source.path), fix="check that the logger recorded anything"
+            "there is no row in the JSON lines", where=str(source.path), fix="check that the logger recorded anything"
         )
     findings = [Finding.of("json-lines", "lines are counted with the names as the first")]
     if left_out:

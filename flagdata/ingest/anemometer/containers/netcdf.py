@@ -113,7 +113,8 @@ def since(attributes: Mapping[str, Any], *, where: str) -> Since:
 
 
 def instants(values: AnyArray, attributes: Mapping[str, Any], *, where: str) -> tuple[IntArray, tuple[Finding, ...]]:
-    """(n,) UTC nanoseconds of a variable as it is stored, `NOT_A_TIME` for missing ones and years beyond 1970 to 2199.
+    """Converts a variable as it is stored to (n,) UTC nanoseconds, `NOT_A_TIME` for missing ones and years beyond 1970
+    to 2199.
 
     Raises:
         TimeError: see `since`.
@@ -189,9 +190,11 @@ def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
     where = str(path)
     time = next((name for name, axis in data.coords.items() if axis.ndim == 1 and is_time(raw[name].attrs)), None)
     if time is None:
-        raise InputError("no axis of time by the CF conventions", where=where, fix="export the readings as CSV")
+        raise InputError(
+            "there is no axis of time by the CF conventions", where=where, fix="export the readings as CSV"
+        )
     if data.sizes[time] > limits.rows:
-        raise LimitError(f"more than {limits.rows} instants", where=where, fix="split the file")
+        raise LimitError(f"there are more than {limits.rows} instants", where=where, fix="split the file")
     columns: dict[str, Any] = {}
     unread: list[str] = []
     for variable in data.data_vars.values():

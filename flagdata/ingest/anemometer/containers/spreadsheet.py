@@ -46,7 +46,7 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
         )
     sheet = _read(where, limits)
     if sheet is None:
-        raise InputError("no sheet with two rows", where=where, fix="check that the workbook holds the log")
+        raise InputError("there is no sheet with two rows", where=where, fix="check that the workbook holds the log")
     findings: tuple[Finding, ...] = ()
     if sheet.others:
         count = 1 + len(sheet.others)

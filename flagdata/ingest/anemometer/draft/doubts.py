@@ -68,7 +68,7 @@ class _Seen:
     reading: Reading
     speed: Series
     direction: Series
-    both: tuple[Series, Series]
+    pairs: tuple[Series, Series]
     unit: str
     assumed: bool
     left_out: int
@@ -125,7 +125,7 @@ def _sight(
         reading=reading,
         speed=speed[np.isfinite(speed)],
         direction=direction[np.isfinite(direction)],
-        both=(speed[finite], direction[finite]),
+        pairs=(speed[finite], direction[finite]),
         unit=unit_name,
         assumed=assumed,
         left_out=left_out,
@@ -281,13 +281,13 @@ def _tens(sight: _Seen) -> str:
 
 
 def _fixed(sight: _Seen) -> str:
-    speed, direction = sight.both
+    speed, direction = sight.pairs
     same = len(direction) > 10 and bool((direction == direction[0]).all()) and len(np.unique(speed)) > 3
     return f"the direction is {direction[0]:g} in every row, while the speed varies" if same else ""
 
 
 def _calm(sight: _Seen) -> str:
-    speed, direction = sight.both
+    speed, direction = sight.pairs
     zero = direction == 0
     si = unit(sight.unit).to_si(speed)
     if zero.sum() < 2 or zero.all():

@@ -151,7 +151,7 @@ class Described:
 def complete(
     open_recipe: OpenRecipe, lines: Sequence[str], options: WindOptions, *, where: str, rename: Any = None
 ) -> Completed:
-    """Complete a recipe by the heading of a file.
+    """Completes a recipe by the heading of a file.
 
     Args:
         lines: the first lines of the file.
@@ -175,7 +175,7 @@ def complete(
     columns, units = _with_units(data, heading, rows, facts, stamped, options, where)
     taken, unread, rivals = _assigned(data["channels"], columns, where=where, heading=heading)
     if not rows:
-        raise InputError("no rows below the heading", where=at_rows, fix="export again")
+        raise InputError("there are no rows below the heading", where=at_rows, fix="export again")
     form, about_time = _format(data["time"], stamped, heading, rows, options, at_rows)
     time = {"columns": stamped, "format": form, **({"zone": zone} if zone else {})}
     facts |= {channel: column.name for channel, column in taken.items()}
@@ -419,7 +419,7 @@ def _assigned(
             raise InputError(message, where=at_names, fix=f"{_FIX}; or let its columns be drafted: --as delimited")
     if not {name for name in taken if name.startswith("wind_") and CHANNELS[name].unit == "m/s"}:
         fix = "let its columns be drafted, and confirm them: --as delimited; or describe the file by a recipe"
-        raise InputError(f"no column of wind speed among {listed}", where=at_names, fix=fix)
+        raise InputError(f"there is no column of wind speed among {listed}", where=at_names, fix=fix)
     return taken, tuple(unread), tuple(rivals)
 
 

@@ -97,8 +97,8 @@ class Stream:
     undirected: int = 0
     unstated: int = 0
     speeds: list[float] = field(default_factory=list)
-    others: list[tuple[Sentence, int]] = field(default_factory=list)
-    beside: Counter[str] = field(default_factory=Counter)
+    older: list[tuple[Sentence, int]] = field(default_factory=list)
+    unread: Counter[str] = field(default_factory=Counter)
     sources: dict[str, set[str]] = field(default_factory=lambda: {wind: set() for wind in _NEWER})
 
 
@@ -245,7 +245,7 @@ def _take(stream: Stream, line: str, at: int, talker: str | None) -> None:
     if talker is not None and sentence.talker != talker:
         return
     if sentence.kind in _OTHERS:
-        stream.others.append((sentence, at))
+        stream.older.append((sentence, at))
     elif sentence.kind in WINDS:
         _wind(stream, sentence, at)
 
@@ -254,10 +254,10 @@ def _take_others(stream: Stream) -> None:
     """Sentences of older kinds, of each wind that the stream holds in no other."""
     channels = {name for row in stream.values for name in row}
     added = False
-    for sentence, at in stream.others:
+    for sentence, at in stream.older:
         kind = _OTHERS[sentence.kind]
         if f"{kind}_speed" in channels:
-            stream.beside[sentence.kind] += 1
+            stream.unread[sentence.kind] += 1
             continue
         added = True
         _wind(stream, sentence, at)
@@ -407,7 +407,7 @@ def _findings(stream: Stream) -> tuple[Finding, ...]:
     note(faults, "sensor-fault", Severity.WARNING, message)
     note(stream.unchecked, "no-checksum", Severity.WARNING, "sentences without a checksum; taken as they are")
     note(stream.unstated, "no-status", Severity.WARNING, "MWV sentences without a status; taken as valid")
-    for kind, number_of in stream.beside.items():
+    for kind, number_of in stream.unread.items():
         message = f"{kind} sentences are not read: {_NEWER[_OTHERS[kind]]} is read for that wind"
         note(number_of, "sentences-not-read", Severity.NOTE, message)
     message = "MWD sentences without a direction: no wind over ground, not read"

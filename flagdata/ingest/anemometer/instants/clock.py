@@ -49,12 +49,12 @@ class Jump:
     Attributes:
         row: the first row after it.
         size: by which it was set [ns]: negative where it was set back.
-        whole: whether that is a multiple of a quarter of an hour; where it is not, it is the step less the usual one.
+        by_quarters: whether that is a multiple of a quarter of an hour; else it is the step less the usual one.
     """
 
     row: int
     size: int
-    whole: bool
+    by_quarters: bool
 
     def text(self) -> str:
         """Writes the jump in words: "set back 1 h", "set on 30 min"."""
@@ -81,8 +81,8 @@ def _jump(row: int, step: int, usual_step: int) -> Jump:
     most = max(3 * usual_step, 60 * NANOSECONDS)
     fitting = [size for size in sizes if size and usual_step // 2 <= step - size <= most]
     if not fitting:
-        return Jump(row=row, size=step - usual_step, whole=False)
-    return Jump(row=row, size=min(fitting, key=lambda size: abs(step - size - usual_step)), whole=True)
+        return Jump(row=row, size=step - usual_step, by_quarters=False)
+    return Jump(row=row, size=min(fitting, key=lambda size: abs(step - size - usual_step)), by_quarters=True)
 
 
 def set_back_a_little(time: Instants, choice: ClockChoice | None) -> tuple[Jump, ...]:
@@ -112,7 +112,7 @@ def set_back_a_little(time: Instants, choice: ClockChoice | None) -> tuple[Jump,
         shift, behind = round(float(solved[2])), at + 1 + after
         undone = behind < len(steps) and abs(int(steps[behind]) - step + shift) <= _APART * abs(shift)
         if shift < 0 and not undone and float(np.abs(clock - sides @ solved).max()) <= _APART * abs(shift):
-            jumps.append(Jump(row=int(rows[at + 1]), size=shift, whole=False))
+            jumps.append(Jump(row=int(rows[at + 1]), size=shift, by_quarters=False))
         if len(jumps) > MOST:
             return ()
     return tuple(jumps)
@@ -142,9 +142,9 @@ def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
         jump = _jump(row + 1, int(steps[row]), step)
         rest = int(steps[row]) - jump.size
         by_chance = wide * step / HOUR * (1 if jump.size == HOUR else 5)
-        by_hours = jump.whole and step // 2 <= rest <= step + max(step // 2, JITTER // 2)
+        by_hours = jump.by_quarters and step // 2 <= rest <= step + max(step // 2, JITTER // 2)
         if steps[row] > _NEVER_SET:
-            jumps.append(Jump(row=row + 1, size=int(steps[row]) - step, whole=False))
+            jumps.append(Jump(row=row + 1, size=int(steps[row]) - step, by_quarters=False))
         elif (
             by_hours
             and steps[row] <= _FARTHEST + 2 * step

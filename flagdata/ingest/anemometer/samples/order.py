@@ -173,7 +173,7 @@ def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> R
 def _believable(time: IntArray, jump: Jump) -> bool:
     """Checks whether a step back is a clock that was set; else it may be files joined in another order."""
     passed_again = int(time[jump.row :].max()) > int(time[jump.row - 1])
-    return jump.size >= -DAY and (jump.whole or jump.size >= -_SMALL or passed_again)
+    return jump.size >= -DAY and (jump.by_quarters or jump.size >= -_SMALL or passed_again)
 
 
 def _runs_back(reading: Reading, where: str, *, settable: bool) -> TimeError:
@@ -215,17 +215,17 @@ def _continued(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | 
 
 @dataclass(frozen=True, kw_only=True)
 class _Runs:
-    """Runs of rows of one stamp: rows, time from each stamp to the next [ns], each row's place in its run."""
+    """Runs of rows of one stamp: rows, time from each stamp to the next [ns], each row's index in its run."""
 
     rows: IntArray
     room: IntArray
-    place: IntArray
+    index: IntArray
 
     @classmethod
     def of(cls, time: IntArray) -> _Runs:
         start = np.flatnonzero(np.concatenate(([True], np.diff(time) != 0)))
         rows = np.diff(np.append(start, len(time)))
-        return cls(rows=rows, room=np.diff(time[start]), place=np.arange(len(time)) - np.repeat(start, rows))
+        return cls(rows=rows, room=np.diff(time[start]), index=np.arange(len(time)) - np.repeat(start, rows))
 
 
 def _distinct(reading: Reading, where: str) -> Reading:
@@ -285,7 +285,7 @@ def _in_room(time: IntArray, runs: _Runs) -> IntArray:
     backward = ~forward & (before >= free + period // 2)
     step = np.where(backward, np.minimum(period, before // rows), step)
     start = np.where(backward, -(rows - 1) * step, 0)
-    return time + np.repeat(start, rows) + runs.place * np.repeat(step, rows)
+    return time + np.repeat(start, rows) + runs.index * np.repeat(step, rows)
 
 
 def _evenly(reading: Reading, runs: _Runs) -> tuple[IntArray, float, int]:
@@ -302,13 +302,13 @@ def _evenly(reading: Reading, runs: _Runs) -> tuple[IntArray, float, int]:
     length = np.round(period * rows).astype(np.int64)
     adjoining = room <= 1.5 * np.maximum(length[:-1], hold)
     length[:-1] = np.where(adjoining, room, np.minimum(length[:-1], room))
-    time = reading.time + np.repeat(length, rows) * runs.place // np.repeat(rows, rows)
+    time = reading.time + np.repeat(length, rows) * runs.index // np.repeat(rows, rows)
     # The log may begin and end within a stamp: those rows keep the period, the first ones before the next stamp.
     first, last = int(rows[0]), len(time) - int(rows[-1])
     if len(room) and adjoining[0]:
         pace = min(period, int(room[0]) / first)  # no row comes before its stamp
         time[:first] = reading.time[first] - np.round(pace * np.arange(first, 0, -1)).astype(np.int64)
-    time[last:] = reading.time[-1] + np.round(period * runs.place[last:]).astype(np.int64)
+    time[last:] = reading.time[-1] + np.round(period * runs.index[last:]).astype(np.int64)
     return time, period, hold
 
 

@@ -101,7 +101,7 @@ def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
     draft = drafted(source, options)
     if draft is None:
         fix = "describe it by a recipe: --sensor FILE.toml"
-        raise UsageError("no table in its first lines", where=where, fix=fix)
+        raise UsageError("there is no table in its first lines", where=where, fix=fix)
     if len(draft.winds) > 1 and options.wind is None:
         question = f"the file holds {len(draft.winds)} anemometers: {', '.join(draft.winds)}; which one?"
         raise OpenFactsError.of([Open(key="wind", question=question, example="COLUMN")], where=where)

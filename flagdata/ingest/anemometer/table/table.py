@@ -115,7 +115,7 @@ class _Gathered:
     bad_stamps: list[int] = field(default_factory=list)
     distant: int = 0
     blank: list[int] = field(default_factory=list)
-    others: set[str] = field(default_factory=set)
+    sites: set[str] = field(default_factory=set)
     """What the column of the sites says in blocks that have no row of the one wanted."""
 
     def columns(self) -> list[_Column]:
@@ -130,7 +130,7 @@ class _Gathered:
         if self.rows is not None and recipe.rows is not None:
             wanted = _among(block, self.rows, (recipe.rows.value,))
             if not wanted.any():
-                self.others.update(map(str.strip, map(str, cells_of(block, self.rows))))
+                self.sites.update(map(str.strip, map(str, cells_of(block, self.rows))))
                 return
             line, block = line[wanted], _where(block, wanted)
         stamps = self.clock.parse(block)
@@ -352,9 +352,9 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
     distance_note = f"; {distant} of them are {years}: a clock that was not set" if distant else ""
     if count == 0 and not bad and recipe.rows is not None:
         raise InputError(
-            f"no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site",
+            f"there is no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site",
             where=where,
-            fix=f"name a site as the file writes it: {_listed(gathered.others)}",
+            fix=f"name a site as the file writes it: {_listed(gathered.sites)}",
         )
     if count == 0:
         refused = InputError if recipe.rows is None else NothingMeasuredError  # of several sites the others are read

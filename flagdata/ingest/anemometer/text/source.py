@@ -372,7 +372,7 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
             spans = np.diff(np.concatenate(([-1 - tail], ends, [len(data)])))
             tail = int(spans[-1]) - 1
             if lines > limits.rows:
-                raise LimitError(f"more than {limits.rows} lines", where=where, fix="split the file")
+                raise LimitError(f"there are more than {limits.rows} lines", where=where, fix="split the file")
             if int(spans.max()) > limits.line:
                 at = int(np.append(ends, len(data))[int(np.argmax(spans))])
                 number = before + max(chunk.count(b"\n", 0, at), chunk.count(b"\r", 0, at)) + 1

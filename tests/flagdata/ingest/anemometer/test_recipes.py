@@ -233,7 +233,7 @@ BAD: list[tuple[str, str, str, str]] = [
     ("column-zero", 'column = "v"', "column = 0", "a whole number of at least 1"),
     ("column-a-list", 'column = "v"', "column = []", "text in quotes or a whole number"),
     ("no-time-column", 'columns = ["t"]\n', "", "no time column"),
-    ("gain-zero", 'unit = "m/s"', 'unit = "m/s"\ngain = 0', "gain of 0"),
+    ("gain-zero", 'unit = "m/s"', 'unit = "m/s"\ngain = 0', "gain is 0"),
     ("gain-text", 'unit = "m/s"', 'unit = "m/s"\ngain = "2"', "a finite number"),
     ("gain-nan", 'unit = "m/s"', 'unit = "m/s"\ngain = nan', "not finite"),
     ("range-empty", 'unit = "m/s"', 'unit = "m/s"\nrange = [5, 1]', "range"),

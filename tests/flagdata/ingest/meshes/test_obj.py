@@ -72,7 +72,7 @@ def test_a_malformed_line_is_refused_by_its_number(tmp_path: Path) -> None:
 
 
 def test_a_mesh_that_is_none_is_refused(tmp_path: Path) -> None:
-    cases = [("v 0 0 0\n", "without faces"), ("", "is empty"), (TRIANGLE + "f 1/1 2/2 3\n", "some corners")]
+    cases = [("v 0 0 0\n", "has no faces"), ("", "is empty"), (TRIANGLE + "f 1/1 2/2 3\n", "some corners")]
     assert not unrefused(lambda text: read(tmp_path, text), cases, InputError)
 
 
