@@ -193,6 +193,7 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
         InputError: too little film.
         RefusedError: a wind that hardly changes; films of several places; a film that does not show the wind.
     """
+    # Usable windows have all their frames and a log that is not silent.
     step = recordings[0].features.layout.step
     usable = [recording.usable for recording in recordings]
     count = sum(int(mask.sum()) for mask in usable)
@@ -203,6 +204,7 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
             fix=f"give {LEAST:.0f} s or more that the log covers; {ENOUGH / 60:.0f} minutes are better",
         )
     _check_wind(recordings, usable)
+    # Their features, with the neighbours' and without, in blocks of time.
     names = recordings[0].features.names
     rows, plain = _rows(recordings, usable)
     numbers = np.repeat(np.arange(len(recordings)), [int(mask.sum()) for mask in usable])
@@ -216,10 +218,12 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
             [recording.winds(offset)[mask] for recording, mask in zip(recordings, usable, strict=True)]
         )
 
+    # The clock's error first: it moves the winds that the features are fitted to.
     clock = max(recording.log.clock for recording in recordings)
     is_named = np.array([not name.startswith(SUMMARY) for name in names])
     offset = _best_offset(plain, winds, blocks, clock, is_named)
     logged = winds(offset)
+    # Penalty and weights by cross-validation over blocks; its errors become the intervals.
     checked = validated(rows, logged, blocks, np.tile(is_named, rows.shape[1] // len(names)))
     spread = float(logged.std())
     if checked.rmse >= spread:
@@ -229,6 +233,7 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
             where=recordings[0].name,
             fix="check the flag with --crop or --flag, and the clocks with flagdata align",
         )
+    # The model itself is fitted to all windows.
     model = ReadingModel(
         network=network.estimator.name,
         identity=network.identity,

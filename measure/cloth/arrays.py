@@ -131,10 +131,10 @@ def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
     table = Columns(where=name, values=values, lines=tuple(range(1, rows + 1)))
     names = sorted(values)
     identity = array_hash({"columns": names}, [values[key] for key in names])
-    return of_columns(table, name=name, identity=identity, beside=None)
+    return of_columns(table, name=name, identity=identity, wind_log=None)
 
 
-def _answer(found: Calibration) -> Calibrated:
+def _answer(calibration: Calibration) -> Calibrated:
     quantities = {
         quantity.name: Weighed(
             unit=quantity.unit,
@@ -145,15 +145,15 @@ def _answer(found: Calibration) -> Calibrated:
             bound=quantity.span.worded(lambda value: f"{value:.4g}", f" {quantity.unit}") if quantity.bounded else None,
             level=quantity.span.level,
         )
-        for quantity in found.cloth
+        for quantity in calibration.cloth
     }
     return Calibrated(
-        sentence=found.sentence,
-        level=found.options.level,
+        sentence=calibration.sentence,
+        level=calibration.options.level,
         quantities=quantities,
-        draws={name: found.draws.cloth[name] for name in quantities},
-        withheld=found.withheld,
-        stated=found.stated,
-        findings=found.findings,
-        document=found.as_dict(),
+        draws={name: calibration.draws.cloth[name] for name in quantities},
+        withheld=calibration.withheld,
+        stated=calibration.stated,
+        findings=calibration.findings,
+        document=calibration.as_dict(),
     )

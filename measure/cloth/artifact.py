@@ -25,21 +25,21 @@ _FORMAT = 1
 _HEAD = "flagdata_calibration"
 
 
-def artifact(found: Calibration, reading: FilmReading, parents: tuple[str, ...]) -> Artifact:
+def artifact(calibration: Calibration, reading: FilmReading, parents: tuple[str, ...]) -> Artifact:
     """Returns the row of a calibration, without its object.
 
     Args:
         reading: how films were read.
         parents: artifacts that the recordings were read from; none for tables.
     """
-    values = {q.name: q.value for q in found.cloth if q.value is not None}
-    sources = [recording.observed.source for recording in found.recordings]
-    spans = [[recording.observed.first, recording.observed.duration] for recording in found.recordings]
+    values = {q.name: q.value for q in calibration.cloth if q.value is not None}
+    sources = [recording.observed.source for recording in calibration.recordings]
+    spans = [[recording.observed.first, recording.observed.duration] for recording in calibration.recordings]
     return Artifact(
         kind=Kind.MEASUREMENT,
-        name=", ".join(recording.observed.name for recording in found.recordings),
+        name=", ".join(recording.observed.name for recording in calibration.recordings),
         parents=parents,
-        seed=found.options.seed,
+        seed=calibration.options.seed,
         parameters=canonical(values),
         recipe={
             "calibrate": ANSWER,
@@ -49,37 +49,44 @@ def artifact(found: Calibration, reading: FilmReading, parents: tuple[str, ...])
             "sources": sources,
             "spans": spans,
             **reading.recipe(),
-            **found.options.recipe(),
+            **calibration.options.recipe(),
         },
-        quality=quality_flags(found.findings),
-        report=canonical({"schema": "flagdata.calibrate-report/1", **found.as_dict()}),
+        quality=quality_flags(calibration.findings),
+        report=canonical({"schema": "flagdata.calibrate-report/1", **calibration.as_dict()}),
     )
 
 
-def keep(lake: Lake, found: Calibration, reading: FilmReading, parents: tuple[str, ...], *, branch: str) -> Placed:
+def keep(
+    lake: Lake, calibration: Calibration, reading: FilmReading, parents: tuple[str, ...], *, branch: str
+) -> Placed:
     """Commit a calibration where it is new, see `flagdata.lake.results`.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    row = artifact(found, reading, parents)
-    return results.keep(lake, row, lambda staged: write(staged, found), f"calibrate {row.name}", branch=branch)
+    row = artifact(calibration, reading, parents)
+    return results.keep(lake, row, lambda staged: write(staged, calibration), f"calibrate {row.name}", branch=branch)
 
 
-def write(path: Path, found: Calibration) -> None:
+def write(path: Path, calibration: Calibration) -> None:
     """Writes a new Zarr folder: `cloth` (draw, quantity) where the weight is not withheld, and for each recording
     `readings-N` (window, observable) and `wind-N` (window)."""
     import zarr
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
-    names = [q.name for q in found.cloth]
+    names = [q.name for q in calibration.cloth]
     group.update_attributes(
-        {_HEAD: {"format": _FORMAT}, "quantities": names, "observables": list(OBSERVED), "answer": found.as_dict()}
+        {
+            _HEAD: {"format": _FORMAT},
+            "quantities": names,
+            "observables": list(OBSERVED),
+            "answer": calibration.as_dict(),
+        }
     )
-    if found.withheld is None:
-        cloth = np.stack([found.draws.cloth[name] for name in names], axis=1)
+    if calibration.withheld is None:
+        cloth = np.stack([calibration.draws.cloth[name] for name in names], axis=1)
         write_plain(group, "cloth", cloth.astype(np.float32), ("draw", "quantity"))
-    for number, recording in enumerate(found.recordings):
+    for number, recording in enumerate(calibration.recordings):
         write_plain(
             group,
             f"readings-{number}",

@@ -27,13 +27,16 @@ from measure.observables.observable import WINDOW
 ANSWER = 5
 """Raised when the same recordings and options get another answer."""
 DETERMINED = 0.8
-"""Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior."""
+"""Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior. Higher gives
+a value where the film says little; lower withholds more of them."""
 _FOLDS = 8
 _CHECKED = 48
-"""Simulations left out that are weighed to check the intervals."""
+"""Simulations left out that are weighed to check the intervals. More make the check of the intervals surer, and slower
+in proportion."""
 _UNLIKE = 0.01
 """Tail probability of a recording's summary among those that the answer predicts below which the weight is withheld: of
-recordings that are as the model has them one in a hundred."""
+recordings that are as the model has them one in a hundred. Higher withholds more weights of flags that are as the model
+has them."""
 _LOOK = (
     "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, --elevation and "
     "--distance; flagdata close-loop looks for what is missing"
@@ -131,17 +134,17 @@ class Check:
 
     Attributes:
         count: of them.
-        held: of them, those whose area weight lies in its interval.
+        contained: of them, those whose area weight lies in its interval.
         error: median error of its value, as a share.
     """
 
     count: int
-    held: int
+    contained: int
     error: float
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
-        return {"count": self.count, "held": self.held, "median_error": self.error}
+        return {"count": self.count, "held": self.contained, "median_error": self.error}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -153,7 +156,7 @@ class Fitted:
         low, middle, high: (window, observable) of simulated flags of the posterior at the level, by the emulator.
         used: (observable,) those whose mean or slope the answer rests on.
         misfit: tail probability of its summary among those that the answer predicts.
-        apart: (2·observable,) summaries less those that the answer predicts, in their standard deviations.
+        deviations: (2·observable,) summaries less those that the answer predicts, in their standard deviations.
         failed: simulations that diverged or hardly show the flag.
     """
 
@@ -163,7 +166,7 @@ class Fitted:
     high: FloatArray
     used: BoolArray
     misfit: float
-    apart: FloatArray
+    deviations: FloatArray
     failed: int
 
     @property
@@ -172,9 +175,11 @@ class Fitted:
         if self.misfit >= _UNLIKE:
             return None
         names = [*OBSERVED, *(f"the change of {name} with the wind" for name in OBSERVED)]
-        order = np.argsort(-np.abs(np.nan_to_num(self.apart)))
+        order = np.argsort(-np.abs(np.nan_to_num(self.deviations)))
         distant = [
-            (names[column], float(self.apart[column])) for column in order.tolist() if abs(self.apart[column]) > _APART
+            (names[column], float(self.deviations[column]))
+            for column in order.tolist()
+            if abs(self.deviations[column]) > _APART
         ]
         if not distant:
             return "its observables together"
@@ -411,28 +416,28 @@ def answered(
 
 
 def _without_unlike(
-    found: Calibration,
-    both: Sequence[tuple[_Simulated, Sight]],
+    calibration: Calibration,
+    models: Sequence[tuple[_Simulated, Sight]],
     options: CalibrationOptions,
     *,
     left_out: Sequence[Finding],
 ) -> Calibration:
     """Returns the answer of those recordings that simulated flags look like, if there are such; otherwise the answer
     as it is, which then is withheld with the reason."""
-    unlike = [recording for recording in found.recordings if recording.unlike is not None]
-    like = [pair for pair, recording in zip(both, found.recordings, strict=True) if recording.unlike is None]
+    unlike = [recording for recording in calibration.recordings if recording.unlike is not None]
+    like = [pair for pair, recording in zip(models, calibration.recordings, strict=True) if recording.unlike is None]
     if not unlike or sum(pair.observed.duration for pair, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
-        return found
+        return calibration
     warned = [Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(fitted), fix=_LOOK) for fitted in unlike]
     again = _answered(like, options, left_out=(*left_out, *warned))
-    return found if again.withheld is not None else again
+    return calibration if again.withheld is not None else again
 
 
 def _answered(
-    both: Sequence[tuple[_Simulated, Sight]], options: CalibrationOptions, *, left_out: Sequence[Finding]
+    models: Sequence[tuple[_Simulated, Sight]], options: CalibrationOptions, *, left_out: Sequence[Finding]
 ) -> Calibration:
     """Returns the answer from recordings whose simulations show what they show."""
-    simulations, sights = [simulation for simulation, _ in both], [sight for _, sight in both]
+    simulations, sights = [simulation for simulation, _ in models], [sight for _, sight in models]
     draws = posterior(sights, [simulation.observed.summary for simulation in simulations], seed=options.seed)
     fitted = tuple(
         _fitted(simulation, sight, draws, number, options)
@@ -475,13 +480,15 @@ def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
     )
 
 
-def checked(made: Sequence[_Simulated], options: CalibrationOptions) -> Check:
+def checked(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Check:
     """Weighs simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
     first recording alone where the others are of other cloths."""
-    weights = [simulation.values[CLOTH[0].name] for simulation in made]
-    made = [simulation for simulation, drawn in zip(made, weights, strict=True) if np.array_equal(drawn, weights[0])]
+    weights = [simulation.values[CLOTH[0].name] for simulation in recordings]
+    recordings = [
+        simulation for simulation, drawn in zip(recordings, weights, strict=True) if np.array_equal(drawn, weights[0])
+    ]
     complete = np.flatnonzero(
-        np.all([np.isfinite(simulation.summaries[:, simulation.used]).all(axis=1) for simulation in made], axis=0)
+        np.all([np.isfinite(simulation.summaries[:, simulation.used]).all(axis=1) for simulation in recordings], axis=0)
     )
     rng = stream(options.seed, "calibrate", "check")
     chosen = rng.permutation(complete)[:_CHECKED]
@@ -490,34 +497,40 @@ def checked(made: Sequence[_Simulated], options: CalibrationOptions) -> Check:
     for fold in range(min(_FOLDS, len(chosen))):
         fold_members = chosen[fold::_FOLDS]
         rest = np.setdiff1d(np.arange(len(weights[0])), fold_members)
-        sights = [simulation.rows(rest).sight(options) for simulation in made]
+        sights = [simulation.rows(rest).sight(options) for simulation in recordings]
         seed = child_seed(options.seed, "check", fold)
-        weight = weighed(sights, [simulation.summaries[fold_members] for simulation in made], seed=seed)[CLOTH[0].name]
+        weight = weighed(sights, [simulation.summaries[fold_members] for simulation in recordings], seed=seed)[
+            CLOTH[0].name
+        ]
         truth = weights[0][fold_members]
         low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
         contained += int(((low <= truth) & (truth <= high)).sum())
         errors.extend(np.abs(middle / truth - 1).tolist())
-    return Check(count=len(errors), held=contained, error=float(np.median(errors)) if errors else math.nan)
+    return Check(count=len(errors), contained=contained, error=float(np.median(errors)) if errors else math.nan)
 
 
 def _placed(options: CalibrationOptions) -> tuple[Uncertain, ...]:
     return (*(q for q in NUISANCES if q.name == "gain"), options.azimuth, options.elevation)
 
 
-def _fitted(made: _Simulated, sight: Sight, found: Posterior, place: int, options: CalibrationOptions) -> Fitted:
+def _fitted(
+    simulated_recording: _Simulated, sight: Sight, posterior_draws: Posterior, index: int, options: CalibrationOptions
+) -> Fitted:
     """Returns what the emulator says that flags of the posterior show."""
-    recording, summaries = made.observed, made.summaries
-    values = {**found.cloth, **found.places[place]}
+    recording, summaries = simulated_recording.observed, simulated_recording.summaries
+    values = {**posterior_draws.cloth, **posterior_draws.places[index]}
     predicted = sight.emulator.draw(values, seed=options.seed)
     used = sight.emulator.used
     count = len(OBSERVED)
     # What depends on nothing that is regressed on is that of simulations at random.
     rows = stream(options.seed, "calibrate", "rows").integers(len(summaries), size=len(predicted))
+    # Replicates of the summary as the answer predicts it.
     replicates = np.where(np.isfinite(summaries), summaries, np.nanmean(summaries, axis=0))[rows]
     replicates[:, used] = predicted
     windows = recording.projection.at(replicates.reshape(len(predicted), -1, count))
     low, middle, high = np.quantile(windows, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=0)
     compared = np.isfinite(recording.summary) & np.isfinite(replicates).all(axis=0)
+    # The recording's distance among those of the replicates is the misfit.
     centre, inverse = replicates[:, compared].mean(axis=0), np.linalg.pinv(np.cov(replicates[:, compared].T))
     offsets = np.concatenate([replicates[:, compared], recording.summary[None, compared]]) - centre
     *distances, distance_observed = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
@@ -535,7 +548,7 @@ def _fitted(made: _Simulated, sight: Sight, found: Posterior, place: int, option
         high=high,
         used=np.asarray(used.reshape(-1, count).any(axis=0)),
         misfit=float((1 + (distance >= distance_observed).sum()) / (1 + len(distance))),
-        apart=deviations,
+        deviations=deviations,
         failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
     )
 
@@ -554,9 +567,9 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     if not calibration.draws.together:
         findings.append(TAKEN_APART)
     check, level = calibration.check, calibration.options.level
-    if check.held < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
+    if check.contained < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
         text = (
-            f"of {check.count} simulations left out, the intervals of {check.held} contain the area weight, where "
+            f"of {check.count} simulations left out, the intervals of {check.contained} contain the area weight, where "
             f"{check.count * level:.0f} are expected: they are too narrow"
         )
         fix = "give more simulations with --simulations"
@@ -569,10 +582,11 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def _unlike(one: Fitted) -> str:
+def _unlike(recording: Fitted) -> str:
     """Returns what is unlike about a recording, and what may be the cause."""
     return (
-        f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth may not be "
+        f"no simulated flag looks like {recording.observed.name} (p = {recording.misfit:.1g}): {recording.unlike}. "
+        "The cloth may not be "
         "separated from what is behind it, or its size, attachment or place be another than stated, or something may "
         "act on it that the model lacks"
     )

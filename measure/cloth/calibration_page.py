@@ -26,11 +26,11 @@ class Band:
     """What a model shows.
 
     Attributes:
-        found: (low middle high, window, observable).
+        limits: (low middle high, window, observable).
         colour: of the band and of its middle.
     """
 
-    found: FloatArray
+    limits: FloatArray
     colour: str
 
 
@@ -53,7 +53,7 @@ def against_wind(observed: Observed, names: Sequence[str], bands: Sequence[Band]
     for axes, name in zip(cells, names, strict=False):
         column = OBSERVED.index(name)
         for band in bands:
-            low, middle, high = band.found[:, order, column]
+            low, middle, high = band.limits[:, order, column]
             axes.fill_between(speed[order], low, high, color=band.colour, alpha=opacity)
             axes.plot(speed[order], middle, color=band.colour)
         axes.plot(speed, observed.readings[:, column], ".", color=dots)
@@ -69,23 +69,25 @@ _BLUE, _RUST = "#2b6f8f", "#c4622d"
 _DEGREES = ("azimuth", "elevation")
 
 
-def calibration_page(found: Calibration, provenance: Mapping[str, str], *, sections: Sequence[Section] = ()) -> str:
+def calibration_page(
+    calibration: Calibration, provenance: Mapping[str, str], *, sections: Sequence[Section] = ()
+) -> str:
     """Writes the page.
 
     Args:
         provenance: rows of a table, in order.
         sections: what comes before it, each under its own heading.
     """
-    check = found.check
+    check = calibration.check
     values = {
-        "name": ", ".join(recording.observed.name for recording in found.recordings),
-        "sentence": found.sentence,
-        "tone": "settled" if found.weight.value is not None else "open" if found.weighs else "missed",
-        "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in found.findings],
-        "level": f"{found.options.level * 100:.3g} %",
-        "cloth": [shown_quantity(q) for q in found.cloth],
-        "stated": found.stated,
-        "posterior": None if found.withheld else _posterior(found),
+        "name": ", ".join(recording.observed.name for recording in calibration.recordings),
+        "sentence": calibration.sentence,
+        "tone": "settled" if calibration.weight.value is not None else "open" if calibration.weighs else "missed",
+        "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in calibration.findings],
+        "level": f"{calibration.options.level * 100:.3g} %",
+        "cloth": [shown_quantity(q) for q in calibration.cloth],
+        "stated": calibration.stated,
+        "posterior": None if calibration.withheld else _posterior(calibration),
         "recordings": [
             {
                 "name": recording.observed.name,
@@ -95,34 +97,34 @@ def calibration_page(found: Calibration, provenance: Mapping[str, str], *, secti
                 "place": [shown_quantity(q) for q in view],
                 "picture": _windows(recording),
             }
-            for recording, view in zip(found.recordings, found.places, strict=True)
+            for recording, view in zip(calibration.recordings, calibration.places, strict=True)
         ],
-        "check": {"count": check.count, "held": check.held, "error": f"{check.error:.1%}"},
+        "check": {"count": check.count, "held": check.contained, "error": f"{check.error:.1%}"},
         "sections": list(sections),
         "provenance": {**provenance, "code": code_version()},
     }
     return render("measure.cloth", "calibration.html.j2", values)
 
 
-def shown_quantity(one: Quantity) -> dict[str, str]:
+def shown_quantity(quantity: Quantity) -> dict[str, str]:
     """Returns a quantity as text: angles in degrees, and as `interval` what its values can be: both ends, or a bound
     with its level."""
-    turn = 180 / math.pi if one.name in _DEGREES else 1.0
-    least, most = one.assumed
-    unit = "" if one.unit == "1" else one.unit
-    interval = one.span.worded(lambda value: f"{value * turn:.3g}")
+    turn = 180 / math.pi if quantity.name in _DEGREES else 1.0
+    least, most = quantity.assumed
+    unit = "" if quantity.unit == "1" else quantity.unit
+    interval = quantity.span.worded(lambda value: f"{value * turn:.3g}")
     return {
-        "name": one.name.replace("_", " "),
-        "unit": "°" if one.name in _DEGREES else unit,
-        "value": "" if one.value is None else f"{one.value * turn:.3g}",
-        "bounded": "yes" if one.bounded else "",
+        "name": quantity.name.replace("_", " "),
+        "unit": "°" if quantity.name in _DEGREES else unit,
+        "value": "" if quantity.value is None else f"{quantity.value * turn:.3g}",
+        "bounded": "yes" if quantity.bounded else "",
         "interval": interval,
-        "level": f"{one.span.level * 100:.3g} %",
+        "level": f"{quantity.span.level * 100:.3g} %",
         "assumed": f"{least * turn:.3g} to {most * turn:.3g}",
     }
 
 
-def _posterior(found: Calibration) -> str:
+def _posterior(calibration: Calibration) -> str:
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
@@ -131,8 +133,8 @@ def _posterior(found: Calibration) -> str:
         low, high = about.at(np.array([0.0, 1.0])).tolist()
         logarithmic = isinstance(about.prior, Range) and about.prior.scale is Scale.LOG
         edges = np.geomspace(low, high, 41) if logarithmic else np.linspace(low, high, 41)
-        axes.hist(found.draws.cloth[about.name], bins=edges, color=_BLUE)
-        axes.axhline(len(found.draws.cloth[about.name]) / 40, color=_RUST)
+        axes.hist(calibration.draws.cloth[about.name], bins=edges, color=_BLUE)
+        axes.axhline(len(calibration.draws.cloth[about.name]) / 40, color=_RUST)
         if logarithmic:
             axes.set_xscale("log")
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30 * low else (1.0,)))
@@ -143,7 +145,7 @@ def _posterior(found: Calibration) -> str:
     return figure_url(figure)
 
 
-def _windows(one: Fitted) -> str:
-    names = [name for name, used in zip(OBSERVED, one.used, strict=True) if used]
-    band = Band(found=np.stack([one.low, one.middle, one.high]), colour=_RUST)
-    return against_wind(one.observed, names, [band], dots=_BLUE, opacity=0.3)
+def _windows(recording: Fitted) -> str:
+    names = [name for name, used in zip(OBSERVED, recording.used, strict=True) if used]
+    band = Band(limits=np.stack([recording.low, recording.middle, recording.high]), colour=_RUST)
+    return against_wind(recording.observed, names, [band], dots=_BLUE, opacity=0.3)

@@ -219,15 +219,17 @@ def workload(durations: Sequence[float], options: FilmLoopOptions) -> float:
     return flags * sum(durations) + finer + paired * lasting(len(durations))
 
 
-def weight(stated: Stated) -> tuple[float, float]:
+def weight(area_weight: Stated) -> tuple[float, float]:
     """Returns mean and standard deviation of a stated area weight [kg/m²]; of a range those of a uniform distribution.
 
     Raises:
         UsageError: a weight that no cloth has.
     """
-    middle = (stated.low + stated.high) / 2
+    middle = (area_weight.low + area_weight.high) / 2
     if not middle > 0:
         raise UsageError(
-            f"the area weight is {stated.text} kg/m²", where="--area-weight", fix="give one above 0, as in 0.155±0.005"
+            f"the area weight is {area_weight.text} kg/m²",
+            where="--area-weight",
+            fix="give one above 0, as in 0.155±0.005",
         )
-    return middle, max(stated.sigma, (stated.high - stated.low) / 12**0.5, _RELATIVE * middle)
+    return middle, max(area_weight.sigma, (area_weight.high - area_weight.low) / 12**0.5, _RELATIVE * middle)

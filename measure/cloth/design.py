@@ -221,7 +221,8 @@ def _read(path: Path) -> FloatArray:
 TOGETHER = 8
 """Flags of a batch: eight take as long as one, and sixteen take 2.7 times as long."""
 PAIRS = 16
-"""Flags with each effect, for each recording."""
+"""Flags with each effect, for each recording. More estimate an effect's change better and take as many more simulations
+for each effect and recording."""
 LONGEST_PAIRS = 120.0
 """s of all recordings together in which flags with an effect are simulated, a minute of each at most."""
 MINUTE = 60.0

@@ -30,7 +30,8 @@ from measure.cloth.prior import CLOTH, Uncertain
 from measure.refine.metamodel import Metamodel, least
 
 SHOWN_BY = 0.8
-"""Share of the simulations that are to show a summary that is used."""
+"""Share of the simulations that are to show a summary that is used. Higher drops summaries that some flags hide; lower
+leaves fewer complete simulations to fit to."""
 INFORMATIVE = 0.8
 """Error of a summary's emulator, as a share of the summary's spread, from which on it is left out of a weighing: what
 depends on nothing that is regressed on adds noise to the scatter's estimate, and nothing else."""
@@ -64,19 +65,21 @@ class Emulator:
     weights: FloatArray
 
     @classmethod
-    def fit(cls, values: Mapping[str, FloatArray], summaries: FloatArray, shown: BoolArray, *, name: str) -> Emulator:
+    def fit(
+        cls, values: Mapping[str, FloatArray], summaries: FloatArray, is_shown: BoolArray, *, name: str
+    ) -> Emulator:
         """Fit it to simulations.
 
         Args:
             values: name → (n,) of the simulations.
             summaries: (n, k), NaN where a simulation does not show one.
-            shown: (k,) those that the recording shows.
+            is_shown: (k,) those that the recording shows.
             name: of the recording.
 
         Raises:
             RefusedError: too few simulations show what the recording shows.
         """
-        used = shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
+        used = is_shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
         complete = np.asarray(np.isfinite(summaries[:, used]).all(axis=1) & used.any(), dtype=np.bool_)
         x, y = regressors(values)[complete], summaries[complete][:, used]
         needed = least(x.shape[1] + 1, y.shape[1]) + 8
@@ -114,13 +117,15 @@ class Emulator:
         return self.model.draw(regressors(values), stream(seed, "calibrate", "predicted"))
 
 
-def informative(values: Mapping[str, FloatArray], summaries: FloatArray, shown: BoolArray, *, name: str) -> BoolArray:
+def informative(
+    values: Mapping[str, FloatArray], summaries: FloatArray, is_shown: BoolArray, *, name: str
+) -> BoolArray:
     """Returns (k,) those of the shown summaries that depend on what is regressed on.
 
     Raises:
         RefusedError: none does.
     """
-    used = shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
+    used = is_shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
     complete = np.isfinite(summaries[:, used]).all(axis=1)
     x, y = regressors(values)[complete], summaries[complete][:, used]
     if len(x) <= x.shape[1] + 1 or not used.any():
@@ -160,9 +165,11 @@ def _ends(quantity: Uncertain) -> tuple[float, float]:
 
 
 FEWEST_FREEDOM = 20
-"""Degrees of freedom below which recordings are taken as independent."""
+"""Degrees of freedom below which recordings are taken as independent. Higher does so more often, and leaves out how
+their residuals are correlated."""
 HEAVY = 10.0
-"""Most degrees of freedom of the t distribution: residuals of simulations have a kurtosis of 4, 3 + 6/(ν − 4)."""
+"""Most degrees of freedom of the t distribution: residuals of simulations have a kurtosis of 4, 3 + 6/(ν − 4). Fewer
+allow for larger residuals and widen the intervals; more approach a normal distribution."""
 TAKEN_APART = Finding.of(
     "recordings-taken-apart",
     "too few simulations for so many recordings: the cloth was taken as a different one in each, so that "

@@ -28,9 +28,11 @@ _DIFFERENCE = 1e-3
 _STARTS = (-0.7, 0.7)
 """Normal scores of the strength at which a search begins."""
 _DRAWS = 256
-"""Importance samples of each experiment."""
+"""Importance samples of each experiment. More lower the error of a Bayes factor with the root of their number, and take
+time in proportion."""
 _WIDER = 1.3
-"""Standard deviations of what they are drawn from over those of the posterior's normal approximation."""
+"""Standard deviations of what they are drawn from over those of the posterior's normal approximation. Nearer to 1
+misses posteriors with heavier tails; larger wastes draws."""
 _TAIL = 6.0
 """Degrees of freedom of what they are drawn from."""
 

@@ -68,9 +68,9 @@ def departures(recordings: Sequence[Observed], sights: Sequence[Sight], base: Fi
     return tuple(sorted(departed, key=lambda departure: -abs(departure.deviations)))
 
 
-def root_mean_square(found: Sequence[Departure]) -> float:
+def root_mean_square(departing: Sequence[Departure]) -> float:
     """Takes the root mean square of departures, in standard deviations of replicates."""
-    return float(np.sqrt(np.mean(np.square([departure.deviations for departure in found]))))
+    return float(np.sqrt(np.mean(np.square([departure.deviations for departure in departing]))))
 
 
 STRONG = 0.9
@@ -209,11 +209,14 @@ def solve(
     if not recordings:
         raise InputError("no recordings are given", where="close-loop", fix="give one or more")
     effects, seed = options.effects, options.calibration.seed
+    # All simulations, read where they were made before.
     simulations = gathered(
         recordings, options.calibration, effects, kinds=options.kinds, folder=folder, workers=workers, stage=stage
     )
+    # A model of what each recording shows, by its simulations; recordings without one are left out.
     recordings, simulations, sights, left_out = shown_by(recordings, simulations)
     effects = tuple(effect for effect in effects if all(effect.name in sight.responses for sight in sights))
+    # Null experiments, the base model's simulations and the recordings, in the same form.
     null, kinds = of_nulls(sights, recordings, simulations, options.area_weight, seed=seed)
     model = of_base(sights, recordings, simulations, options.area_weight, seed=seed)
     experiment = of_recordings(sights, recordings, options.area_weight)

@@ -22,7 +22,8 @@ from measure.cloth.recording import Observed
 from measure.cloth.simulation import Discretisation, FlagBatch
 
 FLAGS = 32
-"""Of each recording that are simulated a second time."""
+"""Of each recording that are simulated a second time. More estimate the correction better; each takes `SLOWER` times as
+long as a flag of the fit."""
 TOGETHER = 8
 """Of them in a batch."""
 LASTING = 12.5

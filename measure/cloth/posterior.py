@@ -25,9 +25,10 @@ from measure.cloth.evidence import Hypothesis, hypothesis
 from measure.cloth.sight import Sight
 
 _STARTS = 4096
-"""Draws of the prior among which walkers start."""
+"""Draws of the prior among which walkers start. More start walkers nearer to a narrow posterior, and cost one
+prediction each."""
 _THIN = 10
-"""Steps between draws that are kept."""
+"""Steps between draws that are kept. Fewer keep draws that are correlated; more keep fewer of them."""
 _STRETCH = 2.0
 """Largest factor of a step, and the inverse of the least one (Goodman and Weare's a)."""
 
@@ -53,12 +54,14 @@ def ensemble(
     def density(scores: FloatArray) -> FloatArray:
         return likelihood(scores) - 0.5 * np.square(scores).sum(axis=2)
 
+    # Walkers start at draws of the prior, chosen by their likelihood.
     prior = rng.standard_normal((groups, _STARTS, dimension))
     # The largest of these are a draw by likelihood without repetition (Gumbel's maximum).
     weight = likelihood(prior) + rng.gumbel(size=prior.shape[:2])
     chosen = np.argsort(-weight, axis=1)[:, :walkers]
     at = np.take_along_axis(prior, chosen[..., None], axis=1)
     value, half, draws = density(at), walkers // 2, []
+    # Stretch moves, each half of the walkers along lines to the other half (Goodman and Weare).
     sides = (slice(0, half), slice(half, None))
     for step in range(steps):
         for moving, still in (sides, sides[::-1]):

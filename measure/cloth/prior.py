@@ -225,21 +225,21 @@ def draws(quantities: tuple[Uncertain, ...], count: int, *, seed: int, name: str
     return {quantity.name: quantity.at(shares[:, column]) for column, quantity in enumerate(quantities)}
 
 
-def stated_angle(about: Uncertain, stated: Stated, *, where: str) -> Uncertain:
+def stated_angle(about: Uncertain, angle: Stated, *, where: str) -> Uncertain:
     """Makes the prior of an angle as the user states it [°], an exact value with the uncertainty of a direction.
 
     Raises:
         UsageError: an azimuth that is not between 0 and 180, or an elevation beyond 60.
     """
     least, most = (1.0, 179.0) if about.name == "azimuth" else (-60.0, 60.0)
-    if stated.low < least or stated.high > most:
+    if angle.low < least or angle.high > most:
         raise UsageError(
-            f"{about.name} is {stated.text}°", where=where, fix=f"give degrees from {least:g} to {most:g}, as in 70±7"
+            f"{about.name} is {angle.text}°", where=where, fix=f"give degrees from {least:g} to {most:g}, as in 70±7"
         )
-    low, high = math.radians(stated.low), math.radians(stated.high)
+    low, high = math.radians(angle.low), math.radians(angle.high)
     if low < high:
         return replace(about, prior=Range(low=low, high=high), source="stated", limits=(low, high))
-    sigma = math.radians(stated.sigma)
+    sigma = math.radians(angle.sigma)
     # An azimuth is to the wind, whose direction is not better known than it is lined up.
     total = math.hypot(sigma, DIRECTION) if about.name == "azimuth" else max(sigma, math.radians(1.0))
     return replace(about, prior=Normal(mean=low, sigma=total), source="stated")

@@ -33,9 +33,10 @@ from measure.observables.film import FilmWindow
 from measure.observables.observable import WINDOW
 
 SHOWN = 0.6
-"""Share of the windows that are to show an observable."""
+"""Share of the windows that are to show an observable. Higher drops observables that some windows hide; lower lets a
+few windows stand for a recording."""
 LEAST_WINDOWS = 4
-"""Fewest windows of a recording: 10 s."""
+"""Fewest windows of a recording: 10 s. Fewer give means that one gust decides."""
 LEAST_IN_ALL = 8
 """Fewest windows of all recordings of a cloth together: 20 s."""
 
@@ -243,21 +244,21 @@ def constant_wind(recordings: Sequence[Observed]) -> tuple[Finding, ...]:
     return (Finding.of("constant-wind", text, fix=fix),)
 
 
-def cut(found: Observed, first: float, last: float | None) -> Observed:
+def cut(observed: Observed, first: float, last: float | None) -> Observed:
     """Cuts out the windows from `first` to `last` [s], `LONGEST` at most.
 
     Raises:
         InputError: the log does not cover them, or too few are left.
     """
     begin = math.ceil(first / WINDOW - 1e-9)
-    end = len(found.readings) if last is None else math.floor(last / WINDOW + 1e-9)
+    end = len(observed.readings) if last is None else math.floor(last / WINDOW + 1e-9)
     most = begin + round(LONGEST / WINDOW)
-    findings = found.findings
-    if min(end, len(found.readings)) > most:
-        findings = (*findings, first_part((min(end, len(found.readings)) - begin) * WINDOW))
-    readings = found.readings[begin : min(end, most)]
-    log = found.log.cut(begin * WINDOW, (begin + len(readings)) * WINDOW)
-    return replace(found, readings=readings, log=log, first=found.first + begin * WINDOW, findings=findings)
+    findings = observed.findings
+    if min(end, len(observed.readings)) > most:
+        findings = (*findings, first_part((min(end, len(observed.readings)) - begin) * WINDOW))
+    readings = observed.readings[begin : min(end, most)]
+    log = observed.log.cut(begin * WINDOW, (begin + len(readings)) * WINDOW)
+    return replace(observed, readings=readings, log=log, first=observed.first + begin * WINDOW, findings=findings)
 
 
 def check_duration(seconds: float, *, where: str) -> None:

@@ -126,37 +126,39 @@ class Scene:
     """Residuals about the regression on the area weight.
 
     Attributes:
-        own: (1, k) of the recordings.
+        observed: (1, k) of the recordings.
         base, null: (n, k) of simulations and null flags.
         kinds: (null,) of numerics.
-        alike: (null,) whose weight is as that of the recordings.
+        comparable: (null,) whose weight is as that of the recordings.
         changes: (effect, k).
     """
 
-    own: FloatArray
+    observed: FloatArray
     base: FloatArray
     null: FloatArray
     kinds: IntArray
-    alike: Mask
+    comparable: Mask
     changes: FloatArray
     _known: dict[frozenset[int], Axes] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, own: Experiments, base: Experiments, nulls: Experiments, kinds: IntArray, changes: FloatArray) -> Scene:
+    def of(
+        cls, observed: Experiments, base: Experiments, nulls: Experiments, kinds: IntArray, changes: FloatArray
+    ) -> Scene:
         """Fits the regression to summaries and weights as scales read them."""
-        at = [_logarithm(experiment, own) for experiment in (own, base, nulls)]
+        at = [_logarithm(experiment, observed) for experiment in (observed, base, nulls)]
         coefficients = np.linalg.lstsq(_regressors(at[1]), base.whole, rcond=None)[0]
         residuals = [
             experiment.whole - _regressors(logarithms) @ coefficients
-            for experiment, logarithms in zip((own, base, nulls), at, strict=True)
+            for experiment, logarithms in zip((observed, base, nulls), at, strict=True)
         ]
         return cls(
-            own=residuals[0],
+            observed=residuals[0],
             base=residuals[1],
             null=residuals[2],
             kinds=kinds,
             changes=changes,
-            alike=np.asarray(np.abs(at[2]) < ALIKE, dtype=np.bool_),
+            comparable=np.asarray(np.abs(at[2]) < ALIKE, dtype=np.bool_),
         )
 
     def axes(self, *without: int) -> Axes:
@@ -172,8 +174,8 @@ class Scene:
         without_kinds = () if without is None else (without,)
         scores = np.concatenate(
             [
-                self.axes(*without_kinds, kind).z(self.null[self.alike & (self.kinds == kind)])
-                for kind in np.unique(self.kinds[self.alike]).tolist()
+                self.axes(*without_kinds, kind).z(self.null[self.comparable & (self.kinds == kind)])
+                for kind in np.unique(self.kinds[self.comparable]).tolist()
                 if kind not in without_kinds
             ]
         )
@@ -197,7 +199,7 @@ class Scored:
         power: (effect,) share of null flags that are beyond the critical value once moved by the effect.
         tested: (effect,) the same of those that are looked for: the suspected one, or all.
         pointed: whether what makes the statistic at the level lies along an effect.
-        alike: (null,) which null flags these are.
+        comparable: (null,) which null flags these are.
     """
 
     z: FloatArray
@@ -209,7 +211,7 @@ class Scored:
     power: FloatArray
     tested: FloatArray
     pointed: bool
-    alike: Mask
+    comparable: Mask
 
     @property
     def p_value(self) -> float:
@@ -218,7 +220,7 @@ class Scored:
 
 
 def score(
-    own: Experiments,
+    observed: Experiments,
     base: Experiments,
     nulls: Experiments,
     kinds: IntArray,
@@ -229,21 +231,21 @@ def score(
     """Test one experiment.
 
     Args:
-        own: of it alone.
+        observed: of it alone.
         base: simulations of the base model.
         nulls: null flags.
         kinds: (null,) of their numerics.
         level: at which power is stated.
     """
-    scene = Scene.of(own, base, nulls, kinds, directions.changes)
+    scene = Scene.of(observed, base, nulls, kinds, directions.changes)
     standing_of_all = scene.standing(None)
-    z = standing_of_all.of(scene.own)
+    z = standing_of_all.of(scene.observed)
     scores = np.full((len(kinds), len(directions.changes) + 1), np.nan)
-    standings = {kind: scene.standing(kind) for kind in np.unique(kinds[scene.alike]).tolist()}
+    standings = {kind: scene.standing(kind) for kind in np.unique(kinds[scene.comparable]).tolist()}
     for kind, standing in standings.items():
-        members = scene.alike & (kinds == kind)
+        members = scene.comparable & (kinds == kind)
         scores[members] = standing.of(scene.null[members])
-    scores, null_kinds = scores[scene.alike], kinds[scene.alike]
+    scores, null_kinds = scores[scene.comparable], kinds[scene.comparable]
     farthest = ClusteredNulls(null=directions.far(scores).max(axis=1), kinds=null_kinds)
     along, alone = directions.along(z)[0], directions.along(scores)
     # As the largest of all directions, whichever was suspected.
@@ -266,11 +268,11 @@ def score(
         power=power,
         tested=power if suspected is None else power[suspected[0] : suspected[0] + 1],
         pointed=suspected is not None or bool((family <= level).any()),
-        alike=scene.alike,
+        comparable=scene.comparable,
     )
 
 
-def _power(scene: Scene, apart: dict[int, Standing], directions: Directions, critical: float | None) -> FloatArray:
+def _power(scene: Scene, by_kind: dict[int, Standing], directions: Directions, critical: float | None) -> FloatArray:
     """Returns (effect,) share of null flags that are beyond a critical value once each effect acts on them."""
     power = np.zeros(len(directions.changes))
     if critical is None:
@@ -280,19 +282,25 @@ def _power(scene: Scene, apart: dict[int, Standing], directions: Directions, cri
         if directions.suspected is not None and directions.suspected[0] == column:
             signs = (directions.suspected[1],)
         beyond = [
-            directions.far(standing.of(scene.null[scene.alike & (scene.kinds == kind)] + sign * change)).max(axis=1)
+            directions.far(standing.of(scene.null[scene.comparable & (scene.kinds == kind)] + sign * change)).max(
+                axis=1
+            )
             > critical
-            for kind, standing in apart.items()
+            for kind, standing in by_kind.items()
             for sign in signs
         ]
         power[column] = float(np.concatenate(beyond).mean())
     return power
 
 
-def _logarithm(each: Experiments, own: Experiments) -> FloatArray:
+def _logarithm(experiments: Experiments, observed: Experiments) -> FloatArray:
     """Returns (n,) of area weights as a scale read them over the stated one; 0 where none was stated, so that all
     are alike."""
-    return np.zeros(len(each)) if each.stated is None or own.stated is None else np.log(each.stated / own.stated[0])
+    return (
+        np.zeros(len(experiments))
+        if experiments.stated is None or observed.stated is None
+        else np.log(experiments.stated / observed.stated[0])
+    )
 
 
 def _regressors(logarithm: FloatArray) -> FloatArray:
@@ -329,9 +337,10 @@ def directions(sights: Sequence[Sight], effects: Sequence[Weighable], suspected:
 
 TEMPERED = 0.5
 """Share of the Bayes factors' logarithms that counts: regressions of an effect from 16 pairs err in the same way in all
-recordings (decision 046)."""
+recordings (decision 046). Nearer to 1 names single effects more often, and wrong ones too."""
 CONFIDENCE = 0.95
-"""Of the set of effects that may be what is missing."""
+"""Of the set of effects that may be what is missing. Higher names more effects side by side; lower leaves out the right
+one more often."""
 PART = 0.25
 """Share of the misfit beyond that of null flags which an effect that is called a part takes away."""
 
@@ -364,34 +373,36 @@ class Judged:
         return self.scored.p_value
 
 
-def judge(own: Weighing, nulls: Misfits, kinds: IntArray, scored: Scored, *, level: float, departure: float) -> Judged:
+def judge(
+    weighing: Weighing, nulls: Misfits, kinds: IntArray, scored: Scored, *, level: float, departure: float
+) -> Judged:
     """Judge one experiment.
 
     Args:
-        own: of it alone.
+        weighing: of it alone.
         nulls: what models leave of null flags.
         kinds: (null,) of their numerics.
         scored: how it was tested.
         level: of the tests.
         departure: root mean square departure of its observables from the base model fitted to it [their scatters].
     """
-    nulls, kinds = nulls.rows(np.flatnonzero(scored.alike).tolist()), kinds[scored.alike]
-    factors = own.factors[0]
+    nulls, kinds = nulls.rows(np.flatnonzero(scored.comparable).tolist()), kinds[scored.comparable]
+    factors = weighing.factors[0]
     probability = np.exp(TEMPERED * factors - logsumexp(TEMPERED * factors))
     order = np.argsort(-probability)
     count = 1 + int(np.searchsorted(np.cumsum(probability[order]), CONFIDENCE - 1e-9))
     confident = tuple(int(column) for column in order[:count])
     leftover = np.array(
         [
-            ClusteredNulls(null=nulls.left[:, column], kinds=kinds).p(float(own.misfits.left[0, column]))
-            for column in range(len(own.effects))
+            ClusteredNulls(null=nulls.left[:, column], kinds=kinds).p(float(weighing.misfits.left[0, column]))
+            for column in range(len(weighing.effects))
         ]
     )
 
-    def judged(conclusion: Conclusion, named: tuple[int, ...] = (), reasons: tuple[str, ...] = ()) -> Judged:
+    def judged(conclusion: Conclusion, indices: tuple[int, ...] = (), reasons: tuple[str, ...] = ()) -> Judged:
         return Judged(
             conclusion=conclusion,
-            named=named,
+            named=indices,
             confident=confident,
             probability=probability,
             leftover=leftover,
@@ -408,7 +419,7 @@ def judge(own: Weighing, nulls: Misfits, kinds: IntArray, scored: Scored, *, lev
         return judged(Conclusion.OUTSIDE)
     if any(leftover[column] > level for column in confident):
         return judged(Conclusion.EFFECT if len(confident) == 1 else Conclusion.ONE_OF, confident)
-    excess = float(own.misfits.base[0] - np.median(nulls.base))
-    explained = float(own.misfits.base[0] - own.misfits.left[0, confident[0]])
+    excess = float(weighing.misfits.base[0] - np.median(nulls.base))
+    explained = float(weighing.misfits.base[0] - weighing.misfits.left[0, confident[0]])
     part = explained >= PART * excess
     return judged(Conclusion.PARTLY, confident[:1]) if part else judged(Conclusion.OUTSIDE)

@@ -102,9 +102,11 @@ class Discretisation:
 COLUMNS = 12
 RATE = 12.5
 """Frames of a simulation [Hz]: a flag of a metre flutters at 1 to 3 Hz, and drawing silhouettes costs as much as they
-do to simulate."""
+do to simulate. Higher shows faster motion and costs drawing in proportion; lower misses the second harmonic of the
+flutter."""
 SETTLE = 4.0
-"""s before the film's first frame that are simulated and not looked at: two swings of a flag of 1.5 m."""
+"""s before the film's first frame that are simulated and not looked at: two swings of a flag of 1.5 m. Shorter leaves
+the start in the film; longer costs time in proportion."""
 BATCH = 16
 """Flags that are simulated together: what a vector register holds in single precision."""
 VERSION = 5
@@ -209,10 +211,10 @@ class FlagBatch:
             "seeds": list(self.seeds),
             "columns": self.columns,
             "observables": list(self.observables),
-            **self._beside(),
+            **self._additions(),
         }
 
-    def _beside(self) -> dict[str, object]:
+    def _additions(self) -> dict[str, object]:
         """Returns what differs from a calibration's simulations, whose hash is older."""
         content: dict[str, object] = {}
         if self.effects:
@@ -277,8 +279,8 @@ class FlagBatch:
             scenes.append(Scene(mesh=mesh, position=start, material=material, handles=handles))
         return scenes
 
-    def _material(self, place: int, damped: float) -> Material:
-        drawn = {name: float(values[place]) for name, values in self.values.items()}
+    def _material(self, index: int, damped: float) -> Material:
+        drawn = {name: float(values[index]) for name, values in self.values.items()}
         return cloth(
             drawn["area_weight"],
             drawn["bending"],

@@ -81,14 +81,14 @@ def gathered(
     paired = [[pairs(design, effect, until=until) for effect in effects] for design in designs]
     null = nulls(designs, first_of([recording.place for recording in recordings]), kinds=kinds, seed=options.seed)
 
-    def all_of(what: str, batches: list) -> FloatArray:
+    def all_of(label: str, batches: list) -> FloatArray:
         total, done = sum(len(batch.seeds) for batch in batches), 0
 
         def advance(count: int) -> None:
             nonlocal done
             done += count
             if stage is not None:
-                stage(what, done, total)
+                stage(label, done, total)
 
         return read(batches, folder=folder, workers=workers, advance=advance)[:, 0]
 
@@ -171,7 +171,7 @@ def sight(
     observed: Observed,
     design: Design,
     base: FloatArray,
-    own: Sequence[tuple[Pairs, FloatArray]],
+    effect_readings: Sequence[tuple[Pairs, FloatArray]],
     correction: Correction,
     *,
     windows: slice | None = None,
@@ -180,7 +180,7 @@ def sight(
 
     Args:
         base: (simulation, window, observable) of the base model.
-        own: of each effect the pairs that were simulated, and their readings.
+        effect_readings: of each effect the pairs that were simulated, and their readings.
         correction: of the base model's.
         windows: a part of it, of which means alone are modelled; None for all of it.
 
@@ -196,9 +196,10 @@ def sight(
         # A change with the wind that depends on nothing here widens the scatter of all others.
         dependent = informative(values, summaries, visible, name=observed.name)
         visible[len(OBSERVED) :] &= dependent[len(OBSERVED) :]
+    # What flags of the base model show, then what each effect changes in pairs of flags with and without it.
     emulator = Emulator.fit(values, summaries, visible, name=observed.name)
     responses = {}
-    for pair, readings in own:
+    for pair, readings in effect_readings:
         count = readings.shape[1]
         projection = Projection(speed=observed.speed[:count], changes=changes)
         with_it = projection.of(readings).reshape(len(readings), -1)
@@ -246,17 +247,17 @@ class _Part(Observed):
 
 
 def of_recordings(
-    sights: Sequence[Sight], recordings: Sequence[Observed], weighed: tuple[float, float] | None
+    sights: Sequence[Sight], recordings: Sequence[Observed], scale_weight: tuple[float, float] | None
 ) -> Experiments:
     """Returns the recordings as the one experiment that they are.
 
     Args:
-        weighed: mean and standard deviation of a stated area weight [kg/m²].
+        scale_weight: mean and standard deviation of a stated area weight [kg/m²].
     """
     summaries = tuple(recording.summary[None, sight.used] for sight, recording in zip(sights, recordings, strict=True))
-    if weighed is None:
+    if scale_weight is None:
         return Experiments(summaries=summaries)
-    mean, sigma = weighed
+    mean, sigma = scale_weight
     return Experiments(summaries=summaries, stated=np.array([mean]), sigma=sigma / mean)
 
 
@@ -264,7 +265,7 @@ def of_nulls(
     sights: Sequence[Sight],
     recordings: Sequence[Observed],
     simulations: Simulations,
-    weighed: tuple[float, float] | None,
+    scale_weight: tuple[float, float] | None,
     *,
     seed: int,
 ) -> tuple[Experiments, IntArray]:
@@ -284,14 +285,14 @@ def of_nulls(
     complete = np.all([np.isfinite(rows).all(axis=1) for rows in columns], axis=0)
     experiments = Experiments(summaries=tuple(rows[complete] for rows in columns))
     kinds = simulations.kinds[complete]
-    return _weighed(experiments, simulations.weights, complete, weighed, seed=seed, what="scale"), kinds
+    return _as_weighed(experiments, simulations.weights, complete, scale_weight, seed=seed, stream_name="scale"), kinds
 
 
 def of_base(
     sights: Sequence[Sight],
     recordings: Sequence[Observed],
     simulations: Simulations,
-    weighed: tuple[float, float] | None,
+    scale_weight: tuple[float, float] | None,
     *,
     seed: int,
 ) -> Experiments:
@@ -306,17 +307,17 @@ def of_base(
     complete = np.all([np.isfinite(rows).all(axis=1) for rows in columns], axis=0)
     experiments = Experiments(summaries=tuple(rows[complete] for rows in columns))
     weights = simulations.designs[0].values()["area_weight"]
-    return _weighed(experiments, weights, complete, weighed, seed=seed, what="scale of the base model")
+    return _as_weighed(experiments, weights, complete, scale_weight, seed=seed, stream_name="scale of the base model")
 
 
-def _weighed(
-    made: Experiments,
+def _as_weighed(
+    experiments: Experiments,
     weights: FloatArray,
     which: BoolArray,
-    weighed: tuple[float, float] | None,
+    scale_weight: tuple[float, float] | None,
     *,
     seed: int,
-    what: str,
+    stream_name: str,
 ) -> Experiments:
     """Experiments with their area weights as a scale reads them that is as good as the one of the recordings' cloth.
 
@@ -324,8 +325,8 @@ def _weighed(
         weights: (n,) of all that were simulated [kg/m²].
         which: (n,) of them the experiments are of.
     """
-    if weighed is None:
-        return made
-    share = weighed[1] / weighed[0]
-    read = weights * np.exp(share * stream(seed, "films", what).standard_normal(len(weights)))
-    return replace(made, stated=read[which], sigma=share)
+    if scale_weight is None:
+        return experiments
+    share = scale_weight[1] / scale_weight[0]
+    read = weights * np.exp(share * stream(seed, "films", stream_name).standard_normal(len(weights)))
+    return replace(experiments, stated=read[which], sigma=share)

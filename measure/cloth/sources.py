@@ -185,10 +185,10 @@ class Sources:
     def read(self, size: FlagSize, *, advance: Callable[[int], object] | None = None) -> Gathered:
         """Read them, and leave out what cannot be used; as `Opened.read`."""
 
-        def one(source: Opened) -> tuple[Opened, tuple[Observed, ...]]:
+        def source_rows(source: Opened) -> tuple[Opened, tuple[Observed, ...]]:
             return source, source.read(size, advance=advance)
 
-        readings, unread = usable(self.opened, one, name=lambda several: several.name)
+        readings, unread = usable(self.opened, source_rows, name=lambda several: several.name)
         recordings, left_out = (
             tuple(recording for _, several in readings for recording in several),
             (*self.left_out, *unread),
@@ -262,7 +262,7 @@ def _of_table(
         raise UsageError(
             "an offset needs a log", where="--clock-offset", fix="name the log: --log ARTIFACT --lake LAKE"
         )
-    recordings = of_table(path, size, beside=log_beside)
+    recordings = of_table(path, size, wind_log=log_beside)
     if recordings[0].place is None:
         return tuple(cut(recording, first, last) for recording in recordings), parent
     if first > 0 or last is not None:

@@ -24,35 +24,37 @@ def stated(
     verdict: Verdict,
     recordings: Sequence[Observed],
     *,
-    weighed: bool,
+    has_weight: bool,
     unseen: tuple[str, ...],
     departing: tuple[Departure, ...],
 ) -> Verdict:
     """States the verdict with all that it says in sentences.
 
     Args:
-        weighed: whether the cloth's area weight was stated.
+        has_weight: whether the cloth's area weight was stated.
         unseen: effects that these recordings would not show.
         departing: what departs from the base model.
     """
     return replace(
         verdict,
         words=lead(verdict),
-        assumptions=assumptions(recordings, weighed=weighed, unseen=unseen),
+        assumptions=assumptions(recordings, has_weight=has_weight, unseen=unseen),
         proposal=missing(departing) if verdict.conclusion not in NOT_REJECTED else "",
-        separating=separating(verdict, weighed=weighed),
+        separating=separating(verdict, has_weight=has_weight),
     )
 
 
-def separating(verdict: Verdict, *, weighed: bool) -> str:
+def separating(verdict: Verdict, *, has_weight: bool) -> str:
     """Returns what would decide between several effects.
 
     Args:
-        weighed: whether the cloth's area weight was stated.
+        has_weight: whether the cloth's area weight was stated.
     """
     if verdict.conclusion is not Conclusion.ONE_OF:
         return ""
-    return f"a recording in another wind, or {'more minutes of it' if weighed else 'the cloth weighed (--area-weight)'}"
+    return (
+        f"a recording in another wind, or {'more minutes of it' if has_weight else 'the cloth weighed (--area-weight)'}"
+    )
 
 
 def missing(departing: Sequence[Departure]) -> str:
@@ -70,14 +72,14 @@ def missing(departing: Sequence[Departure]) -> str:
     return f"What the base model as calibrated does not show, observed less predicted: {', '.join(parts)}."
 
 
-def assumptions(recordings: Sequence[Observed], *, weighed: bool, unseen: tuple[str, ...]) -> tuple[str, ...]:
+def assumptions(recordings: Sequence[Observed], *, has_weight: bool, unseen: tuple[str, ...]) -> tuple[str, ...]:
     """Returns what was taken as given."""
     steady = bool(constant_wind(recordings))
     sentences = [
         "the flag has the stated size and is held as stated, and the camera is where it is stated to be",
         "area weight, bending and damping are calibrated, so that what only changes them is not an effect",
     ]
-    if not weighed:
+    if not has_weight:
         sentences.append(
             "the cloth was not weighed: its weight, the air's density and drag, holes in the cloth, wetness and the "
             "anemometer's gain act alike in a film, so that none of them is found beyond what is assumed of them"

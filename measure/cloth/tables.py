@@ -158,7 +158,7 @@ def _parsed(heading: str) -> tuple[str, str | None]:
     return _named(heading), unit_text.strip() if unit_text else None
 
 
-def _scale(name: str, stated: str | None, size: FlagSize, *, where: str) -> float:
+def _scale(name: str, stated_unit: str | None, size: FlagSize, *, where: str) -> float:
     """Returns what a column's numbers are multiplied by.
 
     Raises:
@@ -167,16 +167,16 @@ def _scale(name: str, stated: str | None, size: FlagSize, *, where: str) -> floa
     """
     about = None if name in _UNITS else OBSERVABLES[name.removesuffix(SIGMA)]
     own_unit = _UNITS[name] if about is None else about.unit
-    if stated is None or stated == own_unit:
+    if stated_unit is None or stated_unit == own_unit:
         return 1.0
-    parsed = unit(stated, where=f"{where}, column {name}")
+    parsed = unit(stated_unit, where=f"{where}, column {name}")
     if parsed.si == own_unit:
         return parsed.scale
     if about is not None and parsed.si == about.measured_in:
         return parsed.scale / (size.length if about.counted_in == "length" else size.height)
     also = "" if about is None or about.measured_in is None else f" or {about.measured_in}"
     raise InputError(
-        f"the unit {spelled(stated) or stated} of {name}, which is in {own_unit}",
+        f"the unit {spelled(stated_unit) or stated_unit} of {name}, which is in {own_unit}",
         where=where,
         fix=f"give {own_unit}{also}",
     )
@@ -262,21 +262,21 @@ class Beside:
     clock: ClockModel
 
 
-def of_table(path: Path, size: FlagSize, *, beside: Beside | None = None) -> tuple[Observed, ...]:
+def of_table(path: Path, size: FlagSize, *, wind_log: Beside | None = None) -> tuple[Observed, ...]:
     """Returns the recordings of a table: one of rows against time, one a row of rows against wind.
 
     Args:
         size: of the flag.
-        beside: the log, where the table has no wind.
+        wind_log: the log, where the table has no wind.
 
     Raises:
         InputError: no such table, or one whose columns do not say what its rows are of.
         FlagdataError: a file that cannot be read.
     """
-    return of_columns(read_table(path, size), name=path.stem, identity=file_hash(path), beside=beside)
+    return of_columns(read_table(path, size), name=path.stem, identity=file_hash(path), wind_log=wind_log)
 
 
-def of_columns(table: Columns, *, name: str, identity: str, beside: Beside | None) -> tuple[Observed, ...]:
+def of_columns(table: Columns, *, name: str, identity: str, wind_log: Beside | None) -> tuple[Observed, ...]:
     """Returns the recordings of a table whose columns were read; as `of_table`.
 
     Args:
@@ -288,13 +288,13 @@ def of_columns(table: Columns, *, name: str, identity: str, beside: Beside | Non
     """
     if not any(column in table for column in OBSERVED):
         raise InputError("no column is an observable", where=table.where, fix=f"name one of {', '.join(OBSERVED)}")
-    if (WIND in table) == (beside is not None):
-        problem = "no column wind" if beside is None else "a column wind, and a log of the wind beside it"
+    if (WIND in table) == (wind_log is not None):
+        problem = "no column wind" if wind_log is None else "a column wind, and a log of the wind beside it"
         raise InputError(
             problem, where=table.where, fix="give the wind in the table or as a log (--log), in one of them"
         )
     if TIME not in table:
-        if beside is not None:
+        if wind_log is not None:
             raise InputError(
                 "the table has no column time to join the log by", where=table.where, fix="add the rows' times"
             )
@@ -303,7 +303,7 @@ def of_columns(table: Columns, *, name: str, identity: str, beside: Beside | Non
         raise InputError(
             f"the table has columns {TIME} and {', '.join(extra)}", where=table.where, fix="keep one of them"
         )
-    return (_against_time(table, name=name, identity=identity, beside=beside),)
+    return (_against_time(table, name=name, identity=identity, wind_log=wind_log),)
 
 
 def rows_of(path: Path, size: FlagSize) -> Columns:
@@ -342,7 +342,7 @@ def instants(table: Columns) -> Instants:
     return table.origin + np.round(table[TIME] * NANOSECONDS).astype(np.int64)
 
 
-def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | None) -> Observed:
+def _against_time(table: Columns, *, name: str, identity: str, wind_log: Beside | None) -> Observed:
     step = spacing(table)
     times = table[TIME]
     begin = float(times[0]) - step / 2
@@ -350,7 +350,7 @@ def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | 
     low = np.maximum(times - step / 2, np.concatenate([[begin], middles]))
     high = np.minimum(times + step / 2, np.concatenate([middles, [times[-1] + step / 2]]))
     edges: FloatArray = begin + WINDOW * np.arange(int((float(high[-1]) - begin) / WINDOW + 1e-6) + 1, dtype=np.float64)
-    if beside is None:
+    if wind_log is None:
         finite = np.isfinite(table[WIND])
         if finite.sum() < _FEWEST_ROWS:
             raise InputError(
@@ -359,8 +359,8 @@ def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | 
         log = Log(times=times[finite] - begin, speed=table[WIND][finite], averaging=step)
     else:
         start = instants(table)[:1] - round(step / 2 * NANOSECONDS)
-        common, sigma = int(beside.clock.to_common(start)[0]), float(beside.clock.sigma(start)[0])
-        log = Log.of(beside.series, start=common, clock=sigma)
+        common, sigma = int(wind_log.clock.to_common(start)[0]), float(wind_log.clock.sigma(start)[0])
+        log = Log.of(wind_log.series, start=common, clock=sigma)
         identity = f"{identity}, its clock {(common - int(start[0])) / NANOSECONDS:+.3f} ± {sigma:.3f} s"
     readings = np.stack(
         [

@@ -62,7 +62,7 @@ def compared(
     *,
     effect: Weighable | None,
     control: Weighable | None,
-    weighed: tuple[float, float] | None = None,
+    scale_weight: tuple[float, float] | None = None,
     seed: int,
 ) -> tuple[Comparison, ...]:
     """Comparisons for each observable: on other halves, and on recordings left out.
@@ -71,7 +71,7 @@ def compared(
         sights: of whole recordings.
         effect: that is named; None for none.
         control: the best wrong effect; None for none.
-        weighed: mean and standard deviation of a stated area weight [kg/m²].
+        scale_weight: mean and standard deviation of a stated area weight [kg/m²].
     """
     comparisons: list[Comparison] = []
     for words, tasks in (
@@ -81,7 +81,7 @@ def compared(
         predictions = [
             predicted
             for task in tasks
-            for predicted in _predicted(task, effect=effect, control=control, weighed=weighed, seed=seed)
+            for predicted in _predicted(task, effect=effect, control=control, scale_weight=scale_weight, seed=seed)
         ]
         for column, name in enumerate(OBSERVED):
             shown_by = [
@@ -131,10 +131,15 @@ def _left_out(recordings: Sequence[Observed], sights: Sequence[Sight]) -> list[_
 
 
 def _predicted(
-    task: _Task, *, effect: Weighable | None, control: Weighable | None, weighed: tuple[float, float] | None, seed: int
+    task: _Task,
+    *,
+    effect: Weighable | None,
+    control: Weighable | None,
+    scale_weight: tuple[float, float] | None,
+    seed: int,
 ) -> list[Prediction]:
     sights = [sight for sight, _ in task.fitted]
-    experiment = of_recordings(sights, [recording for _, recording in task.fitted], weighed)
+    experiment = of_recordings(sights, [recording for _, recording in task.fitted], scale_weight)
     rng = stream(seed, "films", "places")
 
     def means(which: Weighable | None) -> list[FloatArray]:
@@ -179,29 +184,29 @@ def _predicted(
 
 
 def _comparison(
-    words: str, name: str, place: int, own: Sequence[Prediction], control: Weighable | None, *, seed: int
+    words: str, name: str, index: int, predictions: Sequence[Prediction], control: Weighable | None, *, seed: int
 ) -> Comparison:
     """Compares root mean squares over the predicted parts, with intervals by the scatter of replicates."""
     unit = OBSERVABLES[name].unit
     observed, scatter = (
-        np.array([getattr(prediction, key)[place] for prediction in own]) for key in ("observed", "scatter")
+        np.array([getattr(prediction, key)[index] for prediction in predictions]) for key in ("observed", "scatter")
     )
-    noise = scatter * stream(seed, "films", "unseen", words).standard_normal((_DRAWS, len(own)))
+    noise = scatter * stream(seed, "films", "unseen", words).standard_normal((_DRAWS, len(predictions)))
 
     def errors(predicted: Sequence[FloatArray]) -> tuple[float, FloatArray]:
-        off = observed - np.array([prediction[place] for prediction in predicted])
+        off = observed - np.array([prediction[index] for prediction in predicted])
         return float(np.sqrt(np.square(off).mean())), np.sqrt(np.square(off + noise).mean(axis=1))
 
-    before = errors([prediction.before for prediction in own])
-    with_effect = [prediction.after for prediction in own if prediction.after is not None]
-    with_control = [prediction.control for prediction in own if prediction.control is not None]
+    before = errors([prediction.before for prediction in predictions])
+    with_effect = [prediction.after for prediction in predictions if prediction.after is not None]
+    with_control = [prediction.control for prediction in predictions if prediction.control is not None]
     after, wrong = errors(with_effect) if with_effect else None, errors(with_control) if with_control else None
     floor = float(np.sqrt(np.square(scatter).mean()))
     reduction = None if after is None else (before[0] - after[0], before[1] - after[1])
     error_before = _estimate(before, unit)
     return Comparison(
         what=words,
-        frames=sum(prediction.windows for prediction in own),
+        frames=sum(prediction.windows for prediction in predictions),
         before=error_before,
         after=_estimate(after, unit),
         reduction=_estimate(reduction, unit),
@@ -212,10 +217,10 @@ def _comparison(
     )
 
 
-def _estimate(found: tuple[float, FloatArray] | None, unit: str) -> Estimate:
-    if found is None:
+def _estimate(value_and_draws: tuple[float, FloatArray] | None, unit: str) -> Estimate:
+    if value_and_draws is None:
         return Estimate(value=math.nan, low=math.nan, high=math.nan, unit=unit, level=CRITERIA.interval)
-    value, draws = found
+    value, draws = value_and_draws
     tails = [(1 - CRITERIA.interval) / 2, (1 + CRITERIA.interval) / 2]
     low, high = np.quantile(draws, tails).tolist()
     return Estimate(value=value, low=min(low, value), high=max(high, value), unit=unit, level=CRITERIA.interval)

@@ -84,7 +84,7 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
         outcome.sights,
         effect=None if acting is None else acting[0],
         control=effects[rest[0]] if rest and acting is not None else None,
-        weighed=options.area_weight,
+        scale_weight=options.area_weight,
         seed=options.calibration.seed,
     )
     verdict = Verdict(
@@ -114,7 +114,7 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
     return stated(
         verdict,
         outcome.recordings,
-        weighed=options.area_weight is not None,
+        has_weight=options.area_weight is not None,
         unseen=tuple(dict.fromkeys(unseen)),
         departing=tuple(departure for departure in outcome.departures if abs(departure.deviations) >= SEEN),
     )
@@ -196,7 +196,7 @@ def strength_of(effect: Weighable, fit: Fit) -> Estimate:
     shares = ndtr(fit.scores[0][:, -1])  # the last coordinate
     strengths, factor = effect.prior.at(shares), float(np.exp(CRITERIA.reach * CRITERIA.strength_factor))
     marginal, _ = _marginal(strengths, fit.weights[0], effect.column.unit)
-    if (bound := _bound(effect, strengths, shares, fit.weights[0], whole=factor)) is not None:
+    if (bound := _bound(effect, strengths, shares, fit.weights[0], factor=factor)) is not None:
         return bound
     value, size, null = marginal.value, abs(marginal.value), effect.column.described.null
     inward, outward = size * (1 - 1 / factor), size * (factor - 1)
@@ -211,14 +211,14 @@ def strength_of(effect: Weighable, fit: Fit) -> Estimate:
 
 
 def _bound(
-    effect: Weighable, strengths: FloatArray, shares: FloatArray, weights: FloatArray, *, whole: float
+    effect: Weighable, strengths: FloatArray, shares: FloatArray, weights: FloatArray, *, factor: float
 ) -> Estimate | None:
     """Returns a strength that is known on one side only; None of one with two ends.
 
     Args:
         strengths, shares: (n,) of it beyond null, and their places in its prior, of importance samples.
         weights: (n,) of them, of sum 1.
-        whole: factor by which a strength may be off.
+        factor: factor by which a strength may be off.
     """
     even = (np.arange(_EVEN) + 0.5) / _EVEN
     drawn = np.minimum(np.searchsorted(np.cumsum(weights), even), len(weights) - 1)
@@ -236,7 +236,7 @@ def _bound(
         interval.high if interval.bound is Bound.MOST else interval.low if least else float(np.median(strengths[drawn]))
     )
     # A bound gives way by the factor: upwards where it is one from above, and towards zero where it holds a size.
-    wider = end / whole if (end > 0) == least else end * whole
+    wider = end / factor if (end > 0) == least else end * factor
     null = effect.column.described.null
     ends = {Bound.LEAST: (wider, interval.high), Bound.MOST: (interval.low, wider)}.get(
         interval.bound, (interval.low, interval.high)
@@ -278,14 +278,14 @@ def _ranking(outcome: SolvedLoop) -> tuple[Candidate, ...]:
     return tuple(candidates)
 
 
-def _why_not(outcome: SolvedLoop, place: int) -> str:
+def _why_not(outcome: SolvedLoop, index: int) -> str:
     decision = outcome.judged
-    if place in decision.named:
+    if index in decision.named:
         return ""
     if decision.conclusion in NOT_REJECTED:
         return "the base model is not rejected"
-    if decision.leftover[place] <= outcome.options.level:
+    if decision.leftover[index] <= outcome.options.level:
         return "what remains with it is larger than in null experiments"
-    if place in decision.confident:
+    if index in decision.confident:
         return "another effect explains more"
-    return f"its probability is {decision.probability[place]:.1g}, given that one effect is missing"
+    return f"its probability is {decision.probability[index]:.1g}, given that one effect is missing"

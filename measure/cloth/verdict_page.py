@@ -77,14 +77,14 @@ class SideBySide:
     columns: tuple[Moving, ...]
 
 
-def side_by_side(outcome: SolvedLoop, place: int, *, after: str) -> SideBySide | None:
+def side_by_side(outcome: SolvedLoop, index: int, *, after: str) -> SideBySide | None:
     """Returns a recording's window beside what was simulated; None without a film, or where it is too short for halves.
 
     Args:
-        place: of the recording.
+        index: of the recording.
         after: what the model with the effect is called; empty where no effect is named.
     """
-    observed = outcome.recordings[place]
+    observed = outcome.recordings[index]
     excerpt, halves = observed.excerpt, halved(outcome.recordings, outcome.simulations)
     if excerpt is None or not halves:
         return None
@@ -102,7 +102,7 @@ def side_by_side(outcome: SolvedLoop, place: int, *, after: str) -> SideBySide |
         model_fitted = hypothesis(sights, effect)
         fit = fitted(sights, experiment, effect, seed=outcome.options.calibration.seed)
         cloth, places, strength = model_fitted.values(fit.weights[:1] @ fit.scores[0])
-        window, depth = _flown(outcome, place, excerpt.number, {**cloth, **places[place]}, effect, strength)
+        window, depth = _flown(outcome, index, excerpt.number, {**cloth, **places[index]}, effect, strength)
         drawings.append(_moving(label, drawn(window, depth, film, colour)))
     return SideBySide(
         start=observed.first + excerpt.number * WINDOW,
@@ -113,7 +113,7 @@ def side_by_side(outcome: SolvedLoop, place: int, *, after: str) -> SideBySide |
 
 def _flown(
     outcome: SolvedLoop,
-    place: int,
+    index: int,
     number: int,
     values: dict[str, FloatArray],
     effect: Weighable | None,
@@ -126,7 +126,7 @@ def _flown(
         values: name → (1,) of the cloth, the place and the anemometer's gain; what is not among them is at the middle
             of its prior.
     """
-    design = outcome.simulations.designs[place]
+    design = outcome.simulations.designs[index]
     middle = {quantity.name: quantity.at(np.array([0.5])) for quantity in design.quantities()}
     if design.log.distance is not None:
         middle["distance_constant"] = np.array([design.log.distance])
@@ -219,7 +219,7 @@ def verdict_page(verdict: Verdict, outcome: SolvedLoop) -> str:
                 "name": recording.name,
                 "windows": len(recording.readings),
                 "wind": f"{recording.speed.mean():.1f}",
-                "picture": _against_wind(outcome, number, named=bool(verdict.named)),
+                "picture": _against_wind(outcome, number, with_effect=bool(verdict.named)),
                 "beside": side_by_side(outcome, number, after=after),
             }
             for number, recording in enumerate(outcome.recordings)
@@ -267,11 +267,11 @@ def bands(
     return np.asarray(np.quantile(windows, [tail, 0.5, 1 - tail], axis=0))
 
 
-def _against_wind(outcome: SolvedLoop, place: int, *, named: bool) -> str:
+def _against_wind(outcome: SolvedLoop, index: int, *, with_effect: bool) -> str:
     """Draws each observable of a recording's windows against the wind, with both models' bands."""
-    recording, sight = outcome.recordings[place], outcome.sights[place]
+    recording, sight = outcome.recordings[index], outcome.sights[index]
     models: list[tuple[Weighable | None, Fit, str]] = [(None, outcome.base, _BEFORE)]
-    if named and outcome.best is not None:
+    if with_effect and outcome.best is not None:
         models.append((*outcome.best, _AFTER))
     drawn = []
     for effect, fit, colour in models:
@@ -279,12 +279,12 @@ def _against_wind(outcome: SolvedLoop, place: int, *, named: bool) -> str:
         band = bands(
             sight,
             recording,
-            {**cloth, **places[place]},
+            {**cloth, **places[index]},
             fit.weights[0],
             effect,
             strength,
             seed=outcome.options.calibration.seed,
         )
-        drawn.append(Band(found=band, colour=colour))
-    names = [name for column, name in enumerate(OBSERVED) if np.isfinite(drawn[0].found[:, :, column]).all()]
+        drawn.append(Band(limits=band, colour=colour))
+    names = [name for column, name in enumerate(OBSERVED) if np.isfinite(drawn[0].limits[:, :, column]).all()]
     return against_wind(recording, names, drawn, dots=_DOT, opacity=0.25)

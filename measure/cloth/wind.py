@@ -28,11 +28,13 @@ from sim.effects.anemometer_lag import AnemometerLag
 from sim.wind.spectral import VonKarman
 
 WIND_RATE = 10.0
-"""Samples of the wind that blows in a simulation [Hz]; it is linear between them."""
+"""Samples of the wind that blows in a simulation [Hz]; it is linear between them. Higher fills in smaller eddies; lower
+smooths gusts that move a flag."""
 LATERAL, VERTICAL = 0.78, 0.52
 """Standard deviation across the wind and upwards over that along it, near the ground (ESDU 85020)."""
 _BIN = 1.0
-"""Shortest bin that the lag is undone on [s]: on shorter ones it would raise the log's noise."""
+"""Shortest bin that the lag is undone on [s]: on shorter ones it would raise the log's noise. Longer leaves more of the
+lag in."""
 _LEAST = 0.01
 """Least intensity of turbulence that is filled in: that of a tunnel."""
 STEADY = 0.05
@@ -197,18 +199,21 @@ def blown(log: Log, *, before: float, duration: float, distance: float, eddies: 
     """
     count = int(np.ceil((before + duration) * WIND_RATE)) + 2
     times = np.arange(count) / WIND_RATE - before
+    # The logged wind, its lag undone.
     logged_velocity = log.velocity(distance)
     mean = float(log.speed.mean())
     intensity = float(np.clip(logged_velocity[:, 0].std() / mean, _LEAST, 0.5))
     # From the log's own first sample on, so that the instrument's start in balance lies before what is used.
     first = min(float(log.times[0]), -before)
     grid = np.arange(int(np.ceil((times[-1] - first) * WIND_RATE)) + 1) / WIND_RATE + first
+    # Turbulence of the spectrum, on a grid that begins early enough.
     rng = stream(seed, "calibrate", "turbulence")
     drawn = []
     for ratio, length in ((1.0, eddies), (LATERAL, eddies / 2), (VERTICAL, eddies / 2)):
         spectrum = VonKarman(mean=mean, intensity=intensity * ratio, length=length)
         drawn.append(spectrum.series(rng, duration=len(grid) / WIND_RATE, rate=WIND_RATE)[: len(grid)] - mean)
     turbulence = np.stack(drawn, axis=1)
+    # What the same instrument would have logged of it is subtracted: it is in the log already.
     logged_axes = 2 if log.turn is not None else 1
     logged = _read(grid, mean + turbulence[:, :logged_axes], log, distance=distance) - mean
     again = _undone(log.times, logged, lag=distance / mean)

@@ -120,10 +120,10 @@ def calibrate(chosen: CalibrateCommand) -> None:
     with progress(None, label="observe", unit="window") as advance:
         gathered = weighable.read(size, advance=advance)
     observed, parents = gathered.recordings, gathered.parents
-    work = sum(options.simulations * one.duration + effort(one.duration) for one in observed)
+    work = sum(options.simulations * recording.duration + effort(recording.duration) for recording in observed)
     say(announced(work, workers=workers))
     with progress((options.simulations + FLAGS) * len(observed), label="calibrate", unit="flag") as advance:
-        found = calibrated(
+        calibration = calibrated(
             observed,
             options,
             folder=folder_of(chosen),
@@ -133,23 +133,27 @@ def calibrate(chosen: CalibrateCommand) -> None:
         )
     wanted = None
     if lake is not None and not chosen.read_only:
-        wanted = placed(lake, artifact(found, reading, parents), branch=chosen.branch).artifact.id
-    text = None if chosen.report is None else page(found, _provenance(found, wanted), sections=_sections(anemometer))
-    place = None
+        wanted = placed(lake, artifact(calibration, reading, parents), branch=chosen.branch).artifact.id
+    text = (
+        None
+        if chosen.report is None
+        else page(calibration, _provenance(calibration, wanted), sections=_sections(anemometer))
+    )
+    placed_row = None
     if lake is not None and wanted is not None:
-        place = keep(lake, found, reading, parents, branch=chosen.branch)
-        say(f"{wanted[:SHORT]}  measurement, {place.sentence}")
+        placed_row = keep(lake, calibration, reading, parents, branch=chosen.branch)
+        say(f"{wanted[:SHORT]}  measurement, {placed_row.sentence}")
     if chosen.report is not None and text is not None:
-        new = place is not None and place.new
+        new = placed_row is not None and placed_row.new
         with following(f"the calibration {wanted}", "writing its report") if new else nullcontext():
             write_file(chosen.report, text, command="calibrate")
             say(f"report: {chosen.report}")
     if chosen.as_json:
-        own = None if anemometer is None else anemometer.as_dict()
-        document("calibrate", {**found.as_dict(), "artifact": wanted, "anemometer": own})
+        anemometer_answer = None if anemometer is None else anemometer.as_dict()
+        document("calibrate", {**calibration.as_dict(), "artifact": wanted, "anemometer": anemometer_answer})
     else:
-        _print(found)
-    if not found.weighs:
+        _print(calibration)
+    if not calibration.weighs:
         raise click.exceptions.Exit(RefusedError.exit_code)
 
 
@@ -172,8 +176,8 @@ def _check_only(chosen: CalibrateCommand) -> None:
     """Raises:
     UsageError: an option of what is not to be done.
     """
-    others = {"weight": {"name", "model"}, "anemometer": _OF_WEIGHT}.get(chosen.only or "", set())
-    for name in sorted(others & typed(chosen)):
+    ignored = {"weight": {"name", "model"}, "anemometer": _OF_WEIGHT}.get(chosen.only or "", set())
+    for name in sorted(ignored & typed(chosen)):
         spelled = described(CalibrateCommand)[name][1].spelled(name)
         raise UsageError(
             f"{spelled} cannot be combined with --only {chosen.only}", where=spelled, fix=f"leave {spelled} out"
@@ -181,7 +185,8 @@ def _check_only(chosen: CalibrateCommand) -> None:
 
 
 def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: FilmReading, lake: Lake | None) -> Made | None:
-    """The reading model; None with the reason on stderr where none can be made and the weight was asked for as well."""
+    """Makes the reading model; returns None with the reason on stderr where none can be made and the weight was asked
+    for as well."""
     from measure.anemometer.making import made
     from measure.cloth.sources import is_table
 
@@ -238,7 +243,7 @@ def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
     from measure.anemometer.section import page
 
     if report is not None:
-        rows = {one.name: f"recording {one.identity}" for one in anemometer.result.recordings}
+        rows = {recording.name: f"recording {recording.identity}" for recording in anemometer.result.recordings}
         rows |= {"network": f"{anemometer.result.model.network}, SHA-256 {anemometer.result.model.identity}"}
         rows |= {} if anemometer.artifact is None else {"artifact": anemometer.artifact}
         text = page(anemometer.result, anemometer.name, rows)
@@ -251,37 +256,40 @@ def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
         echo(anemometer.result.sentence)
 
 
-def _provenance(found: Calibration, artifact: str | None) -> dict[str, str]:
+def _provenance(calibration: Calibration, artifact: str | None) -> dict[str, str]:
     rows = {
-        f"recording {number}": f"{one.observed.name}, from {one.observed.first:g} s on, {one.observed.source}"
-        for number, one in enumerate(found.recordings, start=1)
+        f"recording {number}": f"{recording.observed.name}, from {recording.observed.first:g} s on, "
+        f"{recording.observed.source}"
+        for number, recording in enumerate(calibration.recordings, start=1)
     }
-    rows |= {name.replace("_", " "): str(value) for name, value in found.options.recipe().items()}
-    rows |= {about.name: about.degrees for about in (found.options.azimuth, found.options.elevation)}
+    rows |= {name.replace("_", " "): str(value) for name, value in calibration.options.recipe().items()}
+    rows |= {about.name: about.degrees for about in (calibration.options.azimuth, calibration.options.elevation)}
     return rows if artifact is None else {**rows, "artifact": artifact}
 
 
-def _print(found: Calibration) -> None:
+def _print(calibration: Calibration) -> None:
     from measure.cloth.calibration_page import shown_quantity as shown
 
-    echo(found.sentence)
-    for one in found.cloth[1:]:
-        row = shown(one)
+    echo(calibration.sentence)
+    for quantity in calibration.cloth[1:]:
+        row = shown(quantity)
         value = "not determined"
         if row["value"]:
             value = f"{row['value']} {row['interval']} {row['unit']}"
         elif row["bounded"]:
             value = f"{row['interval']} {row['unit']}, {row['level']}"
         echo(f"{row['name']}: {value} (assumed: {row['assumed']})")
-    for recording, place in zip(found.recordings, found.places, strict=True):
-        fitted = ", ".join(f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place))
+    for recording, place_quantities in zip(calibration.recordings, calibration.places, strict=True):
+        fitted = ", ".join(
+            f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place_quantities)
+        )
         say(f"  {recording.observed.name}: {fitted}")
-    check = found.check
+    check = calibration.check
     say(
-        f"  intervals of {check.held} of {check.count} simulations left out contain their weight, median error "
+        f"  intervals of {check.contained} of {check.count} simulations left out contain their weight, median error "
         f"{check.error:.1%}"
     )
-    for finding in found.findings:
+    for finding in calibration.findings:
         say_finding(finding)
-    if found.stated is not None:
-        say(f"for flagdata measure: --area-weight {found.stated}")
+    if calibration.stated is not None:
+        say(f"for flagdata measure: --area-weight {calibration.stated}")

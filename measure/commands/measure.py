@@ -106,16 +106,16 @@ def measure(chosen: MeasureCommand) -> None:
     weight = request.options.area_weight
     if weight is not None and request.origin is not None:
         say(f"area weight {weight.text} kg/m² of {chosen.material}: {request.origin}")
-    found = subjects(chosen.source, query=chosen.query, lake=lake, at=at, reading=request.reading)
+    clips = subjects(chosen.source, query=chosen.query, lake=lake, at=at, reading=request.reading)
     job = _Job(chosen=chosen, request=request, network=network(chosen.model, lake=lake, at=at), lake=lake, at=at)
     if chosen.query is not None:
         if chosen.report is not None or chosen.zarr is not None or chosen.as_csv or chosen.refine is not None:
             raise UsageError(
                 "a page, a Zarr, a CSV or a refinement is of one film", fix="measure one clip by its id, or use --json"
             )
-        _several(job, found)
+        _several(job, clips)
         return
-    done = job.do(found[0])
+    done = job.do(clips[0])
     job.refuse(done)
     if chosen.as_json:
         document("measure", done.as_dict(anyway=chosen.anyway))
@@ -135,17 +135,17 @@ class _Done:
     elsewhere: WindComparison | None
 
     def as_dict(self, *, anyway: bool) -> dict[str, Any]:
-        shown = self.measured.shown(anyway=anyway)
-        known = self.subject.known or {}
+        reported = self.measured.shown(anyway=anyway)
+        truths = self.subject.known or {}
         return {
             **self.measured.as_dict(anyway=anyway),
-            "series": self.series.as_dict() if shown else None,
+            "series": self.series.as_dict() if reported else None,
             "source": None if self.subject.artifact is None else self.subject.artifact.id,
             "artifact": self.artifact,
             "refinement": None if self.refinement is None else self.refinement.as_dict(),
             "wind_elsewhere": None if self.elsewhere is None else self.elsewhere.as_dict(),
             "conditioning": self.subject.film.as_dict(),
-            "simulated_with": {name: known[name] for name in self.measured.names if name in known} or None,
+            "simulated_with": {name: truths[name] for name in self.measured.names if name in truths} or None,
         }
 
 
@@ -174,17 +174,17 @@ class _Job:
         wind = None if subject.record is None else subject.record.wind()
         series = beside(measured, start=subject.film.start, wind=wind)
         _warn(measured.noticed(anyway=self.chosen.anyway))
-        shown = measured.shown(anyway=self.chosen.anyway)
+        reported = measured.shown(anyway=self.chosen.anyway)
         refinement = None
-        if self.request.options.refine is not None and shown:
+        if self.request.options.refine is not None and reported:
             from measure.estimate.refined import refined
 
             refinement = refined(
                 measured, subject, estimator, budget=self.request.options.refine, cache=self.chosen.cache
             )
             _warn(refinement.findings)
-        found = None if refinement is None else refinement.as_dict()
-        lake = None if self.chosen.read_only or not shown else self.lake
+        refinement_values = None if refinement is None else refinement.as_dict()
+        lake = None if self.chosen.read_only or not reported else self.lake
         artifact = None
         if lake is not None:
             row = artifact_of(measured, subject, self.network, self.request.reading)
@@ -194,7 +194,7 @@ class _Job:
             text = self._page(measured, series, subject, artifact, refinement)
         published = False
         if lake is not None and artifact is not None:
-            place = keep(
+            placed_row = keep(
                 lake,
                 measured,
                 subject,
@@ -202,17 +202,17 @@ class _Job:
                 self.request.reading,
                 series,
                 branch=self.chosen.branch,
-                refinement=found,
+                refinement=refinement_values,
             )
-            published = place.new
-            say(f"{artifact[:SHORT]}  measurement, {place.sentence}")
+            published = placed_row.new
+            say(f"{artifact[:SHORT]}  measurement, {placed_row.sentence}")
 
-        def writing(what: str) -> AbstractContextManager[None]:
-            return following(f"the measurement {artifact}", f"writing {what}") if published else nullcontext()
+        def writing(written: str) -> AbstractContextManager[None]:
+            return following(f"the measurement {artifact}", f"writing {written}") if published else nullcontext()
 
-        if self.chosen.zarr is not None and shown:
+        if self.chosen.zarr is not None and reported:
             with writing("its Zarr folder"), fresh_folder(self.chosen.zarr) as scratch:
-                write(scratch, measured, series, found)
+                write(scratch, measured, series, refinement_values)
         if self.chosen.report is not None and text is not None:
             with writing("its report"):
                 write_file(self.chosen.report, text, command="measure")
@@ -249,7 +249,7 @@ class _Job:
         artifact: str | None,
         refinement: Refinement | None,
     ) -> str:
-        """The page of a report.
+        """Renders the page of a report.
 
         Args:
             artifact: id of the measurement in the lake; None where it is not to be there.
@@ -303,17 +303,17 @@ def _given(options: Options, reading: FilmReading) -> Mapping[str, Any]:
     return {k: v for k, v in {**options.recipe(), **reading.recipe()}.items() if v is not None}
 
 
-def _several(job: _Job, found: Sequence[Subject]) -> None:
-    done = [job.do(subject) for subject in found]
-    shown = [one for one in done if one.measured.shown(anyway=job.chosen.anyway)]
+def _several(job: _Job, clips: Sequence[Subject]) -> None:
+    done = [job.do(subject) for subject in clips]
+    reported = [result for result in done if result.measured.shown(anyway=job.chosen.anyway)]
     if job.chosen.as_json:
-        document("measurements", {"measurements": [one.as_dict(anyway=job.chosen.anyway) for one in done]})
+        document("measurements", {"measurements": [result.as_dict(anyway=job.chosen.anyway) for result in done]})
     else:
-        for one in done:
-            source = one.subject.artifact.id[:SHORT] if one.subject.artifact is not None else one.measured.film
-            answer = one.measured.sentence if one in shown else f"refused: {one.measured.verdict.sentence}"
+        for result in done:
+            source = result.subject.artifact.id[:SHORT] if result.subject.artifact is not None else result.measured.film
+            answer = result.measured.sentence if result in reported else f"refused: {result.measured.verdict.sentence}"
             echo(f"{source}  {answer}")
-    if not shown:
+    if not reported:
         raise RefusedError(
             f"all {len(done)} clips are unlike what the network was trained on",
             where="--query",
@@ -334,9 +334,11 @@ def _report(done: _Done, *, series: bool) -> None:
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
     echo(mark + measured.sentence)
     say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.verdict.window_p)} windows in the answer")
-    known = done.subject.known or {}
-    if shown := [f"{SHORT[q.name]} {known[q.name]:.3g} {q.unit}" for q in measured.quantities if q.name in known]:
-        say(f"  simulated with {', '.join(shown)}")
+    truths = done.subject.known or {}
+    if simulated_with := [
+        f"{SHORT[q.name]} {truths[q.name]:.3g} {q.unit}" for q in measured.quantities if q.name in truths
+    ]:
+        say(f"  simulated with {', '.join(simulated_with)}")
     for finding in measured.bounds:
         if finding.severity is Severity.NOTE:
             say(f"  {finding.what}; {finding.fix}")
@@ -358,7 +360,7 @@ def _report(done: _Done, *, series: bool) -> None:
 
 @contextmanager
 def _advancing(label: str, unit: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar whose length is given with the first step."""
+    """Shows a progress bar whose length is given with the first step."""
     with ExitStack() as stack:
         steps: list[Callable[[int], None]] = []
 

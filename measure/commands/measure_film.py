@@ -54,17 +54,17 @@ def run(
 
 
 def weight(
-    given: Stated | None, material: str | None, *, lake: Lake | None, at: str | None
+    area_weight: Stated | None, material: str | None, *, lake: Lake | None, at: str | None
 ) -> tuple[Stated | None, str | None]:
-    """The area weight that was given, by itself or by a material's name, and where the latter is from.
+    """Returns the area weight that was given, by itself or by a material's name, and where the latter is from.
 
     Raises:
         UsageError: both were given.
         UnknownNameError: no such material.
     """
-    if given is not None and material is not None:
+    if area_weight is not None and material is not None:
         raise UsageError("the area weight is given twice", fix="choose one of --area-weight and --material")
-    return (given, None) if material is None else weight_of(material, lake=lake, at=at)
+    return (area_weight, None) if material is None else weight_of(material, lake=lake, at=at)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,8 +91,8 @@ class Request:
         Raises:
             FlagdataError: options that contradict each other, or values that no flag has.
         """
-        given = None if chosen.area_weight is None else Stated.of(chosen.area_weight)
-        stated, origin = weight(given, chosen.material, lake=lake, at=at)
+        area_weight = None if chosen.area_weight is None else Stated.of(chosen.area_weight)
+        chosen_weight, origin = weight(area_weight, chosen.material, lake=lake, at=at)
         size = size_of(chosen.source, chosen.flag_size)
         options = Options(
             size=size,
@@ -103,7 +103,7 @@ class Request:
             false_alarm=chosen.false_alarm,
             seed=chosen.seed,
             refine=refine,
-            area_weight=stated,
+            area_weight=chosen_weight,
         )
         return cls(options=options, reading=FilmReading.of(chosen, size), origin=origin)
 
@@ -117,43 +117,43 @@ def measured(chosen: Measuring) -> Measured:
     lake = lake_of(chosen.lake)
     request = Request.of(chosen, lake=lake, at=chosen.at)
     (subject,) = _subjects(chosen.source, lake=lake, at=chosen.at, reading=request.reading)
-    found = run(subject, network(chosen.model, lake=lake, at=chosen.at), request.options)
-    verdict = found.verdict
+    measurement = run(subject, network(chosen.model, lake=lake, at=chosen.at), request.options)
+    verdict = measurement.verdict
     return Measured(
-        film=found.film,
-        rate=found.rate,
-        duration=found.duration,
-        network=found.model,
+        film=measurement.film,
+        rate=measurement.rate,
+        duration=measurement.duration,
+        network=measurement.model,
         refused=verdict.refused,
         verdict=verdict.sentence,
         reasons=tuple(
             Finding(
-                kind=one.kind,
+                kind=reason.kind,
                 severity=Severity.WARNING,
-                what=one.what,
-                fix=one.fix,
-                value=one.value if one.p is None else one.p,
+                what=reason.what,
+                fix=reason.fix,
+                value=reason.value if reason.p is None else reason.p,
             )
-            for one in verdict.reasons
+            for reason in verdict.reasons
         ),
-        findings=found.noticed(anyway=chosen.anyway),
+        findings=measurement.noticed(anyway=chosen.anyway),
         figures=subject.film.as_dict(),
-        given=_answer(found) if found.shown(anyway=chosen.anyway) else None,
-        elsewhere=wind_elsewhere(found, chosen),
+        given=_answer(measurement) if measurement.shown(anyway=chosen.anyway) else None,
+        elsewhere=wind_elsewhere(measurement, chosen),
     )
 
 
-def wind_elsewhere(found: Measurement, chosen: Measuring) -> WindComparison | None:
+def wind_elsewhere(measurement: Measurement, chosen: Measuring) -> WindComparison | None:
     """Compares the measured wind with the one that was stated beside it; None where none was, or nothing is shown."""
-    if chosen.wind is None or not found.shown(anyway=chosen.anyway):
+    if chosen.wind is None or not measurement.shown(anyway=chosen.anyway):
         return None
-    (wind,) = (quantity for quantity in found.quantities if quantity.name == "wind_speed")
+    (wind,) = (quantity for quantity in measurement.quantities if quantity.name == "wind_speed")
     return compared(
-        found.draws[:, found.names.index("wind_speed")],
+        measurement.draws[:, measurement.names.index("wind_speed")],
         Stated.of(chosen.wind),
         is_bound=wind.span.bound is not None,
-        level=found.options.level,
-        seed=found.options.seed,
+        level=measurement.options.level,
+        seed=measurement.options.seed,
     )
 
 
@@ -167,31 +167,34 @@ def _subjects(source: Path | str | Frames, *, lake: Lake | None, at: str | None,
     return [Subject(film=reading.conditioned(source))]
 
 
-def _answer(found: Measurement) -> Answer:
-    quantities = {one.name: _estimate(one) for one in found.quantities}
-    rows = {name: [window.quantity(name) for window in found.windows] for name in found.names}
+def _answer(measurement: Measurement) -> Answer:
+    quantities = {quantity.name: _estimate(quantity) for quantity in measurement.quantities}
+    rows = {name: [window.quantity(name) for window in measurement.windows] for name in measurement.names}
     nan = float("nan")
     windows = Windows(
-        start=np.array([window.start for window in found.windows]),
-        end=np.array([window.end for window in found.windows]),
-        p=np.array([window.p for window in found.windows]),
-        value={name: np.array([nan if q.value is None else q.value for q in own]) for name, own in rows.items()},
-        low={name: np.array([q.span.low for q in own]) for name, own in rows.items()},
-        high={name: np.array([q.span.high for q in own]) for name, own in rows.items()},
+        start=np.array([window.start for window in measurement.windows]),
+        end=np.array([window.end for window in measurement.windows]),
+        p=np.array([window.p for window in measurement.windows]),
+        value={
+            name: np.array([nan if q.value is None else q.value for q in windows_of])
+            for name, windows_of in rows.items()
+        },
+        low={name: np.array([q.span.low for q in windows_of]) for name, windows_of in rows.items()},
+        high={name: np.array([q.span.high for q in windows_of]) for name, windows_of in rows.items()},
     )
-    draws = {name: found.draws[:, column] for column, name in enumerate(found.names)}
-    return Answer(sentence=found.sentence, quantities=quantities, draws=draws, windows=windows)
+    draws = {name: measurement.draws[:, column] for column, name in enumerate(measurement.names)}
+    return Answer(sentence=measurement.sentence, quantities=quantities, draws=draws, windows=windows)
 
 
-def _estimate(one: Quantity) -> Estimate:
+def _estimate(quantity: Quantity) -> Estimate:
     return Estimate(
-        unit=one.unit,
-        value=one.value,
-        sigma=one.sigma,
-        interval=(one.span.low, one.span.high),
-        level=one.span.level,
-        bound=None if one.span.bound is None else one.span.bound.value,
-        constrained=one.constrained,
-        assumed=one.assumed,
-        given=one.given,
+        unit=quantity.unit,
+        value=quantity.value,
+        sigma=quantity.sigma,
+        interval=(quantity.span.low, quantity.span.high),
+        level=quantity.span.level,
+        bound=None if quantity.span.bound is None else quantity.span.bound.value,
+        constrained=quantity.constrained,
+        assumed=quantity.assumed,
+        given=quantity.given,
     )

@@ -35,7 +35,7 @@ REFUSED = "refused-by-gate"
 
 
 def artifact(measured: Measurement, subject: Subject, network: Network, reading: FilmReading) -> Artifact:
-    """The row of a measurement, without its object."""
+    """Builds the row of a measurement, without its object."""
     parents = [] if subject.artifact is None else [subject.artifact.id]
     parents += [] if network.artifact is None else [network.artifact.id]
     start = subject.film.start
@@ -68,7 +68,7 @@ def artifact(measured: Measurement, subject: Subject, network: Network, reading:
 
 
 def report(measured: Measurement) -> Mapping[str, Any]:
-    """What the row says of it: JSON values."""
+    """Returns what the row says of it: JSON values."""
     return {
         "schema": "flagdata.measure-report/2",
         "sentence": measured.sentence,
@@ -109,7 +109,7 @@ def keep(
 
 
 def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping[str, Any] | None = None) -> None:
-    """A new Zarr folder: `draws` (draw, target) and the columns of the wind series, each over `time`.
+    """Writes a new Zarr folder: `draws` (draw, target) and the columns of the wind series, each over `time`.
 
     Dimensions are named, so that xarray opens it as a data set.
     """
@@ -131,7 +131,7 @@ def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping
 
 
 def read(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """The answer of a measurement's object as JSON values, and its arrays.
+    """Reads the answer of a measurement's object as JSON values, and its arrays.
 
     Raises:
         CorruptError: not such a folder, damaged, or of a newer format.

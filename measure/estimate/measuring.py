@@ -141,6 +141,7 @@ def measure(
             where="--model",
             fix="name a model that was trained for a posterior, as the shipped one",
         )
+    # Sizes of flag at which the film is looked at: one where the user states it, else a few of the prior.
     considered = sizes(
         options.size,
         rate=film.rate,
@@ -153,6 +154,7 @@ def measure(
     scales = considered.scale.tolist()
     reader = WindowReader(film, model, scales, step=options.step, first=options.first, last=options.last)
     layout, distinct = reader.layout, reader.distinct
+    # The network and the gate look at every window, at every size.
     looks: list[Look] = []
     clips: UInt8Array | None = None  # of the first window, or of the first with something to measure
     interpolated = 0
@@ -162,6 +164,7 @@ def measure(
             clips = window.clips
         looks.append(look)
         interpolated += window.interpolated
+    # The gate judges the film; sizes at which it is unlike the training are dropped.
     of_film = film.findings()
     faults = [finding for finding in of_film if finding.kind in REASONS]
     if clips is None:
@@ -172,6 +175,7 @@ def measure(
     sizes_kept = considered.only(gate_verdict.sizes)
     answer = Joint(model=model, sizes=sizes_kept, options=options)
     kept_looks = [look.only(gate_verdict.sizes) for look in looks]
+    # One answer of the windows that count, its draws shared by cloth.
     used = _used(kept_looks, gate_verdict, layout)
     draws, places = answer.joint([kept_looks[k] for k in used], dependence)
     middle = looks[int(np.argsort(gate_verdict.window_p, kind="stable")[len(looks) // 2])]
@@ -183,6 +187,7 @@ def measure(
         for look, p, blank in zip(kept_looks, gate_verdict.window_p, gate_verdict.blank, strict=True)
         if not (blank and gate_verdict.measurable)
     )
+    # What is reported.
     quantities = answer.quantities(draws, places)
     open_weight = answer.by_weight([kept_looks[k] for k in used], dependence, quantities, draws)
     return Measurement(

@@ -349,7 +349,8 @@ def _of_flag(conditioning: Conditioning, reference: UInt8Array | None, *, number
                 severity=Severity.WARNING,
                 value=conditioning.size / square.side,
                 what=f"the flag fills {square.side} px of the picture and the network takes {conditioning.size} px: "
-                f"it was enlarged {conditioning.size / square.side:.3g}-fold",
+                "it was "
+                f"enlarged {conditioning.size / square.side:.3g}-fold",
             )
         )
     return notes

@@ -23,7 +23,7 @@ _DARK, _FLAT = 35.0, 4.0
 """Gray levels: of the brightest hundredth of the picture, and of the contrast, below which it is too dark."""
 _NOISY = 0.35
 """Noise of a pixel over the picture's contrast, above which cloth is lost in it. Higher lets films through whose cloth
-cannot be told from noise; lower refuses films in dim light."""
+cannot be separated from noise; lower refuses films in dim light."""
 _LOST = 0.1
 """Share of frames in which the background is not found, above which the camera's motion is unknown."""
 _RESTING = 100

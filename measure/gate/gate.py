@@ -115,11 +115,13 @@ class Gate:
             raise InputError(
                 f"there are no clips of {', '.join(sorted(missing))}", fix="make them by measure.gate.distortions"
             )
+        # Centre and scale of each feature, robust, by one part of the plain clips.
         learned = round(_LEARNING * len(plain))
         first, rest = plain[:learned], plain[learned:]
         low, centre, high = np.quantile(first, (0.25, 0.5, 0.75), axis=0)
         scale = np.maximum((high - low) / 1.349, 0.2 * first.std(axis=0)) + 1e-3
         z = squashed(first, centre, scale)
+        # For each distortion the linear discriminant between it and plain clips.
         directions, offsets = [], []
         z_centred = z - z.mean(axis=0)
         for name in DISTORTIONS:

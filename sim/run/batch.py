@@ -220,6 +220,7 @@ def run(
     Args:
         progress: called with 1 after each frame, settling included.
     """
+    # A full batch, whatever the number of members.
     filled = [*members, *[members[-1]] * (size - len(members))]
     time = crew.recipe.time
     system, state = crew.assemble(filled, device=device)
@@ -234,6 +235,7 @@ def run(
                 winds.append(system.wind.velocity(state.time).expand(3, size).double().cpu().numpy())
             if progress is not None:
                 progress(1)
+    # Why members failed, and sequences of those that did not.
     failures = dict.fromkeys(
         unstable, ("unstable-step", f"its stable step is below the recipe's, {stepper.step:.3g} s")
     )

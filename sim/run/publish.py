@@ -92,6 +92,7 @@ def simulate(
     crew = Crew(recipe)
     identity = recipe.identity()
     ids = {index: member_artifact(recipe, identity, index, crew.seed(index)).id for index in range(recipe.count)}
+    # What the branch has already is left alone.
     in_lake = whole(lake, ids.values(), branch=branch)
     existing = [ids[index] for index in ids if ids[index] in in_lake]
     pending = [index for index in ids if ids[index] not in in_lake]
@@ -102,6 +103,7 @@ def simulate(
     healed: dict[str, Healing] = {}
     failed: list[Mapping[str, Any]] = []
     begun = time.perf_counter()
+    # Each batch is a commit of its own: what is done stays where a run is stopped.
     waiting = batches(crew, steppers, pending)
     for stepper, done in outcomes(crew, waiting, device=device, workers=workers, progress=progress):
         good = [o for o in done if o.sequence is not None]

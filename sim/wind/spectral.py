@@ -69,6 +69,7 @@ class VonKarman:
         count = round(duration * rate)
         if count < 2:
             raise InputError(f"{duration} s at {rate} Hz are {count} samples", fix="ask for two samples or more")
+        # Longer than asked for, so that the ends, which belong together, are far apart.
         period = max(2 * duration, 8 * self.length / self.mean)
         total = 2 * math.ceil(period * rate / 2)
         frequency = np.fft.rfftfreq(total, 1 / rate)

@@ -66,7 +66,7 @@ def judged(own: Experiments, *, seed: int = 1, along: Directions = ALONG, shift:
 def test_z_is_standard_normal_and_the_misfit_chi_squared_where_the_base_model_holds() -> None:
     """Before any scale of null flags, which estimates both to some 6 %."""
     own = scene(flags(stream(7, "own"), 2000, weight=MIDDLE))
-    found = own.axes().z(own.own)
+    found = own.axes().z(own.observed)
     for place in (ONE, EITHER):
         assert kstest(found[:, place], norm(0, 1).cdf).statistic < 0.06
         assert found[:, place].std() == pytest.approx(1.0, abs=0.06)
@@ -83,7 +83,7 @@ def test_an_effect_moves_its_z_by_its_separation(place: int) -> None:
     slope = UNITS * np.arange(1, SIZE + 1)
     exact = float(np.sqrt(change @ np.linalg.solve(COVARIANCE + SIGMA**2 * np.outer(slope, slope), change)))
     still, acted = scene(many), scene(moved(many, change))
-    found = (acted.axes().z(acted.own) - still.axes().z(still.own))[:, place]
+    found = (acted.axes().z(acted.observed) - still.axes().z(still.observed))[:, place]
     assert found == pytest.approx(exact, rel=0.1)
 
 
