@@ -23,17 +23,18 @@ hypothesis.settings.load_profile("whatever-the-load")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 LONGEST = (
-    "measure/loop/test_run.py",
-    "measure/propose/test_propose.py",
-    "sim/datasets/test_build.py",
-    "test_readme.py",
-    "flagdata/test_failing_calls.py",
     "test_hostile.py",
+    "measure/loop/test_run.py",
     "docs/test_pages.py",
+    "test_readme.py",
+    "sim/datasets/test_build.py",
+    "measure/refine/test_procedure.py",
     "docs/test_notebooks.py",
-    "models/training/test_command.py",
-    "verification/flutter/test_flutter.py",
-    "sim/blender/test_environment.py",
+    "measure/loop/test_carried.py",
+    "flagdata/lake/test_object_storage.py",
+    "flagdata/test_failing_calls.py",
+    "measure/propose/test_propose.py",
+    "flagdata/dataset/test_loader.py",
 )
 """Files that take longest, begun first, so that the two workers of `make test` end together."""
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from typing import Any, NamedTuple
 
 import pytest
@@ -26,10 +28,10 @@ class Ended(NamedTuple):
 Run = Callable[..., Ended]
 
 
-def invoke(capsys: pytest.CaptureFixture[str], *arguments: object) -> Ended:
+def invoke(*arguments: object) -> Ended:
     """Run `flagdata ARGUMENTS`."""
-    capsys.readouterr()
-    with pytest.raises(SystemExit) as ended:
+    streams = [io.TextIOWrapper(io.BytesIO(), encoding="utf-8", newline="", write_through=True) for _ in range(2)]
+    with redirect_stdout(streams[0]), redirect_stderr(streams[1]), pytest.raises(SystemExit) as ended:
         main([str(argument) for argument in arguments])
-    printed = capsys.readouterr()
-    return Ended(int(ended.value.code or 0), printed.out, printed.err)
+    out, err = (stream.buffer.getvalue().decode() for stream in streams)  # type: ignore[attr-defined]
+    return Ended(int(ended.value.code or 0), out, err)

@@ -43,23 +43,23 @@ def test_json_before_a_command_is_json_after_it(monkeypatch: pytest.MonkeyPatch)
     assert wrong == []
 
 
-def test_the_help_lists_every_command_once_in_its_group(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_help_lists_every_command_once_in_its_group() -> None:
     grouped = [verb for _, verbs in cli.GROUPS.values() for verb in verbs]
     assert sorted(grouped) == sorted(set(grouped)) == sorted(cli.VERBS)
     assert list(cli.GROUPS) == ["field", "look", "physics", "learn", "lake", "project"]
-    ended = invoke(capsys, "--help")
+    ended = invoke("--help")
     order = [line.split()[0] for line in ended.out.splitlines() if line[:2] == "  " and line.split()[0] in cli.VERBS]
     assert order == grouped
     assert "Physics (" in ended.out
 
 
-def test_without_arguments_and_after_help_the_help_is_the_result(capsys: pytest.CaptureFixture[str]) -> None:
-    wanted = invoke(capsys, "--help").out
+def test_without_arguments_and_after_help_the_help_is_the_result() -> None:
+    wanted = invoke("--help").out
     assert wanted.startswith("Usage: flagdata ")
-    assert invoke(capsys) == (0, wanted, "")
-    assert invoke(capsys, "help") == (0, wanted, "")
-    assert invoke(capsys, "help", "measure") == (0, invoke(capsys, "measure", "--help").out, "")
-    wrong = invoke(capsys, "--json", "help", "mesure")
+    assert invoke() == (0, wanted, "")
+    assert invoke("help") == (0, wanted, "")
+    assert invoke("help", "measure") == (0, invoke("measure", "--help").out, "")
+    wrong = invoke("--json", "help", "mesure")
     assert (wrong.code, wrong.document["fix"]) == (2, "did you mean 'measure'?")
 
 
@@ -75,8 +75,8 @@ def test_a_long_help_is_in_sections_that_hold_each_option_once() -> None:
 
 
 @pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_a_shell_gets_its_completion_by_one_command(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
-    ended = invoke(capsys, "completion", shell)
+def test_a_shell_gets_its_completion_by_one_command(shell: str) -> None:
+    ended = invoke("completion", shell)
     assert ended.code == 0
     assert f"_FLAGDATA_COMPLETE={shell}_complete" in ended.out
 
@@ -87,22 +87,22 @@ def test_verbs_are_completed_without_importing_them(monkeypatch: pytest.MonkeyPa
     assert [(item.value, item.help) for item in found] == [("calibrate", cli.VERBS["calibrate"][1])]
 
 
-def test_every_name_of_the_catalog_has_a_line(capsys: pytest.CaptureFixture[str]) -> None:
-    ended = invoke(capsys, "catalog", "--json")
+def test_every_name_of_the_catalog_has_a_line() -> None:
+    ended = invoke("catalog", "--json")
     kinds = {kind["kind"]: kind["names"] for kind in ended.document["kinds"]}
     assert sorted(kinds) == sorted(cli.NAMES)
     assert kinds["materials"]["paper"] == "Paper"
     assert kinds["models"]["flow"] == "Optical flow to a distribution of wind, area weight and bending"
     assert [(kind, name) for kind, names in kinds.items() for name, line in names.items() if len(line) < 4] == []
     assert [line for names in kinds.values() for line in names.values() if "functools" in line] == []
-    alone = invoke(capsys, "catalog", "effects").out
+    alone = invoke("catalog", "effects").out
     assert "Lift of the faces as thin plates" in alone
     assert "paper" not in alone.split()
-    assert json.loads(invoke(capsys, "--json", "catalog", "scene").out)["fix"] == "did you mean 'scenes'?"
+    assert json.loads(invoke("--json", "catalog", "scene").out)["fix"] == "did you mean 'scenes'?"
 
 
 def test_names_whose_library_is_not_installed_are_left_out_with_the_extra_that_brings_it(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def absent(target: str) -> dict[str, str]:
         if target.startswith("flagdata."):
@@ -110,12 +110,12 @@ def test_names_whose_library_is_not_installed_are_left_out_with_the_extra_that_b
         raise ModuleNotFoundError("No module named 'torch'", name="torch")
 
     monkeypatch.setattr("flagdata.commands.catalog.titles", absent)
-    ended = invoke(capsys, "catalog")
+    ended = invoke("catalog")
     assert ended.code == 0
     assert ended.out.count("  one") == 3
     assert "effects are left out" in ended.err
     assert "flagdata[physics]" in ended.err
-    assert invoke(capsys, "catalog", "effects").code == 1
+    assert invoke("catalog", "effects").code == 1
 
 
 def test_a_warning_is_coloured_on_a_terminal_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
-from flagdata.cli import main
+from tests.program import invoke
 
 CASES: dict[str, tuple[tuple[str, ...], str]] = {
     "query --arrow": (("query", "--lake", "nowhere", "--arrow", "{out}/a.arrow"), "a.arrow"),
@@ -34,15 +33,13 @@ CASES: dict[str, tuple[tuple[str, ...], str]] = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_a_taken_output_is_refused_first_and_kept(
-    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_taken_output_is_refused_first_and_kept(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     arguments, taken = CASES[case]
     out = tmp_path / "out"
     (out / taken).parent.mkdir(parents=True)
     (out / taken).write_text("mine")
     monkeypatch.chdir(tmp_path)
-    code, error = refusal([argument.format(out=out) for argument in arguments], capsys)
+    code, error = refusal([argument.format(out=out) for argument in arguments])
     assert (code, error["kind"]) == (1, "corrupt" if taken.endswith("proposals.json") else "conflict")
     assert str(out) in f"{error['what']} {error['where']}"
     assert error["fix"]
@@ -50,12 +47,10 @@ def test_a_taken_output_is_refused_first_and_kept(
     assert (out / taken).read_text() == "mine"
 
 
-def refusal(arguments: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[object, dict[str, str]]:
+def refusal(arguments: Sequence[str]) -> tuple[int, dict[str, str]]:
     """Exit code and error of a command; of one that takes no --json, in words."""
     structured = arguments[0] not in ("demo", "query")
-    with pytest.raises(SystemExit) as ended:
-        main([*arguments, *(["--json"] if structured else [])])
-    said = capsys.readouterr()
+    ended = invoke(*arguments, *(["--json"] if structured else []))
     if structured:
-        return ended.value.code, json.loads(said.out)
-    return ended.value.code, {"kind": "conflict", "what": said.err, "where": "", "fix": said.err.partition("fix:")[2]}
+        return ended.code, ended.document
+    return ended.code, {"kind": "conflict", "what": ended.err, "where": "", "fix": ended.err.partition("fix:")[2]}

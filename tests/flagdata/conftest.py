@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import resource
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 
@@ -20,32 +20,27 @@ from tests.confirming import CONFIRMED
 VIDEO_START = "2026-05-01T10:00:00Z"
 
 
-@pytest.fixture(scope="session")
-def write_video() -> Callable[..., Path]:
+def write_video(path: Path, *, frames: int = 100, rate: int = 50, creation_time: str | None = VIDEO_START) -> Path:
     """Writes an MP4 of a bright bar that sways, (48, 64) pixels, constant rate."""
-
-    def write(path: Path, *, frames: int = 100, rate: int = 50, creation_time: str | None = VIDEO_START) -> Path:
-        column, row = np.meshgrid(np.arange(64), np.arange(48))
-        with av.open(str(path), "w") as container:
-            if creation_time is not None:
-                container.metadata["creation_time"] = creation_time
-            stream = container.add_stream("libx264", rate=rate, options={"threads": "1"})
-            stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-            stream.codec_context.time_base = Fraction(1, rate)
-            for k in range(frames):
-                bar = np.abs(column - 32 - 12 * np.sin(row / 9 + 2 * np.pi * 2 * k / rate)) < 4
-                image = (40 + row + 150 * bar).astype(np.uint8)
-                frame = av.VideoFrame.from_ndarray(image, format="gray").reformat(format="yuv420p")
-                frame.pts = k
-                container.mux(stream.encode(frame))
-            container.mux(stream.encode(None))
-        return path
-
-    return write
+    column, row = np.meshgrid(np.arange(64), np.arange(48))
+    with av.open(str(path), "w") as container:
+        if creation_time is not None:
+            container.metadata["creation_time"] = creation_time
+        stream = container.add_stream("libx264", rate=rate, options={"threads": "1"})
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.codec_context.time_base = Fraction(1, rate)
+        for k in range(frames):
+            bar = np.abs(column - 32 - 12 * np.sin(row / 9 + 2 * np.pi * 2 * k / rate)) < 4
+            image = (40 + row + 150 * bar).astype(np.uint8)
+            frame = av.VideoFrame.from_ndarray(image, format="gray").reformat(format="yuv420p")
+            frame.pts = k
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return path
 
 
 @pytest.fixture(scope="session")
-def video(tmp_path_factory: pytest.TempPathFactory, write_video: Callable[..., Path]) -> Path:
+def video(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """100 frames at 50 Hz from 2026-05-01T10:00:00Z on."""
     return write_video(tmp_path_factory.mktemp("video") / "field.mp4")
 
@@ -84,17 +79,12 @@ def confirmed_drafts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(OnCommandLine, "__call__", lambda self, drafted: CONFIRMED(drafted))
 
 
-@pytest.fixture
-def small_files() -> Callable[[], AbstractContextManager[None]]:
+@contextmanager
+def small_files() -> Iterator[None]:
     """A context in which no file of this process grows beyond 64 KiB, as on a full disk."""
-
-    @contextmanager
-    def small_files() -> Iterator[None]:
-        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (64 << 10, hard))
-        try:
-            yield
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-    return small_files
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (64 << 10, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))

@@ -64,7 +64,7 @@ ADDRESSED = [
 
 
 def test_commands_refuse_addresses_of_lakes_sources_and_outputs_and_make_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Lake.create("lake")
@@ -72,7 +72,7 @@ def test_commands_refuse_addresses_of_lakes_sources_and_outputs_and_make_nothing
     before = sorted(tmp_path.rglob("*"))
     offenders = []
     for command in ADDRESSED:
-        code, _, err = invoke(capsys, *command.split())
+        code, _, err = invoke(*command.split())
         if code != 2 or "address" not in err or sorted(tmp_path.rglob("*")) != before:
             offenders.append((command, code, err))
     assert offenders == []

@@ -172,10 +172,8 @@ def test_quality_flags_are_warnings_and_errors_once() -> None:
     assert quality_flags((found("c", Severity.NOTE),)) == []
 
 
-def test_errors_on_the_command_line_say_what_and_how_to_mend_it(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    ended = invoke(capsys, "ls", "--lake", tmp_path, "--json")
+def test_errors_on_the_command_line_say_what_and_how_to_mend_it(tmp_path: Path) -> None:
+    ended = invoke("ls", "--lake", tmp_path, "--json")
     assert (ended.code, ended.document["kind"], "fix:" in ended.err) == (1, "not-found", True)
 
 
@@ -185,6 +183,6 @@ def test_a_misspelt_verb_exits_2() -> None:
     assert "ingest" in done.stderr
 
 
-def test_usage_errors_are_one_json_document_too(capsys: pytest.CaptureFixture[str]) -> None:
-    ended = invoke(capsys, "ls", "--bogus", "--json")
+def test_usage_errors_are_one_json_document_too() -> None:
+    ended = invoke("ls", "--bogus", "--json")
     assert (ended.code, ended.document["kind"]) == (2, "usage")

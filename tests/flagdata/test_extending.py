@@ -103,12 +103,10 @@ def test_the_page_lists_the_public_names_and_each_leads_to_something() -> None:
         _ = extend.ForceEfect
 
 
-def test_an_effect_a_data_set_and_a_renderer_from_outside_are_used_by_build(
-    meadow: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert "Drag of a fringe of threads on the cloth" in invoke(capsys, "catalog", "effects").out
-    assert "Flags with a fringe, as dots" in invoke(capsys, "catalog", "datasets").out
-    planned = invoke(capsys, "build", "meadow", "--lake", tmp_path / "lake", "--plan", "--workers", 1, "--json")
+def test_an_effect_a_data_set_and_a_renderer_from_outside_are_used_by_build(meadow: Path, tmp_path: Path) -> None:
+    assert "Drag of a fringe of threads on the cloth" in invoke("catalog", "effects").out
+    assert "Flags with a fringe, as dots" in invoke("catalog", "datasets").out
+    planned = invoke("build", "meadow", "--lake", tmp_path / "lake", "--plan", "--workers", 1, "--json")
     assert planned.code == 0, planned.err
     assert planned.document["films"] == {"train": 6, "validation": 2, "test": 2}
     names: dict[str, Any] = {}
@@ -119,12 +117,10 @@ def test_an_effect_a_data_set_and_a_renderer_from_outside_are_used_by_build(
     assert (plain["bare"].positions != names["flags"].positions).any()
 
 
-def test_a_log_format_from_outside_is_used_by_ingest(
-    meadow: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_log_format_from_outside_is_used_by_ingest(meadow: Path, tmp_path: Path) -> None:
     log, lake = tmp_path / "calm.log", Lake.create(tmp_path / "lake")
     log.write_text("".join(f"CALM 2026-05-01T12:00:{second:02d}Z 4.{second % 10}\n" for second in range(30)))
-    done = invoke(capsys, "ingest", log, "--lake", lake.path)
+    done = invoke("ingest", log, "--lake", lake.path)
     assert done.code == 0, done.err
     (row,) = Lake.open(lake.path).rows("kind = 'wind'").to_pylist()
     assert flagdata.wind(row["artifact"], lake=lake.path).speed.tolist() == [
@@ -132,12 +128,10 @@ def test_a_log_format_from_outside_is_used_by_ingest(
     ]
 
 
-def test_a_network_from_outside_is_used_by_train(
-    meadow: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_network_from_outside_is_used_by_train(meadow: Path, tmp_path: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
     fill(lake, "meadow")
-    done = invoke(capsys, "train", meadow / "restless.toml", "--lake", lake.path, "--workers", 1, "--json")
+    done = invoke("train", meadow / "restless.toml", "--lake", lake.path, "--workers", 1, "--json")
     assert done.code == 0, done.err
     (row,) = Lake.open(lake.path).rows("kind = 'network'").to_pylist()
     assert row["name"] == "restless"

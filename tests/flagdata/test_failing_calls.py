@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.flagdata.conftest import write_video
 from tests.studies.failing.commands import COMMANDS, Scene, core_scene
 from tests.studies.failing.groups import grouped
 from tests.studies.failing.injector import Fault, Injector, injecting
@@ -21,9 +22,7 @@ EVERY = bool(os.environ.get("FLAGDATA_EVERY_CALL"))
 
 
 @pytest.fixture(scope="module")
-def scene(
-    tmp_path_factory: pytest.TempPathFactory, video: Path, wind_log: Path, write_video: Callable[..., Path]
-) -> Scene:
+def scene(tmp_path_factory: pytest.TempPathFactory, video: Path, wind_log: Path) -> Scene:
     return core_scene(tmp_path_factory.mktemp("scene"), video=video, wind_log=wind_log, write_video=write_video)
 
 

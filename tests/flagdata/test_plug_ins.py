@@ -64,26 +64,26 @@ DEFECTS = {
 @pytest.mark.parametrize(("source", "point"), DEFECTS.values(), ids=DEFECTS)
 @pytest.mark.parametrize("kind", ["effects", "log-formats"])
 def test_a_plug_in_that_cannot_be_used_is_named_with_its_package_and_the_others_are_listed(
-    source: str, point: str, kind: str, install: Install, capsys: pytest.CaptureFixture[str]
+    source: str, point: str, kind: str, install: Install
 ) -> None:
     whole = set(titles(NAMES[kind][0]))
     for registry in (EFFECTS, FORMATS):
         registry._found = None
     install(source, **{"effects" if kind == "effects" else "formats": point})
-    shown = invoke(capsys, "catalog", kind, "--json")
+    shown = invoke("catalog", kind, "--json")
     assert shown.code == 0
     (listed,) = shown.document["kinds"]
     assert set(listed["names"]) & whole == whole - {line.partition(" ")[0] for line in point.splitlines()}
     assert "odd" not in listed["names"]
     assert PACKAGE in shown.err
     assert "\x1b" not in shown.err
-    assert invoke(capsys, "catalog").code == 0
+    assert invoke("catalog").code == 0
 
 
-def test_a_plug_in_without_any_description_is_listed(install: Install, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_plug_in_without_any_description_is_listed(install: Install) -> None:
     install(EFFECT.format(name="Plain"), effects="plain = anothers:Plain")
     assert EFFECTS["plain"].__module__ == "anothers"
-    shown = invoke(capsys, "catalog", "effects")
+    shown = invoke("catalog", "effects")
     assert (shown.code, shown.err) == (0, "")
     assert "plain" in shown.out
 
@@ -100,7 +100,7 @@ def test_a_format_that_cannot_be_used_is_left_out_when_a_log_is_recognised(
         FORMATS["odd"]
 
 
-def test_a_defect_of_the_programs_own_tables_is_no_plug_in(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_defect_of_the_programs_own_tables_is_no_plug_in() -> None:
     table = Registry("thing", {"broken": "no_such_module:x"})
     with pytest.raises(ModuleNotFoundError):
         table["broken"]

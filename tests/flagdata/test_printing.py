@@ -171,44 +171,38 @@ def test_every_command_is_called_here() -> None:
 
 
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
-def test_a_command_prints_nothing_that_a_terminal_obeys(
-    path: tuple[str, ...], scene: tuple[Path, str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_command_prints_nothing_that_a_terminal_obeys(path: tuple[str, ...], scene: tuple[Path, str]) -> None:
     assert path[0] in VERBS
     folder, identity = scene
     for arguments in calls(folder, identity)[path]:
         for given in (arguments, [*arguments, "--json"], ["--debug", *arguments]):
             shutil.rmtree(folder / "copy", ignore_errors=True)
             before = ["--debug"] if given[0:1] == ["--debug"] else []
-            done = invoke(capsys, *before, *path, *given[len(before) :])
+            done = invoke(*before, *path, *given[len(before) :])
             assert obeyed(done.out) == obeyed(done.err) == set(), (path, given)
 
 
-def test_a_message_of_several_lines_forges_no_line_of_the_log(
-    scene: tuple[Path, str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_message_of_several_lines_forges_no_line_of_the_log(scene: tuple[Path, str]) -> None:
     folder, _ = scene
-    shown = invoke(capsys, "log", "--lake", folder / "lake")
+    shown = invoke("log", "--lake", folder / "lake")
     assert len(shown.out.splitlines()) == 1 + len(Lake.open(folder / "lake").catalog.history())
     assert printable(EVIL) in shown.out
 
 
-def test_texts_that_come_from_another_lake_are_reported_and_stay_as_they_are(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_texts_that_come_from_another_lake_are_reported_and_stay_as_they_are(tmp_path: Path) -> None:
     of_another(tmp_path / "lake")
-    done = invoke(capsys, "clone", tmp_path / "lake", tmp_path / "copy")
+    done = invoke("clone", tmp_path / "lake", tmp_path / "copy")
     assert done.code == 0
     assert "control characters" in done.err
     copy = Lake.open(tmp_path / "copy")
     assert set(copy.rows()["name"].to_pylist()) == {EVIL, "good"}
-    plain = invoke(capsys, "push", tmp_path / "copy", "--lake", tmp_path / "lake", "--json")
+    plain = invoke("push", tmp_path / "copy", "--lake", tmp_path / "lake", "--json")
     assert plain.document["findings"] == []
 
 
-def test_json_holds_the_same_texts_escaped(scene: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_holds_the_same_texts_escaped(scene: tuple[Path, str]) -> None:
     folder, _ = scene
-    shown = invoke(capsys, "log", "--json", "--lake", folder / "lake")
+    shown = invoke("log", "--json", "--lake", folder / "lake")
     assert obeyed(shown.out) == set()
     assert EVIL in {commit["message"] for commit in shown.document["commits"]}
 

@@ -18,10 +18,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def user(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> Iterator[User]:
+def user(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[User]:
     """A user in a copy of the scene, who does what each remedy says that he meets."""
-    user = User.at(scene, tmp_path / "scene", capsys, monkeypatch)
+    user = User.at(scene, tmp_path / "scene", monkeypatch)
     yield user
     assert user.unfollowed() == []

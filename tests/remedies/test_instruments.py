@@ -9,9 +9,10 @@ from operator import xor
 
 import pytest
 
+from tests.flagdata.ingest.anemometer.cases import sentence
 from tests.flagdata.ingest.anemometer.test_format_exports import EDDYPRO, eddypro
 from tests.remedies.cases import OR, Case, heal
-from tests.remedies.test_winds import PLAIN, PLAIN_NAKED, RECIPE, STREAM, TIMELESS, ZONED, mwv, nmea, rows
+from tests.remedies.test_winds import PLAIN, PLAIN_NAKED, RECIPE, STREAM, TIMELESS, ZONED, mwv, rows
 from tests.remedies.user import User
 
 S = range(40)
@@ -37,7 +38,7 @@ def network(*sources: int, reference: str = "fa", speed_over_ground: str = "") -
 
 def vtg(*, knots: float) -> str:
     """The course and speed over ground of a stream whose wind is apparent."""
-    return "".join(mwv(k) + nmea(f"GPVTG,90.0,T,,M,{knots:.1f},N,{knots * 1.852:.1f},K,A") + "\n" for k in S)
+    return "".join(mwv(k) + sentence(f"GPVTG,90.0,T,,M,{knots:.1f},N,{knots * 1.852:.1f},K,A") + "\n" for k in S)
 
 
 def framed(body: str) -> str:
@@ -403,10 +404,10 @@ def test_a_count_that_starts_again_is_read_as_a_file_of_each_stretch(user: User)
         user.follows("ingest", name, *start, f"2026-05-01T1{number}:00:00Z")
 
 
-STILL = nmea("GPZDA,120000.00,01,05,2026,00,00") + "\n"
+STILL = sentence("GPZDA,120000.00,01,05,2026,00,00") + "\n"
 STREAMS = {
     "a clock that stands still": STILL.join(mwv(k, time=False) for k in (*S, 0)),
-    "a receiver without a fix": (nmea("GPRMC,,V,,,,,,,,,,N") + "\n").join([TIMELESS] * 3),
+    "a receiver without a fix": (sentence("GPRMC,,V,,,,,,,,,,N") + "\n").join([TIMELESS] * 3),
     "no sentence with a time": TIMELESS,
     "one time": STILL + mwv(1, time=False) * 3,
 }

@@ -7,6 +7,7 @@ import textwrap
 
 import pytest
 
+from tests.flagdata.ingest.anemometer.cases import sentence
 from tests.remedies.cases import OR, Case, heal
 from tests.remedies.user import User
 
@@ -56,23 +57,15 @@ name = "mine"
 HOSTED = rows("laptop_time,raw_line\n", "2026-05-01T12:{m}:{s}.5Z,{v}")
 
 
-def nmea(body: str) -> str:
-    """A sentence with its checksum."""
-    total = 0
-    for character in body:
-        total ^= ord(character)
-    return f"${body}*{total:02X}"
-
-
 def mwv(second: int, *, talker: str = "WI", date: bool = True, time: bool = True, reference: str = "R") -> str:
     lines = []
     if time:
         lines.append(
-            nmea(f"GPZDA,1200{second:02d}.00,01,05,2026,00,00")
+            sentence(f"GPZDA,1200{second:02d}.00,01,05,2026,00,00")
             if date
-            else nmea(f"GPGGA,1200{second:02d}.00,5222.0,N,00452.0,E,1,08,1.0,1.0,M,46.0,M,,")
+            else sentence(f"GPGGA,1200{second:02d}.00,5222.0,N,00452.0,E,1,08,1.0,1.0,M,46.0,M,,")
         )
-    lines.append(nmea(f"{talker}MWV,{200 + second % 5}.0,{reference},{4 + second % 7 / 10:.1f},M,A"))
+    lines.append(sentence(f"{talker}MWV,{200 + second % 5}.0,{reference},{4 + second % 7 / 10:.1f},M,A"))
     return "\n".join(lines) + "\n"
 
 

@@ -47,7 +47,6 @@ class User:
 
     origin: Path
     folder: Path
-    capsys: pytest.CaptureFixture[str]
     met: dict[Remedy, set[str]] = field(default_factory=dict)
     """Remedies that were printed, each with the commands and options it names that are still to be typed."""
     _made: list[Made] = field(default_factory=list)
@@ -65,7 +64,7 @@ class User:
     def types(self, *words: object) -> Ended:
         """Run a command as it is typed, whatever comes of it."""
         self._made.clear()
-        return invoke(self.capsys, *(str(word) for word in words))
+        return invoke(*(str(word) for word in words))
 
     def succeeds(self, *words: object, shows: str = "") -> Ended:
         """Run a command that ends with exit code 0 and prints what the expression `shows` finds."""
@@ -134,9 +133,9 @@ class User:
         return [f"{remedy}: {' '.join(sorted(left))}" for remedy, left in self.met.items() if left]
 
     @classmethod
-    def at(cls, origin: Path, folder: Path, capsys: pytest.CaptureFixture[str], patch: pytest.MonkeyPatch) -> User:
+    def at(cls, origin: Path, folder: Path, patch: pytest.MonkeyPatch) -> User:
         """A user in `folder`, whose errors and findings are noted as they are made."""
-        user = cls(origin, folder, capsys)
+        user = cls(origin, folder)
         user.begins()
         for made in (FlagdataError, Finding):
             patch.setattr(made, "__init__", _noting(made, user._made))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -19,13 +19,8 @@ from sim.system import System
 from sim.tables import Evaluation
 from sim.wind import UniformWind
 
-MakeSystem = Callable[..., tuple[System, State]]
-
-
-@pytest.fixture
-def plain() -> Material:
-    """Constant stiffness, no damping: its forces derive from an energy."""
-    return isotropic(name="plain", density=0.2, stretching=50.0, shear=40.0, bending=1e-4)
+PLAIN = isotropic(name="plain", density=0.2, stretching=50.0, shear=40.0, bending=1e-4)
+"""Constant stiffness, no damping: its forces derive from an energy."""
 
 
 @pytest.fixture
@@ -38,35 +33,30 @@ def distorted() -> Mesh:
     return Mesh(rest=rest, faces=mesh.faces)
 
 
-@pytest.fixture
-def make_system() -> MakeSystem:
+def make_system(
+    mesh: Mesh,
+    materials: Sequence[Material],
+    *,
+    handles: Handles | None = None,
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    air: AirForce | None = None,
+    evaluation: Evaluation = Evaluation.ARCSIM,
+    dtype: torch.dtype = torch.float64,
+) -> tuple[System, State]:
     """A float64 system of any mesh and materials, held or free, without gravity and wind unless given."""
-
-    def make(
-        mesh: Mesh,
-        materials: Sequence[Material],
-        *,
-        handles: Handles | None = None,
-        gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        air: AirForce | None = None,
-        evaluation: Evaluation = Evaluation.ARCSIM,
-        dtype: torch.dtype = torch.float64,
-    ) -> tuple[System, State]:
-        batch = len(materials)
-        cloth = Cloth.build(mesh, materials, evaluation=evaluation, dtype=dtype)
-        held = handles or Handles(vertices=())
-        position = torch.tensor(upright(mesh), dtype=dtype).unsqueeze(-1).repeat(1, 1, batch)
-        vertices = torch.tensor(held.vertices, dtype=torch.int64)
-        system = System(
-            cloth=cloth,
-            gravity=torch.tensor(gravity, dtype=dtype)[:, None].repeat(1, batch),
-            wind=UniformWind(constant=torch.tensor(wind, dtype=dtype)[:, None].repeat(1, batch)),
-            air=air or QuadraticNormal(),
-            handles=held,
-            held=vertices,
-            anchors=position[vertices].clone(),
-        )
-        return system, State(position=position, velocity=torch.zeros_like(position))
-
-    return make
+    batch = len(materials)
+    cloth = Cloth.build(mesh, materials, evaluation=evaluation, dtype=dtype)
+    held = handles or Handles(vertices=())
+    position = torch.tensor(upright(mesh), dtype=dtype).unsqueeze(-1).repeat(1, 1, batch)
+    vertices = torch.tensor(held.vertices, dtype=torch.int64)
+    system = System(
+        cloth=cloth,
+        gravity=torch.tensor(gravity, dtype=dtype)[:, None].repeat(1, batch),
+        wind=UniformWind(constant=torch.tensor(wind, dtype=dtype)[:, None].repeat(1, batch)),
+        air=air or QuadraticNormal(),
+        handles=held,
+        held=vertices,
+        anchors=position[vertices].clone(),
+    )
+    return system, State(position=position, velocity=torch.zeros_like(position))

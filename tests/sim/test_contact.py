@@ -20,6 +20,7 @@ from sim.mesh import Mesh, grid
 from sim.scene import assemble, flag
 from sim.state import State
 from tests.refusals import unrefused
+from tests.sim.conftest import make_system
 
 G = 9.81
 
@@ -38,7 +39,7 @@ def pleated(system, state, *, noise: float = 1e-3):
 
 
 @pytest.fixture
-def folded(make_system):
+def folded():
     mesh = grid(width=0.8, height=0.3, columns=16, rows=6)
     system, state = make_system(mesh, [named("camel-ponte-roma"), named("gray-interlock"), named("royal-target")])
     system = replace(system, contact=Contact())
@@ -91,7 +92,7 @@ def test_kernel_finds_and_pushes_what_the_definition_does(folded) -> None:
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
-def test_what_the_kernel_remembers_of_other_states_changes_nothing_to_the_bit(make_system, dtype) -> None:
+def test_what_the_kernel_remembers_of_other_states_changes_nothing_to_the_bit(dtype) -> None:
     mesh = grid(width=0.8, height=0.3, columns=16, rows=6)
     system, state = make_system(mesh, [named("camel-ponte-roma")] * 3, dtype=dtype)
     used, fresh = replace(system, contact=Contact()), replace(system, contact=Contact())
@@ -105,7 +106,7 @@ def test_what_the_kernel_remembers_of_other_states_changes_nothing_to_the_bit(ma
     assert float((apart.position - first.position).abs().max()) > 1e-4
 
 
-def test_flat_cloth_and_its_neighbouring_faces_do_not_touch(make_system) -> None:
+def test_flat_cloth_and_its_neighbouring_faces_do_not_touch() -> None:
     mesh = grid(width=0.4, height=0.2, columns=16, rows=8)
     system, state = make_system(mesh, [named("gray-interlock")])
     system = replace(system, contact=Contact())
@@ -113,7 +114,7 @@ def test_flat_cloth_and_its_neighbouring_faces_do_not_touch(make_system) -> None
     assert float(contact.energy(system.cloth, system.contact, state.position, pairs_of(system, state.position))) == 0.0
 
 
-def test_a_patch_slides_to_rest_as_coulomb_says(make_system) -> None:
+def test_a_patch_slides_to_rest_as_coulomb_says() -> None:
     # A patch on a level, rigidly held sheet: deceleration μ g, from 0.6 m/s to rest after v²/(2 μ g).
     base = grid(width=1.0, height=0.3, columns=20, rows=6)
     patch = grid(width=0.1, height=0.1, columns=2, rows=2)

@@ -16,6 +16,7 @@ from sim.material import Material, named
 from sim.mesh import Mesh
 from sim.tables import Evaluation
 from tests.refusals import unrefused
+from tests.sim.conftest import PLAIN, make_system
 
 
 def crumpled(mesh: Mesh, batch: int) -> torch.Tensor:
@@ -33,8 +34,8 @@ def velocity_like(position: torch.Tensor) -> torch.Tensor:
 
 
 @pytest.mark.parametrize("part", [membrane, bending])
-def test_force_is_minus_the_gradient_of_the_energy_for_constant_stiffness(part, make_system, plain, distorted) -> None:
-    system, _ = make_system(distorted, [plain, plain])
+def test_force_is_minus_the_gradient_of_the_energy_for_constant_stiffness(part, distorted) -> None:
+    system, _ = make_system(distorted, [PLAIN, PLAIN])
     position = crumpled(distorted, 2).requires_grad_()
     (gradient,) = torch.autograd.grad(part.energy(system.cloth, position).sum(), position)
     force = part.force(system.cloth, position.detach(), torch.zeros_like(position))
@@ -43,9 +44,7 @@ def test_force_is_minus_the_gradient_of_the_energy_for_constant_stiffness(part, 
 
 @pytest.mark.parametrize("part", [membrane, bending])
 @pytest.mark.parametrize("evaluation", list(Evaluation))
-def test_internal_forces_turn_with_the_cloth_and_do_not_see_where_it_is(
-    part, evaluation, make_system, distorted
-) -> None:
+def test_internal_forces_turn_with_the_cloth_and_do_not_see_where_it_is(part, evaluation, distorted) -> None:
     system, _ = make_system(distorted, [named("camel-ponte-roma")], evaluation=evaluation)
     position = crumpled(distorted, 1)
     velocity = velocity_like(position)
@@ -59,7 +58,7 @@ def test_internal_forces_turn_with_the_cloth_and_do_not_see_where_it_is(
 
 
 @pytest.mark.parametrize("part", [membrane, bending])
-def test_internal_forces_have_no_resultant_and_no_moment(part, make_system, distorted) -> None:
+def test_internal_forces_have_no_resultant_and_no_moment(part, distorted) -> None:
     system, _ = make_system(distorted, [named("white-swim-solid")])
     position = crumpled(distorted, 1)
     force = part.force(system.cloth, position, velocity_like(position))
@@ -71,7 +70,7 @@ def test_internal_forces_have_no_resultant_and_no_moment(part, make_system, dist
 
 
 @pytest.mark.parametrize("part", [membrane, bending])
-def test_rigid_motion_is_not_damped_and_damping_takes_energy(part, make_system, distorted) -> None:
+def test_rigid_motion_is_not_damped_and_damping_takes_energy(part, distorted) -> None:
     system, _ = make_system(distorted, [named("camel-ponte-roma")])
     position = crumpled(distorted, 1)
     still = part.force(system.cloth, position, torch.zeros_like(position))
@@ -83,7 +82,7 @@ def test_rigid_motion_is_not_damped_and_damping_takes_energy(part, make_system, 
     assert float(power) < 0
 
 
-def test_patch_a_uniform_stretch_leaves_inner_vertices_free_on_a_distorted_mesh(make_system, distorted) -> None:
+def test_patch_a_uniform_stretch_leaves_inner_vertices_free_on_a_distorted_mesh(distorted) -> None:
     # Patch test: constant strain gives constant stress, whose forces cancel at inner vertices.
     system, state = make_system(distorted, [named("camel-ponte-roma")])
     stretch = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.08, 0.05], [0.0, 0.02, 0.97]], dtype=torch.float64)
@@ -94,17 +93,17 @@ def test_patch_a_uniform_stretch_leaves_inner_vertices_free_on_a_distorted_mesh(
     assert float(force.abs().max()) > 0.1
 
 
-def test_uniaxial_stretch_pulls_with_stiffness_times_strain(make_system, plain, distorted) -> None:
+def test_uniaxial_stretch_pulls_with_stiffness_times_strain(distorted) -> None:
     # One dimension: force per width = K λ (λ² − 1)/2 (first Piola–Kirchhoff stress of K G²/2), K = 50 N/m, λ = 1.1,
     # width 0.4 m: 50 · 1.1 · 0.105 · 0.4 = 2.31 N.
-    system, state = make_system(distorted, [plain])
+    system, state = make_system(distorted, [PLAIN])
     position = state.position * torch.tensor([1.0, 1.1, 1.0], dtype=torch.float64)[:, None]
     force = membrane.force(system.cloth, position, state.velocity)
     free_edge = np.flatnonzero(distorted.rest[:, 0] > 0.6 - 1e-9)
     assert float(force[free_edge, 1].sum()) == pytest.approx(-2.31, rel=1e-12)
 
 
-def test_fold_angle_and_moment_of_two_triangles_by_hand(make_system) -> None:
+def test_fold_angle_and_moment_of_two_triangles_by_hand() -> None:
     # A square folded along its diagonal by 60° into a valley: θ = π/3; S = 2/(2 · 1) = 1; α = ½ θ √2 = 0.740 1/m.
     material = Material(
         name="m", source="test", density=1.0, damping=0.0, stretching=np.ones((6, 4)), bending=np.full((3, 5), 0.3)
@@ -128,8 +127,8 @@ def test_fold_angle_and_moment_of_two_triangles_by_hand(make_system) -> None:
     assert float(force[1, 2]) < 0
 
 
-def test_air_force_on_a_flat_sheet_is_area_density_speed_squared(make_system, plain, distorted) -> None:
-    system, state = make_system(distorted, [plain])
+def test_air_force_on_a_flat_sheet_is_area_density_speed_squared(distorted) -> None:
+    system, state = make_system(distorted, [PLAIN])
     air = QuadraticNormal(density=1.2, drag=0.7)
     wind = torch.tensor([[3.0], [4.0], [0.0]], dtype=torch.float64)
     force = air.force(system.cloth, state.position, state.velocity, wind)
@@ -137,8 +136,8 @@ def test_air_force_on_a_flat_sheet_is_area_density_speed_squared(make_system, pl
     np.testing.assert_allclose(force.sum(0)[:, 0], [1.2 * 0.24 * 9, 0.7 * 0.24 * 4, 0], atol=1e-12)
 
 
-def test_air_acts_on_relative_velocity_only(make_system, plain, distorted) -> None:
-    system, _ = make_system(distorted, [plain])
+def test_air_acts_on_relative_velocity_only(distorted) -> None:
+    system, _ = make_system(distorted, [PLAIN])
     position = crumpled(distorted, 1)
     velocity = velocity_like(position)
     wind = torch.tensor([[3.0], [-1.0], [0.5]], dtype=torch.float64)
@@ -150,17 +149,17 @@ def test_air_acts_on_relative_velocity_only(make_system, plain, distorted) -> No
         assert float(still.abs().max()) == 0.0
 
 
-def test_stokes_on_a_single_mass_is_a_spheres_drag(make_system, plain, distorted) -> None:
+def test_stokes_on_a_single_mass_is_a_spheres_drag(distorted) -> None:
     # 6 π η R w with R = √(A/π): for A = 0.01 m², w = 2 m/s, η = 1.789e-5: 3.805e-5 N.
-    system, state = make_system(distorted, [plain])
+    system, state = make_system(distorted, [PLAIN])
     wind = torch.tensor([[2.0], [0.0], [0.0]], dtype=torch.float64)
     force = Stokes().force(system.cloth, state.position, state.velocity, wind)
     corner_area = distorted.vertex_areas[0]
     assert float(force[0, 0]) == pytest.approx(3.805e-5 * math.sqrt(corner_area / 0.01), rel=1e-3)
 
 
-def test_null_values_of_the_air_give_exactly_no_force(make_system, plain, distorted) -> None:
-    system, _ = make_system(distorted, [plain])
+def test_null_values_of_the_air_give_exactly_no_force(distorted) -> None:
+    system, _ = make_system(distorted, [PLAIN])
     position = crumpled(distorted, 1)
     wind = torch.ones((3, 1), dtype=torch.float64)
     for air in (QuadraticNormal(density=0.0), Stokes(viscosity=0.0)):
@@ -180,9 +179,9 @@ def test_negative_parameters_of_the_air_are_refused() -> None:
     )
 
 
-def test_linearised_stiffness_is_the_derivative_of_the_force_at_small_strain(make_system, plain, distorted) -> None:
+def test_linearised_stiffness_is_the_derivative_of_the_force_at_small_strain(distorted) -> None:
     # At rest the terms that the linearisation leaves out vanish.
-    system, state = make_system(distorted, [plain])
+    system, state = make_system(distorted, [PLAIN])
     field = velocity_like(crumpled(distorted, 1))
     step = 1e-6
     for part, kind, slots in (

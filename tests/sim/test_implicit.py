@@ -19,6 +19,7 @@ from sim.material import isotropic, named
 from sim.mesh import grid
 from sim.state import State
 from tests.refusals import unrefused
+from tests.sim.conftest import make_system
 
 
 def matrix(seed: int) -> torch.Tensor:
@@ -54,7 +55,7 @@ def test_a_member_that_does_not_converge_is_marked_and_the_others_are_solved() -
     torch.testing.assert_close(found[..., 1], right[..., 1])
 
 
-def test_a_free_mass_point_under_gravity_falls_as_the_method_says(make_system, distorted) -> None:
+def test_a_free_mass_point_under_gravity_falls_as_the_method_says(distorted) -> None:
     # v_n = g n h exactly, x_n = g h² n(n+1)/2.
     system, state = make_system(distorted, [named("camel-ponte-roma")], gravity=(0.0, 0.0, -10.0))
     final = BackwardEuler(step=0.01, tolerance=1e-12).advance(system, state, 0.1)
@@ -63,7 +64,7 @@ def test_a_free_mass_point_under_gravity_falls_as_the_method_says(make_system, d
     torch.testing.assert_close(fall, torch.full_like(fall, -10 * 1e-4 * 55), rtol=0, atol=1e-10)
 
 
-def test_backward_euler_converges_to_leapfrog_with_first_order(make_system) -> None:
+def test_backward_euler_converges_to_leapfrog_with_first_order() -> None:
     material = isotropic(name="soft", density=0.3, stretching=20.0, shear=20.0, bending=1e-4, damping=1e-3)
     mesh = grid(width=0.4, height=0.3, columns=4, rows=3)
     handles = Handles(vertices=(0, 3), stiffness=math.inf)
@@ -78,7 +79,7 @@ def test_backward_euler_converges_to_leapfrog_with_first_order(make_system) -> N
     assert 0.7 < math.log2(errors[1] / errors[2]) < 1.2
 
 
-def test_backward_euler_damps_a_slow_mode_as_declared_damping_of_one_step_does(make_system) -> None:
+def test_backward_euler_damps_a_slow_mode_as_declared_damping_of_one_step_does() -> None:
     # A linear mode with ω h ≪ 1: backward Euler multiplies it by 1/√(1 + ω² h²) ≈ exp(−ω² h²/2) a step, Kelvin–Voigt
     # damping d by exp(−d ω² h/2): the same for d = h. Here ω ≈ √(K/ρ)/width · √2 ≈ 14/s, so that ω h = 0.07.
     spring = isotropic(name="spring", density=1.0, stretching=100.0, shear=0.0, bending=0.0)
@@ -108,7 +109,7 @@ def test_impossible_settings_are_refused() -> None:
 @pytest.mark.parametrize("stiffness", [1e3, math.inf])
 @pytest.mark.parametrize("shape", list(AirShape))
 @pytest.mark.parametrize(("dtype", "tolerance"), [(torch.float64, 1e-9), (torch.float32, 1e-4)])
-def test_kernel_and_torch_take_the_same_step(stiffness, shape, dtype, tolerance, make_system, distorted) -> None:
+def test_kernel_and_torch_take_the_same_step(stiffness, shape, dtype, tolerance, distorted) -> None:
     handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
     materials = [named(name) for name in ("camel-ponte-roma", "11oz-black-denim", "gray-interlock")]
     system, state = make_system(
@@ -132,7 +133,7 @@ def test_kernel_and_torch_take_the_same_step(stiffness, shape, dtype, tolerance,
 
 
 @pytest.mark.parametrize("backend", [Backend.TORCH, Backend.KERNEL])
-def test_a_diverged_member_is_marked_and_does_not_change_the_others(backend, make_system, distorted) -> None:
+def test_a_diverged_member_is_marked_and_does_not_change_the_others(backend, distorted) -> None:
     system, state = make_system(distorted, [named("camel-ponte-roma")] * 2, wind=(5.0, 0.0, 0.0))
     broken = state.position.clone()
     broken[7, 0, 1] = torch.nan
@@ -143,7 +144,7 @@ def test_a_diverged_member_is_marked_and_does_not_change_the_others(backend, mak
     assert torch.equal(final.position[..., 0], healthy.position[..., 0])
 
 
-def test_stiff_materials_take_the_papers_steps(make_system) -> None:
+def test_stiff_materials_take_the_papers_steps() -> None:
     # Aluminium foil of 0.07 kg/m² and 1.8 MN/m: an explicit step would have to be below a microsecond.
     mesh = grid(width=0.3, height=0.2, columns=6, rows=4)
     handles = Handles(vertices=(0, 4))
@@ -159,7 +160,7 @@ def test_stiff_materials_take_the_papers_steps(make_system) -> None:
 
 
 @pytest.mark.parametrize("stiffness", [1e3, math.inf])
-def test_steps_in_one_call_are_those_taken_one_by_one_to_the_bit(make_system, distorted, stiffness: float) -> None:
+def test_steps_in_one_call_are_those_taken_one_by_one_to_the_bit(distorted, stiffness: float) -> None:
     handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
     system, state = make_system(
         distorted, [named("camel-ponte-roma"), named("white-swim-solid")], handles=handles, gravity=(0.0, 0.0, -9.81)

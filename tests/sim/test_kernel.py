@@ -19,6 +19,7 @@ from sim.kernel import Kernel
 from sim.material import named
 from sim.state import State
 from sim.tables import Evaluation
+from tests.sim.conftest import PLAIN, make_system
 
 
 @pytest.fixture
@@ -37,9 +38,7 @@ def stirred(state: State) -> State:
 @pytest.mark.parametrize("evaluation", list(Evaluation))
 @pytest.mark.parametrize("stiffness", [1e3, float("inf")])
 @pytest.mark.parametrize(("dtype", "tolerance"), [(torch.float64, 1e-11), (torch.float32, 2e-4)])
-def test_kernel_and_torch_agree_to_rounding(
-    evaluation, stiffness, dtype, tolerance, make_system, materials, distorted
-) -> None:
+def test_kernel_and_torch_agree_to_rounding(evaluation, stiffness, dtype, tolerance, materials, distorted) -> None:
     handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
     system, state = make_system(
         distorted,
@@ -66,7 +65,7 @@ def test_kernel_and_torch_agree_to_rounding(
     torch.testing.assert_close(results[1].velocity, results[0].velocity, rtol=0, atol=100 * tolerance)
 
 
-def test_a_members_result_does_not_depend_on_the_others_to_the_bit(make_system, materials, distorted) -> None:
+def test_a_members_result_does_not_depend_on_the_others_to_the_bit(materials, distorted) -> None:
     first, second, third = materials
     outcomes = []
     for batch in ([first, second, third], [first, third, third], [first] * 3, [first, *[second] * 40]):
@@ -81,7 +80,7 @@ def test_a_members_result_does_not_depend_on_the_others_to_the_bit(make_system, 
         assert torch.equal(outcome, outcomes[0])
 
 
-def test_a_diverging_member_leaves_the_others_unharmed(make_system, materials, distorted) -> None:
+def test_a_diverging_member_leaves_the_others_unharmed(materials, distorted) -> None:
     system, state = make_system(distorted, materials, dtype=torch.float32)
     start = stirred(state)
     broken = State(position=start.position.clone(), velocity=start.velocity)
@@ -92,7 +91,7 @@ def test_a_diverging_member_leaves_the_others_unharmed(make_system, materials, d
     assert torch.equal(final.position[..., [0, 2]], reference.position[..., [0, 2]])
 
 
-def test_other_air_and_effects_are_added_to_the_kernels_forces(make_system, materials, distorted) -> None:
+def test_other_air_and_effects_are_added_to_the_kernels_forces(materials, distorted) -> None:
     class Push:
         """A body force that grows with time."""
 
@@ -111,8 +110,8 @@ def test_other_air_and_effects_are_added_to_the_kernels_forces(make_system, mate
 # Central differences of a smooth function err by the square of the step. The tables have kinks, which the difference
 # crosses for some faces and the gradient does not see: 0.1 %.
 @pytest.mark.parametrize(("measured", "tolerance"), [(False, 1e-7), (True, 1e-3)])
-def test_gradients_go_through_torch_and_are_right(measured, tolerance, make_system, plain, distorted) -> None:
-    system, state = make_system(distorted, [named("camel-ponte-roma") if measured else plain], wind=(5.0, 0.0, 0.0))
+def test_gradients_go_through_torch_and_are_right(measured, tolerance, distorted) -> None:
+    system, state = make_system(distorted, [named("camel-ponte-roma") if measured else PLAIN], wind=(5.0, 0.0, 0.0))
     start = stirred(state)
 
     def outcome(shift: torch.Tensor) -> torch.Tensor:
@@ -140,7 +139,7 @@ def no_compiler(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("no_compiler")
-def test_without_a_compiler_torch_does_the_work_after_one_warning(make_system, distorted) -> None:
+def test_without_a_compiler_torch_does_the_work_after_one_warning(distorted) -> None:
     system, state = make_system(distorted, [named("paper")])
     with pytest.warns(RuntimeWarning, match="no C\\+\\+ compiler") as caught:
         state = advance(system, stirred(state), 1e-5, steps=2)
@@ -168,13 +167,13 @@ def test_processes_that_build_at_once_all_get_a_kernel(tmp_path) -> None:
     assert [path.suffix for path in cache.iterdir()] == [".so"]
 
 
-def test_a_forced_step_beyond_the_limit_is_refused_with_the_limit(make_system, distorted) -> None:
+def test_a_forced_step_beyond_the_limit_is_refused_with_the_limit(distorted) -> None:
     system, state = make_system(distorted, [named("11oz-black-denim")])
     with pytest.raises(UsageError, match="unstable: the limit"):
         Symplectic(step=5e-3).advance(system, state, 0.04)
 
 
-def test_just_below_the_limit_is_stable_and_well_above_is_not(make_system, distorted) -> None:
+def test_just_below_the_limit_is_stable_and_well_above_is_not(distorted) -> None:
     # The estimate is for 15 % stretch and the largest table entries; at small strain the true limit is some way above.
     from sim.integrate import stable_step
 

@@ -24,13 +24,14 @@ from sim.run import Recipe, parse
 from sim.scene import assemble, flag
 from sim.state import State
 from sim.tables import Evaluation
+from tests.sim.conftest import PLAIN, make_system
 
 wp = pytest.importorskip("warp", reason="warp-lang is not installed: pip install 'flagdata[gpu]'")
 FABRICS = ("camel-ponte-roma", "white-swim-solid", "royal-target")
 
 
 @pytest.fixture
-def flapping(make_system, distorted):
+def flapping(distorted):
     """Three fabrics in a breeze, held by springs at two corners: a system and its start."""
     return make_system(
         distorted,
@@ -60,7 +61,7 @@ def test_a_second_of_flags_is_the_compiled_kernels_to_a_tenth_of_a_millimetre() 
 
 @pytest.mark.parametrize("evaluation", list(Evaluation))
 @pytest.mark.parametrize("stiffness", [1e3, float("inf")])
-def test_twenty_steps_agree_with_torch_to_rounding(evaluation, stiffness, make_system, distorted) -> None:
+def test_twenty_steps_agree_with_torch_to_rounding(evaluation, stiffness, distorted) -> None:
     handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
     system, state = make_system(
         distorted,
@@ -130,14 +131,14 @@ def test_what_it_does_not_have_is_refused_by_name(more, named_, flapping) -> Non
         advance(replace(system, **more), start, 0.002, steps=20, backend=Backend.WARP)
 
 
-def test_implicit_steps_float64_and_gradients_are_refused(flapping, make_system, plain, distorted) -> None:
+def test_implicit_steps_float64_and_gradients_are_refused(flapping, distorted) -> None:
     system, start = flapping
     with pytest.raises(UsageError, match="only leapfrog steps"):
         BackwardEuler(backend=Backend.WARP).advance(system, start, 0.04)
     tracked = State(position=start.position.clone().requires_grad_(), velocity=start.velocity)
     with pytest.raises(UsageError, match="no gradients"):
         advance(system, tracked, 0.002, steps=2, backend=Backend.WARP)
-    double, begin = make_system(distorted, [plain])
+    double, begin = make_system(distorted, [PLAIN])
     with pytest.raises(UsageError, match="float64"):
         advance(double, begin, 0.002, steps=2, backend=Backend.WARP)
 
@@ -175,12 +176,12 @@ def test_a_recipe_names_the_backend_and_its_hash_changes_only_then() -> None:
         recipe('name = "implicit"\nbackend = "warp"')
 
 
-def test_threads_may_run_batches_at_once(make_system, plain) -> None:
+def test_threads_may_run_batches_at_once() -> None:
     # As `flagdata simulate --workers` does; the mesh is one that no other test has had compiled.
     mesh = grid(width=0.5, height=0.3, columns=5, rows=3)
 
     def one(_: int) -> torch.Tensor:
-        system, start = make_system(mesh, [plain], wind=(3.0, 0.5, 0.0), dtype=torch.float32)
+        system, start = make_system(mesh, [PLAIN], wind=(3.0, 0.5, 0.0), dtype=torch.float32)
         return advance(system, start, 0.002, steps=20, backend=Backend.WARP).position
 
     with ThreadPoolExecutor(4) as pool:

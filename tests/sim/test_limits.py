@@ -16,9 +16,10 @@ from sim.limits import StrainLimits, correction, limited, stretches
 from sim.material import named
 from sim.mesh import grid
 from sim.state import State
+from tests.sim.conftest import make_system
 
 
-def test_a_single_triangle_is_brought_to_the_limits_with_its_centroid_kept(make_system) -> None:
+def test_a_single_triangle_is_brought_to_the_limits_with_its_centroid_kept() -> None:
     # Stretched by 1.3 along u and to 0.8 along v: principal stretches 1.05 and 0.95 afterwards.
     mesh = grid(width=1.0, height=1.0, columns=1, rows=1)
     one = type(mesh)(rest=mesh.rest[[0, 2, 3]], faces=[[0, 1, 2]])
@@ -31,14 +32,14 @@ def test_a_single_triangle_is_brought_to_the_limits_with_its_centroid_kept(make_
     torch.testing.assert_close(moved.mean(0), position.mean(0))
 
 
-def test_within_the_limits_nothing_moves(make_system, distorted) -> None:
+def test_within_the_limits_nothing_moves(distorted) -> None:
     system, state = make_system(distorted, [named("paper")])
     bent = state.position.clone()
     bent[:, 0] = 0.01 * torch.sin(8 * bent[:, 1])
     assert float(correction(system.cloth, StrainLimits(), bent).abs().max()) < 1e-15
 
 
-def test_a_correction_keeps_the_centre_of_mass_and_turns_with_the_cloth(make_system, distorted) -> None:
+def test_a_correction_keeps_the_centre_of_mass_and_turns_with_the_cloth(distorted) -> None:
     system, state = make_system(distorted, [named("camel-ponte-roma")])
     position = state.position * 1.2 + 0.05 * torch.sin(9 * state.position.roll(1, 1))
     move = correction(system.cloth, StrainLimits(), position)
@@ -53,7 +54,7 @@ def test_a_correction_keeps_the_centre_of_mass_and_turns_with_the_cloth(make_sys
 @pytest.mark.parametrize(
     ("method", "limits"), [(Symplectic(step=3e-4), StrainLimits()), (BackwardEuler(), StrainLimits(sweeps=50))]
 )
-def test_a_heavy_hanging_cloth_stretches_to_the_limit_and_not_beyond(method, limits, make_system) -> None:
+def test_a_heavy_hanging_cloth_stretches_to_the_limit_and_not_beyond(method, limits) -> None:
     # A fiftieth of the measured stiffness, at most 10.7 N/m: its weight, 2.8 N/m, stretches it by a quarter and more.
     mesh = grid(width=0.2, height=1.0, columns=4, rows=20)
     top = tuple(int(i) for i in np.flatnonzero(mesh.rest[:, 1] > 1 - 1e-9))
@@ -70,7 +71,7 @@ def test_a_heavy_hanging_cloth_stretches_to_the_limit_and_not_beyond(method, lim
     assert longest[limits] < 1.07
 
 
-def test_accelerated_sweeps_keep_the_momentum_and_come_closer(make_system, distorted) -> None:
+def test_accelerated_sweeps_keep_the_momentum_and_come_closer(distorted) -> None:
     # By the distance from the limits that is left, root mean square over the faces: 30 plain sweeps against 30 of which
     # 22 are accelerated.
     system, state = make_system(distorted, [named("camel-ponte-roma")])
@@ -94,7 +95,7 @@ def test_accelerated_sweeps_keep_the_momentum_and_come_closer(make_system, disto
 
 @pytest.mark.parametrize("backend", [Backend.TORCH, Backend.KERNEL])
 @pytest.mark.parametrize("stiffness", [math.inf, 1e3])
-def test_what_handles_hold_is_not_moved_by_the_limits(backend, stiffness, make_system, distorted) -> None:
+def test_what_handles_hold_is_not_moved_by_the_limits(backend, stiffness, distorted) -> None:
     # The start is beyond the limits, and forces have no time: membranes that pull a gram with 10 N move it by 5 nm.
     handles = Handles(vertices=(0, 4), stiffness=stiffness)
     system, state = make_system(distorted, [named("camel-ponte-roma")], handles=handles)
@@ -111,7 +112,7 @@ def test_what_handles_hold_is_not_moved_by_the_limits(backend, stiffness, make_s
 @pytest.mark.parametrize("stiffness", [math.inf, 1e3])
 @pytest.mark.parametrize("sweeps", [2, 12])
 @pytest.mark.parametrize(("dtype", "tolerance"), [(torch.float64, 1e-9), (torch.float32, 1e-4)])
-def test_kernel_and_torch_limit_alike(dtype, tolerance, sweeps, stiffness, make_system, distorted) -> None:
+def test_kernel_and_torch_limit_alike(dtype, tolerance, sweeps, stiffness, distorted) -> None:
     handles = Handles(vertices=(0, 4), stiffness=stiffness)
     system, state = make_system(
         distorted,

@@ -19,6 +19,7 @@ from sim.integrate import Backend, Symplectic, advance
 from sim.material import named
 from sim.mesh import grid
 from sim.scene import assemble, flag
+from tests.sim.conftest import PLAIN, make_system
 
 STEP = 4e-4
 
@@ -35,10 +36,10 @@ def flying(*effects: Any, winds: tuple[float, ...] = (4.0, 5.0), dtype: torch.dt
     return apply(effects, system, state)
 
 
-def test_friction_slows_a_sliding_sheet_exponentially_and_at_second_order_of_the_outer_step(make_system, plain) -> None:
+def test_friction_slows_a_sliding_sheet_exponentially_and_at_second_order_of_the_outer_step() -> None:
     """σ v̇ = −c v along the sheet: v₀ e^(−c t/σ), here e^(−1)."""
     mesh = grid(width=1.0, height=1.0, columns=2, rows=2)
-    system, state = make_system(mesh, [plain], air=NO_AIR)
+    system, state = make_system(mesh, [PLAIN], air=NO_AIR)
     sliding = torch.tensor([0.0, 3.0, 0.0], dtype=torch.float64)[:, None].expand_as(state.position)
     system, state = apply([TangentialLinearDrag(coefficient=0.4)], system, replace(state, velocity=sliding))
     errors = []
@@ -51,11 +52,11 @@ def test_friction_slows_a_sliding_sheet_exponentially_and_at_second_order_of_the
     assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.08)
 
 
-def test_the_error_falls_with_the_square_of_the_outer_step(make_system, plain, distorted) -> None:
+def test_the_error_falls_with_the_square_of_the_outer_step(distorted) -> None:
     # Neither damping nor air in the base model, whose own error would depend on how often it starts afresh.
     system, state = make_system(
         distorted,
-        [plain],
+        [PLAIN],
         handles=Handles(vertices=(0, 4)),
         gravity=(0.0, 0.0, -9.81),
         wind=(5.0, 1.0, 0.0),

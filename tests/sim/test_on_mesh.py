@@ -11,6 +11,7 @@ from sim.air import NO_AIR, QuadraticNormal, Stokes, face_wind
 from sim.cloth import Cloth
 from sim.effects import Permeability, PowerLawDrag
 from sim.material import named
+from tests.sim.conftest import make_system
 
 BATCHES = (1, 3, 8, 20)
 """Fewer members than are taken at a time, as many, and more with some left over."""
@@ -104,7 +105,7 @@ def test_a_force_of_the_air_is_its_plain_one_and_what_is_beyond(cloth: Cloth, ai
     torch.testing.assert_close(air.force(cloth, *given), whole, rtol=1e-12, atol=1e-14)
 
 
-def test_factors_on_the_pressure_multiply_the_normal_force_alone(make_system, distorted) -> None:
+def test_factors_on_the_pressure_multiply_the_normal_force_alone(distorted) -> None:
     # ρ a |w_n| w_n times the product of the factors, plus the tangential part as it is.
     system, state = make_system(
         distorted, [named("camel-ponte-roma")] * 3, air=QuadraticNormal(density=1.2, drag=0.1), wind=(5.0, 1.0, 0.0)

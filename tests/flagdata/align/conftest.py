@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -124,26 +123,16 @@ def make(
     return motion, wind
 
 
-@pytest.fixture(scope="session")
-def scene() -> Callable[..., tuple[MotionSeries, WindAverage]]:
+def scene(
+    *, gust: np.ndarray | None = None, other: np.ndarray | None = None, **changes: float
+) -> tuple[MotionSeries, WindAverage]:
     """`scene(seed=1, offset=12.3, …)`: a film's motion and an anemometer's averages."""
-
-    def build(
-        *, gust: np.ndarray | None = None, other: np.ndarray | None = None, **changes: float
-    ) -> tuple[MotionSeries, WindAverage]:
-        return make(Scene(**changes), gust=gust, other=other)  # type: ignore[arg-type]
-
-    return build
+    return make(Scene(**changes), gust=gust, other=other)  # type: ignore[arg-type]
 
 
-@pytest.fixture(scope="session")
-def gusts_alone() -> Callable[[int, float], np.ndarray]:
-    """`gusts_alone(seed, seconds)`: gusts of unit variance of another day."""
-
-    def build(seed: int, seconds: float) -> np.ndarray:
-        return gusts(Scene(seed=seed), stream(seed, "another day"), seconds)
-
-    return build
+def gusts_alone(seed: int, seconds: float) -> np.ndarray:
+    """Gusts of unit variance of another day."""
+    return gusts(Scene(seed=seed), stream(seed, "another day"), seconds)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,8 +16,8 @@ from flagdata.ingest import WindOptions, read_log
 from flagdata.ingest.anemometer import average
 from flagdata.rng import stream
 from flagdata.signals import WindAverage
+from tests.flagdata.align.conftest import gusts_alone, scene
 
-Scenes = Callable[..., tuple[MotionSeries, WindAverage]]
 SECOND = 1_000_000_000
 FIELDS = 60
 
@@ -32,14 +31,14 @@ def refusals(found: LagEstimate) -> set[str]:
 
 
 @pytest.mark.parametrize("offset", [-97.4, -12.3, 0.0, 31.7, 118.0])
-def test_offset_of_a_gusty_ten_minutes_is_recovered_within_half_a_second(scene: Scenes, offset: float) -> None:
+def test_offset_of_a_gusty_ten_minutes_is_recovered_within_half_a_second(offset: float) -> None:
     found = estimate(scene(seed=3, offset=offset, apart=1.5, flag_noise=0.3))
     assert found.accepted, found.reasons
     assert found.offset == pytest.approx(offset, abs=0.5)  # the acceptance bound
     assert found.interval[0] <= offset <= found.interval[1]
 
 
-def test_intervals_of_field_recordings_cover_the_offset_at_their_level(scene: Scenes) -> None:
+def test_intervals_of_field_recordings_cover_the_offset_at_their_level() -> None:
     """Fields drawn at random: turbulence 10 to 25 %, length scales 50 to 100 m, flag 1 to 3 m from the sensor.
 
     The flag's response is drawn with the mean and spread that the search assumes. Coverage is that of accepted
@@ -80,7 +79,7 @@ def test_intervals_of_field_recordings_cover_the_offset_at_their_level(scene: Sc
     assert np.mean(np.abs(errors) < 0.5) > 0.85
 
 
-def test_the_offset_does_not_depend_on_the_generator(scene: Scenes) -> None:
+def test_the_offset_does_not_depend_on_the_generator() -> None:
     pair = scene(seed=3, offset=5.0, apart=1.5)
     found = [
         estimate_offset(*pair, search=LagSearch(surrogates=60), generator=stream(seed, "chance")) for seed in (0, 1)
@@ -89,7 +88,7 @@ def test_the_offset_does_not_depend_on_the_generator(scene: Scenes) -> None:
     assert found[0].sigma == found[1].sigma
 
 
-def test_a_monotone_transform_of_the_wind_moves_nothing(scene: Scenes) -> None:
+def test_a_monotone_transform_of_the_wind_moves_nothing() -> None:
     motion, wind = scene(seed=3, offset=5.0, apart=1.5)
     plain = estimate((motion, wind), surrogates=60)
     squared = estimate((motion, replace(wind, speed=wind.speed**2)), surrogates=60)
@@ -97,7 +96,7 @@ def test_a_monotone_transform_of_the_wind_moves_nothing(scene: Scenes) -> None:
     assert squared.sigma == plain.sigma
 
 
-def test_shifting_the_cameras_clock_shifts_the_offset_by_as_much(scene: Scenes) -> None:
+def test_shifting_the_cameras_clock_shifts_the_offset_by_as_much() -> None:
     motion, wind = scene(seed=3, offset=5.0, apart=1.5)
     plain = estimate((motion, wind), surrogates=60)
     moved = estimate((replace(motion, time=motion.time - 20 * SECOND), wind), surrogates=60)
@@ -105,7 +104,7 @@ def test_shifting_the_cameras_clock_shifts_the_offset_by_as_much(scene: Scenes) 
     assert moved.offset == pytest.approx(plain.offset + 20, abs=0.005)
 
 
-def test_one_missing_minute_of_either_side_leaves_the_offset_within_its_interval(scene: Scenes) -> None:
+def test_one_missing_minute_of_either_side_leaves_the_offset_within_its_interval() -> None:
     motion, wind = scene(seed=3, offset=5.0, apart=1.5)
     frames = np.ones(len(motion), dtype=bool)
     frames[4000:5500] = False
@@ -127,22 +126,20 @@ def test_one_missing_minute_of_either_side_leaves_the_offset_within_its_interval
     assert found.interval[0] <= 5.0 <= found.interval[1]
 
 
-def test_steady_wind_is_refused(scene: Scenes) -> None:
+def test_steady_wind_is_refused() -> None:
     found = estimate(scene(seed=4, turbulence=0.005))
     assert not found.accepted
     assert refusals(found) == {"steady-wind"}
 
 
 @pytest.mark.parametrize("period", [7.0, 20.0, 60.0])
-def test_periodic_wind_is_refused_as_ambiguous(scene: Scenes, period: float) -> None:
+def test_periodic_wind_is_refused_as_ambiguous(period: float) -> None:
     time = np.arange(900 * 20) / 20
     found = estimate(scene(seed=5, offset=20.0, apart=0.0, gust=np.sqrt(2) * np.sin(2 * np.pi * time / period)))
     assert "ambiguous-offset" in refusals(found)
 
 
-def test_unrelated_wind_is_accepted_no_more_often_than_stated(
-    scene: Scenes, gusts_alone: Callable[..., np.ndarray]
-) -> None:
+def test_unrelated_wind_is_accepted_no_more_often_than_stated() -> None:
     """Films of one gusty day against the wind of another; the stated chance is 1 %."""
     accepted = 0
     for seed in range(FIELDS):
@@ -151,58 +148,58 @@ def test_unrelated_wind_is_accepted_no_more_often_than_stated(
     assert accepted <= binom.ppf(0.999, FIELDS, 0.01)
 
 
-def test_too_short_an_overlap_is_refused(scene: Scenes) -> None:
+def test_too_short_an_overlap_is_refused() -> None:
     motion, wind = scene(seed=3, duration=100.0)
     assert refusals(estimate((motion, wind))) == {"short-overlap"}
 
 
-def test_a_film_of_two_minutes_is_too_short_and_not_unmoved(scene: Scenes) -> None:
+def test_a_film_of_two_minutes_is_too_short_and_not_unmoved() -> None:
     """Two minutes are asked for, and the estimate cannot use all of them: that is the reason."""
     motion, wind = scene(seed=3, duration=120.0)
     assert refusals(estimate((motion, wind))) == {"short-overlap"}
 
 
-def test_a_peak_at_the_edge_of_the_search_is_refused(scene: Scenes) -> None:
+def test_a_peak_at_the_edge_of_the_search_is_refused() -> None:
     found = estimate(scene(seed=3, offset=30.0, apart=1.5, flag_noise=0.2), window=30.0, surrogates=60)
     assert "offset-at-edge" in refusals(found)
 
 
-def test_an_offset_beyond_the_search_is_refused(scene: Scenes) -> None:
+def test_an_offset_beyond_the_search_is_refused() -> None:
     found = estimate(scene(seed=3, offset=60.0, apart=1.5, flag_noise=0.2), window=30.0, surrogates=60)
     assert not found.accepted
 
 
-def test_a_still_film_is_refused(scene: Scenes) -> None:
+def test_a_still_film_is_refused() -> None:
     motion, wind = scene(seed=3)
     found = estimate((replace(motion, energy=np.zeros(len(motion))), wind))
     assert refusals(found) == {"still-flag"}
 
 
-def test_a_motion_that_falls_when_the_wind_rises_is_refused(scene: Scenes) -> None:
+def test_a_motion_that_falls_when_the_wind_rises_is_refused() -> None:
     motion, wind = scene(seed=3, offset=0.0, apart=0.5, flag_noise=0.1)
     found = estimate((replace(motion, energy=1 / motion.energy), wind), window=3.0, surrogates=60)
     assert "unmoved-flag" in refusals(found)
 
 
-def test_a_film_without_two_comparable_frames_says_so(scene: Scenes) -> None:
+def test_a_film_without_two_comparable_frames_says_so() -> None:
     motion, wind = scene(seed=3)
     with pytest.raises(InputError, match="no motion"):
         estimate((replace(motion, energy=np.full(len(motion), np.nan)), wind))
 
 
-def test_wind_and_film_of_different_days_say_so(scene: Scenes) -> None:
+def test_wind_and_film_of_different_days_say_so() -> None:
     motion, wind = scene(seed=3)
     with pytest.raises(InputError, match="do not overlap"):
         estimate((replace(motion, time=motion.time + 86_400 * SECOND), wind))
 
 
-def test_frames_slower_than_the_bins_say_so(scene: Scenes) -> None:
+def test_frames_slower_than_the_bins_say_so() -> None:
     motion, wind = scene(seed=3)
     with pytest.raises(InputError, match="too slow"):
         estimate((MotionSeries(time=motion.time[::20], energy=motion.energy[::20]), wind))
 
 
-def test_bins_off_their_grid_say_so(scene: Scenes) -> None:
+def test_bins_off_their_grid_say_so() -> None:
     motion, wind = scene(seed=3)
     jitter = stream(1, "jitter").integers(-300_000_000, 300_000_000, len(wind.time))
     with pytest.raises(InputError, match="regular grid"):
@@ -226,7 +223,7 @@ def test_searches_that_make_no_sense_are_refused(wrong: dict[str, float]) -> Non
 
 
 @pytest.mark.reference
-def test_a_real_sonics_gusts_tie_a_flag_to_its_clock(scene: Scenes, reference_data: Path) -> None:
+def test_a_real_sonics_gusts_tie_a_flag_to_its_clock(reference_data: Path) -> None:
     """Fifteen minutes of a CSAT3 in a field at 20 Hz: 1.8 m/s, intensity 56 %, gusts that no spectrum here made."""
     log = read_log(reference_data / "wind" / "toa5_csat3_20hz.dat", WindOptions(zone="UTC"))
     speed = log.series.channels["wind_speed"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +13,8 @@ from flagdata.align.methods import Evidence
 from flagdata.errors import ConflictError, InputError
 from flagdata.rng import stream
 from flagdata.signals import WindAverage
+from tests.flagdata.align.conftest import scene
 from tests.refusals import unrefused
-
-Scenes = Callable[..., tuple[MotionSeries, WindAverage]]
 
 
 def evidence(pair: tuple[MotionSeries, WindAverage]) -> Evidence:
@@ -34,14 +32,14 @@ def size(path: Path) -> tuple[int, int]:
         return image.size
 
 
-def test_an_accepted_and_a_refused_estimate_are_drawn(scene: Scenes, tmp_path: Path) -> None:
+def test_an_accepted_and_a_refused_estimate_are_drawn(tmp_path: Path) -> None:
     draw(evidence(scene(seed=3, offset=9.0, apart=1.5, flag_noise=0.3)), tmp_path / "good.png", title="cam and mast")
     draw(evidence(scene(seed=3, turbulence=0.005)), tmp_path / "steady.png", title="cam and mast")
     draw(evidence(scene(seed=3, duration=90.0)), tmp_path / "short.png", title="cam and mast")
     assert size(tmp_path / "good.png") == size(tmp_path / "steady.png") == size(tmp_path / "short.png") == (1200, 768)
 
 
-def test_a_measured_drift_adds_its_own_panel(scene: Scenes, tmp_path: Path) -> None:
+def test_a_measured_drift_adds_its_own_panel(tmp_path: Path) -> None:
     draw(evidence(scene(seed=11, duration=5400.0, apart=1.5, flag_noise=0.3)), tmp_path / "long.png", title="long")
     assert size(tmp_path / "long.png") == (1200, 1056)
 
@@ -52,7 +50,7 @@ def test_files_that_cannot_be_drawn_say_so_before_anything_is_searched(tmp_path:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_an_earlier_picture_is_replaced_and_another_file_is_not(suffix: str, scene: Scenes, tmp_path: Path) -> None:
+def test_an_earlier_picture_is_replaced_and_another_file_is_not(suffix: str, tmp_path: Path) -> None:
     path, found = tmp_path / f"lag{suffix}", evidence(scene(seed=3, turbulence=0.005))
     draw(found, path, title="steady")
     draw(found, path, title="still steady")

@@ -13,8 +13,8 @@ from tests.program import Run, invoke
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    return lambda *arguments: invoke(capsys, *arguments, "--lake", lake.path)
+def run(lake: Lake) -> Run:
+    return lambda *arguments: invoke(*arguments, "--lake", lake.path)
 
 
 def test_a_recording_is_brought_in_aligned_tagged_and_exported(

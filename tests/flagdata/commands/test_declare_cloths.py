@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import flagdata
 from flagdata.cli import root
 from flagdata.lake import Lake
 from flagdata.record import Record
+from tests.flagdata.conftest import write_video
 from tests.program import Run, invoke
 
 
@@ -30,7 +30,7 @@ class Declared:
 
 
 @pytest.fixture(scope="module")
-def declared(tmp_path_factory: pytest.TempPathFactory, write_video: Callable[..., Path]) -> Declared:
+def declared(tmp_path_factory: pytest.TempPathFactory) -> Declared:
     folder = tmp_path_factory.mktemp("cloths")
     write_video(folder / "felt.mp4", frames=80, creation_time=None)
     write_video(folder / "silk.mp4", frames=90, creation_time=None)
@@ -52,8 +52,8 @@ def lake(declared: Declared, tmp_path: Path) -> Lake:
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    return lambda *arguments: invoke(capsys, "declare-cloths", *arguments, "--lake", lake.path)
+def run(lake: Lake) -> Run:
+    return lambda *arguments: invoke("declare-cloths", *arguments, "--lake", lake.path)
 
 
 def clips(lake: Lake) -> dict[str, dict[str, Any]]:
@@ -127,26 +127,22 @@ def table(declared: Declared, tmp_path: Path) -> Path:
     return Path(copied) / "cloths.csv"
 
 
-def test_an_error_midway_says_what_stays_published_and_a_repeat_makes_the_rest(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_error_midway_says_what_stays_published_and_a_repeat_makes_the_rest(table: Path, tmp_path: Path) -> None:
     lake, silk = Lake.open(tmp_path / "fresh"), table.with_name("silk.mp4")
     whole = silk.read_bytes()
     silk.write_bytes(whole[:100])
-    code, _, err = invoke(capsys, "declare-cloths", table, "--lake", lake.path)
+    code, _, err = invoke("declare-cloths", table, "--lake", lake.path)
     assert code == 1
     assert "on branch main: camera 1, clip 1, recording 1; give the same command again for the rest" in err
     silk.write_bytes(whole)
-    code, _, err = invoke(capsys, "declare-cloths", table, "--lake", lake.path)
+    code, _, err = invoke("declare-cloths", table, "--lake", lake.path)
     assert code == 0, err
     assert [row["name"] for row in lake.rows("kind = 'recording'").to_pylist()] == ["felt", "silk"]
 
 
-def test_an_error_before_anything_is_published_promises_nothing(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_error_before_anything_is_published_promises_nothing(table: Path, tmp_path: Path) -> None:
     table.with_name("felt.mp4").write_bytes(b"no film")
-    code, _, err = invoke(capsys, "declare-cloths", table, "--lake", tmp_path / "fresh")
+    code, _, err = invoke("declare-cloths", table, "--lake", tmp_path / "fresh")
     assert code == 1
     assert "Published" not in err
     assert not len(Lake.open(tmp_path / "fresh").rows())

@@ -23,8 +23,8 @@ def lake(tmp_path: Path) -> Lake:
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    return lambda *arguments: invoke(capsys, "export", "--lake", lake.path, *arguments)
+def run(lake: Lake) -> Run:
+    return lambda *arguments: invoke("export", "--lake", lake.path, *arguments)
 
 
 def test_the_folder_is_the_result_and_the_summary_is_printed(run: Run, tmp_path: Path) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +12,13 @@ from PIL import Image
 from flagdata.commands.ingest_options import frame_rate
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
+from tests.flagdata.conftest import small_files
 from tests.program import Run, invoke
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    return lambda *arguments: invoke(capsys, "ingest", *arguments, "--lake", lake.path)
+def run(lake: Lake) -> Run:
+    return lambda *arguments: invoke("ingest", *arguments, "--lake", lake.path)
 
 
 def test_kind_is_inferred_from_content_not_name(run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path) -> None:
@@ -136,7 +135,7 @@ def test_a_single_failure_has_its_own_exit_code_and_one_document(run, tmp_path: 
 
 
 def test_a_disk_that_refuses_the_record_is_one_clear_error_and_the_lake_is_unchanged(
-    run, lake: Lake, video: Path, small_files: Callable[[], AbstractContextManager[None]]
+    run, lake: Lake, video: Path
 ) -> None:
     with small_files():
         code, out, err = run(video, "--json")
@@ -275,9 +274,7 @@ def test_a_crop_picture_that_cannot_be_written_leaves_the_lake_unchanged(
     assert again.read_bytes() == picture.read_bytes()
 
 
-def test_no_crop_picture_is_left_by_an_ingest_that_failed(
-    run, lake: Lake, video: Path, tmp_path: Path, small_files: Callable[[], AbstractContextManager[None]]
-) -> None:
+def test_no_crop_picture_is_left_by_an_ingest_that_failed(run, lake: Lake, video: Path, tmp_path: Path) -> None:
     picture = tmp_path / "crop.png"
     with small_files():
         code, _, err = run(video, "--crop", "auto", "--crop-picture", picture)

@@ -8,7 +8,7 @@ import os
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -197,9 +197,7 @@ def test_pipes_and_devices_are_refused_at_once(tmp_path: Path) -> None:
     assert not _ingest(lake, Path("/dev/zero"))
 
 
-def test_names_that_are_no_text_are_shown_and_do_no_harm(
-    tmp_path: Path, wind_log: Path, write_video: Callable[..., Path]
-) -> None:
+def test_names_that_are_no_text_are_shown_and_do_no_harm(tmp_path: Path, wind_log: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
     path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9.csv"))
     path.write_bytes(wind_log.read_bytes())

@@ -23,12 +23,12 @@ START = "2024-01-01T00:00:00Z"
 
 
 @pytest.fixture
-def ingest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[dict[str, Any], Record]]:
+def ingest(tmp_path: Path) -> Callable[..., tuple[dict[str, Any], Record]]:
     """Ingests one source into an empty lake; its report and its record."""
     lake = Lake.create(tmp_path / "lake")
 
     def ingest(*arguments: object) -> tuple[dict[str, Any], Record]:
-        ended = invoke(capsys, "ingest", *arguments, "--lake", lake.path, "--json")
+        ended = invoke("ingest", *arguments, "--lake", lake.path, "--json")
         assert ended.code == 0, ended
         result = ended.document["results"][0]
         return result["report"], Record.open(lake.object_path(result["object"]))

@@ -15,8 +15,8 @@ ROWS = [f"2026-05-13T12:00:{k:02d}Z,{4 + k % 7 / 10:.1f},{3 + k % 5 / 10:.1f}" f
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    return lambda *arguments: invoke(capsys, "ingest", *arguments, "--lake", lake.path)
+def run(lake: Lake) -> Run:
+    return lambda *arguments: invoke("ingest", *arguments, "--lake", lake.path)
 
 
 def test_each_anemometer_of_a_table_becomes_an_artifact(run: Run, lake: Lake, tmp_path: Path) -> None:
@@ -91,12 +91,10 @@ def test_the_anemometers_of_a_table_come_in_whole_or_not_at_all(run: Run, lake: 
     assert lake.view(None)[0].version == 1  # one commit
 
 
-def test_ls_shows_the_mean_wind_of_a_log(
-    run: Run, lake: Lake, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_ls_shows_the_mean_wind_of_a_log(run: Run, lake: Lake, tmp_path: Path) -> None:
     path = tmp_path / "mast.csv"
     rows = [f"2026-05-13T12:00:{k:02d}Z,{4 + k % 3}" for k in range(30)]
     path.write_text("\n".join(["time,wind speed (m/s)", *rows]) + "\n")
     assert run(path)[0] == 0
-    (row,) = invoke(capsys, "ls", "--lake", lake.path).out.splitlines()[1:]
+    (row,) = invoke("ls", "--lake", lake.path).out.splitlines()[1:]
     assert row.split()[2:5] == ["mast", "2026-05-13T12:00:00Z", "5.00"]

@@ -50,8 +50,8 @@ def clip(recording: str, number: int, *, wind: float | None) -> Artifact:
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    return lambda *arguments: invoke(capsys, "query", "--lake", lake.path, *arguments)
+def run(lake: Lake) -> Run:
+    return lambda *arguments: invoke("query", "--lake", lake.path, *arguments)
 
 
 def test_people_see_a_table_with_units_and_the_columns_of_that_kind(run: Run) -> None:

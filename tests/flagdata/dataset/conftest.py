@@ -117,16 +117,6 @@ def field_lake(tmp_path_factory) -> Lake:
     return lake
 
 
-@pytest.fixture(scope="session", name="write_record")
-def write_record_fixture():
-    return write_record
-
-
-@pytest.fixture(scope="session", name="add_recording")
-def add_recording_fixture():
-    return add_recording
-
-
 @pytest.fixture(scope="session")
 def made():
     return Made

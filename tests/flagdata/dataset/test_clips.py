@@ -17,6 +17,7 @@ from flagdata.lake import Artifact
 from flagdata.record import Record, RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
+from tests.flagdata.dataset.conftest import write_record
 
 NS = 1_000_000_000
 PERIOD = NS // 25
@@ -67,7 +68,7 @@ def test_clips_never_overlap_nor_span_a_gap(steps, frames):
         assert np.all(np.diff(instants[first:end]) <= gap)
 
 
-def test_ground_truth_of_a_clip_is_the_mean_of_the_minute_before_its_end(tmp_path, write_record, made):
+def test_ground_truth_of_a_clip_is_the_mean_of_the_minute_before_its_end(tmp_path, made):
     record = write_record(tmp_path / "a.mcap", made(number=1, mean=6.0))
     clock = ClockModel.identity("camera", "wind", start=NOON - 10 * NS, end=NOON + 10 * NS, sigma=0.1)
     rows = clip_rows(record, recording(clock_model=clock.to_json()))
@@ -86,7 +87,7 @@ def test_ground_truth_of_a_clip_is_the_mean_of_the_minute_before_its_end(tmp_pat
     assert len({r.id for r in rows}) == 3
 
 
-def test_a_clip_with_a_thin_minute_stays_as_a_row_that_says_so(tmp_path, write_record, made):
+def test_a_clip_with_a_thin_minute_stays_as_a_row_that_says_so(tmp_path, made):
     record = write_record(tmp_path / "a.mcap", made(number=1, missing=(30, 90)))
     rows = clip_rows(record, recording(clock_sigma=0.1))
     # All of the minute before the first frame is missing; the log resumes at the first frame.
@@ -95,14 +96,14 @@ def test_a_clip_with_a_thin_minute_stays_as_a_row_that_says_so(tmp_path, write_r
     assert "wind-coverage-low" in rows[0].quality
 
 
-def test_a_record_without_wind_gives_clips_without_ground_truth(tmp_path, write_record, made):
+def test_a_record_without_wind_gives_clips_without_ground_truth(tmp_path, made):
     record = write_record(tmp_path / "a.mcap", made(number=1, truth={"bending": 1e-5}))
     row = clip_rows(record, recording(clock_sigma=0.1))[0]
     assert (row.wind, row.wind_sigma, row.wind_coverage, row.wind_staleness) == (None, None, 0.0, None)
     assert "wind-missing" in row.quality
 
 
-def test_an_unknown_clock_uncertainty_makes_the_ground_truths_unknown(tmp_path, write_record, made):
+def test_an_unknown_clock_uncertainty_makes_the_ground_truths_unknown(tmp_path, made):
     row = clip_rows(write_record(tmp_path / "a.mcap", made(number=1)), recording())[0]
     assert row.wind is not None
     assert row.wind_sigma is None
@@ -110,7 +111,7 @@ def test_an_unknown_clock_uncertainty_makes_the_ground_truths_unknown(tmp_path, 
     assert "clock-sigma-unknown" in row.quality
 
 
-def test_a_simulated_record_states_its_wind_exactly_and_has_no_day(tmp_path, write_record, made):
+def test_a_simulated_record_states_its_wind_exactly_and_has_no_day(tmp_path, made):
     truth = {"wind_speed": 4.5, "bending": 1e-5}
     record = write_record(tmp_path / "a.mcap", made(number=1, frames=60, truth=truth))
     rows = clip_rows(record, recording(seed=7, clock_sigma=0.0))

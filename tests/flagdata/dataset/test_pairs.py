@@ -13,6 +13,7 @@ import flagdata
 from flagdata.dataset import ExplicitSplit, HashedSplit, Sample, Tolerance
 from flagdata.errors import NotFoundError, RefusedError, UnknownNameError, UsageError
 from flagdata.lake import Lake
+from tests.flagdata.dataset.conftest import add_recording, write_record
 from tests.refusals import unrefused
 
 NS = 1_000_000_000
@@ -44,7 +45,7 @@ def test_real_and_simulated_clips_are_samples_of_one_type(source):
     assert (simulated.wind, simulated.wind_sigma, simulated.clock_sigma, simulated.day) == (5.0, 0.0, 0.0, "")
 
 
-def test_the_clip_holds_the_frames_of_its_place_in_the_recording(source, field_lake, tmp_path, write_record, made):
+def test_the_clip_holds_the_frames_of_its_place_in_the_recording(source, field_lake, tmp_path, made):
     pairs = source.pairs("seed is null and wind < 3.5", at="v1")  # the first recording: mean 3 m/s
     reference = write_record(tmp_path / "a.mcap", made(number=0, session="site0", mean=3.0))
     assert len(pairs) == 3
@@ -53,7 +54,7 @@ def test_the_clip_holds_the_frames_of_its_place_in_the_recording(source, field_l
         assert sample.wind == pytest.approx(3.0, abs=1e-12)
 
 
-def test_a_tag_gives_the_same_pairs_after_later_commits(lake, add_recording, made):
+def test_a_tag_gives_the_same_pairs_after_later_commits(lake, made):
     add_recording(lake, made(number=1))
     lake.tag("v1")
     before = flagdata.open(lake.path).pairs(at="v1")
@@ -74,7 +75,7 @@ def test_the_fingerprint_is_of_the_pairs_and_not_of_the_query(source):
     assert source.pairs("session = 'site1'", at="v1").fingerprint != filtered.fingerprint
 
 
-def test_order_does_not_depend_on_the_order_of_commits(tmp_path, add_recording, made):
+def test_order_does_not_depend_on_the_order_of_commits(tmp_path, made):
     fingerprints = []
     for numbers in ((1, 2, 3), (3, 1, 2)):
         lake = Lake.create(tmp_path / f"lake{numbers[0]}")
@@ -84,7 +85,7 @@ def test_order_does_not_depend_on_the_order_of_commits(tmp_path, add_recording, 
     assert fingerprints[0] == fingerprints[1]
 
 
-def test_pairs_outside_the_tolerance_are_refused_with_every_reason(lake, add_recording, made):
+def test_pairs_outside_the_tolerance_are_refused_with_every_reason(lake, made):
     add_recording(lake, made(number=1, start=NOON))
     # The log pauses from 40 s to 89 s after its start. The first clip ends at 91.16 s, so its minute holds the samples
     # 32 to 39 and 89 to 91, of which the first speaks for 0.84 s: 10.84 s of 60.
@@ -100,20 +101,20 @@ def test_pairs_outside_the_tolerance_are_refused_with_every_reason(lake, add_rec
     assert len(loose) == 6
 
 
-def test_a_stale_log_is_refused(lake, add_recording, made):
+def test_a_stale_log_is_refused(lake, made):
     add_recording(lake, made(number=1, missing=(80, 200)))
     with pytest.raises(RefusedError, match=r"the newest wind sample is 12\.2 s old, above 5 s"):
         flagdata.open(lake.path).pairs(tolerance=Tolerance(coverage=0.1))
 
 
-def test_a_clip_without_any_wind_never_becomes_a_pair(lake, add_recording, made):
+def test_a_clip_without_any_wind_never_becomes_a_pair(lake, made):
     add_recording(lake, made(number=1, truth={"bending": 1e-5}, seed=1))
     everything = Tolerance(clock_sigma=math.inf, staleness=math.inf, coverage=0.0)
     with pytest.raises(RefusedError, match="no usable wind sample"):
         flagdata.open(lake.path).pairs(tolerance=everything)
 
 
-def test_another_window_is_computed_anew_from_the_wind(lake, add_recording, made):
+def test_another_window_is_computed_anew_from_the_wind(lake, made):
     add_recording(lake, made(number=1, mean=5.0))
     minute = flagdata.open(lake.path).pairs()
     short = flagdata.open(lake.path).pairs(window=3.0)
@@ -165,7 +166,7 @@ def test_an_explicit_split_through_a_session_is_refused_whichever_side_is_asked_
             source.pairs(at="v1", split=side, split_by=split_by)
 
 
-def test_two_recordings_of_one_camera_file_are_never_on_two_sides(lake, add_recording, made):
+def test_two_recordings_of_one_camera_file_are_never_on_two_sides(lake, made):
     add_recording(lake, made(number=1))
     add_recording(lake, made(number=1, start=NOON + DAY))
     split_by = ExplicitSplit(where={"train": "day = '2026-05-01'", "test": "day = '2026-05-02'"})
@@ -173,7 +174,7 @@ def test_two_recordings_of_one_camera_file_are_never_on_two_sides(lake, add_reco
         flagdata.open(lake.path).pairs(split="train", split_by=split_by)
 
 
-def test_a_recording_that_was_aligned_anew_gives_its_clips_once(lake, add_recording, made):
+def test_a_recording_that_was_aligned_anew_gives_its_clips_once(lake, made):
     old = add_recording(lake, made(number=1))
     lake.tag("before")
     new = add_recording(lake, made(number=1, start=NOON + NS))

@@ -12,6 +12,7 @@ from flagdata.dataset import HashedSplit
 from flagdata.errors import RefusedError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
+from tests.flagdata.dataset.conftest import write_record
 
 NS = 1_000_000_000
 NOON = 1_777_636_800 * NS
@@ -19,7 +20,7 @@ SIDES = ("train", "validation", "test")
 
 
 @pytest.fixture(scope="module")
-def tangled(tmp_path_factory, write_record, made):
+def tangled(tmp_path_factory, made):
     """A lake of 80 recordings, and each one's film. They are tangled by sessions over several days, days over several
     sessions, films that were ingested twice, and seeds rendered twice; each has a record of two frames."""
     lake = Lake.create(tmp_path_factory.mktemp("tangled") / "lake")

@@ -46,8 +46,8 @@ def table(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    return lambda *arguments: invoke(capsys, *arguments, "--lake", lake.path)
+def run(lake: Lake) -> Run:
+    return lambda *arguments: invoke(*arguments, "--lake", lake.path)
 
 
 @pytest.fixture

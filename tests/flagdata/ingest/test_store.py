@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tracemalloc
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +27,7 @@ from flagdata.provenance import file_hash
 from flagdata.record import Coding, Record
 from flagdata.schema import Kind
 from tests.confirming import CONFIRMED
+from tests.flagdata.conftest import write_video
 
 START = 1_777_629_600_000_000_000  # 2026-05-01T10:00:00Z
 
@@ -225,9 +225,7 @@ def test_an_interruption_leaves_the_lake_unchanged(lake: Lake, video: Path) -> N
     assert list(lake.staging.rglob("*.mcap")) == []
 
 
-def test_a_source_that_changes_while_it_is_read_is_refused(
-    lake: Lake, tmp_path: Path, write_video: Callable[..., Path]
-) -> None:
+def test_a_source_that_changes_while_it_is_read_is_refused(lake: Lake, tmp_path: Path) -> None:
     growing = write_video(tmp_path / "growing.mp4")
 
     def grow(_: int) -> None:
@@ -239,9 +237,7 @@ def test_a_source_that_changes_while_it_is_read_is_refused(
     assert lake.rows().num_rows == 0
 
 
-def test_a_missing_start_is_a_time_error_and_a_missing_file_is_named(
-    lake: Lake, tmp_path: Path, write_video: Callable[..., Path]
-) -> None:
+def test_a_missing_start_is_a_time_error_and_a_missing_file_is_named(lake: Lake, tmp_path: Path) -> None:
     with pytest.raises(TimeError, match="--start"):
         ingest_camera(lake, write_video(tmp_path / "a.mp4", creation_time=None))
     with pytest.raises((InputError, NotFoundError), match="nothing"):
@@ -265,7 +261,7 @@ def test_a_crop_from_motion_is_attached_as_a_picture(lake: Lake, video: Path) ->
     assert picture.startswith(b"\x89PNG")
 
 
-def test_memory_does_not_grow_with_the_video(lake: Lake, tmp_path: Path, write_video: Callable[..., Path]) -> None:
+def test_memory_does_not_grow_with_the_video(lake: Lake, tmp_path: Path) -> None:
     """400 frames of 300×300 are 36 MB; a stream keeps a chunk of 1 MiB and a few frames."""
     path = write_video(tmp_path / "long.mp4", frames=400, rate=25)
     tracemalloc.start()

@@ -26,22 +26,26 @@ _WORKER = Path(__file__).with_name("ingest_worker.py")
 _ENDS = {"done", "failed", "killed"}
 
 
-@pytest.fixture
-def put_text() -> Callable[..., Artifact]:
+def put_text(lake: Lake, text: str, *, branch: str = "main", parents: tuple[str, ...] = ()) -> Artifact:
     """Commits one row whose object is a small text."""
+    with lake.transaction(f"ingest {text}", branch=branch) as tx:
+        path = tx.staging(".mcap")
+        path.write_text(text)
+        name = tx.put(path)
+        artifact = Artifact(kind=Kind.WIND, name=text, object=name, source_hash=name.partition("/")[2], parents=parents)
+        tx.add(artifact)
+    return artifact
 
-    def put(lake: Lake, text: str, *, branch: str = "main", parents: tuple[str, ...] = ()) -> Artifact:
-        with lake.transaction(f"ingest {text}", branch=branch) as tx:
-            path = tx.staging(".mcap")
-            path.write_text(text)
-            name = tx.put(path)
-            artifact = Artifact(
-                kind=Kind.WIND, name=text, object=name, source_hash=name.partition("/")[2], parents=parents
-            )
-            tx.add(artifact)
-        return artifact
 
-    return put
+@pytest.fixture(params=["folder", "bucket"])
+def place(request: pytest.FixtureRequest) -> Lake:
+    """An empty lake, in a folder and in a bucket."""
+    return request.getfixturevalue("lake" if request.param == "folder" else "remote_lake")
+
+
+def stored(lake: Lake) -> set[str]:
+    """Names of all objects of a lake."""
+    return {one.name for one in lake.objects}
 
 
 def overwrite(place: Place, data: bytes) -> None:

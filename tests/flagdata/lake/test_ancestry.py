@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pyarrow as pa
@@ -12,24 +12,24 @@ import pytest
 from PIL import Image
 
 from flagdata.commands.looking import _lines
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Lake
 from flagdata.lake.ancestry import ancestry
 from flagdata.pages import COLOURS, picture
 from flagdata.pages.graph import PAPER, RULE, Box, svg
 from flagdata.pages.graph_png import _ascii, png
 from flagdata.printable import printable
 from flagdata.schema import catalog_schema
+from tests.flagdata.lake.conftest import put_text
 from tests.program import Run, invoke
 
-Put = Callable[..., Artifact]
 SVG = "{http://www.w3.org/2000/svg}"
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+def run(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Runs `flagdata ...` on the lake."""
     monkeypatch.setenv("FLAGDATA_LAKE", str(lake.path))
-    return lambda *arguments: invoke(capsys, *arguments)
+    return lambda *arguments: invoke(*arguments)
 
 
 def rows(parents: Mapping[str, Sequence[str]], *, names: Mapping[str, str] | None = None) -> pa.Table:
@@ -88,7 +88,7 @@ def test_a_circle_in_a_damaged_catalog_and_a_parent_that_is_not_there_end_the_se
     ET.fromstring(picture(found))
 
 
-def test_the_tree_shows_each_relative_once_with_what_belongs_to_it(run: Run, lake: Lake, put_text: Put) -> None:
+def test_the_tree_shows_each_relative_once_with_what_belongs_to_it(run: Run, lake: Lake) -> None:
     mast = put_text(lake, "mast")
     first = put_text(lake, "first", parents=(mast.id,))
     second = put_text(lake, "second", parents=(mast.id,))
@@ -203,7 +203,7 @@ def test_a_png_shows_the_boxes_and_lines_of_the_svg() -> None:
 
 @pytest.mark.parametrize(("name", "begin"), [("l.svg", b"<svg"), ("l.png", b"\x89PNG")])
 def test_a_picture_is_written_as_svg_or_png_and_on_top_of_nothing(
-    run: Run, lake: Lake, put_text: Put, tmp_path: Path, name: str, begin: bytes
+    run: Run, lake: Lake, tmp_path: Path, name: str, begin: bytes
 ) -> None:
     put_text(lake, "mast")
     assert run("lineage", "mast", "--picture", tmp_path / name).code == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,17 +10,15 @@ import pytest
 from flagdata.addresses import lake_place
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
-from tests.flagdata.lake.conftest import overwrite
+from tests.flagdata.lake.conftest import overwrite, put_text
 from tests.program import Run, invoke
-
-Put = Callable[..., Artifact]
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+def run(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Runs `flagdata ...` on the lake, named by its environment variable."""
     monkeypatch.setenv("FLAGDATA_LAKE", str(lake.path))
-    return lambda *arguments: invoke(capsys, *arguments)
+    return lambda *arguments: invoke(*arguments)
 
 
 def test_init_makes_a_lake_that_the_others_open(run: Run, tmp_path: Path) -> None:
@@ -46,7 +43,7 @@ def test_a_missing_lake_is_reported_in_three_lines_with_a_fix(run: Run, tmp_path
     assert run("ls", "--lake", tmp_path, "--json").document["kind"] == "not-found"
 
 
-def test_ls_and_show_find_an_artifact_by_the_beginning_of_its_id(run: Run, lake: Lake, put_text: Put) -> None:
+def test_ls_and_show_find_an_artifact_by_the_beginning_of_its_id(run: Run, lake: Lake) -> None:
     parent = put_text(lake, "parent")
     child = put_text(lake, "child", parents=(parent.id,))
     listed = run("ls")
@@ -68,7 +65,7 @@ def test_ls_and_show_find_an_artifact_by_the_beginning_of_its_id(run: Run, lake:
     assert "did you mean 'wind'?" in misspelt.err
 
 
-def test_show_finds_an_artifact_by_its_name_where_only_one_has_it(run: Run, lake: Lake, put_text: Put) -> None:
+def test_show_finds_an_artifact_by_its_name_where_only_one_has_it(run: Run, lake: Lake) -> None:
     first, second = put_text(lake, "cup"), put_text(lake, "sonic")
     assert run("show", "sonic", "--json").document["artifact"]["artifact"] == second.id
     with lake.transaction("another of that name") as tx:
@@ -82,7 +79,7 @@ def test_show_finds_an_artifact_by_its_name_where_only_one_has_it(run: Run, lake
     assert run("show", first.id, "--json").document["artifact"]["name"] == "cup"
 
 
-def test_ls_counts_clips_and_lists_them_on_request(run: Run, lake: Lake, put_text: Put) -> None:
+def test_ls_counts_clips_and_lists_them_on_request(run: Run, lake: Lake) -> None:
     recording = put_text(lake, "recording")
     with lake.transaction("clips") as tx:
         for first in (0, 30):
@@ -105,7 +102,7 @@ def test_ls_counts_clips_and_lists_them_on_request(run: Run, lake: Lake, put_tex
     assert " 9 B" not in run("ls", "--kind", "clip").out
 
 
-def test_log_lists_each_commit_and_a_commit_names_a_version(run: Run, lake: Lake, put_text: Put) -> None:
+def test_log_lists_each_commit_and_a_commit_names_a_version(run: Run, lake: Lake) -> None:
     put_text(lake, "a")
     put_text(lake, "b")
     commits = run("log", "--json").document["commits"]
@@ -119,7 +116,7 @@ def test_log_lists_each_commit_and_a_commit_names_a_version(run: Run, lake: Lake
     assert len(run("log", "--limit", 1).out.splitlines()) == 2
 
 
-def test_tags_and_branches_are_made_and_listed(run: Run, lake: Lake, put_text: Put) -> None:
+def test_tags_and_branches_are_made_and_listed(run: Run, lake: Lake) -> None:
     put_text(lake, "a")
     assert run("tag", "v1").code == 0
     put_text(lake, "b")
@@ -132,7 +129,7 @@ def test_tags_and_branches_are_made_and_listed(run: Run, lake: Lake, put_text: P
     assert run("tag", "--at", "v1").code == 2
 
 
-def test_merge_brings_a_branch_to_main(run: Run, lake: Lake, put_text: Put) -> None:
+def test_merge_brings_a_branch_to_main(run: Run, lake: Lake) -> None:
     run("branch", "try")
     put_text(lake, "a", branch="try")
     assert run("merge", "try").out == "version 2: 1 added, 0 were there\n"
@@ -141,7 +138,7 @@ def test_merge_brings_a_branch_to_main(run: Run, lake: Lake, put_text: Put) -> N
     assert run("merge", "v1").code == 1
 
 
-def test_diff_prints_what_came_and_what_went(run: Run, lake: Lake, put_text: Put) -> None:
+def test_diff_prints_what_came_and_what_went(run: Run, lake: Lake) -> None:
     gone = put_text(lake, "gone")
     run("tag", "v1")
     came = put_text(lake, "came")
@@ -158,7 +155,7 @@ def test_diff_prints_what_came_and_what_went(run: Run, lake: Lake, put_text: Put
     assert run("diff", "v2").code == 1
 
 
-def test_withdraw_says_what_went_along(run: Run, lake: Lake, put_text: Put) -> None:
+def test_withdraw_says_what_went_along(run: Run, lake: Lake) -> None:
     recording = put_text(lake, "recording")
     with lake.transaction("a clip") as tx:
         clip = Artifact(kind="clip", name="clip", object=recording.object, parents=(recording.id,))
@@ -172,7 +169,7 @@ def test_withdraw_says_what_went_along(run: Run, lake: Lake, put_text: Put) -> N
     assert run("ls", "--json").document["artifacts"] == []
 
 
-def test_withdraw_takes_a_recordings_clips_without_an_option(run: Run, lake: Lake, put_text: Put) -> None:
+def test_withdraw_takes_a_recordings_clips_without_an_option(run: Run, lake: Lake) -> None:
     recording = put_text(lake, "recording")
     with lake.transaction("clips") as tx:
         for i in range(200):
@@ -192,7 +189,7 @@ def test_missing_refs_are_not_found_and_errors_of_names_say_branch_or_tag(run: R
     assert "move" not in run("branch", "v1").err
 
 
-def test_verify_counts_only_what_it_could_read(run: Run, lake: Lake, put_text: Put) -> None:
+def test_verify_counts_only_what_it_could_read(run: Run, lake: Lake) -> None:
     for text in "abc":
         put_text(lake, text)
     artifact = put_text(lake, "d")
@@ -201,7 +198,7 @@ def test_verify_counts_only_what_it_could_read(run: Run, lake: Lake, put_text: P
     assert "3 of 4 objects re-hashed" in run("verify").err
 
 
-def test_verify_and_doctor_exit_with_3_when_the_lake_is_damaged(run: Run, lake: Lake, put_text: Put) -> None:
+def test_verify_and_doctor_exit_with_3_when_the_lake_is_damaged(run: Run, lake: Lake) -> None:
     artifact = put_text(lake, "a")
     assert [run(verb).code for verb in ("verify", "doctor")] == [0, 0]
     assert run("verify", "--sample", 1, "--json").document["healthy"] is True
@@ -217,7 +214,7 @@ def test_verify_and_doctor_exit_with_3_when_the_lake_is_damaged(run: Run, lake: 
     assert "error: dangling-row" in run("doctor").out
 
 
-def test_verify_and_a_deep_doctor_find_a_flipped_bit_in_the_catalog(run: Run, lake: Lake, put_text: Put) -> None:
+def test_verify_and_a_deep_doctor_find_a_flipped_bit_in_the_catalog(run: Run, lake: Lake) -> None:
     put_text(lake, "a")
     path = next((lake.path / "catalog").glob("*.parquet"))
     data = bytearray(path.read_bytes())

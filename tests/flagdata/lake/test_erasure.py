@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
@@ -15,11 +14,10 @@ from flagdata.errors import ConflictError, NotFoundError
 from flagdata.export import Export, export
 from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake, collect, doctor, lost, verify, verify_catalog
+from tests.flagdata.lake.conftest import put_text
 
-Put = Callable[..., Artifact]
 
-
-def test_bytes_go_from_tags_branches_and_old_versions_and_each_says_by_which_version(lake: Lake, put_text: Put) -> None:
+def test_bytes_go_from_tags_branches_and_old_versions_and_each_says_by_which_version(lake: Lake) -> None:
     film, other = put_text(lake, "film"), put_text(lake, "other")
     lake.tag("v1")
     lake.branch("b")
@@ -39,9 +37,7 @@ def test_bytes_go_from_tags_branches_and_old_versions_and_each_says_by_which_ver
     assert collect(lake, grace=timedelta(0)).objects == ()
 
 
-def test_an_old_version_whose_data_gc_took_says_so_to_ls_export_and_doctor_alike(
-    lake: Lake, put_text: Put, tmp_path: Path
-) -> None:
+def test_an_old_version_whose_data_gc_took_says_so_to_ls_export_and_doctor_alike(lake: Lake, tmp_path: Path) -> None:
     film = put_text(lake, "film")
     version = str(lake.catalog.head())
     lake.withdraw([film.id], "blurred")
@@ -56,7 +52,7 @@ def test_an_old_version_whose_data_gc_took_says_so_to_ls_export_and_doctor_alike
     assert [note.kind for note in doctor(lake)] == ["withdrawn-collected"]
 
 
-def test_what_was_made_of_it_is_named_before_anything_is_deleted(lake: Lake, put_text: Put) -> None:
+def test_what_was_made_of_it_is_named_before_anything_is_deleted(lake: Lake) -> None:
     film = put_text(lake, "film")
     made = put_text(lake, "made", parents=(film.id,))
     with pytest.raises(ConflictError, match="made"):
@@ -69,7 +65,7 @@ def test_what_was_made_of_it_is_named_before_anything_is_deleted(lake: Lake, put
         lake.erase(["0" * 32], "asked")
 
 
-def test_a_withdrawn_row_that_a_tag_shows_can_still_be_erased(lake: Lake, put_text: Put) -> None:
+def test_a_withdrawn_row_that_a_tag_shows_can_still_be_erased(lake: Lake) -> None:
     film = put_text(lake, "film")
     lake.tag("v1")
     lake.withdraw([film.id], "first")
@@ -80,7 +76,7 @@ def test_a_withdrawn_row_that_a_tag_shows_can_still_be_erased(lake: Lake, put_te
 
 
 def test_content_that_another_artifact_has_stays_and_what_is_ingested_again_is_whole(
-    lake: Lake, put_text: Put, tmp_path: Path
+    lake: Lake, tmp_path: Path
 ) -> None:
     film = put_text(lake, "film")
     lake.tag("v1")
@@ -100,7 +96,7 @@ def test_content_that_another_artifact_has_stays_and_what_is_ingested_again_is_w
     assert not doctor(lake)
 
 
-def test_the_command_reports_what_it_erased_and_ls_marks_the_rows(lake: Lake, put_text: Put) -> None:
+def test_the_command_reports_what_it_erased_and_ls_marks_the_rows(lake: Lake) -> None:
     put_text(lake, "film")
     lake.tag("v1")
     run = CliRunner()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
@@ -11,17 +10,12 @@ import pytest
 from flagdata.errors import ConflictError, NotFoundError
 from flagdata.export import Export, export
 from flagdata.lake import Artifact, Lake, collect, doctor, expire, is_healthy, last_version, lost, verify_catalog
+from tests.flagdata.lake.conftest import put_text, stored
 from tests.program import invoke
-
-Put = Callable[..., Artifact]
-
-
-def stored(lake: Lake) -> set[str]:
-    return {one.name for one in lake.objects}
 
 
 def test_what_only_expired_versions_show_goes_and_ls_export_and_doctor_say_alike_by_which_version(
-    lake: Lake, put_text: Put, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    lake: Lake, tmp_path: Path
 ) -> None:
     blurred, film = put_text(lake, "blurred"), put_text(lake, "film")  # versions 1 and 2
     lake.withdraw([blurred.id], "out of focus")
@@ -30,7 +24,7 @@ def test_what_only_expired_versions_show_goes_and_ls_export_and_doctor_say_alike
     assert stored(lake) == {film.object}
     (why,) = lost(lake, lake.rows(at="2")).values()
     assert "went when versions up to 2 expired, by version 4 (the first season)" in why.what
-    listed = invoke(capsys, "ls", "--at", "2", "--lake", lake.path)
+    listed = invoke("ls", "--at", "2", "--lake", lake.path)
     assert f"without data: blurred: {why.what}" in listed.err
     with pytest.raises(NotFoundError) as refused:
         export(lake, Export(format="csv", at="2", where="name = 'blurred'"), tmp_path / "out")
@@ -39,11 +33,11 @@ def test_what_only_expired_versions_show_goes_and_ls_export_and_doctor_say_alike
     assert (note.kind, note.where, note.count) == ("expired", "versions up to 2", 1)
     assert "by version 4 (the first season)" in note.what
     assert not verify_catalog(lake)
-    newest = invoke(capsys, "log", "--limit", "1", "--json", "--lake", lake.path).document["commits"][0]
+    newest = invoke("log", "--limit", "1", "--json", "--lake", lake.path).document["commits"][0]
     assert (newest["version"], newest["message"]) == (4, "the first season")
 
 
-def test_branches_tags_and_versions_that_have_not_expired_keep_their_data(lake: Lake, put_text: Put) -> None:
+def test_branches_tags_and_versions_that_have_not_expired_keep_their_data(lake: Lake) -> None:
     tagged, branched, later, gone = (put_text(lake, name) for name in ("tagged", "branched", "later", "gone"))
     lake.tag("v1", at="1")
     lake.branch("b", at="2")
@@ -59,7 +53,7 @@ def test_branches_tags_and_versions_that_have_not_expired_keep_their_data(lake: 
     assert collect(lake, grace=timedelta(0)).objects == ()
 
 
-def test_no_new_tag_or_branch_shows_what_went_and_ingesting_again_restores_it(lake: Lake, put_text: Put) -> None:
+def test_no_new_tag_or_branch_shows_what_went_and_ingesting_again_restores_it(lake: Lake) -> None:
     film = put_text(lake, "film")
     lake.withdraw([film.id], "blurred")
     expire(lake, 1)
@@ -72,7 +66,7 @@ def test_no_new_tag_or_branch_shows_what_went_and_ingesting_again_restores_it(la
     lake.tag("old", at="1")
 
 
-def test_what_a_running_transaction_holds_stays(lake: Lake, put_text: Put) -> None:
+def test_what_a_running_transaction_holds_stays(lake: Lake) -> None:
     film = put_text(lake, "film")
     lake.withdraw([film.id], "blurred")
     with lake.transaction("again") as tx:
@@ -81,9 +75,7 @@ def test_what_a_running_transaction_holds_stays(lake: Lake, put_text: Put) -> No
     assert stored(lake) == {film.object}
 
 
-def test_versions_are_chosen_by_age_and_by_how_many_are_newer(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_versions_are_chosen_by_age_and_by_how_many_are_newer(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("a", "b", "c"):
         put_text(lake, name)  # versions 1 to 3
     assert [last_version(lake, older_than=None, keep=keep) for keep in (1, 2, 4, 9)] == [2, 1, -1, -1]
@@ -97,46 +89,42 @@ def test_versions_are_chosen_by_age_and_by_how_many_are_newer(
     assert last_version(lake, older_than=timedelta(days=15), keep=4) == -1
 
 
-def test_the_command_says_what_would_go_and_deletes_nothing_then(
-    lake: Lake, put_text: Put, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_says_what_would_go_and_deletes_nothing_then(lake: Lake) -> None:
     film = put_text(lake, "film")
     lake.withdraw([film.id], "blurred")
     where = ("--lake", lake.path)
-    tried = invoke(capsys, "expire", "--keep", "1", "--dry-run", *where)
+    tried = invoke("expire", "--keep", "1", "--dry-run", *where)
     assert (tried.code, tried.out) == (0, f"{film.object}\n")
     assert "versions up to 1 would expire: 1 object, 4 B, would go" in tried.err
     assert stored(lake) == {film.object}
     assert lake.catalog.head() == 2
-    done = invoke(capsys, "expire", "--keep", "1", "--json", *where).document
+    done = invoke("expire", "--keep", "1", "--json", *where).document
     assert (done["up_to"], done["objects"], done["version"]) == (1, [film.object], 3)
-    assert invoke(capsys, "expire", *where).code == 2
-    assert "no version is that old" in invoke(capsys, "expire", "--older-than", "9d", *where).err
+    assert invoke("expire", *where).code == 2
+    assert "no version is that old" in invoke("expire", "--older-than", "9d", *where).err
 
 
-def test_a_lake_in_a_bucket_expires_alike(remote_lake: Lake, put_text: Put) -> None:
+def test_a_lake_in_a_bucket_expires_alike(remote_lake: Lake) -> None:
     film = put_text(remote_lake, "film")
     remote_lake.withdraw([film.id], "blurred")
     assert expire(remote_lake, 1).objects == (film.object,)
     assert stored(remote_lake) == set()
 
 
-def test_what_expired_keeps_its_lineage_here_and_in_clones(
-    lake: Lake, put_text: Put, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_expired_keeps_its_lineage_here_and_in_clones(lake: Lake, tmp_path: Path) -> None:
     log = put_text(lake, "log")
     recording = put_text(lake, "recording", parents=(log.id,))
     clip = put_text(lake, "clip", parents=(recording.id,))  # version 3
     before, after = tmp_path / "before", tmp_path / "after"
-    assert invoke(capsys, "clone", lake.path, before).code == 0
+    assert invoke("clone", lake.path, before).code == 0
     lake.withdraw([log.id, recording.id, clip.id], "another flag")
     assert expire(lake, 4, "the first season").objects
-    assert invoke(capsys, "pull", lake.path, "--lake", before).code == 0
-    assert invoke(capsys, "clone", lake.path, after).code == 0
+    assert invoke("pull", lake.path, "--lake", before).code == 0
+    assert invoke("clone", lake.path, after).code == 0
     for place in (lake.path, before, after):
-        of_it = invoke(capsys, "lineage", "clip", "--at", "3", "--lake", place, "--json").document
+        of_it = invoke("lineage", "clip", "--at", "3", "--lake", place, "--json").document
         assert {one["name"] for one in of_it["relatives"]} == {"log", "recording", "clip"}
         assert is_healthy(doctor(Lake.open(place)))
     put_text(Lake.open(after), "spare")
-    assert invoke(capsys, "push", lake.path, "--lake", after).code == 0
+    assert invoke("push", lake.path, "--lake", after).code == 0
     assert lake.rows()["name"].to_pylist() == ["spare"]

@@ -23,10 +23,9 @@ from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputErr
 from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake, collect, doctor
 from flagdata.schema import Kind
-from tests.flagdata.lake.conftest import LINKS
+from tests.flagdata.lake.conftest import LINKS, put_text
 
 NOW = timedelta(0)
-Put = Callable[..., Artifact]
 
 # A process that may not write more than so many bytes to one file: the kernel refuses, as a full disk does.
 _LIMITED = """
@@ -48,7 +47,7 @@ except FlagdataError as error:
 @pytest.mark.disk("a bucket has no limit of the size of files")
 @pytest.mark.parametrize(("limit", "doing"), [(50_000, "storing an object"), (1_000, "committing")])
 def test_a_write_that_the_kernel_refuses_is_a_clear_error_and_publishes_nothing(
-    lake: Lake, put_text: Put, tmp_path: Path, limit: int, doing: str
+    lake: Lake, tmp_path: Path, limit: int, doing: str
 ) -> None:
     put_text(lake, "before")
     source = tmp_path / "large.mcap"
@@ -84,7 +83,7 @@ def test_a_disk_that_refuses_the_folder_of_the_catalog_is_a_clear_error_and_leav
 
 @pytest.mark.disk("it is about a full disk")
 def test_a_disk_that_fills_at_any_step_leaves_a_whole_lake_and_ingesting_again_succeeds(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put_text(lake, "before")
     flush = os.fsync
@@ -118,7 +117,7 @@ def test_a_disk_that_fills_at_any_step_leaves_a_whole_lake_and_ingesting_again_s
 
 
 @pytest.mark.disk(LINKS)
-def test_a_folder_that_may_not_be_written_is_a_clear_error(lake: Lake, put_text: Put) -> None:
+def test_a_folder_that_may_not_be_written_is_a_clear_error(lake: Lake) -> None:
     store = lake.path / "mcap"
     store.chmod(0o555)
     if os.access(store, os.W_OK):
@@ -299,7 +298,7 @@ def test_a_folder_without_a_lake_is_an_error_with_a_fix(tmp_path: Path) -> None:
         Lake.open(tmp_path)
 
 
-def test_a_damaged_checkpoint_is_reported_with_a_fix_that_works(lake: Lake, put_text: Put) -> None:
+def test_a_damaged_checkpoint_is_reported_with_a_fix_that_works(lake: Lake) -> None:
     for i in range(40):
         put_text(lake, str(i))
     log = lake.path / "catalog" / "_delta_log"
@@ -316,7 +315,7 @@ def test_a_damaged_checkpoint_is_reported_with_a_fix_that_works(lake: Lake, put_
     assert Lake.open(lake.path).rows().num_rows == 40
 
 
-def test_a_process_that_died_between_a_checkpoint_and_its_hint_stops_no_commit(lake: Lake, put_text: Put) -> None:
+def test_a_process_that_died_between_a_checkpoint_and_its_hint_stops_no_commit(lake: Lake) -> None:
     count = 0
     while not lake.catalog.is_due_for_tidying():
         put_text(lake, str(count))
@@ -335,7 +334,7 @@ def test_a_process_that_died_between_a_checkpoint_and_its_hint_stops_no_commit(l
     assert doctor(later, grace=NOW) == ()
 
 
-def test_a_lake_travels_by_pickle(lake: Lake, put_text: Put) -> None:
+def test_a_lake_travels_by_pickle(lake: Lake) -> None:
     put_text(lake, "a")
     lake.rows()
     assert pickle.loads(pickle.dumps(lake)).rows()["name"].to_pylist() == ["a"]

@@ -7,7 +7,6 @@ import os
 import shutil
 import subprocess
 import time
-from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
@@ -23,12 +22,10 @@ from flagdata.lake.catalog import Moved
 from flagdata.schema import CATALOG, Kind
 from flagdata.storage import RemotePath
 from flagdata.storage.connection import settings
-from tests.flagdata.lake.conftest import AGES
-
-Put = Callable[..., Artifact]
+from tests.flagdata.lake.conftest import AGES, put_text
 
 
-def test_polars_reads_the_catalog_as_a_delta_table(lake: Lake, put_text: Put) -> None:
+def test_polars_reads_the_catalog_as_a_delta_table(lake: Lake) -> None:
     for i in range(40):  # beyond the merge of small files
         put_text(lake, f"{i:02d}")
     options = settings() if isinstance(lake.path, RemotePath) else None
@@ -57,7 +54,7 @@ def test_a_folder_has_the_hash_of_the_lines_that_sha256sum_prints(tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ["with blank", "50%", "a#b", "q?x=1", "ünïcode", "[set]", "file:"])
-def test_a_lake_works_in_a_folder_of_any_name(tmp_path: Path, put_text: Put, name: str) -> None:
+def test_a_lake_works_in_a_folder_of_any_name(tmp_path: Path, name: str) -> None:
     lake = Lake.create(tmp_path / name / "lake")
     put_text(lake, "a")
     lake.tag("v1")
@@ -74,7 +71,7 @@ def test_a_folder_name_that_the_delta_library_would_decode_is_refused(tmp_path: 
 
 
 @pytest.mark.disk("a bucket cannot rename; `clone` copies a lake")
-def test_a_lake_that_is_moved_stays_whole(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_a_lake_that_is_moved_stays_whole(lake: Lake, tmp_path: Path) -> None:
     put_text(lake, "a")
     lake.path.rename(tmp_path / "elsewhere")
     moved = Lake.open(tmp_path / "elsewhere")
@@ -83,7 +80,7 @@ def test_a_lake_that_is_moved_stays_whole(lake: Lake, put_text: Put, tmp_path: P
     assert doctor(moved) == ()
 
 
-def test_of_two_appends_at_one_version_the_second_fails_and_publishes_nothing(lake: Lake, put_text: Put) -> None:
+def test_of_two_appends_at_one_version_the_second_fails_and_publishes_nothing(lake: Lake) -> None:
     put_text(lake, "a")
     base = lake.catalog.head()
     rows = lake.rows()
@@ -96,7 +93,7 @@ def test_of_two_appends_at_one_version_the_second_fails_and_publishes_nothing(la
     assert lake.catalog.unpublished_files() == []
 
 
-def test_a_catalog_whose_protocol_another_program_raised_is_read_and_not_written(lake: Lake, put_text: Put) -> None:
+def test_a_catalog_whose_protocol_another_program_raised_is_read_and_not_written(lake: Lake) -> None:
     """Delta: a writer must not write to a table that asks for a later writer version than it implements."""
     kept = put_text(lake, "before")
     raised = {"protocol": {"minReaderVersion": 1, "minWriterVersion": 4}}
@@ -129,7 +126,7 @@ def test_rows_come_in_the_order_of_commit_then_start_then_frame(lake: Lake) -> N
     assert lake.rows("kind = 'clip'")["name"].to_pylist() == expected
 
 
-def test_the_error_of_a_damaged_log_entry_names_it(lake: Lake, put_text: Put) -> None:
+def test_the_error_of_a_damaged_log_entry_names_it(lake: Lake) -> None:
     put_text(lake, "a")
     put_text(lake, "b")
     entry = lake.path / "catalog" / "_delta_log" / "00000000000000000001.json"
@@ -150,7 +147,7 @@ def test_the_error_of_a_damaged_log_entry_names_it(lake: Lake, put_text: Put) ->
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_an_emptied_or_altered_log_entry_stops_collection(lake: Lake, put_text: Put, version: int) -> None:
+def test_an_emptied_or_altered_log_entry_stops_collection(lake: Lake, version: int) -> None:
     put_text(lake, "a")
     put_text(lake, "b")
     entry = lake.path / "catalog" / "_delta_log" / f"{version:020d}.json"
@@ -170,7 +167,7 @@ def test_an_emptied_or_altered_log_entry_stops_collection(lake: Lake, put_text: 
 
 
 def test_an_empty_entry_that_a_power_cut_left_before_it_was_acknowledged_may_be_deleted_as_the_fix_says(
-    lake: Lake, put_text: Put
+    lake: Lake,
 ) -> None:
     put_text(lake, "a")
     entry = lake.path / "catalog" / "_delta_log" / f"{2:020d}.json"
@@ -185,9 +182,7 @@ def test_an_empty_entry_that_a_power_cut_left_before_it_was_acknowledged_may_be_
 
 
 @pytest.mark.disk(AGES)
-def test_another_program_s_vacuum_takes_no_file_that_a_tag_needs(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_program_s_vacuum_takes_no_file_that_a_tag_needs(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
     month = 30 * 86_400 * 10**9  # ns; Delta's default is to keep replaced files for a week
     now = time.time_ns
     monkeypatch.setattr(time, "time_ns", lambda: now() - month)

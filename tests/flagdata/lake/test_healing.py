@@ -37,12 +37,11 @@ from flagdata.lake import (
 from flagdata.object_cache import forget
 from flagdata.schema import Kind
 from flagdata.storage import Place
-from tests.flagdata.lake.conftest import overwrite
+from tests.flagdata.lake.conftest import overwrite, put_text
 from tests.flagdata.lake.test_transfer import no_bar
 from tests.program import invoke
 from tests.small import SCENE
 
-Put = Callable[..., Artifact]
 Damage = Callable[[Lake, str], None]
 SQUARE = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nvt 0 0\nvt 0.1 0\nvt 0 0.1\nf 1/1 2/2 3/3\n"
 
@@ -83,12 +82,6 @@ DAMAGES = [flip, cut, lose_a_file, lose]
 
 def is_whole(lake: Lake) -> bool:
     return is_healthy(doctor(lake)) and verify(lake, object_names(lake), read_refs(lake)) == ()
-
-
-@pytest.fixture(params=["folder", "bucket"])
-def place(request: pytest.FixtureRequest) -> Lake:
-    """An empty lake, in a folder and in a bucket."""
-    return request.getfixturevalue("lake" if request.param == "folder" else "remote_lake")
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
@@ -146,14 +139,14 @@ def test_meshes_markers_and_records_are_put_back_by_their_sources(
     assert is_whole(lake)
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_a_simulation_that_is_repeated_makes_only_what_is_damaged(
-    place: Lake, damage: Damage, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.parametrize(
+    ("place", "damage"), [*(("folder", damage) for damage in DAMAGES), ("bucket", flip)], indirect=["place"]
+)
+def test_a_simulation_that_is_repeated_makes_only_what_is_damaged(place: Lake, damage: Damage, tmp_path: Path) -> None:
     (scene := tmp_path / "scene.toml").write_text(SCENE.replace("count = 1", "count = 2"))
 
     def simulated() -> dict[str, object]:
-        done = invoke(capsys, "simulate", scene, "--workers", 1, "--json", "--lake", place.path)
+        done = invoke("simulate", scene, "--workers", 1, "--json", "--lake", place.path)
         assert done.code == 0, done.err
         return json.loads(done.out)
 
@@ -171,20 +164,20 @@ def test_a_simulation_that_is_repeated_makes_only_what_is_damaged(
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_recording_is_put_back_by_the_command_that_aligned_or_declared_it(
-    lake: Lake, damage: Damage, video: Path, wind_log: Path, capsys: pytest.CaptureFixture[str]
+    lake: Lake, damage: Damage, video: Path, wind_log: Path
 ) -> None:
     film, wind = ingest_camera(lake, video).artifact, ingest_wind(lake, wind_log).artifact
     for command in (
         ("align", film.id, wind.id, "--by", "stamps", "--offset-sigma", 0.1),
         ("declare", film.id, "--speed", 5, "--sigma", 0.1),
     ):
-        assert invoke(capsys, *command, "--lake", lake.path).code == 0
+        assert invoke(*command, "--lake", lake.path).code == 0
         made = lake.rows({"kind": Kind.RECORDING}, columns=["object"])["object"].to_pylist()[-1]
         damage(lake, made)
-        again = invoke(capsys, *command, "--lake", lake.path)
+        again = invoke(*command, "--lake", lake.path)
         assert (again.code, "replaced the damaged or missing object" in again.out) == (0, True)
         assert is_whole(lake)
-        assert "replaced" not in invoke(capsys, *command, "--lake", lake.path).out
+        assert "replaced" not in invoke(*command, "--lake", lake.path).out
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
@@ -280,9 +273,7 @@ def test_other_bytes_keep_the_name_session_and_labels_of_the_artifact(lake: Lake
 
 
 @pytest.mark.parametrize("damage", [cut, lose])
-def test_a_pull_from_a_clone_puts_back_what_is_damaged(
-    lake: Lake, damage: Damage, put_text: Put, tmp_path: Path
-) -> None:
+def test_a_pull_from_a_clone_puts_back_what_is_damaged(lake: Lake, damage: Damage, tmp_path: Path) -> None:
     made = put_text(lake, "film")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
     damage(lake, str(made.object))
@@ -290,7 +281,7 @@ def test_a_pull_from_a_clone_puts_back_what_is_damaged(
     assert is_whole(lake)
 
 
-def test_a_pull_puts_back_what_verify_found_changed(place: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_a_pull_puts_back_what_verify_found_changed(place: Lake, tmp_path: Path) -> None:
     made = put_text(place, "film")
     copy, _ = clone(place, tmp_path / "copy", bars=no_bar)
     flip(place, str(made.object))
@@ -300,9 +291,7 @@ def test_a_pull_puts_back_what_verify_found_changed(place: Lake, put_text: Put, 
     assert transfer(copy, place, bars=no_bar).objects == ()
 
 
-def test_a_note_of_damage_is_no_stray_file_and_goes_where_the_object_is_restored_by_hand(
-    lake: Lake, put_text: Put
-) -> None:
+def test_a_note_of_damage_is_no_stray_file_and_goes_where_the_object_is_restored_by_hand(lake: Lake) -> None:
     made = put_text(lake, "film")
     path = lake.objects.path(str(made.object))
     flip(lake, str(made.object))
@@ -314,7 +303,7 @@ def test_a_note_of_damage_is_no_stray_file_and_goes_where_the_object_is_restored
     assert lake.objects.is_sound(str(made.object), 4)
 
 
-def test_what_is_asked_for_of_many_objects_is_what_is_asked_for_of_each(place: Lake, put_text: Put) -> None:
+def test_what_is_asked_for_of_many_objects_is_what_is_asked_for_of_each(place: Lake) -> None:
     sizes = {str(put_text(place, f"film {k}").object): len(f"film {k}") for k in range(18)}
     names = list(sizes)
     lose(place, names[3])
@@ -343,9 +332,7 @@ def test_the_remedy_says_which_source_is_ingested_again_on_which_branch(
     assert "flagdata ingest mast.csv --branch side again" in remedies
 
 
-def test_a_lake_that_cannot_be_written_is_verified_all_the_same(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_lake_that_cannot_be_written_is_verified_all_the_same(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
     made = put_text(lake, "film")
     flip(lake, str(made.object))
 

@@ -36,16 +36,15 @@ from flagdata.lake import (
 from flagdata.provenance import digest
 from flagdata.schema import Kind, catalog_schema
 from flagdata.storage import Place, RemotePath
-from tests.flagdata.lake.conftest import LINKS, overwrite
+from tests.flagdata.lake.conftest import LINKS, overwrite, put_text
 from tests.flagdata.lake.test_transfer import no_bar
 
 NOW = timedelta(0)
-Put = Callable[..., Artifact]
 HUGE = ("9" * 20, str(2**63), str(10**12), "0" * 15 + "77777")
 
 
 @pytest.fixture
-def filled(lake: Lake, put_text: Put) -> Lake:
+def filled(lake: Lake) -> Lake:
     """A lake of three commits, a tag and a branch."""
     for text in "abc":
         put_text(lake, text)
@@ -126,7 +125,7 @@ def test_a_version_beyond_the_newest_is_not_there_however_many_digits_it_has(fil
 
 
 def test_a_listing_of_a_bucket_with_a_flipped_digit_ends_in_an_error(
-    remote_lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+    remote_lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put_text(remote_lake, "a")
     listed = RemotePath.iterdir
@@ -286,7 +285,7 @@ def test_refs_without_a_checksum_as_older_lakes_have_are_read(filled: Lake) -> N
 
 @pytest.mark.disk("it reads a lake hundreds of times")
 def test_a_bit_that_flips_in_a_checkpoint_is_refused_and_the_deletion_heals(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(catalog, "_TIDY_EVERY", 4)
     for number in range(9):
@@ -305,7 +304,7 @@ def test_a_bit_that_flips_in_a_checkpoint_is_refused_and_the_deletion_heals(
 
 
 def test_rows_of_a_lake_whose_summaries_name_no_files_are_compared_with_what_was_noted(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(catalog, "_TIDY_EVERY", 4)
     for number in range(6):
@@ -337,7 +336,7 @@ def beside(folder: Path) -> None:
 
 @pytest.mark.disk("an operating system puts none into a bucket")
 def test_files_of_an_operating_system_in_all_folders_of_a_lake_are_passed_over(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    lake: Lake, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert isinstance(lake.path, Path)
     monkeypatch.setattr(catalog, "_TIDY_EVERY", 2)
@@ -412,7 +411,7 @@ def test_the_log_counts_up_to_no_number_that_a_name_states(lake: Lake, monkeypat
 
 
 @pytest.mark.parametrize("end", ["\u2028", "\u2029", "\x85", "\x0b", "\x1c", "\n", "\r"])
-def test_a_message_with_any_line_end_of_unicode_is_read_as_it_was_written(lake: Lake, put_text: Put, end: str) -> None:
+def test_a_message_with_any_line_end_of_unicode_is_read_as_it_was_written(lake: Lake, end: str) -> None:
     put_text(lake, "a")
     message = f"first{end}second"
     with lake.transaction(message) as tx:
@@ -424,7 +423,7 @@ def test_a_message_with_any_line_end_of_unicode_is_read_as_it_was_written(lake: 
 
 @pytest.mark.disk("it changes files behind the lake's back")
 def test_a_clone_takes_no_damaged_entry_and_no_damaged_file(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    lake: Lake, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(catalog, "_TIDY_EVERY", 3)  # so that no reader of the head needs what is old
     for number in range(7):
@@ -470,7 +469,7 @@ def unchained(log: Log, versions: Sequence[int], *, head: int) -> list[Any]:
 
 @pytest.mark.disk("it changes files behind the lake's back")
 def test_an_entry_that_a_summary_covers_is_compared_where_an_old_version_is_read_from_it(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(catalog, "_TIDY_EVERY", 5)
     for number in range(7):
@@ -488,7 +487,7 @@ def test_an_entry_that_a_summary_covers_is_compared_where_an_old_version_is_read
 
 @pytest.mark.disk(LINKS)
 @pytest.mark.timeout(60)
-def test_a_pipe_in_place_of_what_the_delta_library_reads_is_named_and_nobody_waits(lake: Lake, put_text: Put) -> None:
+def test_a_pipe_in_place_of_what_the_delta_library_reads_is_named_and_nobody_waits(lake: Lake) -> None:
     put_text(lake, "gusts")
     hint = lake.path / "catalog" / "_delta_log" / "_last_checkpoint"
     hint.unlink(missing_ok=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,10 @@ from flagdata.cli import root
 from flagdata.dataset import Source
 from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, UsageError
 from flagdata.export import Export, export
-from flagdata.lake import Artifact, Lake, given, select
+from flagdata.lake import Lake, given, select
 from flagdata.schema import CATALOG
 from tests.flagdata.export.conftest import known as known
-
-Put = Callable[..., Artifact]
+from tests.flagdata.lake.conftest import put_text
 
 
 def test_a_value_is_a_number_a_truth_value_or_a_text() -> None:
@@ -38,7 +36,7 @@ def test_a_value_is_a_number_a_truth_value_or_a_text() -> None:
             given(wrong)
 
 
-def test_labels_are_columns_of_queries_with_their_type_and_of_their_version(lake: Lake, put_text: Put) -> None:
+def test_labels_are_columns_of_queries_with_their_type_and_of_their_version(lake: Lake) -> None:
     one, two = put_text(lake, "one"), put_text(lake, "two")
     lake.label([one.id], {"rating": 4, "colour": "red", "usable": True}, "looked at")
     lake.tag("v1")
@@ -55,7 +53,7 @@ def test_labels_are_columns_of_queries_with_their_type_and_of_their_version(lake
     assert lake.rows("label_usable", columns=["name"])["name"].to_pylist() == ["one"]
 
 
-def test_a_name_keeps_its_type_and_an_artifact_has_to_be_there(lake: Lake, put_text: Put) -> None:
+def test_a_name_keeps_its_type_and_an_artifact_has_to_be_there(lake: Lake) -> None:
     one, two = put_text(lake, "one"), put_text(lake, "two")
     lake.label([one.id], {"rating": 4}, "a number")
     with pytest.raises(ConflictError, match="rating is a number on other artifacts"):
@@ -67,7 +65,7 @@ def test_a_name_keeps_its_type_and_an_artifact_has_to_be_there(lake: Lake, put_t
     lake.label([two.id], {"rating": 4}, "no artifact that is shown has a text any more")
 
 
-def test_no_name_hides_another_or_leaves_its_column(lake: Lake, put_text: Put) -> None:
+def test_no_name_hides_another_or_leaves_its_column(lake: Lake) -> None:
     one, two = put_text(lake, "one"), put_text(lake, "two")
     lake.label([one.id], {"Cloth": 1}, "a capital")
     with pytest.raises(ConflictError, match="one column in SQL"):
@@ -82,7 +80,7 @@ def test_no_name_hides_another_or_leaves_its_column(lake: Lake, put_text: Put) -
     ]
 
 
-def test_labels_of_a_branch_stay_there_until_it_is_merged(lake: Lake, put_text: Put) -> None:
+def test_labels_of_a_branch_stay_there_until_it_is_merged(lake: Lake) -> None:
     one = put_text(lake, "one")
     lake.branch("b")
     lake.label([one.id], {"rating": 4}, "on b", branch="b")
@@ -94,7 +92,7 @@ def test_labels_of_a_branch_stay_there_until_it_is_merged(lake: Lake, put_text: 
     assert select(lake, "label_rating = 4", columns=["name"])["name"].to_pylist() == ["one"]
 
 
-def test_the_stored_catalog_stays_what_older_programs_read(lake: Lake, put_text: Put) -> None:
+def test_the_stored_catalog_stays_what_older_programs_read(lake: Lake) -> None:
     one = put_text(lake, "one")
     lake.label([one.id], {"rating": 4}, "looked at")
     table = DeltaTable(lake.catalog.path.as_uri(), storage_options=lake.catalog._options())
@@ -121,7 +119,7 @@ def test_clips_of_a_labelled_recording_are_pairs_with_its_numbers_and_exports_ha
     assert pq.read_table(tmp_path / "before" / "rows").column_names == list(CATALOG)
 
 
-def test_the_command_labels_by_name_and_show_prints_them(lake: Lake, put_text: Put) -> None:
+def test_the_command_labels_by_name_and_show_prints_them(lake: Lake) -> None:
     put_text(lake, "one")
     run, where = CliRunner(), ["--lake", str(lake.path)]
     done = run.invoke(root, ["label", "one", "rating=4", "colour=red", *where])

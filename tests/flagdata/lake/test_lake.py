@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
@@ -13,11 +12,10 @@ import pytest
 from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake import Artifact, Lake, doctor, object_names, verify
 from flagdata.schema import Kind, catalog_schema
+from tests.flagdata.lake.conftest import put_text
 
-Put = Callable[..., Artifact]
 
-
-def test_a_committed_row_and_its_object_are_found_by_a_fresh_handle(lake: Lake, put_text: Put) -> None:
+def test_a_committed_row_and_its_object_are_found_by_a_fresh_handle(lake: Lake) -> None:
     identity = put_text(lake, "gusts").id
     again = Lake.open(lake.path)
     artifact = again.artifact(identity[:8])
@@ -55,7 +53,7 @@ def test_a_transaction_is_of_no_use_outside_its_block(lake: Lake) -> None:
         pass
 
 
-def test_the_same_identity_is_published_once(lake: Lake, put_text: Put) -> None:
+def test_the_same_identity_is_published_once(lake: Lake) -> None:
     first = put_text(lake, "gusts")
     before = lake.resolve(None)
     assert put_text(lake, "gusts") == first
@@ -63,7 +61,7 @@ def test_the_same_identity_is_published_once(lake: Lake, put_text: Put) -> None:
     assert lake.rows().num_rows == 1
 
 
-def test_a_tag_keeps_showing_what_it_named(lake: Lake, put_text: Put) -> None:
+def test_a_tag_keeps_showing_what_it_named(lake: Lake) -> None:
     put_text(lake, "a")
     lake.tag("v1")
     put_text(lake, "b")
@@ -73,7 +71,7 @@ def test_a_tag_keeps_showing_what_it_named(lake: Lake, put_text: Put) -> None:
         lake.tag("v1")
 
 
-def test_a_branch_shows_its_base_and_its_own_rows_and_main_does_not_see_them(lake: Lake, put_text: Put) -> None:
+def test_a_branch_shows_its_base_and_its_own_rows_and_main_does_not_see_them(lake: Lake) -> None:
     put_text(lake, "a")
     lake.branch("try")
     put_text(lake, "b")
@@ -82,7 +80,7 @@ def test_a_branch_shows_its_base_and_its_own_rows_and_main_does_not_see_them(lak
     assert [r["name"] for r in lake.rows().to_pylist()] == ["a", "b"]
 
 
-def test_a_filter_selects_by_sql_and_a_bad_one_is_a_usage_error(lake: Lake, put_text: Put) -> None:
+def test_a_filter_selects_by_sql_and_a_bad_one_is_a_usage_error(lake: Lake) -> None:
     put_text(lake, "a")
     put_text(lake, "b")
     assert lake.rows("name = 'b' and \"end\" is null")["name"].to_pylist() == ["b"]
@@ -110,7 +108,7 @@ def test_a_row_whose_object_was_never_put_is_refused(lake: Lake) -> None:
         tx.add(Artifact(kind=Kind.WIND, name="x", object="mcap/" + "0" * 64))
 
 
-def test_a_merge_brings_a_branch_s_own_rows_to_main_once(lake: Lake, put_text: Put) -> None:
+def test_a_merge_brings_a_branch_s_own_rows_to_main_once(lake: Lake) -> None:
     base = put_text(lake, "base")
     lake.branch("try")
     put_text(lake, "made on try", branch="try", parents=(base.id,))
@@ -128,7 +126,7 @@ def test_a_merge_brings_a_branch_s_own_rows_to_main_once(lake: Lake, put_text: P
         lake.merge("other", "no")
 
 
-def test_a_merge_brings_all_that_the_branch_shows_what_it_began_from_too(lake: Lake, put_text: Put) -> None:
+def test_a_merge_brings_all_that_the_branch_shows_what_it_began_from_too(lake: Lake) -> None:
     lake.branch("one")
     parent = put_text(lake, "parent", branch="one")
     lake.branch("two", at="one")
@@ -150,7 +148,7 @@ def test_a_merge_brings_parents_and_children_whatever_begins_earlier(lake: Lake)
     assert lake.rows()["name"].to_pylist() == ["made of it", "log"]
 
 
-def test_threads_that_share_a_lake_lose_no_row_and_repeat_none(lake: Lake, put_text: Put) -> None:
+def test_threads_that_share_a_lake_lose_no_row_and_repeat_none(lake: Lake) -> None:
     texts = [f"{i}" for i in range(12)] * 3
     with ThreadPoolExecutor(max_workers=6) as pool:
         ids = {artifact.id for artifact in pool.map(lambda text: put_text(lake, text), texts)}

@@ -17,12 +17,11 @@ from flagdata.findings import Finding, Severity
 from flagdata.lake import Artifact, Lake, collect, doctor, garbage, object_names, verify, verify_catalog
 from flagdata.lake.layout import FOLDERS, LinkError
 from flagdata.schema import Kind
-from tests.flagdata.lake.conftest import LINKS
+from tests.flagdata.lake.conftest import LINKS, put_text
 from tests.program import invoke
 
 pytestmark = pytest.mark.disk(LINKS)
 NOW = timedelta(0)
-Put = Callable[..., Artifact]
 
 
 def tree(folder: Path) -> dict[str, tuple[int, bytes]]:
@@ -48,7 +47,7 @@ def put_folder(lake: Lake) -> Path:
 
 
 @pytest.fixture
-def victim(tmp_path: Path, put_text: Put) -> Lake:
+def victim(tmp_path: Path) -> Lake:
     """Another lake, of which a wrong collection would take something in any folder."""
     lake = Lake.create(tmp_path / "victim")
     put_text(lake, "precious")
@@ -60,7 +59,7 @@ def victim(tmp_path: Path, put_text: Put) -> Lake:
 
 @pytest.mark.parametrize("name", FOLDERS)
 def test_a_folder_that_is_a_link_is_refused_by_all_that_writes_and_named_by_doctor_and_verify(
-    lake: Lake, victim: Lake, put_text: Put, name: str
+    lake: Lake, victim: Lake, name: str
 ) -> None:
     artifact = put_text(lake, "mine")
     with lake.transaction("one more, so that every folder has been made"):
@@ -87,7 +86,7 @@ def test_a_folder_that_is_a_link_is_refused_by_all_that_writes_and_named_by_doct
     assert (tree(victim.path), tree(lake.path)) == before
 
 
-def test_a_folder_that_is_a_file_is_refused_too(lake: Lake, put_text: Put) -> None:
+def test_a_folder_that_is_a_file_is_refused_too(lake: Lake) -> None:
     (lake.path / "zarr").rmdir()
     (lake.path / "zarr").write_text("mine")
     with pytest.raises(LinkError, match="no folder"):
@@ -96,7 +95,7 @@ def test_a_folder_that_is_a_file_is_refused_too(lake: Lake, put_text: Put) -> No
 
 
 def test_a_linked_object_and_a_linked_chunk_are_findings_and_others_are_checked_all_the_same(
-    lake: Lake, put_text: Put, tmp_path: Path
+    lake: Lake, tmp_path: Path
 ) -> None:
     file, damaged = (lake.object_path(str(put_text(lake, text).object)) for text in ("linked", "damaged"))
     folder = put_folder(lake)
@@ -113,19 +112,17 @@ def test_a_linked_object_and_a_linked_chunk_are_findings_and_others_are_checked_
     assert collect(lake, grace=NOW).objects == ()  # rows need them
 
 
-def test_doctor_and_verify_name_a_link_once_each(lake: Lake, put_text: Put, capsys: pytest.CaptureFixture[str]) -> None:
+def test_doctor_and_verify_name_a_link_once_each(lake: Lake) -> None:
     path = lake.object_path(str(put_text(lake, "linked").object))
     path.rename(lake.path / "elsewhere")
     path.symlink_to(lake.path / "elsewhere")
     for command in (["doctor"], ["doctor", "--deep"], ["verify"]):
-        code, said, _ = invoke(capsys, *command, "--lake", lake.path)
+        code, said, _ = invoke(*command, "--lake", lake.path)
         assert code == 3
         assert said.count("error: ") == said.count("error: link:") == 1, said
 
 
-def test_ingesting_again_replaces_a_link_by_the_object_and_leaves_what_it_leads_to(
-    lake: Lake, put_text: Put, tmp_path: Path
-) -> None:
+def test_ingesting_again_replaces_a_link_by_the_object_and_leaves_what_it_leads_to(lake: Lake, tmp_path: Path) -> None:
     put_text(lake, "file")
     for path in (lake.object_path(str(put_text(lake, "file").object)), put_folder(lake)):
         elsewhere = tmp_path / path.name
@@ -159,9 +156,7 @@ def test_an_orphan_that_is_a_link_is_deleted_and_what_it_leads_to_is_not(
     assert doctor(lake, grace=NOW) == ()
 
 
-def test_a_lock_that_is_a_link_is_refused_and_makes_no_file_elsewhere(
-    lake: Lake, put_text: Put, tmp_path: Path
-) -> None:
+def test_a_lock_that_is_a_link_is_refused_and_makes_no_file_elsewhere(lake: Lake, tmp_path: Path) -> None:
     for name in (".collect", ".turn"):
         (lake.staging / name).unlink(missing_ok=True)
         (lake.staging / name).symlink_to(tmp_path / "made")
@@ -206,7 +201,7 @@ _MAKE: dict[str, Callable[[Path], object]] = {
     [*itertools.product(("entry", "rows", "tag"), _MAKE), ("mark", "folder"), ("mark", "pipe"), ("mark", "no UTF-8")],
 )
 def test_a_file_of_the_catalog_or_refs_that_cannot_be_opened_is_a_finding_and_a_clear_error(
-    lake: Lake, put_text: Put, part: str, kind: str
+    lake: Lake, part: str, kind: str
 ) -> None:
     put_text(lake, "a")
     lake.tag("v1")
@@ -230,15 +225,13 @@ def test_a_file_of_the_catalog_or_refs_that_cannot_be_opened_is_a_finding_and_a_
         collect(fresh, grace=NOW)
 
 
-def test_doctor_reports_a_log_entry_that_cannot_be_opened_as_its_finding(
-    lake: Lake, put_text: Put, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_doctor_reports_a_log_entry_that_cannot_be_opened_as_its_finding(lake: Lake) -> None:
     put_text(lake, "a")
     entry = lake.path / "catalog" / "_delta_log" / f"{1:020d}.json"
     entry.unlink()
     entry.mkdir()
     for verb, code in (("doctor", 3), ("verify", 3), ("ls", 1)):
-        ended = invoke(capsys, verb, "--lake", lake.path)
+        ended = invoke(verb, "--lake", lake.path)
         assert ended.code == code
         assert ended.out.count("error: log-damaged: ") == (verb != "ls")
         assert f"where: {entry}" in (ended.err if verb == "ls" else ended.out)
@@ -258,7 +251,7 @@ def test_doctor_reports_a_log_entry_that_cannot_be_opened_as_its_finding(
     ],
 )
 def test_a_ref_whose_values_are_of_another_type_is_a_finding_and_a_clear_error(
-    stated: dict[str, object], lake: Lake, put_text: Put
+    stated: dict[str, object], lake: Lake
 ) -> None:
     put_text(lake, "a")
     lake.tag("v1")
@@ -296,14 +289,14 @@ VERBS = [
 
 
 def test_each_verb_that_writes_refuses_a_lake_that_can_only_be_read_before_it_works(
-    lake: Lake, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Their input does not exist: a verb that looks at its input first reports that instead."""
     monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK and str(path).startswith(str(lake.path))))
     refused = (1, "flagdata: this lake can be read, but not written", True)
     offenders = {}
     for arguments in VERBS:
-        code, _, err = invoke(capsys, *arguments, "--lake", lake.path)
+        code, _, err = invoke(*arguments, "--lake", lake.path)
         if (code, err.splitlines()[0], "write permission" in err) != refused:
             offenders[arguments[0]] = (code, err)
     assert offenders == {}
@@ -319,14 +312,12 @@ def test_doctor_makes_no_file_in_a_copy_that_came_without_its_empty_folders(lake
     assert sorted(lake.path.rglob("*")) == before
 
 
-def test_what_only_looks_opens_a_lake_that_can_only_be_read(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_only_looks_opens_a_lake_that_can_only_be_read(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
     put_text(lake, "a")
     monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK and str(path).startswith(str(lake.path))))
     looking = (["ls"], ["tag"], ["branch"], ["log"], ["doctor"], ["verify"], ["gc", "--dry-run"])
     for arguments in looking:
-        ended = invoke(capsys, *arguments, "--lake", lake.path)
+        ended = invoke(*arguments, "--lake", lake.path)
         assert ended.code == 0, ended.err
     for arguments in (["measure", "x", "--read-only"], ["align", "x", "y", "--dry-run"]):
-        assert "can be read" not in invoke(capsys, *arguments, "--lake", lake.path).err
+        assert "can be read" not in invoke(*arguments, "--lake", lake.path).err

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
@@ -16,20 +15,18 @@ from flagdata.lake import Artifact, Lake, collect, doctor
 from flagdata.lake.lineage import Removal
 from flagdata.lake.marking import mark
 from flagdata.schema import Kind
+from tests.flagdata.lake.conftest import put_text
 from tests.program import Ended, invoke
 
 NOW = timedelta(0)
 DAY = timedelta(hours=24)
-Put = Callable[..., Artifact]
 
 
 def names(lake: Lake, at: str | None = None) -> list[str]:
     return sorted(lake.rows(at=at)["name"].to_pylist())
 
 
-def test_what_was_withdrawn_after_a_merge_stays_withdrawn_when_the_branch_is_merged_again(
-    lake: Lake, put_text: Put
-) -> None:
+def test_what_was_withdrawn_after_a_merge_stays_withdrawn_when_the_branch_is_merged_again(lake: Lake) -> None:
     put_text(lake, "base")
     lake.branch("b")
     a = put_text(lake, "A", branch="b")
@@ -44,7 +41,7 @@ def test_what_was_withdrawn_after_a_merge_stays_withdrawn_when_the_branch_is_mer
     assert names(lake, "b") == ["C", "base"]
 
 
-def test_a_merge_that_nothing_records_brings_nothing_back_either(lake: Lake, put_text: Put) -> None:
+def test_a_merge_that_nothing_records_brings_nothing_back_either(lake: Lake) -> None:
     """As lakes have them that were written before merges were recorded: the same row was committed on both."""
     lake.branch("b")
     a = put_text(lake, "A", branch="b")
@@ -55,7 +52,7 @@ def test_a_merge_that_nothing_records_brings_nothing_back_either(lake: Lake, put
     assert names(lake) == []
 
 
-def test_what_is_made_anew_after_it_was_withdrawn_comes_back_and_is_named(lake: Lake, put_text: Put) -> None:
+def test_what_is_made_anew_after_it_was_withdrawn_comes_back_and_is_named(lake: Lake) -> None:
     a = put_text(lake, "A")
     lake.withdraw([a.id], "no")
     lake.branch("b")
@@ -68,9 +65,7 @@ def test_what_is_made_anew_after_it_was_withdrawn_comes_back_and_is_named(lake: 
     assert names(lake) == ["A"]
 
 
-def test_a_withdrawal_on_a_branch_hides_a_row_of_main_there_and_goes_to_main_with_a_merge(
-    lake: Lake, put_text: Put
-) -> None:
+def test_a_withdrawal_on_a_branch_hides_a_row_of_main_there_and_goes_to_main_with_a_merge(lake: Lake) -> None:
     wrong, right = put_text(lake, "wrong"), put_text(lake, "right")
     lake.branch("b")
     lake.withdraw([wrong.id], "to try the data without it", branch="b")
@@ -86,7 +81,7 @@ def test_a_withdrawal_on_a_branch_hides_a_row_of_main_there_and_goes_to_main_wit
     assert doctor(lake, grace=NOW)[0].kind == "orphan"  # which gc takes: no ref shows it any more
 
 
-def test_what_a_branch_hides_keeps_its_object_for_the_grace_period(lake: Lake, put_text: Put) -> None:
+def test_what_a_branch_hides_keeps_its_object_for_the_grace_period(lake: Lake) -> None:
     artifact = put_text(lake, "a")
     lake.branch("b")
     lake.withdraw([artifact.id], "from main")
@@ -96,7 +91,7 @@ def test_what_a_branch_hides_keeps_its_object_for_the_grace_period(lake: Lake, p
 
 
 def test_a_row_whose_parent_the_other_side_withdrew_is_a_conflict_that_names_both_and_publishes_nothing(
-    lake: Lake, put_text: Put
+    lake: Lake,
 ) -> None:
     one, two = put_text(lake, "one"), put_text(lake, "two")
     lake.branch("b")
@@ -115,7 +110,7 @@ def test_a_row_whose_parent_the_other_side_withdrew_is_a_conflict_that_names_bot
     assert (lake.catalog.head(), names(lake)) == (before, ["made of two", "two"])
 
 
-def test_a_merge_whose_object_is_missing_is_refused(lake: Lake, put_text: Put) -> None:
+def test_a_merge_whose_object_is_missing_is_refused(lake: Lake) -> None:
     lake.branch("b")
     lake.objects.remove(lake.objects.path(str(put_text(lake, "a", branch="b").object)))
     with pytest.raises(NotFoundError, match="missing"):
@@ -123,7 +118,7 @@ def test_a_merge_whose_object_is_missing_is_refused(lake: Lake, put_text: Put) -
     assert names(lake) == []
 
 
-def test_a_branch_that_is_merged_can_be_deleted_and_its_name_used_again(lake: Lake, put_text: Put) -> None:
+def test_a_branch_that_is_merged_can_be_deleted_and_its_name_used_again(lake: Lake) -> None:
     put_text(lake, "base")
     lake.branch("b")
     put_text(lake, "A", branch="b")
@@ -145,9 +140,7 @@ def test_a_branch_that_is_merged_can_be_deleted_and_its_name_used_again(lake: La
     assert doctor(lake, grace=NOW) == ()
 
 
-def test_a_branch_or_tag_that_alone_shows_rows_is_deleted_only_when_they_are_given_up(
-    lake: Lake, put_text: Put
-) -> None:
+def test_a_branch_or_tag_that_alone_shows_rows_is_deleted_only_when_they_are_given_up(lake: Lake) -> None:
     lake.branch("b")
     a = put_text(lake, "A", branch="b")
     with pytest.raises(ConflictError, match="1 artifacts are shown by this branch alone"):
@@ -163,7 +156,7 @@ def test_a_branch_or_tag_that_alone_shows_rows_is_deleted_only_when_they_are_giv
     assert collect(lake, grace=NOW).objects == (a.object,)
 
 
-def test_the_name_of_a_deleted_tag_never_shows_anything_else(lake: Lake, put_text: Put) -> None:
+def test_the_name_of_a_deleted_tag_never_shows_anything_else(lake: Lake) -> None:
     put_text(lake, "a")
     lake.tag("v1")
     lake.delete_tag("v1")
@@ -189,7 +182,7 @@ def test_what_cannot_be_deleted_is_an_error(lake: Lake) -> None:
 
 
 def test_a_process_that_dies_between_the_commit_and_the_ref_leaves_a_whole_lake(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put_text(lake, "base")
     lake.branch("b")
@@ -209,7 +202,7 @@ def test_a_process_that_dies_between_the_commit_and_the_ref_leaves_a_whole_lake(
 
 
 def test_versions_whose_data_gc_deleted_are_named_by_doctor_and_by_what_needs_the_data(
-    lake: Lake, put_text: Put, tmp_path: Path
+    lake: Lake, tmp_path: Path
 ) -> None:
     request = Export(format="mcap", where="name = 'gone'", at="2", options={})
     kept, gone = put_text(lake, "kept"), put_text(lake, "gone")
@@ -232,7 +225,7 @@ def test_versions_whose_data_gc_deleted_are_named_by_doctor_and_by_what_needs_th
     assert lake.object_path(str(gone.object)).exists()
 
 
-def test_a_file_that_only_older_versions_need_does_not_end_doctor(lake: Lake, put_text: Put) -> None:
+def test_a_file_that_only_older_versions_need_does_not_end_doctor(lake: Lake) -> None:
     artifact = put_text(lake, "a")
     (old,) = (lake.path / "catalog").glob("*.parquet")
     lake.withdraw([artifact.id], "no")
@@ -249,11 +242,9 @@ def test_a_note_of_the_log_that_cannot_be_read_is_damage(note: dict[str, str]) -
             _ = Removal({"version": 7, **view}).view
 
 
-def test_the_verbs_say_what_a_merge_and_a_deletion_did(
-    lake: Lake, put_text: Put, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_verbs_say_what_a_merge_and_a_deletion_did(lake: Lake) -> None:
     def run(*arguments: str) -> Ended:
-        return invoke(capsys, *arguments, "--lake", lake.path)
+        return invoke(*arguments, "--lake", lake.path)
 
     both, base = put_text(lake, "both"), put_text(lake, "base")
     lake.branch("b")

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import UTC, datetime
 
 import pytest
 
 from flagdata.errors import NotFoundError, UsageError
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Lake
 from flagdata.lake import refs as references
 from flagdata.lake.refs import moment
+from tests.flagdata.lake.conftest import put_text
 
 NOON = datetime(2026, 11, 26, 12, tzinfo=UTC)
 
@@ -26,7 +26,7 @@ def test_a_day_ends_at_midnight_a_time_names_its_zone_and_ago_counts_from_now() 
             moment(wrong)
 
 
-def test_the_newest_version_up_to_an_instant_is_shown(lake: Lake, put_text: Callable[..., Artifact]) -> None:
+def test_the_newest_version_up_to_an_instant_is_shown(lake: Lake) -> None:
     put_text(lake, "one")
     assert lake.resolve("0.seconds.ago") == lake.catalog.head()
     hours = [{"version": n, "timestamp": (1_795_694_400 + 3600 * n) * 1000} for n in range(4)]  # from noon on

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,15 +9,14 @@ import pytest
 
 from flagdata.lake import Artifact, Lake, meant
 from flagdata.schema import Kind
+from tests.flagdata.lake.conftest import put_text
 from tests.program import Run, invoke
-
-Put = Callable[..., Artifact]
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+def run(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> Run:
     monkeypatch.setenv("FLAGDATA_LAKE", str(lake.path))
-    return lambda *arguments: invoke(capsys, *arguments)
+    return lambda *arguments: invoke(*arguments)
 
 
 def row(artifact: str, kind: Kind, name: str, *, parents: tuple[str, ...] = (), source: str | None = None) -> Any:
@@ -57,7 +55,7 @@ def test_a_name_means_what_a_person_means_by_it(wanted: str, kinds: tuple[Kind, 
     assert {one["artifact"] for one in meant(ROWS, wanted, kinds=kinds)} == set(found)
 
 
-def test_an_artifact_that_is_withdrawn_is_found_at_a_tag(run: Run, lake: Lake, put_text: Put) -> None:
+def test_an_artifact_that_is_withdrawn_is_found_at_a_tag(run: Run, lake: Lake) -> None:
     kept = put_text(lake, "cup")
     lake.tag("v1")
     lake.withdraw([kept.id], "replaced")
@@ -66,14 +64,12 @@ def test_an_artifact_that_is_withdrawn_is_found_at_a_tag(run: Run, lake: Lake, p
     assert lake.artifact("cup@v1").id == kept.id
 
 
-def test_a_name_that_is_nearly_right_is_suggested(run: Run, lake: Lake, put_text: Put) -> None:
+def test_a_name_that_is_nearly_right_is_suggested(run: Run, lake: Lake) -> None:
     put_text(lake, "anemometer")
     assert "did you mean 'anemometer'?" in run("show", "anemometre").err
 
 
-def test_show_says_what_matters_of_a_verdict_and_lists_twenty_of_what_was_made_from_it(
-    run: Run, lake: Lake, put_text: Put
-) -> None:
+def test_show_says_what_matters_of_a_verdict_and_lists_twenty_of_what_was_made_from_it(run: Run, lake: Lake) -> None:
     words = "Adding lift explains a third of the error."
     with lake.transaction("verdict") as tx:
         verdict = Artifact(kind="measurement", name="flag", report=f'{{"words": "{words}"}}', recipe={"secret": 1})

@@ -40,12 +40,13 @@ from flagdata.lake import (
 from flagdata.lake.leases import last_written, leases
 from flagdata.schema import Kind
 from flagdata.storage import RemotePath, StoreError, plain
+from tests.flagdata.conftest import write_video
+from tests.flagdata.lake.conftest import put_text
 from tests.program import invoke
 from tests.s3 import SECRETS, Careless, Denying, Forbidding, read_only, serving
 from tests.studies.failing.store import failing, planned
 
 NOW = timedelta(0)
-Put = Callable[..., Artifact]
 Use = Callable[[str], None]
 
 
@@ -61,7 +62,7 @@ def put_folder(lake: Lake, text: str) -> Artifact:
     return artifact
 
 
-def test_rows_and_objects_of_a_bucket_are_found_whole_by_a_fresh_handle(remote_lake: Lake, put_text: Put) -> None:
+def test_rows_and_objects_of_a_bucket_are_found_whole_by_a_fresh_handle(remote_lake: Lake) -> None:
     record, folder = put_text(remote_lake, "gusts"), put_folder(remote_lake, "sheet")
     again = Lake.open(str(remote_lake.path))
     assert set(again.rows()["name"].to_pylist()) == {"gusts", "sheet"}
@@ -73,7 +74,7 @@ def test_rows_and_objects_of_a_bucket_are_found_whole_by_a_fresh_handle(remote_l
     assert verify(again, object_names(again)) == verify_catalog(again) == doctor(again, grace=NOW) == ()
 
 
-def test_what_is_withdrawn_is_collected_and_tags_keep_theirs(remote_lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_what_is_withdrawn_is_collected_and_tags_keep_theirs(remote_lake: Lake, tmp_path: Path) -> None:
     kept, gone = put_text(remote_lake, "kept"), put_folder(remote_lake, "gone")
     remote_lake.tag("v1")
     put_text(remote_lake, "later")
@@ -88,7 +89,7 @@ def test_what_is_withdrawn_is_collected_and_tags_keep_theirs(remote_lake: Lake, 
     assert [finding.kind for finding in doctor(remote_lake, grace=NOW)] == ["withdrawn-collected"]
 
 
-def test_two_writers_at_once_lose_no_commit(remote_lake: Lake, put_text: Put) -> None:
+def test_two_writers_at_once_lose_no_commit(remote_lake: Lake) -> None:
     def write(writer: int) -> list[str]:
         own = Lake.open(remote_lake.path)
         return [put_text(own, f"{writer}-{i}").id for i in range(3)]
@@ -101,7 +102,7 @@ def test_two_writers_at_once_lose_no_commit(remote_lake: Lake, put_text: Put) ->
 
 
 def test_an_object_that_changed_in_the_bucket_is_found_and_healed_by_ingesting_again(
-    remote_lake: Lake, put_text: Put, tmp_path: Path
+    remote_lake: Lake, tmp_path: Path
 ) -> None:
     artifact = put_text(remote_lake, "gusts")
     name = str(artifact.object)
@@ -128,23 +129,17 @@ def test_a_store_that_ignores_conditions_is_refused_before_anything_is_written(u
         assert not any("lake.json" in key or "catalog" in key for key in Careless.objects)
 
 
-def test_credentials_show_nowhere(
-    remote_lake: Lake,
-    put_text: Put,
-    use_store: Use,
-    capsys: pytest.CaptureFixture[str],
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_credentials_show_nowhere(remote_lake: Lake, use_store: Use, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.DEBUG):
         put_text(remote_lake, "gusts")
-        shown = [invoke(capsys, command, "--lake", remote_lake.path, "--json").out for command in ("ls", "log")]
+        shown = [invoke(command, "--lake", remote_lake.path, "--json").out for command in ("ls", "log")]
         shown += [repr(remote_lake.path), pickle.dumps(remote_lake).decode(errors="replace")]
         shown += [path.read_bytes().decode(errors="replace") for path in remote_lake.path.rglob("*")]
         assert len(shown) > 8  # of the bucket, too
         with serving(Denying) as address:
             use_store(address)
             for arguments in (("ls",), ("ls", "--json"), ("--debug", "verify"), ("gc",), ("tag", "v1")):
-                ended = invoke(capsys, *arguments, "--lake", remote_lake.path)
+                ended = invoke(*arguments, "--lake", remote_lake.path)
                 assert ended.code == 1
                 shown += [ended.out, ended.err]
             with pytest.raises(FlagdataError) as caught:
@@ -181,7 +176,7 @@ def test_a_lake_at_another_storage_is_refused_and_makes_no_folder(
 
 
 def test_with_credentials_that_permit_reading_alone_rows_are_read_and_nothing_is_written(
-    remote_lake: Lake, put_text: Put, use_store: Use, s3_server: str
+    remote_lake: Lake, use_store: Use, s3_server: str
 ) -> None:
     name = str(put_text(remote_lake, "gusts").object)
     with read_only(s3_server) as address:
@@ -258,7 +253,7 @@ def dead_owner() -> dict[str, object]:
     return {**locks.owner(), "pid": process.pid, "started": started}
 
 
-def test_locks_of_a_process_that_was_killed_hold_nobody_up(remote_lake: Lake, put_text: Put) -> None:
+def test_locks_of_a_process_that_was_killed_hold_nobody_up(remote_lake: Lake) -> None:
     text = json.dumps(dead_owner()).encode() + b"\n"
     (remote_lake.staging / "collect").write_bytes(text)
     (remote_lake.staging / "shared" / "a").write_bytes(text)
@@ -291,9 +286,7 @@ def test_a_collection_leaves_what_a_running_transaction_has_put(remote_lake: Lak
     assert remote_lake.object_path(name).read_text() == "running"
 
 
-def test_who_was_cut_off_for_long_publishes_nothing(
-    remote_lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_was_cut_off_for_long_publishes_nothing(remote_lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
     put = Transaction.put
 
     def slow(transaction: Transaction, path: Path) -> str:
@@ -318,7 +311,7 @@ def test_a_long_wait_for_a_lock_is_reported_once(
 
 
 def test_a_lease_is_renewed_and_counts_where_the_system_has_no_clock_of_its_time_since_start(
-    remote_lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+    remote_lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr(time, "CLOCK_BOOTTIME")
     put_text(remote_lake, "gusts")
@@ -331,7 +324,7 @@ def test_lakes_of_other_prefixes_have_other_folders_in_the_cache() -> None:
     assert one.name.startswith("bucket-a-b-c-")
 
 
-def test_the_exclusive_lock_keeps_writers_waiting(remote_lake: Lake, put_text: Put) -> None:
+def test_the_exclusive_lock_keeps_writers_waiting(remote_lake: Lake) -> None:
     with ThreadPoolExecutor(1) as pool:
         with collecting(remote_lake.staging):
             written = pool.submit(put_text, Lake.open(remote_lake.path), "waits")
@@ -357,7 +350,7 @@ def test_a_forked_child_says_that_it_cannot_use_the_store(remote_lake: Lake) -> 
 
 
 def test_the_cache_gives_up_what_was_used_least_recently(
-    remote_lake: Lake, put_text: Put, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    remote_lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     names = [str(put_text(remote_lake, text).object) for text in ("a" * 100, "b" * 100, "c" * 100)]
     shutil.rmtree(tmp_path / "cache" / "objects")  # of what was put
@@ -428,7 +421,7 @@ def test_a_staging_folder_that_its_owner_removes_meanwhile_is_old(
     assert last_written(place) == 0.0
 
 
-def test_labels_and_what_was_erased_are_as_in_a_folder(remote_lake: Lake, put_text: Put) -> None:
+def test_labels_and_what_was_erased_are_as_in_a_folder(remote_lake: Lake) -> None:
     gone, kept = put_folder(remote_lake, "gone"), put_text(remote_lake, "kept")
     remote_lake.tag("v1")
     remote_lake.label([kept.id], {"rating": 4}, "looked at")
@@ -441,9 +434,7 @@ def test_labels_and_what_was_erased_are_as_in_a_folder(remote_lake: Lake, put_te
     assert [finding.kind for finding in doctor(Lake.open(str(remote_lake.path)), grace=NOW)] == ["erased"]
 
 
-def test_erasing_stops_where_its_lock_was_lost_on_the_way(
-    remote_lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_erasing_stops_where_its_lock_was_lost_on_the_way(remote_lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
     one, two = put_text(remote_lake, "one"), put_text(remote_lake, "two")
     remove = remote_lake.objects.remove
 
@@ -474,22 +465,17 @@ def test_an_exclusive_lock_whose_renewal_was_answered_to_nobody_is_still_its_hol
 
 
 def test_a_film_and_a_log_are_ingested_aligned_exported_and_loaded(
-    remote_lake: Lake,
-    write_video: Callable[..., Path],
-    wind_log: Path,
-    confirmed_drafts: None,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    remote_lake: Lake, wind_log: Path, confirmed_drafts: None, tmp_path: Path
 ) -> None:
     film = write_video(tmp_path / "field.mp4", frames=130, creation_time="2026-05-01T10:01:10Z")
     place = ("--lake", remote_lake.path)
-    came = invoke(capsys, "ingest", film, wind_log, "--session", "field-1", "--json", *place).document
+    came = invoke("ingest", film, wind_log, "--session", "field-1", "--json", *place).document
     camera, wind = (result["artifact"] for result in came["results"])
     given = ("--by", "given", "--offset", "0", "--offset-sigma", "0.1")
-    aligned = invoke(capsys, "align", camera, wind, *given, "--json", *place).document
+    aligned = invoke("align", camera, wind, *given, "--json", *place).document
     assert len(aligned["clips"]) == 2  # 130 frames at 50 Hz are 65 at 25 Hz
-    assert invoke(capsys, "tag", "v1", *place).code == 0
-    exported = invoke(capsys, "export", "csv", "--where", "kind = 'recording'", "--to", tmp_path / "csv", *place)
+    assert invoke("tag", "v1", *place).code == 0
+    exported = invoke("export", "csv", "--where", "kind = 'recording'", "--to", tmp_path / "csv", *place)
     assert exported.code == 0
     assert len(list((tmp_path / "csv").rglob("*.csv"))) == 1
     shutil.rmtree(tmp_path / "cache" / "objects")
@@ -524,12 +510,7 @@ READING = (
 
 
 def test_with_keys_that_only_read_every_command_that_commits_nothing_works_and_asks_for_no_write(
-    remote_lake: Lake,
-    put_text: Put,
-    use_store: Use,
-    s3_server: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    remote_lake: Lake, use_store: Use, s3_server: str, tmp_path: Path
 ) -> None:
     put_text(remote_lake, "gusts")
     remote_lake.tag("v1")
@@ -539,17 +520,17 @@ def test_with_keys_that_only_read_every_command_that_commits_nothing_works_and_a
     with read_only(s3_server) as address:
         use_store(address)
         for command in READING:
-            ended = invoke(capsys, *command, "--lake", remote_lake.path)
+            ended = invoke(*command, "--lake", remote_lake.path)
             assert (command, ended.code) == (command, 0), ended.err
-        ended = invoke(capsys, "clone", remote_lake.path, tmp_path / "clone")
+        ended = invoke("clone", remote_lake.path, tmp_path / "clone")
         assert ended.code == 0, ended.err
-        ended = invoke(capsys, "pull", remote_lake.path, "--lake", tmp_path / "clone")
+        ended = invoke("pull", remote_lake.path, "--lake", tmp_path / "clone")
         assert ended.code == 0, ended.err
         assert urlopen(f"{address}/refused").read() == b""
 
 
 def test_what_is_young_by_the_stores_clock_is_kept_whatever_this_machines_says(
-    remote_lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+    remote_lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     transaction = remote_lake.transaction("is given up").__enter__()
     (path := transaction.staging(".mcap")).write_text("young")
@@ -588,7 +569,7 @@ def test_a_put_in_conflict_with_another_is_made_again(bucket_folder: str, monkey
 
 
 def test_without_permission_to_list_or_to_delete_a_command_says_which_is_missing(
-    remote_lake: Lake, put_text: Put, use_store: Use, s3_server: str, capsys: pytest.CaptureFixture[str]
+    remote_lake: Lake, use_store: Use, s3_server: str
 ) -> None:
     put_text(remote_lake, "gusts")
     Forbidding.store = s3_server.removeprefix("http://")
@@ -601,7 +582,7 @@ def test_without_permission_to_list_or_to_delete_a_command_says_which_is_missing
         ):
             use_store(address)
             Forbidding.forbidden = forbidden
-            ended = invoke(capsys, *command, "--lake", remote_lake.path)
+            ended = invoke(*command, "--lake", remote_lake.path)
             assert ended.code == 1
             assert f"have {action} permitted" in ended.err.partition("fix:")[2]
 
@@ -653,9 +634,7 @@ def test_an_answer_that_breaks_off_is_asked_for_again_and_a_listing_goes_on_behi
         list(folder.names())
 
 
-def test_a_conditional_put_whose_answer_is_lost_counts_for_its_writer(
-    s3_server: str, use_store: Use, capsys: pytest.CaptureFixture[str], put_text: Put
-) -> None:
+def test_a_conditional_put_whose_answer_is_lost_counts_for_its_writer(s3_server: str, use_store: Use) -> None:
     address = f"s3://bucket/lost-answers-{time.time_ns()}"
     with failing(s3_server) as proxy:
         use_store(proxy)
@@ -663,7 +642,7 @@ def test_a_conditional_put_whose_answer_is_lost_counts_for_its_writer(
         commands = (("init", address), ("tag", "v1"), ("branch", "side"), ("tag", "v1", "--delete"), ("gc",))
         for name, *arguments in commands:
             place = () if name == "init" else ("--lake", address)
-            ended = invoke(capsys, name, *arguments, *place)
+            ended = invoke(name, *arguments, *place)
             assert ended.code == 0, ended.err
         lake = Lake.open(address)
         artifacts = [put_text(lake, f"gusts {number}").id for number in range(4)]

@@ -6,14 +6,14 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from flagdata.errors import UsageError
-from flagdata.lake import Artifact, Lake
-from tests.flagdata.lake.conftest import LINKS
+from flagdata.lake import Lake
+from tests.flagdata.lake.conftest import LINKS, put_text
 from tests.program import invoke
 
 NOBODY = 65534
@@ -39,7 +39,7 @@ for arguments in json.loads(sys.argv[1]):
 
 
 @pytest.fixture
-def forbidden(lake: Lake, put_text: Callable[..., Artifact]) -> Path:
+def forbidden(lake: Lake) -> Path:
     put_text(lake, "a")
     for folder in (lake.path, *lake.path.parents):
         if folder.owner() == Path.home().owner() and str(folder).startswith("/tmp/"):
@@ -84,13 +84,11 @@ def test_each_command_says_what_may_not_be_read(forbidden: Path, part: str) -> N
 
 
 @pytest.mark.parametrize("name", ["a\\b", os.fsdecode(b"a\xff"), "a\udc80b"])
-def test_a_folder_that_the_catalog_cannot_work_in_is_refused_by_name(
-    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_that_the_catalog_cannot_work_in_is_refused_by_name(tmp_path: Path, name: str) -> None:
     with pytest.raises(UsageError, match="backslash, or a byte that is not UTF-8"):
         Lake.create(tmp_path / name)
     for more in ([], ["--json"]):
-        ended = invoke(capsys, "init", tmp_path / name, *more)
+        ended = invoke("init", tmp_path / name, *more)
         assert (ended.code, "rename the folder" in ended.err) == (2, True)
     assert list(tmp_path.iterdir()) == []
 
@@ -122,9 +120,7 @@ for arguments in json.loads(sys.argv[1]):
 
 
 @pytest.mark.disk(LINKS)
-def test_a_lake_on_a_disk_that_is_mounted_read_only_is_read_and_what_would_write_says_so(
-    lake: Lake, put_text: Callable[..., Artifact]
-) -> None:
+def test_a_lake_on_a_disk_that_is_mounted_read_only_is_read_and_what_would_write_says_so(lake: Lake) -> None:
     put_text(lake, "a")
     try:
         subprocess.run([*_MOUNTED, _READ_ONLY, str(lake.path), "true"], capture_output=True, check=True)

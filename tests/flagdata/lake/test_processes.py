@@ -14,6 +14,7 @@ import pytest
 from flagdata.errors import ConflictError
 from flagdata.findings import Severity
 from flagdata.lake import Lake, catalog, collect, doctor, object_names, verify
+from tests.flagdata.lake.conftest import put_text
 
 NOW = timedelta(0)
 
@@ -34,9 +35,7 @@ def test_four_processes_ingesting_at_once_lose_no_row(lake: Lake, start_worker: 
     assert verify(lake, object_names(lake)) == ()
 
 
-def test_the_history_at_a_head_is_the_same_while_others_commit(
-    lake: Lake, put_text: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_history_at_a_head_is_the_same_while_others_commit(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
     put_text(lake, "before")
     expected = Lake.open(lake.path).catalog.history()
     assert [entry["version"] for entry in expected] == list(range(len(expected)))[::-1]
@@ -75,7 +74,7 @@ def test_a_commit_that_waited_for_a_collection_does_not_give_up_at_the_first_oth
 
 
 def test_a_process_reads_what_others_committed_once_and_finds_the_history_that_a_fresh_one_does(
-    lake: Lake, put_text: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reader = Lake.open(lake.path).catalog
     put_text(lake, "one")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +11,9 @@ import pytest
 from flagdata.lake import Artifact, Lake, Placed, Request, Selection, keep, placed, versions
 from flagdata.lake.ancestry import ancestry
 from flagdata.schema import Kind
+from tests.flagdata.lake.conftest import put_text
 from tests.program import Run, invoke
 
-Put = Callable[..., Artifact]
 OLD, NEW, NEWEST = "0.1.0+aaaaaaa", "0.1.0+bbbbbbb", "0.1.0+ccccccc"
 
 
@@ -42,7 +41,7 @@ def kept(lake: Lake, row: Artifact, *, branch: str = "main") -> Placed:
 
 
 @pytest.fixture
-def recording(lake: Lake, put_text: Put) -> Artifact:
+def recording(lake: Lake) -> Artifact:
     return put_text(lake, "recording")
 
 
@@ -112,10 +111,10 @@ def test_a_version_stays_one_where_the_first_was_withdrawn(lake: Lake, recording
 
 
 def test_ls_and_show_say_which_version_is_superseded(
-    lake: Lake, recording: Artifact, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    lake: Lake, recording: Artifact, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("FLAGDATA_LAKE", str(lake.path))
-    run: Run = lambda *arguments: invoke(capsys, *arguments)  # noqa: E731
+    run: Run = lambda *arguments: invoke(*arguments)  # noqa: E731
     first, second = (kept(lake, verdict(recording, code)).artifact for code in (OLD, NEW))
     listed = {row["artifact"]: row for row in run("ls", "--json").document["artifacts"]}
     assert (listed[first.id]["superseded"], listed[second.id]["superseded"]) == (True, False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 import pyarrow as pa
@@ -14,15 +13,11 @@ from flagdata.errors import CorruptError
 from flagdata.lake import Artifact, Lake, Scan, select
 from flagdata.lake.rowfiles import ROW_ORDER, RowFiles, in_order
 from flagdata.schema import Kind, catalog_schema
-from tests.flagdata.lake.conftest import overwrite
+from tests.flagdata.lake.conftest import overwrite, put_text
 from tests.program import invoke
 
-Put = Callable[..., Artifact]
 
-
-def test_queries_look_ups_and_commits_do_not_decode_whole_rows(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_queries_look_ups_and_commits_do_not_decode_whole_rows(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
     identities = [put_text(lake, name).id for name in ("one", "two", "three")]
 
     def refuse(self: RowFiles, name: str) -> pa.Table:
@@ -47,11 +42,11 @@ def test_queries_look_ups_and_commits_do_not_decode_whole_rows(
     lake.withdraw([identities[1]], "not on the side", branch="side")
     assert lake.merge("side", "what was done aside", into="other").added == transaction.result.added
     assert lake.rows(columns=["name"], at="other")["name"].to_pylist() == ["one", "three", "four", "fifth", "clip"]
-    listed = invoke(capsys, "ls", "--lake", lake.path)
+    listed = invoke("ls", "--lake", lake.path)
     assert ("two" in listed.out, "5 artifacts" in listed.err) == (True, True)
 
 
-def test_a_scan_is_the_table_of_every_view(lake: Lake, put_text: Put) -> None:
+def test_a_scan_is_the_table_of_every_view(lake: Lake) -> None:
     kept, gone = put_text(lake, "kept"), put_text(lake, "gone")
     lake.branch("side")
     put_text(lake, "aside", branch="side")
@@ -72,7 +67,7 @@ def test_a_scan_is_the_table_of_every_view(lake: Lake, put_text: Put) -> None:
 
 
 @pytest.mark.disk("it opens the table by the Delta library, which takes options for a bucket")
-def test_a_withdrawal_writes_anew_only_the_files_that_have_its_rows(lake: Lake, put_text: Put) -> None:
+def test_a_withdrawal_writes_anew_only_the_files_that_have_its_rows(lake: Lake) -> None:
     put_text(lake, "one")
     gone = put_text(lake, "two")
     put_text(lake, "three")
@@ -96,7 +91,7 @@ def test_rows_are_sorted_as_arrow_sorts_them() -> None:
     assert in_order(swapped).equals(ordered)
 
 
-def test_a_damaged_column_is_named_by_its_file(lake: Lake, put_text: Put) -> None:
+def test_a_damaged_column_is_named_by_its_file(lake: Lake) -> None:
     put_text(lake, "gusts")
     (file,) = lake.catalog.path.glob("*.parquet")
     content = bytearray(file.read_bytes())
@@ -114,7 +109,7 @@ def test_a_damaged_column_is_named_by_its_file(lake: Lake, put_text: Put) -> Non
 
 
 def test_the_files_of_a_version_are_listed_once_however_often_versions_take_turns(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put_text(lake, "a")
     lake.tag("v1")

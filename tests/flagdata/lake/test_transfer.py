@@ -10,13 +10,12 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import ConflictError, CorruptError
-from flagdata.lake import Artifact, Lake, clone, collect, doctor, object_names, transfer, verify, verify_catalog
+from flagdata.lake import Lake, clone, collect, doctor, object_names, transfer, verify, verify_catalog
 from flagdata.object_cache import forget
-from tests.flagdata.lake.conftest import overwrite
+from tests.flagdata.lake.conftest import overwrite, put_text
 from tests.program import invoke
 
 NOW = timedelta(0)
-Put = Callable[..., Artifact]
 
 
 @contextmanager
@@ -28,7 +27,7 @@ def is_whole(lake: Lake) -> bool:
     return (*doctor(lake, grace=NOW), *verify(lake, object_names(lake)), *verify_catalog(lake)) == ()
 
 
-def test_a_clone_has_the_versions_tags_and_branches_of_its_source(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_a_clone_has_the_versions_tags_and_branches_of_its_source(lake: Lake, tmp_path: Path) -> None:
     first = put_text(lake, "first")
     lake.tag("v1")
     lake.branch("side")
@@ -44,7 +43,7 @@ def test_a_clone_has_the_versions_tags_and_branches_of_its_source(lake: Lake, pu
     assert is_whole(copy)
 
 
-def test_what_was_moved_before_is_not_moved_again(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_what_was_moved_before_is_not_moved_again(lake: Lake, tmp_path: Path) -> None:
     put_text(lake, "first")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
     later = put_text(lake, "second")
@@ -56,7 +55,7 @@ def test_what_was_moved_before_is_not_moved_again(lake: Lake, put_text: Put, tmp
     assert copy.rows(at="v2").equals(lake.rows(at="v2"))
 
 
-def test_commits_of_a_clone_are_pushed_back(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_commits_of_a_clone_are_pushed_back(lake: Lake, tmp_path: Path) -> None:
     put_text(lake, "first")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
     put_text(copy, "second")
@@ -65,9 +64,7 @@ def test_commits_of_a_clone_are_pushed_back(lake: Lake, put_text: Put, tmp_path:
     assert is_whole(lake)
 
 
-def test_a_transfer_that_was_stopped_goes_on(
-    lake: Lake, put_text: Put, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_transfer_that_was_stopped_goes_on(lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for text in ("first", "second", "third"):
         put_text(lake, text)
     lake.tag("v1")
@@ -91,7 +88,7 @@ def test_a_transfer_that_was_stopped_goes_on(
     assert is_whole(copy)
 
 
-def test_a_log_that_names_a_file_outside_its_folder_is_damaged(lake: Lake, put_text: Put) -> None:
+def test_a_log_that_names_a_file_outside_its_folder_is_damaged(lake: Lake) -> None:
     put_text(lake, "first")
     head = lake.catalog.head()
     stored, files = lake.catalog.entry(head)
@@ -103,7 +100,7 @@ def test_a_log_that_names_a_file_outside_its_folder_is_damaged(lake: Lake, put_t
             lake.catalog.entry(head)
 
 
-def test_lakes_that_went_apart_are_refused_and_stay_as_they_are(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_lakes_that_went_apart_are_refused_and_stay_as_they_are(lake: Lake, tmp_path: Path) -> None:
     put_text(lake, "first")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
     put_text(lake, "here")
@@ -116,7 +113,7 @@ def test_lakes_that_went_apart_are_refused_and_stay_as_they_are(lake: Lake, put_
         transfer(lake, Lake.create(tmp_path / "another"), bars=no_bar)
 
 
-def test_a_tag_of_the_same_name_that_is_another_is_refused(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_a_tag_of_the_same_name_that_is_another_is_refused(lake: Lake, tmp_path: Path) -> None:
     put_text(lake, "first")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
     copy.tag("v1")
@@ -127,7 +124,7 @@ def test_a_tag_of_the_same_name_that_is_another_is_refused(lake: Lake, put_text:
     assert copy.rows().num_rows == 1
 
 
-def test_a_tag_that_was_deleted_goes_from_the_clone_too(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_a_tag_that_was_deleted_goes_from_the_clone_too(lake: Lake, tmp_path: Path) -> None:
     put_text(lake, "first")
     lake.tag("v1")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
@@ -136,7 +133,7 @@ def test_a_tag_that_was_deleted_goes_from_the_clone_too(lake: Lake, put_text: Pu
     assert copy.refs.tags() == {}
 
 
-def test_a_damaged_object_is_not_moved(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_a_damaged_object_is_not_moved(lake: Lake, tmp_path: Path) -> None:
     place = lake.objects.path(name := str(put_text(lake, "first").object))
     overwrite(place, b"furst")
     forget(name, place.suffix)  # of a lake in a bucket this machine keeps a sound copy
@@ -146,26 +143,24 @@ def test_a_damaged_object_is_not_moved(lake: Lake, put_text: Put, tmp_path: Path
 
 
 @pytest.mark.disk("it clones a lake on a disk to a bucket")
-def test_a_lake_is_cloned_to_a_bucket_and_back(
-    lake: Lake, put_text: Put, bucket_folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_lake_is_cloned_to_a_bucket_and_back(lake: Lake, bucket_folder: str, tmp_path: Path) -> None:
     put_text(lake, "first")
     lake.tag("v1")
-    assert invoke(capsys, "clone", lake.path, bucket_folder, "--json").document["refs"] == ["v1"]
+    assert invoke("clone", lake.path, bucket_folder, "--json").document["refs"] == ["v1"]
     later = put_text(lake, "second")
-    pushed = invoke(capsys, "push", bucket_folder, "--lake", lake.path, "--json").document
+    pushed = invoke("push", bucket_folder, "--lake", lake.path, "--json").document
     assert (pushed["versions"], pushed["objects"]) == (1, [later.object])
-    assert invoke(capsys, "clone", bucket_folder, tmp_path / "back").code == 0
+    assert invoke("clone", bucket_folder, tmp_path / "back").code == 0
     back = Lake.open(tmp_path / "back")
     assert back.rows().equals(lake.rows())
     assert back.rows(at="v1").equals(lake.rows(at="v1"))
     assert is_whole(back)
     put_text(Lake.open(bucket_folder), "third")
-    assert invoke(capsys, "pull", bucket_folder, "--lake", back.path, "--json").document["versions"] == 1
+    assert invoke("pull", bucket_folder, "--lake", back.path, "--json").document["versions"] == 1
     assert collect(Lake.open(bucket_folder), grace=NOW).objects == ()
 
 
-def test_a_lake_of_which_something_was_erased_is_cloned_without_it(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_a_lake_of_which_something_was_erased_is_cloned_without_it(lake: Lake, tmp_path: Path) -> None:
     gone, kept = put_text(lake, "gone"), put_text(lake, "kept")
     lake.tag("v1")
     lake.erase([gone.id], "consent withdrawn")

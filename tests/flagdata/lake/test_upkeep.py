@@ -33,7 +33,7 @@ from flagdata.lake import (
 from flagdata.lake.leases import keeping_collectors_out, leases
 from flagdata.schema import Kind
 from flagdata.storage import Place
-from tests.flagdata.lake.conftest import AGES, LINKS, LOCKS, overwrite
+from tests.flagdata.lake.conftest import AGES, LINKS, LOCKS, overwrite, put_text
 
 NOW = timedelta(0)
 DAY = timedelta(hours=24)
@@ -71,7 +71,7 @@ def age(path: Path, by: timedelta) -> None:
     os.utime(path, (then, then))
 
 
-def test_a_sound_lake_has_no_findings(lake: Lake, put_text: Put) -> None:
+def test_a_sound_lake_has_no_findings(lake: Lake) -> None:
     put_text(lake, "a")
     lake.tag("v1")
     lake.branch("try")
@@ -80,7 +80,7 @@ def test_a_sound_lake_has_no_findings(lake: Lake, put_text: Put) -> None:
     assert verify(lake, object_names(lake)) == ()
 
 
-def test_a_missing_object_is_a_dangling_row(lake: Lake, put_text: Put) -> None:
+def test_a_missing_object_is_a_dangling_row(lake: Lake) -> None:
     object_of(lake, put_text(lake, "a")).unlink()
     findings = doctor(lake)
     assert kinds(findings) == ["dangling-row"]
@@ -89,7 +89,7 @@ def test_a_missing_object_is_a_dangling_row(lake: Lake, put_text: Put) -> None:
     assert kinds(verify(lake, object_names(lake))) == ["object-missing"]
 
 
-def test_a_truncated_object_is_found_by_its_size_and_a_changed_one_by_its_hash(lake: Lake, put_text: Put) -> None:
+def test_a_truncated_object_is_found_by_its_size_and_a_changed_one_by_its_hash(lake: Lake) -> None:
     short, changed = object_of(lake, put_text(lake, "long enough")), object_of(lake, put_text(lake, "same size"))
     overwrite(short, b"long")
     overwrite(changed, b"some size")
@@ -97,7 +97,7 @@ def test_a_truncated_object_is_found_by_its_size_and_a_changed_one_by_its_hash(l
     assert kinds(verify(lake, object_names(lake))) == ["object-changed", "object-changed"]
 
 
-def test_ingesting_again_heals_a_damaged_object(lake: Lake, put_text: Put) -> None:
+def test_ingesting_again_heals_a_damaged_object(lake: Lake) -> None:
     path = object_of(lake, put_text(lake, "a"))
     overwrite(path, b"b")
     put_text(lake, "a")
@@ -124,7 +124,7 @@ def test_a_row_of_a_newer_format_is_named(lake: Lake) -> None:
     assert "99" in findings[0].what
 
 
-def test_a_ref_that_cannot_be_read_is_an_error_and_stops_collection(lake: Lake, put_text: Put) -> None:
+def test_a_ref_that_cannot_be_read_is_an_error_and_stops_collection(lake: Lake) -> None:
     put_text(lake, "a")
     lake.tag("v1")
     name = abandon(lake, "orphan")
@@ -136,7 +136,7 @@ def test_a_ref_that_cannot_be_read_is_an_error_and_stops_collection(lake: Lake, 
 
 
 @pytest.mark.parametrize("lost", [0, 2, 3])
-def test_every_reader_reports_a_lost_log_entry_and_nothing_is_collected(lake: Lake, put_text: Put, lost: int) -> None:
+def test_every_reader_reports_a_lost_log_entry_and_nothing_is_collected(lake: Lake, lost: int) -> None:
     artifacts = [put_text(lake, text) for text in "abc"]
     entry = lake.path / "catalog" / "_delta_log" / f"{lost:020d}.json"
     content = entry.read_bytes()
@@ -158,7 +158,7 @@ def test_every_reader_reports_a_lost_log_entry_and_nothing_is_collected(lake: La
     assert doctor(fresh, grace=NOW) == ()
 
 
-def test_losing_the_last_commits_can_be_accepted_as_the_fix_says(lake: Lake, put_text: Put) -> None:
+def test_losing_the_last_commits_can_be_accepted_as_the_fix_says(lake: Lake) -> None:
     for text in "ab":
         put_text(lake, text)
     (lake.path / "catalog" / "_delta_log" / f"{2:020d}.json").unlink()
@@ -179,9 +179,7 @@ def flip(path: Place, position: int) -> None:
     path.write_bytes(data)
 
 
-def test_a_bit_that_flips_anywhere_in_a_file_of_the_catalog_is_found_and_stops_collection(
-    lake: Lake, put_text: Put
-) -> None:
+def test_a_bit_that_flips_anywhere_in_a_file_of_the_catalog_is_found_and_stops_collection(lake: Lake) -> None:
     put_text(lake, "a")
     lake.withdraw([put_text(lake, "b").id], "so that one file is of an older version only")
     name = abandon(lake, "orphan")
@@ -199,7 +197,7 @@ def test_a_bit_that_flips_anywhere_in_a_file_of_the_catalog_is_found_and_stops_c
     assert "catalog-file-missing" in kinds(verify_catalog(Lake.open(lake.path)))
 
 
-def test_a_branch_whose_ref_is_lost_is_reported_and_its_objects_are_kept(lake: Lake, put_text: Put) -> None:
+def test_a_branch_whose_ref_is_lost_is_reported_and_its_objects_are_kept(lake: Lake) -> None:
     lake.branch("try")
     artifact = put_text(lake, "a", branch="try")
     (lake.path / "refs" / "branches" / "try.json").unlink()
@@ -238,7 +236,7 @@ def test_an_orphan_is_left_alone_for_the_grace_period(lake: Lake) -> None:
 
 @pytest.mark.parametrize("ahead", [-7200.0, 7200.0])
 def test_what_is_young_by_the_clock_of_its_disk_is_kept_whatever_this_machines_says(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch, ahead: float
+    lake: Lake, monkeypatch: pytest.MonkeyPatch, ahead: float
 ) -> None:
     orphan, withdrawn = abandon(lake, "orphan"), put_text(lake, "withdrawn")
     lake.withdraw([withdrawn.id], "out of focus")
@@ -334,9 +332,7 @@ def is_free(lock: Path) -> bool:
 
 
 @pytest.mark.disk(AGES)
-def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_while_a_tag_needs_it(
-    lake: Lake, put_text: Put
-) -> None:
+def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_while_a_tag_needs_it(lake: Lake) -> None:
     tagged = put_text(lake, "tagged")
     lake.tag("v1")
     untagged = put_text(lake, "untagged")
@@ -355,7 +351,7 @@ def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_wh
     assert lake.rows()["name"].to_pylist() == ["untagged"]
 
 
-def test_withdrawal_spares_what_others_were_made_from_and_what_other_branches_show(lake: Lake, put_text: Put) -> None:
+def test_withdrawal_spares_what_others_were_made_from_and_what_other_branches_show(lake: Lake) -> None:
     parent = put_text(lake, "parent")
     child = put_text(lake, "child", parents=(parent.id,))
     lake.branch("try")
@@ -389,9 +385,7 @@ def clips(lake: Lake, recording: Artifact, count: int) -> list[Artifact]:
     return made
 
 
-def test_clips_go_along_with_their_recording_and_what_was_made_from_it_otherwise_does_not(
-    lake: Lake, put_text: Put
-) -> None:
+def test_clips_go_along_with_their_recording_and_what_was_made_from_it_otherwise_does_not(lake: Lake) -> None:
     recording, other = put_text(lake, "recording"), put_text(lake, "other")
     own, others = clips(lake, recording, 3), clips(lake, other, 2)
     measured = put_text(lake, "measured", parents=(own[1].id,))
@@ -407,7 +401,7 @@ def test_clips_go_along_with_their_recording_and_what_was_made_from_it_otherwise
     assert doctor(lake, grace=DAY) == ()
 
 
-def test_a_difference_names_rows_and_objects_both_ways(lake: Lake, put_text: Put) -> None:
+def test_a_difference_names_rows_and_objects_both_ways(lake: Lake) -> None:
     gone = put_text(lake, "gone")
     lake.tag("before")
     came = put_text(lake, "came")
@@ -422,7 +416,7 @@ def test_a_difference_names_rows_and_objects_both_ways(lake: Lake, put_text: Put
 
 
 @pytest.mark.disk(LOCKS)
-def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake, put_text: Put) -> None:
+def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake) -> None:
     put_text(lake, "a")
     orphan = abandon(lake, "orphan")
     left = [
@@ -489,7 +483,7 @@ def test_a_sample_is_of_the_size_asked_for_and_never_larger_than_all() -> None:
     assert sampled(names, 99) == names
 
 
-def test_values_in_the_log_that_no_writer_writes_are_refused(lake: Lake, put_text: Put) -> None:
+def test_values_in_the_log_that_no_writer_writes_are_refused(lake: Lake) -> None:
     put_text(lake, "a")
     entry = max((lake.path / "catalog" / "_delta_log").glob("*.json"))
     sound = entry.read_bytes().decode()
@@ -514,9 +508,7 @@ def test_values_in_the_log_that_no_writer_writes_are_refused(lake: Lake, put_tex
             Lake.open(lake.path).catalog.history()
 
 
-def test_an_entry_before_the_checkpoint_that_is_cut_off_is_named(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_entry_before_the_checkpoint_that_is_cut_off_is_named(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(catalog, "_TIDY_EVERY", 3)
     for text in "abcde":
         put_text(lake, text)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
 from flagdata.lake import Artifact, Lake, collect, usage
 from flagdata.lake.collection import CATALOG, OTHER, UNSHOWN, Usage, files_of
 from flagdata.schema import Kind
+from tests.flagdata.lake.conftest import put_text
 from tests.program import Run, invoke
 
-Put = Callable[..., Artifact]
 AT_ONCE = timedelta(0)
 
 
@@ -22,7 +21,7 @@ def shown(found: Usage, name: str) -> tuple[int, int, int]:
     return version.share.size, version.own, version.lost
 
 
-def test_every_file_counts_once_also_where_rows_of_two_kinds_share_it(lake: Lake, put_text: Put) -> None:
+def test_every_file_counts_once_also_where_rows_of_two_kinds_share_it(lake: Lake) -> None:
     film = put_text(lake, "film")
     with lake.transaction("a clip of it") as tx:
         tx.add(Artifact(kind=Kind.CLIP, name="clip", object=film.object, parents=(film.id,), frame_first=0))
@@ -42,7 +41,7 @@ def test_every_file_counts_once_also_where_rows_of_two_kinds_share_it(lake: Lake
         assert found.total == sum(path.stat().st_size for path in lake.path.rglob("*") if path.is_file())
 
 
-def test_what_two_versions_show_is_shared_and_the_rest_their_own(lake: Lake, put_text: Put) -> None:
+def test_what_two_versions_show_is_shared_and_the_rest_their_own(lake: Lake) -> None:
     both = put_text(lake, "both")
     put_text(lake, "in-v1")
     lake.tag("v1")
@@ -59,7 +58,7 @@ def test_what_two_versions_show_is_shared_and_the_rest_their_own(lake: Lake, put
     assert found.kinds["wind"].size == 4
 
 
-def test_what_gc_would_free_is_what_it_frees(lake: Lake, put_text: Put) -> None:
+def test_what_gc_would_free_is_what_it_frees(lake: Lake) -> None:
     gone = put_text(lake, "gone")
     put_text(lake, "stays")
     version = str(lake.catalog.head())
@@ -74,7 +73,7 @@ def test_what_gc_would_free_is_what_it_frees(lake: Lake, put_text: Put) -> None:
     assert shown(after, version) == (5, 0, 1)
 
 
-def test_a_copy_without_empty_folders_and_one_with_links_is_counted(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_a_copy_without_empty_folders_and_one_with_links_is_counted(lake: Lake, tmp_path: Path) -> None:
     if not isinstance(lake.path, Path):
         return
     film = put_text(lake, "film")
@@ -90,7 +89,7 @@ def test_a_copy_without_empty_folders_and_one_with_links_is_counted(lake: Lake, 
     assert usage(Lake.open(copy), grace=AT_ONCE).kinds["wind"].objects == 1
 
 
-def test_a_lake_in_a_bucket_is_counted_alike(remote_lake: Lake, put_text: Put) -> None:
+def test_a_lake_in_a_bucket_is_counted_alike(remote_lake: Lake) -> None:
     gone = put_text(remote_lake, "gone")
     put_text(remote_lake, "stays")
     remote_lake.tag("v1")
@@ -101,10 +100,10 @@ def test_a_lake_in_a_bucket_is_counted_alike(remote_lake: Lake, put_text: Put) -
     assert sum(share.size for share in found.kinds.values()) == found.total
 
 
-def test_du_prints_a_table_of_kinds_one_of_versions_and_a_document(lake: Lake, put_text: Put, capsys) -> None:
+def test_du_prints_a_table_of_kinds_one_of_versions_and_a_document(lake: Lake) -> None:
     put_text(lake, "film")
     lake.tag("v1")
-    run: Run = lambda *arguments: invoke(capsys, *arguments, "--lake", lake.path)  # noqa: E731
+    run: Run = lambda *arguments: invoke(*arguments, "--lake", lake.path)  # noqa: E731
     ended = run("du")
     assert ended.out.splitlines()[1].split() == ["wind", "1", "1", "4", "B"]
     assert ended.out.splitlines()[-1].split() == ["v1", "tag", "1", "4", "B", "0", "B", "4", "B"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import struct
 import tracemalloc
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFound
 from flagdata.findings import Severity
 from flagdata.record import Chunking, Coding, Record, messages, salvage
 from flagdata.schema import TOPIC_IMAGE
+from tests.flagdata.conftest import small_files
 
 
 def _messages(path: Path) -> list[tuple[str, int, int, int, bytes]]:
@@ -230,9 +230,7 @@ def test_video_cut_off_still_decodes(tmp_path: Path, write: Callable[..., Path])
     np.testing.assert_array_equal(record.frames(0, record.frame_count), whole[: record.frame_count])
 
 
-def test_a_disk_that_refuses_the_target_is_one_clear_error_and_leaves_none(
-    tmp_path: Path, sample: Path, small_files: Callable[[], AbstractContextManager[None]]
-) -> None:
+def test_a_disk_that_refuses_the_target_is_one_clear_error_and_leaves_none(tmp_path: Path, sample: Path) -> None:
     target = tmp_path / "out.mcap"
     with small_files(), pytest.raises(FlagdataError, match="writing a record failed: File too large"):
         salvage(sample, target)

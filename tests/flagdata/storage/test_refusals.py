@@ -142,9 +142,9 @@ def test_missing_credentials_are_named(answering: Answering, monkeypatch: pytest
     assert "AWS_PROFILE" in caught.value.fix
 
 
-def test_a_command_ends_at_once_with_the_cause(answering: Answering, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_command_ends_at_once_with_the_cause(answering: Answering) -> None:
     answering(refusing(403, "RequestTimeTooSkewed"))
-    ended = invoke(capsys, "ls", "--lake", "s3://case/lake")
+    ended = invoke("ls", "--lake", "s3://case/lake")
     assert ended.code == 1
     assert "clock" in ended.err.partition("fix:")[2]
 

@@ -36,9 +36,7 @@ def begin(s3_server: str, key: str) -> str:
     return identity
 
 
-def test_an_upload_that_was_cut_off_is_named_by_doctor_and_aborted_by_gc(
-    remote_lake: Lake, s3_server: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_upload_that_was_cut_off_is_named_by_doctor_and_aborted_by_gc(remote_lake: Lake, s3_server: str) -> None:
     place = root(remote_lake) / "mcap" / f"{'0' * 64}.mcap"
     begin(s3_server, place.key)
     elsewhere = begin(s3_server, f"{root(remote_lake).key}-of-another-lake/mcap/x.mcap")
@@ -46,7 +44,7 @@ def test_an_upload_that_was_cut_off_is_named_by_doctor_and_aborted_by_gc(
     assert (found.kind, found.severity, found.where) == ("upload-unfinished", Severity.WARNING, str(place))
     assert [str(upload) for upload in garbage(remote_lake, grace=DAY).uploads] == [str(place)]
     assert doctor(remote_lake, grace=DAY) == (found,)  # a dry run aborts nothing
-    ended = invoke(capsys, "gc", "--lake", remote_lake.path)
+    ended = invoke("gc", "--lake", remote_lake.path)
     assert ended.code == 0
     assert str(place) in ended.out
     assert "1 unfinished upload aborted" in ended.err
@@ -93,7 +91,7 @@ def test_a_store_that_does_not_list_uploads_says_why(
 
 
 def test_where_uploads_may_not_be_listed_a_lake_is_examined_and_collected_all_the_same(
-    remote_lake: Lake, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    remote_lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def denied(self: RemotePath) -> list[Upload]:
         raise StoreError(5, "s3:ListBucketMultipartUploads is not permitted", str(self))
@@ -101,7 +99,7 @@ def test_where_uploads_may_not_be_listed_a_lake_is_examined_and_collected_all_th
     monkeypatch.setattr(RemotePath, "uploads", denied)
     (found,) = doctor(remote_lake, grace=NOW)
     assert (found.kind, found.severity) == ("uploads-unlisted", Severity.NOTE)
-    ended = invoke(capsys, "gc", "--lake", remote_lake.path)
+    ended = invoke("gc", "--lake", remote_lake.path)
     assert ended.code == 0
     assert "s3:ListBucketMultipartUploads is not permitted" in ended.err
 

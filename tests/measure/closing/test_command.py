@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 from collections.abc import Sequence
@@ -12,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.cli import main
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest import MarkerOptions, ingest_markers
@@ -35,12 +33,10 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_tracks(tmp_path_factory.mktemp("tracks") / "tracks.csv", "calm", "brisk")
 
 
-def said(arguments: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, dict]:
+def said(arguments: Sequence[str]) -> tuple[int, dict]:
     """Exit code and document of a command that fails."""
-    with pytest.raises(SystemExit) as ended:
-        main(["close-loop", *arguments, "--json"])
-    assert isinstance(ended.value.code, int)
-    return ended.value.code, json.loads(capsys.readouterr().out)
+    ended = invoke("close-loop", *arguments, "--json")
+    return ended.code, ended.document
 
 
 @pytest.mark.parametrize(
@@ -67,25 +63,21 @@ def said(arguments: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[
         (["nowhere.csv", "--lake", "nowhere"], 1, "no lake"),
     ],
 )
-def test_what_makes_no_sense_is_refused(
-    arguments: Sequence[str], code: int, what: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    ended, error = said(arguments, capsys)
+def test_what_makes_no_sense_is_refused(arguments: Sequence[str], code: int, what: str) -> None:
+    ended, error = said(arguments)
     assert ended == code
     assert what in error["what"]
     assert error["fix"]
 
 
-def test_winds_are_one_for_all_or_one_each(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, error = said([str(table), "--rate", str(RATE), *["--wind", "4"] * 3], capsys)
+def test_winds_are_one_for_all_or_one_each(table: Path) -> None:
+    code, error = said([str(table), "--rate", str(RATE), *["--wind", "4"] * 3])
     assert (code, error["what"]) == (2, "there are 3 winds for 2 recordings")
 
 
 @pytest.mark.parametrize("option", ["--offset=2", "--sensor=generic-csv", "--zone=+02:00"])
-def test_options_of_a_log_are_not_ignored_where_there_is_none(
-    table: Path, option: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, error = said([str(table), "--rate", str(RATE), "--wind", "4", option], capsys)
+def test_options_of_a_log_are_not_ignored_where_there_is_none(table: Path, option: str) -> None:
+    code, error = said([str(table), "--rate", str(RATE), "--wind", "4", option])
     assert (code, error["where"]) == (2, option.partition("=")[0])
 
 
@@ -126,25 +118,21 @@ def test_a_warning_that_may_explain_the_verdict_is_reported_with_it() -> None:
         "--zone=UTC",
     ],
 )
-def test_beside_a_recipe_with_recordings_no_option_is_ignored(
-    table: Path, tmp_path: Path, option: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_beside_a_recipe_with_recordings_no_option_is_ignored(table: Path, tmp_path: Path, option: str) -> None:
     recipe = tmp_path / "flag.toml"
     recipe.write_text(f'[[recording]]\nsource = "{table}"\ntake = "calm"\n')
-    code, error = said([str(recipe), option], capsys)
+    code, error = said([str(recipe), option])
     assert (code, error["where"]) == (2, option.partition("=")[0])
-    code, error = said([str(table), str(recipe)], capsys)
+    code, error = said([str(table), str(recipe)])
     assert (code, error["where"]) == (2, "SOURCE")
 
 
-def test_a_draft_is_the_recipe_of_what_the_command_line_states(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_draft_is_the_recipe_of_what_the_command_line_states(table: Path, tmp_path: Path) -> None:
     path = tmp_path / "deeper" / "flag.toml"
     path.parent.mkdir()
     words = "--wind 4 --wind 8 --axis 0,2,0 --pins 0,0;0,0.4 --size 1.2x0.8 --material paper --density-uncertainty 0.02"
     given = ("close-loop", table, *words.split(), "--noise", "0.001", "--rate", RATE, "--draft", path, "--json")
-    ended = invoke(capsys, *given)
+    ended = invoke(*given)
     assert (ended.code, ended.document["recipe"]) == (0, str(path))
     recipe = parse(path)
     assert [(one.take, one.noise) for one in recipe.recordings] == [("calm", 1e-3), ("brisk", 1e-3)]
@@ -158,23 +146,21 @@ def test_a_draft_is_the_recipe_of_what_the_command_line_states(
     assert recipe.setup.material.name == "paper"
     assert (recipe.setup.mass_known, recipe.setup.density_uncertainty) == (True, 0.02)
     np.testing.assert_allclose(recipe.setup.outline, setup.outline)  # type: ignore[arg-type]
-    assert invoke(capsys, *given).code == 1  # the file is there
-    again = invoke(capsys, "close-loop", path, "--draft", tmp_path / "other.toml", "--json")
+    assert invoke(*given).code == 1  # the file is there
+    again = invoke("close-loop", path, "--draft", tmp_path / "other.toml", "--json")
     assert (again.code, again.document["where"]) == (2, "--draft")
 
 
 @pytest.mark.parametrize(("line", "what"), [("nuls = 64", "did you mean 'nulls'"), ("nulls = 0.5", "whole number")])
-def test_a_recipe_says_what_the_test_is_and_no_more(
-    tmp_path: Path, line: str, what: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_recipe_says_what_the_test_is_and_no_more(tmp_path: Path, line: str, what: str) -> None:
     recipe = tmp_path / "flag.toml"
     recipe.write_text(f"[test]\n{line}\n")
-    code, error = said(["tracks.csv", str(recipe)], capsys)
+    code, error = said(["tracks.csv", str(recipe)])
     assert code in (1, 2)
     assert what in error["fix"]
 
 
-def test_data_that_are_no_cloth_end_it_with_the_reason(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_data_that_are_no_cloth_end_it_with_the_reason(table: Path) -> None:
     """Markers in millimetres that are taken for metres."""
     code, error = said(
         [
@@ -190,7 +176,6 @@ def test_data_that_are_no_cloth_end_it_with_the_reason(table: Path, capsys: pyte
             "--material",
             "camel-ponte-roma",
         ],
-        capsys,
     )
     assert (code, error["kind"]) == (1, "bad-input")
 

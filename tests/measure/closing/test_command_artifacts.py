@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import sim.run.models
-from flagdata.cli import main
 from flagdata.errors import CorruptError, InputError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
@@ -27,6 +26,7 @@ from sim.material import named
 from sim.mesh import Mesh
 from sim.run import Crew, of_content
 from tests.measure.report.verdicts import Size, verdict
+from tests.program import invoke
 
 FITTED = {"density": (1.0, 1.1), "bending": (1.6, 0.7), "damping": (0.004, 0.003)}
 """Before and after the effect was added; damping in seconds, the others of nominal."""
@@ -254,12 +254,11 @@ def test_a_cloth_of_any_outline_held_anywhere_keeps_its_mesh_and_pins(specimen: 
     np.testing.assert_allclose(scene.material.bending, 1.6 * odd.material.bending)
 
 
-def test_simulate_runs_a_model_by_its_name(lake: Lake, specimen: Specimen, capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulate_runs_a_model_by_its_name(lake: Lake, specimen: Specimen) -> None:
     kept = keep(lake, closed(experiment(specimen)))
-    with pytest.raises(SystemExit) as ended:
-        main(["simulate", "tracks-lift", "--lake", str(lake.path), "--json", "--workers", "1"])
-    assert ended.value.code == 0
-    (added,) = json.loads(capsys.readouterr().out)["added"]
+    ended = invoke("simulate", "tracks-lift", "--lake", lake.path, "--json", "--workers", 1)
+    assert ended.code == 0
+    (added,) = ended.document["added"]
     flown = lake.artifact(added)
     assert flown.kind is Kind.MESHES
     assert flown.parents == (kept.models[1],)
@@ -273,13 +272,12 @@ def test_simulate_runs_a_model_by_its_name(lake: Lake, specimen: Specimen, capsy
     ("source", "what"), [("tracks-lfit", "did you mean 'tracks-lift'"), ("flag-gust", "did you mean 'flag-gusts'")]
 )
 def test_a_name_that_is_neither_a_recipe_nor_a_model_is_refused_with_the_nearest(
-    lake: Lake, specimen: Specimen, capsys: pytest.CaptureFixture[str], source: str, what: str
+    lake: Lake, specimen: Specimen, source: str, what: str
 ) -> None:
     keep(lake, closed(experiment(specimen)))
-    with pytest.raises(SystemExit) as ended:
-        main(["simulate", source, "--lake", str(lake.path)])
-    assert ended.value.code == 2
-    assert what in capsys.readouterr().err
+    ended = invoke("simulate", source, "--lake", lake.path)
+    assert ended.code == 2
+    assert what in ended.err
 
 
 def test_toml_reads_back_as_it_was_written() -> None:

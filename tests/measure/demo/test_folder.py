@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from flagdata.cli import main
 from measure.demo import MINUTES, Story, Transcript, story
+from tests.program import invoke
 
 
 @pytest.fixture
@@ -34,10 +34,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def demo(out: Path, *arguments: str) -> int:
-    with pytest.raises(SystemExit) as ended:
-        main(["demo", "--out", str(out), *arguments])
-    assert isinstance(ended.value.code, int)
-    return ended.value.code
+    return invoke("demo", "--out", out, *arguments).code
 
 
 def names(folder: Path) -> list[str]:

@@ -9,9 +9,8 @@ import json
 import re
 import shutil
 from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 import numpy as np
 import pytest
@@ -19,7 +18,6 @@ import torch
 from PIL import Image
 
 import flagdata
-from flagdata.cli import main
 from flagdata.console import progress
 from flagdata.dataset import clip_rows
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
@@ -35,26 +33,20 @@ from measure.estimate.nearest import nearest
 from models.conditioning import conditioned
 from models.estimator import DEFAULT, Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, pictures, write_video
+from tests.program import Ended, invoke
 
 START = 1_700_000_000 * NANOSECONDS
 SIZED = ("--flag-size", "1.5x1.0")
 
 
-class Said(NamedTuple):
-    stdout: str
-    stderr: str
-
-
-def run(*arguments: str | Path, code: int = 0) -> Said:
-    out, err = io.StringIO(), io.StringIO()
-    with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as ended:
-        main(["measure", *map(str, arguments)])
-    assert ended.value.code == code, out.getvalue() + err.getvalue()
-    return Said(stdout=out.getvalue(), stderr=err.getvalue())
+def run(*arguments: str | Path, code: int = 0) -> Ended:
+    ended = invoke("measure", *arguments)
+    assert ended.code == code, ended.out + ended.err
+    return ended
 
 
 def answer(*arguments: str | Path) -> dict[str, object]:
-    return json.loads(run(*arguments, "--json").stdout)
+    return json.loads(run(*arguments, "--json").out)
 
 
 @pytest.fixture(scope="module")
@@ -116,8 +108,8 @@ def measurements(lake: Path) -> Sequence[dict[str, object]]:
 
 def test_a_video_file_is_answered_in_one_line(film: Path, model_folder: Path) -> None:
     done = run(film, *SIZED, "--model", model_folder, "--anyway")
-    assert len(done.stdout.splitlines()) == 1
-    assert re.search(r"wind(: not constrained by this clip| \d+\.\d m/s \[\d+\.\d, \d+\.\d\] 90 %)", done.stdout)
+    assert len(done.out.splitlines()) == 1
+    assert re.search(r"wind(: not constrained by this clip| \d+\.\d m/s \[\d+\.\d, \d+\.\d\] 90 %)", done.out)
 
 
 def test_python_gives_the_answer_of_the_command_as_arrays(film: Path, model_folder: Path) -> None:
@@ -165,8 +157,8 @@ def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_
 def test_a_material_states_its_area_weight_from_the_catalog_or_the_lakes_films(film: Path, lake: Path) -> None:
     named = (film, *SIZED, "--anyway", "--json", "--read-only", "--lake", lake, "--material")
     done = run(*named, "tango-red-jet-set")
-    assert "Wang" in done.stderr
-    found = json.loads(done.stdout)
+    assert "Wang" in done.err
+    found = json.loads(done.out)
     assert found["options"]["area_weight"] == 0.113  # Wang et al. 2011, table of densities
     assert found["quantities"]["density"]["given"] is True
     assert found["sentence"].endswith("area weight 0.113 kg/m², as given")
@@ -182,7 +174,7 @@ def test_a_material_states_its_area_weight_from_the_catalog_or_the_lakes_films(f
         weight_of("fellt", lake=made, at=None)
     with pytest.raises(UnknownNameError, match="--material"):
         weight_of("felt", lake=None, at=None)
-    assert "twice" in run(film, "--material", "paper", "--area-weight", "0.1", code=2).stderr
+    assert "twice" in run(film, "--material", "paper", "--area-weight", "0.1", code=2).err
 
 
 def test_the_shipped_model_of_hanging_cloth_gives_weights_of_its_range(film: Path) -> None:
@@ -204,23 +196,23 @@ def test_a_refused_film_ends_with_3_and_shows_no_estimate(strange: Path, tmp_pat
     page = tmp_path / "report.html"
     done = run(strange, *SIZED, "--report", page, code=3)
     words = re.sub(r"data:image/[^\"]*", "", page.read_text())
-    assert "m/s" not in done.stdout + words
-    assert re.search(r"noise of [\d.]+ gray levels", done.stderr)
-    assert "also: " in done.stderr
+    assert "m/s" not in done.out + words
+    assert re.search(r"noise of [\d.]+ gray levels", done.err)
+    assert "also: " in done.err
     assert "Refused" in page.read_text()
-    error = json.loads(run(strange, *SIZED, "--json", code=3).stdout)
+    error = json.loads(run(strange, *SIZED, "--json", code=3).out)
     assert error["kind"] == "refused"
     marked = run(strange, *SIZED, "--anyway")
-    assert marked.stdout.startswith("refused by the gate, not to be relied on: ")
+    assert marked.out.startswith("refused by the gate, not to be relied on: ")
 
 
 @pytest.mark.parametrize("form", [(), ("--json",), ("--csv",)])
 def test_a_still_film_is_given_no_number_even_anyway(tmp_path: Path, form: tuple[str, ...]) -> None:
     still = write_video(tmp_path / "still.mkv", pictures(1, height=40, width=56).repeat(40, axis=0))
     done = run(still, *SIZED, "--anyway", *form, code=3)
-    assert "no number is given, not even with --anyway: no motion is found in the picture" in done.stdout + done.stderr
-    assert "m/s" not in done.stdout + done.stderr
-    assert not form or "quantities" not in done.stdout
+    assert "no number is given, not even with --anyway: no motion is found in the picture" in done.out + done.err
+    assert "m/s" not in done.out + done.err
+    assert not form or "quantities" not in done.out
 
 
 def test_the_report_is_one_file_that_refers_to_no_other(film: Path, model_folder: Path, tmp_path: Path) -> None:
@@ -234,7 +226,7 @@ def test_the_report_is_one_file_that_refers_to_no_other(film: Path, model_folder
 
 def test_a_crop_beyond_the_picture_is_refused_and_one_inside_changes_the_answer(film: Path, model_folder: Path) -> None:
     options = (*SIZED, "--model", model_folder, "--anyway")
-    assert "reaches beyond" in run(film, *options, "--crop", "30,0,30,30", code=2).stderr
+    assert "reaches beyond" in run(film, *options, "--crop", "30,0,30,30", code=2).err
     whole, part = answer(film, *options), answer(film, *options, "--crop", "0,0,30,30")
     assert whole["quantities"] != part["quantities"]
 
@@ -262,7 +254,7 @@ def test_a_recording_measured_by_newer_code_is_a_new_version_of_the_measurement(
     first = answer("made-1", *options)
     monkeypatch.setattr("flagdata.provenance.code_version", lambda: "0.1.0+mended")
     done = run("made-1", *options)
-    assert f"committed as version 2 of 'made-1'; version 1, {str(first['artifact'])[:12]}, is by code " in done.stderr
+    assert f"committed as version 2 of 'made-1'; version 1, {str(first['artifact'])[:12]}, is by code " in done.err
     old, new = measurements(lake)
     assert (old["artifact"], new["code_version"]) == (first["artifact"], "0.1.0+mended")
     assert new["parents"] == old["parents"]
@@ -335,7 +327,7 @@ def test_a_query_measures_each_clip(lake: Path, model_folder: Path) -> None:
     clips = Lake.open(lake).rows("kind = 'clip' and seed = 1", columns=["artifact"])["artifact"].to_pylist()
     assert sorted(one["source"] for one in found) == sorted(clips)  # type: ignore[union-attr, index]
     assert {one["simulated_with"]["wind_speed"] for one in found} == {4.0}  # type: ignore[union-attr, index]
-    assert "no clip matches" in run("--query", "wind > 90", *options, code=1).stderr
+    assert "no clip matches" in run("--query", "wind > 90", *options, code=1).err
 
 
 def test_a_clip_is_its_part_of_the_recording(lake: Path, model_folder: Path) -> None:
@@ -367,7 +359,7 @@ def test_a_wind_series_is_a_table_and_a_data_set(lake: Path, model_folder: Path,
         "--zarr",
         target,
     )
-    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    rows = list(csv.DictReader(io.StringIO(done.out)))
     assert len(rows) == 7
     assert {float(row["anemometer"]) for row in rows} == {4.0}
     with xarray.open_zarr(target, consolidated=False) as data:
@@ -399,14 +391,14 @@ def test_what_cannot_be_measured_is_an_error_with_a_fix(
 ) -> None:
     named = {"FILM": str(film), "LAKE": str(lake)}
     done = run(*(named.get(argument, argument) for argument in arguments), code=code)
-    assert words in done.stderr
-    assert "fix:" in done.stderr
+    assert words in done.err
+    assert "fix:" in done.err
 
 
 def test_a_text_file_is_no_film(tmp_path: Path) -> None:
     path = tmp_path / "notes.txt"
     path.write_text("no film")
-    assert "fix:" in run(path, code=1).stderr
+    assert "fix:" in run(path, code=1).err
 
 
 def test_a_hanging_cloth_is_measured_by_a_model_of_it(film: Path, cloth_folder: Path) -> None:
@@ -417,7 +409,7 @@ def test_a_hanging_cloth_is_measured_by_a_model_of_it(film: Path, cloth_folder: 
 
 def test_a_hanging_cloth_is_not_refined_by_simulating_flags(film: Path, cloth_folder: Path) -> None:
     said = run(film, "--model", cloth_folder, "--flag-size", "1.0x1.0", "--anyway", "--refine", "28", "--json", code=2)
-    assert "hanging-cloth" in said.stdout + said.stderr
+    assert "hanging-cloth" in said.out + said.err
 
 
 def refused_by_the_disk(*_: object, **__: object) -> NoReturn:
@@ -433,9 +425,9 @@ def test_a_measurement_that_is_committed_is_reported_whatever_becomes_of_its_fil
     files = ("--report", tmp_path / "report.html", "--zarr", tmp_path / "series.zarr")
     options = ("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway", *files, "--json")
     done = run(*options)
-    assert json.loads(done.stdout)["artifact"] == measurements(lake)[0]["artifact"]
+    assert json.loads(done.out)["artifact"] == measurements(lake)[0]["artifact"]
     for what in ("its Zarr folder", "its report"):
-        assert f"is published, but writing {what} failed: the system refused: Input/output error" in done.stderr
+        assert f"is published, but writing {what} failed: the system refused: Input/output error" in done.err
     run(*options, "--read-only", code=1)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.cli import main
 from flagdata.errors import InputError
 from measure.closing import close_loop
 from measure.forecasting import Calibration, Setting
@@ -35,6 +33,7 @@ from measure.verdict import NOT_REJECTED
 from sim.effects import EFFECTS, Effect
 from sim.material import named
 from tests.pools import Here
+from tests.program import invoke
 
 SIZE, RATE, DURATION, NOISE, FAR, VERTICES = 0.4, 25.0, 4.6, 5e-4, 0.12, 36
 KINDS = 12
@@ -156,9 +155,7 @@ def test_the_ways_of_the_data_shape_their_nulls() -> None:
     assert plan.design_hash(elsewhere) != plan.design_hash(setting)
 
 
-def test_close_loop_judges_a_table_of_a_carried_cloth(
-    bank: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_close_loop_judges_a_table_of_a_carried_cloth(bank: Path, tmp_path: Path) -> None:
     lines = ["recording,frame,marker,u,v,x,y,z"]
     for seen in observations(seed=5):
         for frame, places in enumerate(seen.positions):
@@ -174,22 +171,10 @@ def test_close_loop_judges_a_table_of_a_carried_cloth(
         f'[pins]\nat = "top-corners"\ncarried = true\n{takes}\n',
         encoding="utf-8",
     )
-    with pytest.raises(SystemExit) as ended:
-        main(
-            [
-                "close-loop",
-                str(recipe),
-                "--bank",
-                str(bank),
-                "--level",
-                str(LEVEL),
-                "--json",
-                "--out",
-                str(tmp_path / "loop"),
-            ]
-        )
-    assert ended.value.code == 0
-    said = json.loads(capsys.readouterr().out)
+    options = ("--bank", bank, "--level", LEVEL, "--json", "--out", tmp_path / "loop")
+    ended = invoke("close-loop", recipe, *options)
+    assert ended.code == 0
+    said = ended.document
     assert said["conclusion"] in {one.value for one in NOT_REJECTED}
     assert said["test"]["nulls"].endswith("carried along the recordings' own ways from other instants on")
     assert "own ways from other instants on" in (tmp_path / "loop" / "report.html").read_text(encoding="utf-8")

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from flagdata.arrays import UInt8Array
-from flagdata.cli import main
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
 from measure.commands import observe as command
 from measure.film import ConditionedFilm, FlagSize
 from measure.observables import watched, watching
+from tests.program import invoke
 
 SIZE = FlagSize(length=1.5, height=1.0)
 RATE, COUNT, SIDE = 10.0, 30, 64
@@ -61,6 +61,5 @@ def test_the_bar_of_observe_ends_at_the_whole_windows_of_the_part(monkeypatch: p
     monkeypatch.setattr(command, "progress", bar)
     monkeypatch.setattr(watching, "watched", read)
     for part in ([], ["--start", "5s", "--window", "2s"]):
-        with pytest.raises(SystemExit):
-            main(["observe", "example:flag", "--flag-size", "1.5x1.0", *part])
+        invoke("observe", "example:flag", "--flag-size", "1.5x1.0", *part)
     assert lengths == [4, 3]

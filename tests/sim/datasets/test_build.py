@@ -135,9 +135,9 @@ def test_a_build_ends_without_workers_and_without_its_scheduler_and_goes_on_when
 
 
 def test_without_a_scheduler_it_is_built_by_processes_of_this_machine(
-    recipe_file: Path, built: Path, builds: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    recipe_file: Path, built: Path, builds: Any, tmp_path: Path
 ) -> None:
-    said = invoke(capsys, "build", recipe_file, "--lake", tmp_path / "lake", "--workers", 1, "--json").document
+    said = invoke("build", recipe_file, "--lake", tmp_path / "lake", "--workers", 1, "--json").document
     assert said["schema"] == "flagdata.build/1"
     assert (said["new_sequences"], said["new_films"], said["clips"]) == (SEQUENCES, FILMS, FILMS)
     assert Path(said["card"]).parent == tmp_path / "lake" / "cards"

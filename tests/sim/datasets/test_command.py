@@ -17,15 +17,13 @@ from sim.datasets.plan import Rates
 from tests.program import Ended, invoke
 
 
-def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> Ended:
-    return invoke(capsys, "build", *arguments)
+def said(*arguments: object) -> Ended:
+    return invoke("build", *arguments)
 
 
-def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(
-    recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(recipe_file: Path, tmp_path: Path) -> None:
     lake = tmp_path / "lake"
-    code, out, _ = said(capsys, recipe_file, "--lake", lake, "--plan", "--workers", 2, "--json")
+    code, out, _ = said(recipe_file, "--lake", lake, "--plan", "--workers", 2, "--json")
     assert code == 0
     assert not lake.exists()
     plan = json.loads(out)
@@ -41,12 +39,10 @@ def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(
     assert 30 * 2048 <= rates["film_bytes"] < 30 * 2048 + 60_000
 
 
-def test_the_planned_size_of_a_sequence_is_near_the_real_one(
-    recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_planned_size_of_a_sequence_is_near_the_real_one(recipe_file: Path, tmp_path: Path) -> None:
     from flagdata.lake import write_meshes
 
-    _, out, _ = said(capsys, recipe_file, "--lake", tmp_path / "lake", "--plan", "--json")
+    _, out, _ = said(recipe_file, "--lake", tmp_path / "lake", "--plan", "--json")
     simulation = next(casts(load(str(recipe_file)))).simulation
     (outcome, _) = jobs.simulate(simulation, 0, [0, 1], "cpu").outcomes
     assert outcome.sequence is not None
@@ -55,10 +51,8 @@ def test_the_planned_size_of_a_sequence_is_near_the_real_one(
     assert json.loads(out)["rates"]["sequence_bytes"] == pytest.approx(real, rel=0.25)
 
 
-def test_a_plan_for_people_has_a_line_a_side(
-    recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, out, err = said(capsys, recipe_file, "--lake", tmp_path / "lake", "--plan", "--workers", 2)
+def test_a_plan_for_people_has_a_line_a_side(recipe_file: Path, tmp_path: Path) -> None:
+    code, out, err = said(recipe_file, "--lake", tmp_path / "lake", "--plan", "--workers", 2)
     assert code == 0
     assert [line.split() for line in out.splitlines()] == [
         ["side", "sequences", "films", "clips"],
@@ -78,27 +72,23 @@ def test_a_plan_for_people_has_a_line_a_side(
         (["flagsim", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"], 2, "--workers with --scheduler"),
     ],
 )
-def test_what_cannot_be_built_is_refused(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, options: list[str], code: int, says: str
-) -> None:
-    found, _, err = said(capsys, *options, "--lake", tmp_path / "lake")
+def test_what_cannot_be_built_is_refused(tmp_path: Path, options: list[str], code: int, says: str) -> None:
+    found, _, err = said(*options, "--lake", tmp_path / "lake")
     assert found == code
     assert says in err
     assert not (tmp_path / "lake").exists()
 
 
-def test_a_folder_that_is_no_lake_is_left_alone(
-    recipe_file: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_folder_that_is_no_lake_is_left_alone(recipe_file: Path, tmp_path: Path) -> None:
     (tmp_path / "letter.txt").write_text("dear")
-    code, _, err = said(capsys, recipe_file, "--lake", tmp_path)
+    code, _, err = said(recipe_file, "--lake", tmp_path)
     assert code == 1
     assert "there is no lake here" in err
     assert [entry.name for entry in tmp_path.iterdir()] == ["letter.txt"]
 
 
 def test_a_data_set_that_is_built_is_reported_although_its_card_cannot_be_written(
-    recipe_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    recipe_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     report = BuildReport(
         sequences=6, films=15, new_sequences=6, new_films=15, healed=0, clips=15, failed=(), seconds=1.0
@@ -110,7 +100,7 @@ def test_a_data_set_that_is_built_is_reported_although_its_card_cannot_be_writte
     monkeypatch.setattr("sim.datasets.cluster.connected", lambda *_, **__: nullcontext())
     monkeypatch.setattr("sim.datasets.build.Build.run", lambda _: report)
     monkeypatch.setattr("sim.datasets.card.write_card", refused)
-    code, out, err = said(capsys, recipe_file, "--lake", tmp_path / "lake", "--json")
+    code, out, err = said(recipe_file, "--lake", tmp_path / "lake", "--json")
     assert code == 0
     assert (json.loads(out)["films"], json.loads(out)["card"]) == (15, None)
     assert "the data set tiny is published, but writing its card failed" in err

@@ -14,6 +14,7 @@ from sim.effects import EFFECTS, Slack, apply
 from sim.handles import Handles, corners
 from sim.integrate import BackwardEuler, JointBatch, SplitEuler, advance
 from sim.mesh import grid
+from tests.sim.conftest import PLAIN, make_system
 
 FullHoist = EFFECTS["full-hoist"]
 TiltedPole = EFFECTS["tilted-pole"]
@@ -22,13 +23,13 @@ STILL = QuadraticNormal(density=0.0)
 
 
 @pytest.fixture
-def held(make_system, plain):
+def held():
     """A flag on two corners, and its start; options as for the system."""
     mesh = grid(width=0.6, height=0.4, columns=6, rows=4)
 
     def make(**options):
         handles = Handles(vertices=corners(mesh.rest), stiffness=options.pop("stiffness", 1e3))
-        return make_system(mesh, [plain], handles=handles, air=STILL, **options)
+        return make_system(mesh, [PLAIN], handles=handles, air=STILL, **options)
 
     return make
 
@@ -62,9 +63,9 @@ def test_tight_lacing_keeps_the_hoist_in_place_and_loose_does_not(held, integrat
     assert travel[1] < 1.5 * 24e-6
 
 
-def test_a_hoist_held_throughout_needs_no_lacing(make_system, plain) -> None:
+def test_a_hoist_held_throughout_needs_no_lacing() -> None:
     mesh = grid(width=0.6, height=0.4, columns=3, rows=1)
-    system, state = make_system(mesh, [plain], handles=Handles(vertices=(0, 1)))
+    system, state = make_system(mesh, [PLAIN], handles=Handles(vertices=(0, 1)))
     with pytest.raises(UsageError, match="held already"):
         apply([FullHoist(stiffness=1e3)], system, state)
 
@@ -118,16 +119,16 @@ def test_a_tilted_pole_turns_everything_rigidly_by_its_angle(held) -> None:
         torch.testing.assert_close(start.position[list(system.handles.vertices)], tilted.anchors)
 
 
-def test_a_pole_without_attachments_cannot_be_tilted(make_system, plain, square) -> None:
-    system, state = make_system(square, [plain])
+def test_a_pole_without_attachments_cannot_be_tilted(square) -> None:
+    system, state = make_system(square, [PLAIN])
     with pytest.raises(UsageError, match="nothing holds"):
         apply([TiltedPole(lean=0.1)], system, state)
 
 
-def test_lacing_moves_with_the_handles(make_system, plain) -> None:
+def test_lacing_moves_with_the_handles() -> None:
     mesh = grid(width=0.6, height=0.4, columns=6, rows=4)
     handles = Handles(vertices=corners(mesh.rest), times=(0.0, 1.0), offsets=((0.0, 0.0, 0.0), (0.0, 0.5, 0.0)))
-    system, state = make_system(mesh, [plain], handles=handles)
+    system, state = make_system(mesh, [PLAIN], handles=handles)
     system, state = apply([FullHoist(stiffness=5e3)], system, replace(state))
     (lace,) = system.ties
     moved = state.position + torch.tensor([0.0, 0.25, 0.0], dtype=torch.float64)[:, None]

@@ -17,6 +17,7 @@ from sim.handles import Handles
 from sim.integrate import advance, stable_step
 from sim.material import isotropic
 from sim.mesh import Mesh, grid
+from tests.sim.conftest import PLAIN, make_system
 
 HemStiffness = EFFECTS["hem-stiffness"]
 Hysteresis = EFFECTS["hysteresis"]
@@ -30,9 +31,9 @@ def rolled(mesh: Mesh, curvature: float) -> torch.Tensor:
     return torch.tensor(position)[..., None]
 
 
-def test_a_hem_adds_its_line_density_times_the_perimeter(make_system, plain) -> None:
+def test_a_hem_adds_its_line_density_times_the_perimeter() -> None:
     mesh = grid(width=1.5, height=1.0, columns=6, rows=4)
-    system, state = make_system(mesh, [plain])
+    system, state = make_system(mesh, [PLAIN])
     heavier, _ = apply([HemMass(line_density=0.01)], system, state)
     added = (heavier.cloth.mass - system.cloth.mass)[:, 0].numpy()
     assert added.sum() == pytest.approx(0.01 * 5.0, rel=1e-12)
@@ -40,8 +41,8 @@ def test_a_hem_adds_its_line_density_times_the_perimeter(make_system, plain) -> 
     assert (added[inner] == 0).all()
 
 
-def test_wet_cloth_falls_as_fast_and_is_blown_less(make_system, plain, square) -> None:
-    system, state = make_system(square, [plain], gravity=(0.0, 0.0, -9.81), wind=(5.0, 0.0, 0.0))
+def test_wet_cloth_falls_as_fast_and_is_blown_less(square) -> None:
+    system, state = make_system(square, [PLAIN], gravity=(0.0, 0.0, -9.81), wind=(5.0, 0.0, 0.0))
     wet, _ = apply([WetMass(uptake=0.6)], system, state)
     dry_push, wet_push = (s.external(s.wind.velocity(0.0), 0.0, state.position, state.velocity) for s in (system, wet))
     dry, soaked = (push / s.cloth.mass.unsqueeze(1) for push, s in ((dry_push, system), (wet_push, wet)))
@@ -50,28 +51,28 @@ def test_wet_cloth_falls_as_fast_and_is_blown_less(make_system, plain, square) -
 
 
 @pytest.mark.parametrize("columns", [4, 8])
-def test_a_hem_stiffens_a_rolled_cloth_by_its_width_on_any_mesh(make_system, plain, columns) -> None:
+def test_a_hem_stiffens_a_rolled_cloth_by_its_width_on_any_mesh(columns) -> None:
     """Rolled along u, only the creases along v bend; hems of width w at both their ends, r times stiffer on top, add
     2 r w/H to the energy."""
     mesh = grid(width=1.0, height=0.8, columns=columns, rows=columns)
-    system, state = make_system(mesh, [plain])
+    system, state = make_system(mesh, [PLAIN])
     hemmed, _ = apply([HemStiffness(ratio=10.0, width=0.02)], system, state)
     position = rolled(mesh, 0.8)
     ratio = float(bending.energy(hemmed.cloth, position) / bending.energy(system.cloth, position))
     assert ratio == pytest.approx(1 + 2 * 10.0 * 0.02 / 0.8, rel=1e-9)
 
 
-def test_a_hem_lowers_the_stable_step_no_more_than_bending_can(make_system, plain, square) -> None:
+def test_a_hem_lowers_the_stable_step_no_more_than_bending_can(square) -> None:
     """Stiffness r on top in part of the cloth: the step shrinks, by at most √(1 + r)."""
-    stiff = replace(plain, bending=plain.bending * 1e4)
+    stiff = replace(PLAIN, bending=PLAIN.bending * 1e4)
     system, state = make_system(square, [stiff])
     hemmed, _ = apply([HemStiffness(ratio=24.0, width=0.03)], system, state)
     assert 1 < stable_step(system) / stable_step(hemmed) < 5
 
 
-def test_cloth_rolled_at_its_rest_curvature_does_not_bend(make_system, plain) -> None:
+def test_cloth_rolled_at_its_rest_curvature_does_not_bend() -> None:
     mesh = grid(width=1.0, height=0.8, columns=7, rows=5)
-    system, state = make_system(mesh, [plain])
+    system, state = make_system(mesh, [PLAIN])
     curled, _ = apply([RestCurvature(curvature=1.5)], system, state)
     (curl,) = curled.effects
     position = rolled(mesh, 1.5)
@@ -82,7 +83,7 @@ def test_cloth_rolled_at_its_rest_curvature_does_not_bend(make_system, plain) ->
     np.testing.assert_allclose(total, 0, atol=1e-15)
 
 
-def test_damping_lets_a_vibration_decay_as_stated(make_system) -> None:
+def test_damping_lets_a_vibration_decay_as_stated() -> None:
     """Stiffness-proportional damping d: ẍ + d ω² ẋ + ω² x = 0, so that the amplitude falls by e^(−d ω² t/2); ω is
     that of the undamped member of the same batch, a patch held at one edge and stretched along itself."""
     sheet = isotropic(name="sheet", density=0.2, stretching=50.0, shear=40.0, bending=1e-4)
@@ -116,9 +117,9 @@ def folded(angle: float) -> torch.Tensor:
 
 
 @pytest.fixture
-def hinge(make_system, plain):
+def hinge():
     rest = np.array([[0.0, 0.0], [0.0, 1.0], [-1.0, 0.5], [1.0, 0.5]])
-    return make_system(Mesh(rest=rest, faces=np.array([[0, 1, 2], [1, 0, 3]])), [plain])
+    return make_system(Mesh(rest=rest, faces=np.array([[0, 1, 2], [1, 0, 3]])), [PLAIN])
 
 
 def work_of_cycle(hinge, friction: Hysteresis, amplitude: float, steps: int) -> float:

@@ -8,6 +8,7 @@ import torch
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.rng import stream
 from sim.effects import EFFECTS, Porosity, Shear, apply
+from tests.sim.conftest import PLAIN, make_system
 
 
 def test_a_refused_value_is_reported_with_its_admissible_range_and_expected_value() -> None:
@@ -23,21 +24,21 @@ def test_a_mistyped_effect_is_answered_with_the_nearest() -> None:
         EFFECTS["porostiy"]
 
 
-def test_an_effect_at_null_leaves_the_system_itself(make_system, plain, square) -> None:
-    system, state = make_system(square, [plain])
+def test_an_effect_at_null_leaves_the_system_itself(square) -> None:
+    system, state = make_system(square, [PLAIN])
     assert apply([Porosity(), Shear(exponent=0.0, height=3.0)], system, state) == (system, state)
 
 
-def test_a_wanted_gradient_keeps_an_effect_at_null(make_system, plain, square) -> None:
-    system, state = make_system(square, [plain])
+def test_a_wanted_gradient_keeps_an_effect_at_null(square) -> None:
+    system, state = make_system(square, [PLAIN])
     wanted = torch.zeros(1, dtype=torch.float64, requires_grad=True)
     changed, _ = apply([Porosity(open_share=wanted)], system, state)
     assert changed is not system
     assert any(tensor.requires_grad for tensor in changed.tensors())
 
 
-def test_values_for_another_batch_are_refused(make_system, plain, square) -> None:
-    system, state = make_system(square, [plain, plain])
+def test_values_for_another_batch_are_refused(square) -> None:
+    system, state = make_system(square, [PLAIN, PLAIN])
     with pytest.raises(UsageError, match="2 members, and there are values for 3"):
         apply([Porosity(open_share=torch.full((3,), 0.1))], system, state)
 

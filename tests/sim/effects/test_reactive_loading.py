@@ -8,6 +8,7 @@ import torch
 
 from sim.effects import ReactiveLoading
 from sim.mesh import grid
+from tests.sim.conftest import PLAIN, make_system
 
 U, K, OMEGA, AMPLITUDE, MASS = 6.0, 9.0, 100.0, 1e-4, 0.4
 
@@ -30,17 +31,17 @@ def convective_error(make_system, plain, columns: int) -> float:
     return float(np.abs(load - expected)[inner].max() / np.abs(expected).max())
 
 
-def test_the_load_of_a_travelling_wave_converges_at_second_order(make_system, plain) -> None:
-    errors = [convective_error(make_system, plain, columns) for columns in (20, 40, 80)]
+def test_the_load_of_a_travelling_wave_converges_at_second_order() -> None:
+    errors = [convective_error(make_system, PLAIN, columns) for columns in (20, 40, 80)]
     assert errors[2] < 0.02
     rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     # Central differences on a wide stencil: (k Δ)²/3 for each derivative, 0.4 % at 80 columns.
     assert rates.min() > 1.75
 
 
-def test_a_rigid_plate_in_steady_translation_feels_no_load(make_system, plain, square, inclined) -> None:
+def test_a_rigid_plate_in_steady_translation_feels_no_load(square, inclined) -> None:
     """Its normal and its velocity relative to the air are constant: D V = 0, at any incidence."""
-    system, _ = make_system(square, [plain])
+    system, _ = make_system(square, [PLAIN])
     position = inclined(square, 0.6)
     velocity = torch.tensor([1.0, -2.0, 0.5], dtype=torch.float64)[:, None].expand_as(position)
     wind = torch.tensor([6.0, 1.0, 0.0], dtype=torch.float64)[:, None]
@@ -48,9 +49,9 @@ def test_a_rigid_plate_in_steady_translation_feels_no_load(make_system, plain, s
     np.testing.assert_allclose(force, 0, atol=1e-11)
 
 
-def test_a_pitching_plate_feels_the_coriolis_load(make_system, plain, square) -> None:
+def test_a_pitching_plate_feels_the_coriolis_load(square) -> None:
     """η = x φ(t) with φ = 0 now: (∂t + U ∂x)² η = x φ̈ + 2 U φ̇; the convective part is 2 U φ̇ everywhere."""
-    system, _ = make_system(square, [plain])
+    system, _ = make_system(square, [PLAIN])
     u, v = square.rest.T
     position = torch.tensor(np.stack([u, v, 0 * u], axis=1))[..., None]
     rate = 0.8
@@ -60,10 +61,10 @@ def test_a_pitching_plate_feels_the_coriolis_load(make_system, plain, square) ->
     np.testing.assert_allclose(force[:, 2, 0], -MASS * 2 * U * rate * square.vertex_areas, rtol=1e-10)
 
 
-def test_a_still_curved_sheet_in_a_stream_is_pushed_away_from_its_centre(make_system, plain) -> None:
+def test_a_still_curved_sheet_in_a_stream_is_pushed_away_from_its_centre() -> None:
     """η = κ x²/2: the load is −m_a U² κ everywhere, the centrifugal force that acts as compression on a flag."""
     mesh = grid(width=1.0, height=0.3, columns=40, rows=12)
-    system, _ = make_system(mesh, [plain])
+    system, _ = make_system(mesh, [PLAIN])
     u, v = mesh.rest.T
     position = torch.tensor(np.stack([u, v, 0.01 * u**2 / 2], axis=1))[..., None]
     wind = torch.tensor([U, 0.0, 0.0], dtype=torch.float64)[:, None]
@@ -75,7 +76,7 @@ def test_a_still_curved_sheet_in_a_stream_is_pushed_away_from_its_centre(make_sy
     assert float(total) == pytest.approx(-MASS * U**2 * 0.01, rel=0.01)
 
 
-def test_a_curved_sheet_in_steady_translation_sheds_the_energy_it_gives(make_system, plain) -> None:
+def test_a_curved_sheet_in_steady_translation_sheds_the_energy_it_gives() -> None:
     """A gutter of radius R from φ = −φ₀ to φ₀ moves at c along its axis of symmetry through still air.
 
     There V = c cos φ, s = c sin φ e_φ, and nothing changes in time: D V = c²/R (½ cos² φ − sin² φ). The work on the
@@ -83,7 +84,7 @@ def test_a_curved_sheet_in_steady_translation_sheds_the_energy_it_gives(make_sys
     """
     radius, speed, half = 0.4, 3.0, 1.2
     mesh = grid(width=2 * half * radius, height=0.2, columns=96, rows=8)
-    system, _ = make_system(mesh, [plain])
+    system, _ = make_system(mesh, [PLAIN])
     angle = mesh.rest[:, 0] / radius - half
     position = np.stack([radius * np.cos(angle), radius * np.sin(angle), mesh.rest[:, 1]], axis=1)
     x = torch.tensor(position)[..., None]
@@ -105,9 +106,9 @@ def test_a_curved_sheet_in_steady_translation_sheds_the_energy_it_gives(make_sys
 
 
 @pytest.mark.parametrize("speed", [0.0, 8.0])
-def test_the_loads_terms_scale_as_powers_of_the_stream(make_system, plain, square, speed) -> None:
+def test_the_loads_terms_scale_as_powers_of_the_stream(square, speed) -> None:
     """For a still, wavy sheet only U² η_xx is left."""
-    system, _ = make_system(square, [plain])
+    system, _ = make_system(square, [PLAIN])
     u, v = square.rest.T
     position = torch.tensor(np.stack([u, v, 1e-5 * np.sin(4 * u)], axis=1))[..., None]
     load = ReactiveLoading(mass=MASS)

@@ -17,6 +17,7 @@ from sim.effects.wagner_lag import HeldBack, WagnerLag
 from sim.integrate import Symplectic
 from sim.material import named
 from sim.scene import assemble
+from tests.sim.conftest import PLAIN, make_system
 
 SPEED = 6.0
 
@@ -33,10 +34,10 @@ def plate(make_system, plain, square, inclined, share: float):
 @pytest.mark.parametrize("share", [0.4, 1.0])
 @pytest.mark.parametrize("moving", [False, True], ids=["in a wind", "towed through calm air"])
 def test_the_load_of_a_plate_that_is_set_moving_at_once_grows_as_wagners_function(
-    make_system, plain, square, inclined, share: float, moving: bool
+    square, inclined, share: float, moving: bool
 ) -> None:
     """F (1 − s (1 − φ)), φ(τ) = 1 − 0.165 e^(−0.0455 τ) − 0.335 e^(−0.3 τ), τ = 2 U t/L with L = 1 m, in any steps."""
-    system, state, _ = plate(make_system, plain, square, inclined, share)
+    system, state, _ = plate(make_system, PLAIN, square, inclined, share)
     wind = torch.tensor([[0.0 if moving else SPEED], [0.0], [0.0]], dtype=torch.float64)
     velocity = torch.zeros_like(state.velocity)
     velocity[:, 0] = -SPEED if moving else 0.0
@@ -56,14 +57,12 @@ def test_the_load_of_a_plate_that_is_set_moving_at_once_grows_as_wagners_functio
 
 
 @pytest.mark.parametrize("frequency", [0.05, 0.2, 0.6, 2.0])
-def test_a_load_that_oscillates_follows_theodorsens_function(
-    make_system, plain, square, inclined, frequency: float
-) -> None:
+def test_a_load_that_oscillates_follows_theodorsens_function(square, inclined, frequency: float) -> None:
     """C(k) = H₁/(H₁ + i H₀), Hankel functions of the second kind of k = ω L/(2 U) (NACA report 496, 1935).
 
     The load is sin ωt in a wind of constant speed. Jones' fit is within 0.03 of it.
     """
-    system, state, lag = plate(make_system, plain, square, inclined, 1.0)
+    system, state, lag = plate(make_system, PLAIN, square, inclined, 1.0)
     normal = face_wind(system.cloth, state.position, state.velocity, torch.zeros_like(system.gravity)).normal[0, :, 0]
     along = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
     omega, memory = 2 * SPEED * frequency, state.memory[0]
@@ -112,7 +111,7 @@ def test_a_lag_that_starts_at_nothing_errs_by_less_than_one_at_the_load_of_the_m
     assert at_load > 0.5 * without
 
 
-def test_it_is_refused_where_the_air_has_no_normal_force(make_system, plain, square) -> None:
-    system, state = make_system(square, [plain], air=Stokes())
+def test_it_is_refused_where_the_air_has_no_normal_force(square) -> None:
+    system, state = make_system(square, [PLAIN], air=Stokes())
     with pytest.raises(UsageError, match="WagnerLag changes a normal force, which Stokes has none of"):
         apply([WagnerLag(share=0.5)], system, state)

@@ -9,6 +9,7 @@ import torch
 from sim.render import plate, to_bytes, to_linear
 from sim.render.develop import develop
 from sim.render.texture import Pyramid
+from tests.sim.render.conftest import look
 
 
 def test_the_published_points_of_srgb() -> None:
@@ -44,7 +45,7 @@ def cell(shown: np.ndarray, row: int, column: int) -> tuple[int, int]:
     return round(float(code[0])), round(float(code[1]))
 
 
-def test_at_scale_0_6_the_shorter_side_fills_the_frame(look) -> None:
+def test_at_scale_0_6_the_shorter_side_fills_the_frame() -> None:
     shown = plate(grid_picture(), look(background_scale=0.6))
     assert shown.shape == (300, 300, 3)
     # 300 px show 500 of them, the middle ones across: columns 100 to 600, rows 0 to 500.
@@ -52,20 +53,20 @@ def test_at_scale_0_6_the_shorter_side_fills_the_frame(look) -> None:
     assert cell(shown, 290, 290) == (11, 9)
 
 
-def test_at_scale_1_pixels_are_its_own_and_offsets_move_it(look) -> None:
+def test_at_scale_1_pixels_are_its_own_and_offsets_move_it() -> None:
     shown = plate(grid_picture(), look(background_scale=1.0))
     assert cell(shown, 125, 125) == (6, 4)  # px (325, 225) of 700 × 500: the frame begins at (200, 100)
     moved = plate(grid_picture(), look(background_scale=1.0, background_offset_x=50.0, background_offset_y=-50.0))
     assert cell(moved, 125, 125) == (5, 5)
 
 
-def test_beyond_its_edges_a_background_is_its_reflection(look) -> None:
+def test_beyond_its_edges_a_background_is_its_reflection() -> None:
     shown = plate(grid_picture(), look(background_scale=0.6, background_offset_y=60.0))  # 100 px of the picture
     assert cell(shown, 45, 150) == cell(shown, 75, 150) == (7, 0)
     assert cell(shown, 15, 150) == cell(shown, 105, 150) == (7, 1)
 
 
-def test_larger_frames_show_the_same_of_a_background(look) -> None:
+def test_larger_frames_show_the_same_of_a_background() -> None:
     small = plate(grid_picture(), look(background_offset_x=15.0))
     large = plate(grid_picture(), look(background_offset_x=15.0, width=600, height=600))
     for row, column in ((20, 30), (150, 222), (280, 75)):

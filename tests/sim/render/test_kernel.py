@@ -10,6 +10,7 @@ from sim import compiler as build
 from sim.render import raster_kernel
 from sim.render.coverage import Triangles, fragments
 from sim.render.develop import develop
+from tests.sim.render.conftest import camera_of, look
 from tests.sim.render.pieces import meshes, sheet
 
 
@@ -40,7 +41,7 @@ def crumpled(seed: int, *, cells: int = 9):
         (4, 2, {"width": 300, "height": 300, "camera_radius": 2.5}),  # faces too large for narrow arithmetic
     ],
 )
-def test_the_kernel_makes_the_bytes_that_torch_makes(camera_of, look, monkeypatch, seed, cells, changes) -> None:
+def test_the_kernel_makes_the_bytes_that_torch_makes(monkeypatch, seed, cells, changes) -> None:
     if raster_kernel.library() is None:
         pytest.skip("no C++ compiler")
     rng = np.random.default_rng(seed)
@@ -70,14 +71,14 @@ def test_the_kernel_encodes_every_value_as_torch_does() -> None:
 
 
 @pytest.mark.usefixtures("no_compiler")
-def test_without_a_compiler_torch_renders_after_one_warning(camera_of, look) -> None:
+def test_without_a_compiler_torch_renders_after_one_warning() -> None:
     with pytest.warns(RuntimeWarning, match="raster renderer runs as plain torch") as caught:
         image = camera_of().render(meshes(sheet()), look(raster_samples=2))
     assert len(caught) == 1
     assert image[0, 150, 150].tolist() == [255, 255, 255]
 
 
-def test_equal_input_gives_equal_bytes(camera_of, look) -> None:
+def test_equal_input_gives_equal_bytes() -> None:
     zeta = look(sun_strength=4.0, exposure_time=0.01)
     first, second = (camera_of().render(crumpled(5), zeta) for _ in range(2))
     assert torch.equal(first, second)

@@ -10,6 +10,7 @@ import torch
 
 from sim.render import stage
 from sim.render.sampling import Samples
+from tests.sim.render.conftest import camera_of, look
 from tests.sim.render.pieces import linear, meshes, sheet, together
 
 BYTE = 0.006  # linear; half a step of the bytes near white
@@ -26,26 +27,26 @@ SLANTED = {
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.5, -0.9])
-def test_brightness_follows_the_cosine_of_the_suns_angle(camera_of, look, turn) -> None:
+def test_brightness_follows_the_cosine_of_the_suns_angle(turn) -> None:
     image = camera_of().render(meshes(sheet(turn=turn, side=1.5)), look(**SLANTED))
     # White that faces the sun is 1. Normal (−sin t, …): the sun's horizontal part is cos 45° along −y.
     assert linear(image[0])[150, 150, 0] == pytest.approx(math.cos(math.pi / 4) * math.cos(turn), abs=BYTE)
 
 
-def test_sky_and_sun_add_up(camera_of, look) -> None:
+def test_sky_and_sun_add_up() -> None:
     image = camera_of().render(meshes(sheet()), look(**SLANTED | {"sky_strength": 0.25}))
     # Gain 1 / (π / π + 0.25).
     assert linear(image[0])[150, 150, 0] == pytest.approx((math.cos(math.pi / 4) + 0.25) / 1.25, abs=BYTE)
 
 
-def test_the_far_side_gets_what_goes_through_and_the_near_side_loses_it(camera_of, look) -> None:
+def test_the_far_side_gets_what_goes_through_and_the_near_side_loses_it() -> None:
     for angle, share in ((math.pi / 2, 0.7), (-math.pi / 2, 0.3)):
         zeta = look(**SLANTED, translucency=0.3, camera_angle=angle)
         image = camera_of().render(meshes(sheet()), zeta)
         assert linear(image[0])[150, 150, 0] == pytest.approx(share * math.cos(math.pi / 4), abs=BYTE)
 
 
-def test_exposure_doubles_with_each_stop(camera_of, look) -> None:
+def test_exposure_doubles_with_each_stop() -> None:
     dark, darker = (
         linear(camera_of().render(meshes(sheet()), look(exposure_bias=bias))[0])[150, 150, 0] for bias in (-1.0, -2.0)
     )
@@ -58,7 +59,7 @@ def brightness(image, camera, points: list[tuple[float, float, float]]) -> list[
     return [float(linear(image)[int(y), int(x), 0]) for x, y in places.tolist()]
 
 
-def test_a_shadow_falls_where_the_suns_rays_put_it(camera_of, look) -> None:
+def test_a_shadow_falls_where_the_suns_rays_put_it() -> None:
     # A square 0.5 m before a wall shades the one of its size 0.5 m lower, out of the view of a camera that looks up.
     scene = meshes(together(sheet(side=2.4), sheet(side=0.4, middle=(0.1, -0.5, 0.7))))
     zeta = look(**SLANTED, camera_height=-3.0)
@@ -70,7 +71,7 @@ def test_a_shadow_falls_where_the_suns_rays_put_it(camera_of, look) -> None:
     assert brightness(image, camera, outside) == pytest.approx([math.cos(math.pi / 4)] * 4, abs=BYTE)
 
 
-def test_a_penumbra_rises_as_the_part_of_the_suns_disc_that_an_edge_leaves_free(camera_of, look) -> None:
+def test_a_penumbra_rises_as_the_part_of_the_suns_disc_that_an_edge_leaves_free() -> None:
     # The sun in the wall's normal; an upright edge at x = 0, 0.8 m before the wall; the sun's angular radius atan 0.15.
     scene = meshes(together(sheet(side=2.4), sheet(side=3.0, middle=(-1.5, -0.8, 0.0))))
     sun = SLANTED | {"sun_height": 1e-3, "sun_radius": 3.0, "sun_softness": 0.15}
@@ -86,7 +87,7 @@ def test_a_penumbra_rises_as_the_part_of_the_suns_disc_that_an_edge_leaves_free(
 
 
 @pytest.mark.parametrize("softness", [0.0, 0.3, 2.0, 10.0])
-def test_the_suns_points_light_a_surface_that_faces_it_with_its_strength(look, softness) -> None:
+def test_the_suns_points_light_a_surface_that_faces_it_with_its_strength(softness) -> None:
     samples = Samples.of(look(sun_strength=5.0, sun_softness=softness, raster_samples=64), to_sun=(0.6, 0.0, 0.8))
     directions = samples.to_sun.reshape(-1, 3)
     received = samples.sun_weight * np.maximum(directions @ [0.6, 0.0, 0.8], 0).sum()

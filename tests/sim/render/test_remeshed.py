@@ -12,13 +12,12 @@ from flagdata.ingest import read_folder
 from flagdata.lake import RaggedMeshSequence
 from sim.render import Camera, Meshes, stage
 from sim.render.shutter import VertexMotion
+from tests.sim.render.conftest import camera_of, look
 from tests.sim.render.pieces import linear
 
 
 @pytest.mark.reference
-def test_a_remeshed_flag_is_seen_where_its_vertices_project_and_moves_between_frames(
-    reference_data: Path, camera_of, look
-) -> None:
+def test_a_remeshed_flag_is_seen_where_its_vertices_project_and_moves_between_frames(reference_data: Path) -> None:
     sequence = read_folder(reference_data / "arcsim" / "raw_remeshed")
     assert isinstance(sequence, RaggedMeshSequence)
     meshes = Meshes.flag(sequence, heading=0.0)

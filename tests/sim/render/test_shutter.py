@@ -9,13 +9,14 @@ import torch
 from flagdata.errors import InputError
 from sim.render import Meshes
 from sim.render.shutter import moved
+from tests.sim.render.conftest import camera_of, look
 from tests.sim.render.pieces import linear, meshes, sheet
 
 RATE = 25.0
 STEADY = np.array([[0.1 * i, 0.0, 0.0] for i in range(-2, 3)])  # 0.1 m a frame: 2.5 m/s
 
 
-def test_the_blur_of_an_edge_is_speed_times_exposure_about_mid_exposure(camera_of, look) -> None:
+def test_the_blur_of_an_edge_is_speed_times_exposure_about_mid_exposure() -> None:
     scene = meshes(sheet(side=1.0), moves=STEADY, rate=RATE)
     exposure = 0.032  # s; 2.5 m/s · 0.032 s · 60 px/m = 4.8 px
     image = camera_of().render(scene, look(exposure_time=exposure, raster_samples=100))
@@ -29,7 +30,7 @@ def test_the_blur_of_an_edge_is_speed_times_exposure_about_mid_exposure(camera_o
         assert np.sqrt(12 * spread - 2) == pytest.approx(4.8, abs=0.1)
 
 
-def test_without_exposure_an_edge_is_sharp(camera_of, look) -> None:
+def test_without_exposure_an_edge_is_sharp() -> None:
     scene = meshes(sheet(side=1.0), moves=STEADY, rate=RATE)
     profile = linear(camera_of().render(scene, look(raster_samples=16))[2])[150, :, 0]
     assert ((profile > 0.01) & (profile < 0.99)).sum() <= 2
@@ -75,7 +76,7 @@ def test_cloth_that_is_cut_anew_moves_as_its_material_does(offset) -> None:
     assert torch.allclose(moved(scene, offset).positions, expected, atol=2e-5)  # places on the very edge move by 1e-5
 
 
-def test_frames_of_any_topology_look_as_they_do_alone(camera_of, look) -> None:
+def test_frames_of_any_topology_look_as_they_do_alone() -> None:
     moves = np.array([[-0.2, 0.0, 0.1], [0.2, 0.0, -0.1], [0.0, 0.3, 0.0]])
     both = camera_of().render(ragged(cells=[3, 6, 4], moves=moves), look())
     assert both.shape == (3, 300, 300, 3)
@@ -101,14 +102,14 @@ def test_cloth_that_the_next_frame_does_not_have_is_an_error_not_a_guess() -> No
         moved(torn, 0.01)
 
 
-def test_frames_are_the_same_however_many_are_worked_on_together(camera_of, look, monkeypatch) -> None:
+def test_frames_are_the_same_however_many_are_worked_on_together(monkeypatch) -> None:
     scene, zeta = meshes(sheet(side=1.0), moves=STEADY, rate=RATE), look(exposure_time=0.02, raster_samples=2)
     together = camera_of().render(scene, zeta)
     monkeypatch.setattr("sim.render.raster._TOGETHER", 2)
     assert torch.equal(camera_of().render(scene, zeta), together)
 
 
-def test_a_part_of_a_sequence_is_rendered_as_in_the_whole(camera_of, look) -> None:
+def test_a_part_of_a_sequence_is_rendered_as_in_the_whole() -> None:
     """The camera aims at the cloth of all frames, not of the part's."""
     scene, zeta = meshes(sheet(side=1.0), moves=STEADY, rate=RATE), look(exposure_time=0.02, raster_samples=4)
     renderer = camera_of()

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-
-import pytest
 
 from sim.run import Recipe, parse
 
@@ -30,24 +27,13 @@ settle = 0.1
 frames = 4
 {more}
 """
-MakeRecipe = Callable[..., Recipe]
 
 
-@pytest.fixture
-def small() -> Callable[..., str]:
+def small(*, top: str = "", scene: str = "", material: str = "", more: str = "") -> str:
     """The text of a small recipe of the search space, with additions to its tables."""
-
-    def text(*, top: str = "", scene: str = "", material: str = "", more: str = "") -> str:
-        return SMALL.format(top=top, scene=scene, material=material, more=more)
-
-    return text
+    return SMALL.format(top=top, scene=scene, material=material, more=more)
 
 
-@pytest.fixture
-def make_recipe(small: Callable[..., str]) -> MakeRecipe:
+def make_recipe(**additions: str) -> Recipe:
     """That recipe, read."""
-
-    def make(**additions: str) -> Recipe:
-        return parse(small(**additions), name="small", folder=Path(), where="small.toml")
-
-    return make
+    return parse(small(**additions), name="small", folder=Path(), where="small.toml")

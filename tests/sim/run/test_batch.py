@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from sim.integrate import BackwardEuler, Symplectic
 from sim.material import named
 from sim.run import BatchOutcome, Crew, Stepper, parse, principal_strains, run
 from sim.scene import assemble, flag
+from tests.sim.run.conftest import make_recipe, small
 
 SIZE = 4
 
@@ -40,7 +41,7 @@ def all_bits(outcomes: Sequence[BatchOutcome]) -> list[bytes | None]:
     ],
     ids=["explicit", "implicit", "contact", "effects", "air", "warp"],
 )
-def test_a_member_is_the_same_to_the_bit_whatever_it_is_simulated_with(make_recipe: Callable, additions: dict) -> None:
+def test_a_member_is_the_same_to_the_bit_whatever_it_is_simulated_with(additions: dict) -> None:
     crew = Crew(make_recipe(**additions))
     stepper = Stepper.of(crew)
     members = [crew.member(index) for index in range(SIZE)]
@@ -51,7 +52,7 @@ def test_a_member_is_the_same_to_the_bit_whatever_it_is_simulated_with(make_reci
     assert bits(run(crew, stepper, members[1:2], size=SIZE)[0]) == together[1]
 
 
-def test_a_backend_that_cannot_run_a_recipe_is_refused_before_the_first_step(make_recipe: Callable) -> None:
+def test_a_backend_that_cannot_run_a_recipe_is_refused_before_the_first_step() -> None:
     more = '[integrator]\nbackend = "warp"\n[effects.lift]\ncoefficient = 2.0'
     with pytest.raises(UsageError, match="only the base model, not effects"):
         Stepper.of(Crew(make_recipe(more=more)))
@@ -60,9 +61,7 @@ def test_a_backend_that_cannot_run_a_recipe_is_refused_before_the_first_step(mak
 @pytest.mark.parametrize(
     ("contact", "steps"), [("", 50), ("[contact]\nthickness = 0.02", 150)], ids=["plain", "contact"]
 )
-def test_members_that_diverge_are_reported_and_leave_the_others_unharmed(
-    make_recipe: Callable, contact: str, steps: int
-) -> None:
+def test_members_that_diverge_are_reported_and_leave_the_others_unharmed(contact: str, steps: int) -> None:
     # Steps that soft members bear and stiff ones, up to a thousand times as stiff, do not.
     stiff = 'stretching-factor = { low = 1.0, high = 1e3, scale = "log" }'
     recipe = make_recipe(material=stiff, more=contact)
@@ -78,7 +77,7 @@ def test_members_that_diverge_are_reported_and_leave_the_others_unharmed(
     assert all_bits(without) == [bits(outcomes[0]), bits(outcomes[2])]
 
 
-def test_a_solve_that_does_not_converge_is_a_divergence_of_that_member(make_recipe: Callable) -> None:
+def test_a_solve_that_does_not_converge_is_a_divergence_of_that_member() -> None:
     # As many iterations as soft members need, and stiff ones, whose systems are worse conditioned, do not get by with.
     stiff = 'stretching-factor = { low = 1.0, high = 1e5, scale = "log" }'
     recipe = make_recipe(material=stiff)
@@ -92,7 +91,7 @@ def test_a_solve_that_does_not_converge_is_a_divergence_of_that_member(make_reci
     assert all_bits(without) == [bits(outcomes[0]), bits(outcomes[2])]
 
 
-def test_steps_follow_from_the_recipe_and_not_from_the_draws(make_recipe: Callable) -> None:
+def test_steps_follow_from_the_recipe_and_not_from_the_draws() -> None:
     crew = Crew(make_recipe())
     stepper = Stepper.of(crew)
     frame = 1 / 25
@@ -114,7 +113,7 @@ def test_each_material_of_a_recipe_has_its_own_steps() -> None:
     assert mixed[1] > 2 * mixed[0]
 
 
-def test_a_forced_step_beyond_the_limit_is_refused_with_it(make_recipe: Callable) -> None:
+def test_a_forced_step_beyond_the_limit_is_refused_with_it() -> None:
     with pytest.raises(UsageError, match=r"a step of 0\.02 s is unstable: the limit"):
         Stepper.of(Crew(make_recipe(more="[integrator]\nstep = 0.02")))
     assert Stepper.of(Crew(make_recipe(more="[integrator]\nstep = 5e-4"))).steps == 80
@@ -164,7 +163,7 @@ def test_principal_strains_are_those_of_a_known_deformation() -> None:
     assert membrane.strain(system.cloth, state.position).g00.abs().max() < 1e-12
 
 
-def test_energies_are_those_of_the_motion(make_recipe: Callable) -> None:
+def test_energies_are_those_of_the_motion() -> None:
     recipe = make_recipe(more="")
     crew = Crew(recipe)
     outcome = run(crew, Stepper.of(crew), [crew.member(0)], size=1)[0]
@@ -178,7 +177,7 @@ def test_energies_are_those_of_the_motion(make_recipe: Callable) -> None:
     np.testing.assert_allclose(energies["gravity"], 9.81 * (height * mass).sum(axis=1), rtol=1e-5)
 
 
-def test_frames_are_on_the_clock_of_the_run(make_recipe: Callable) -> None:
+def test_frames_are_on_the_clock_of_the_run() -> None:
     crew = Crew(make_recipe())
     outcome = run(crew, Stepper.of(crew), [crew.member(0)], size=1)[0]
     assert outcome.sequence is not None
@@ -187,7 +186,7 @@ def test_frames_are_on_the_clock_of_the_run(make_recipe: Callable) -> None:
     assert outcome.sequence.attributes["seed"] == crew.seed(0)
 
 
-def test_a_run_without_settling_begins_with_the_start(make_recipe: Callable, small: Callable) -> None:
+def test_a_run_without_settling_begins_with_the_start() -> None:
     text = small().replace("settle = 0.1", "settle = 0.0")
     crew = Crew(parse(text, name="r", folder=Path(), where="r"))
     outcome = run(crew, Stepper.of(crew), [crew.member(0)], size=1)[0]

@@ -117,13 +117,13 @@ frames = 6
 
 
 @pytest.fixture
-def run(lake: Lake, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
+def run(lake: Lake, tmp_path: Path) -> Run:
     """Simulate a recipe with such a wind."""
 
     def simulate(wind: str) -> Ended:
         recipe = tmp_path / "gusty.toml"
         recipe.write_text(RECIPE.format(wind=wind))
-        return invoke(capsys, "simulate", recipe, "--lake", lake.path, "--json")
+        return invoke("simulate", recipe, "--lake", lake.path, "--json")
 
     return simulate
 

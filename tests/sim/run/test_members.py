@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +12,12 @@ from sim.effects import EFFECTS
 from sim.material import named
 from sim.run import Crew, parse
 from sim.scene import upright
+from tests.sim.run.conftest import make_recipe, small
 
 CAMEL = named("camel-ponte-roma")
 
 
-def test_draws_cover_the_search_space_uniformly(make_recipe: Callable) -> None:
+def test_draws_cover_the_search_space_uniformly() -> None:
     crew = Crew(make_recipe())
     members = [crew.member(index) for index in range(400)]
     speed = np.array([m.parameters["wind_speed"] for m in members])
@@ -33,7 +33,7 @@ def test_draws_cover_the_search_space_uniformly(make_recipe: Callable) -> None:
     assert np.abs(correlation).max() < 4 / np.sqrt(400)
 
 
-def test_materials_are_drawn_alike_often(small: Callable) -> None:
+def test_materials_are_drawn_alike_often() -> None:
     text = small().replace('name = "camel-ponte-roma"', 'names = ["paper", "gray-interlock", "camel-ponte-roma"]')
     crew = Crew(parse(text, name="r", folder=Path(), where="r"))
     drawn = [crew.member(index) for index in range(300)]
@@ -46,7 +46,7 @@ def test_materials_are_drawn_alike_often(small: Callable) -> None:
     crew.assemble(drawn[:9])
 
 
-def test_a_density_factor_multiplies_each_materials_own_density(small: Callable) -> None:
+def test_a_density_factor_multiplies_each_materials_own_density() -> None:
     """Log-uniform from 0.7 to 1.4: the mean logarithm of n draws has a standard deviation of ln 2/√(12 n)."""
     text = small(material="density-factor = { low = 0.7, high = 1.4, scale = 'log' }")
     text = text.replace('name = "camel-ponte-roma"', 'names = ["paper", "gray-interlock"]')
@@ -62,7 +62,7 @@ def test_a_density_factor_multiplies_each_materials_own_density(small: Callable)
     np.testing.assert_allclose([m.scene.material.density for m in members], density)
 
 
-def test_the_stable_step_is_looked_for_at_the_lightest_cloth(small: Callable) -> None:
+def test_the_stable_step_is_looked_for_at_the_lightest_cloth() -> None:
     light, plain = (
         Crew(parse(small(material=extra), name="r", folder=Path(), where="r"))
         for extra in ("density-factor = { low = 0.5, high = 2.0 }", "")
@@ -71,7 +71,7 @@ def test_the_stable_step_is_looked_for_at_the_lightest_cloth(small: Callable) ->
     assert mass[0] / mass[1] == pytest.approx(0.5, rel=1e-5)
 
 
-def test_a_recipe_without_a_density_factor_is_the_recipe_it_was(small: Callable) -> None:
+def test_a_recipe_without_a_density_factor_is_the_recipe_it_was() -> None:
     """Its hash is in lakes: artifacts made before there were such factors are found again."""
     plain, one = (
         parse(small(material=extra), name="r", folder=Path(), where="r").identity()
@@ -81,7 +81,7 @@ def test_a_recipe_without_a_density_factor_is_the_recipe_it_was(small: Callable)
     assert "density_factor" not in plain["material"]
 
 
-def test_a_new_draw_does_not_move_the_others(make_recipe: Callable) -> None:
+def test_a_new_draw_does_not_move_the_others() -> None:
     plain, more = (
         Crew(make_recipe()).member(2),
         Crew(make_recipe(material="damping = { low = 0.0, high = 1e-3 }")).member(2),
@@ -92,7 +92,7 @@ def test_a_new_draw_does_not_move_the_others(make_recipe: Callable) -> None:
     np.testing.assert_array_equal(more.scene.position, plain.scene.position)
 
 
-def test_handles_start_where_they_are_held(make_recipe: Callable) -> None:
+def test_handles_start_where_they_are_held() -> None:
     crew = Crew(make_recipe(scene='attachment = "hoist"'))
     held = list(crew.handles.vertices)
     assert len(held) == 5
@@ -103,13 +103,13 @@ def test_handles_start_where_they_are_held(make_recipe: Callable) -> None:
     assert noise.std() == pytest.approx(1e-3, rel=4 / np.sqrt(2 * noise.size))
 
 
-def test_wind_blows_towards_its_angle_from_x_to_y(small: Callable) -> None:
+def test_wind_blows_towards_its_angle_from_x_to_y() -> None:
     text = small().replace("speed = { low = 0.0, high = 10.0 }", "speed = 2.0\ntoward = 1.5707963267948966")
     scene = Crew(parse(text, name="r", folder=Path(), where="r")).member(0).scene
     np.testing.assert_allclose(scene.wind, [0, 2, 0], atol=1e-12)
 
 
-def test_gusts_are_each_members_own(make_recipe: Callable) -> None:
+def test_gusts_are_each_members_own() -> None:
     crew = Crew(make_recipe(more="[effects.gusts]\nintensity = 0.2"))
     members = [crew.member(index) for index in range(3)]
     times = torch.linspace(0, 0.2, 5).tolist()
@@ -125,7 +125,7 @@ def test_gusts_are_each_members_own(make_recipe: Callable) -> None:
     assert float((together[0] - still).abs().max()) > 0.1
 
 
-def test_seeds_of_members_are_theirs_alone(make_recipe: Callable) -> None:
+def test_seeds_of_members_are_theirs_alone() -> None:
     crew, other = Crew(make_recipe()), Crew(make_recipe(top=""))
     seeds = [crew.seed(index) for index in range(100)]
     assert len(set(seeds)) == 100
@@ -134,7 +134,7 @@ def test_seeds_of_members_are_theirs_alone(make_recipe: Callable) -> None:
 
 
 @pytest.mark.parametrize("effect", ["porosity", "shear", "hem-mass", "wagner-lag", "finite-span-loading", "pole-wake"])
-def test_effects_are_named_by_their_registry(make_recipe: Callable, effect: str) -> None:
+def test_effects_are_named_by_their_registry(effect: str) -> None:
     parameters = "\n".join(f'{key.replace("_", "-")} = "prior"' for key in EFFECTS[effect].parameters())
     crew = Crew(make_recipe(more=f"[effects.{effect}]\n{parameters}"))
     member = crew.member(0)

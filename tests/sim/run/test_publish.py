@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,8 +12,9 @@ import pytest
 
 from flagdata.errors import UsageError
 from flagdata.lake import Lake, MeshSequence, read_meshes
-from sim.run import Crew, Recipe, load, parse, simulate
+from sim.run import Crew, load, parse, simulate
 from tests import pausing
+from tests.sim.run.conftest import make_recipe, small
 
 WORKER = Path(__file__).with_name("simulate_worker.py")
 
@@ -31,7 +31,7 @@ def objects(lake: Lake) -> dict[int, str]:
     return {row["seed"]: row["object"] for row in rows}
 
 
-def test_members_are_published_with_what_they_were_made_of(lake: Lake, make_recipe: Callable[..., Recipe]) -> None:
+def test_members_are_published_with_what_they_were_made_of(lake: Lake) -> None:
     recipe = make_recipe()
     report = simulate(lake, recipe)
     assert (len(report.added), report.existing, report.failed) == (6, (), ())
@@ -54,7 +54,7 @@ def test_members_are_published_with_what_they_were_made_of(lake: Lake, make_reci
         assert sequence.attributes["parameters"] == parameters
 
 
-def test_running_again_makes_nothing_and_more_members_only_the_new_ones(lake: Lake, make_recipe: Callable) -> None:
+def test_running_again_makes_nothing_and_more_members_only_the_new_ones(lake: Lake) -> None:
     recipe = make_recipe()
     first = simulate(lake, replace(recipe, count=3))
     again = simulate(lake, replace(recipe, count=3, batch=2, name="other", title="other"))
@@ -64,7 +64,7 @@ def test_running_again_makes_nothing_and_more_members_only_the_new_ones(lake: La
     assert set(more.existing) == set(first.added)
 
 
-def test_members_of_several_materials_are_all_there(lake: Lake, small: Callable[..., str]) -> None:
+def test_members_of_several_materials_are_all_there(lake: Lake) -> None:
     text = small().replace('name = "camel-ponte-roma"', 'names = ["camel-ponte-roma", "gray-interlock", "paper"]')
     recipe = replace(parse(text, name="mixed", folder=Path(), where="r"), count=9)
     report = simulate(lake, recipe, workers=2)
@@ -79,7 +79,7 @@ def test_members_of_several_materials_are_all_there(lake: Lake, small: Callable[
         assert json.loads(row["report"])["step"] == report.steps[name]
 
 
-def test_a_member_is_the_same_in_any_company(tmp_path: Path, make_recipe: Callable) -> None:
+def test_a_member_is_the_same_in_any_company(tmp_path: Path) -> None:
     recipe = make_recipe()
     whole, parts = Lake.create(tmp_path / "whole"), Lake.create(tmp_path / "parts")
     simulate(whole, recipe)
@@ -89,7 +89,7 @@ def test_a_member_is_the_same_in_any_company(tmp_path: Path, make_recipe: Callab
 
 
 @pytest.mark.parametrize("more", ["", '[integrator]\nname = "implicit"', "[effects.hysteresis]\ncouple = 1e-3"])
-def test_workers_side_by_side_make_the_same_members(tmp_path: Path, make_recipe: Callable, more: str) -> None:
+def test_workers_side_by_side_make_the_same_members(tmp_path: Path, more: str) -> None:
     recipe = replace(make_recipe(more=more), count=8, batch=2)
     one, four = Lake.create(tmp_path / "one"), Lake.create(tmp_path / "four")
     simulate(one, recipe)
@@ -101,7 +101,7 @@ def test_workers_side_by_side_make_the_same_members(tmp_path: Path, make_recipe:
         simulate(one, recipe, workers=0)
 
 
-def test_an_interrupted_run_keeps_what_was_committed(lake: Lake, make_recipe: Callable) -> None:
+def test_an_interrupted_run_keeps_what_was_committed(lake: Lake) -> None:
     recipe = replace(make_recipe(), count=12, batch=2)
 
     def interrupt(count: int) -> None:
@@ -117,7 +117,7 @@ def test_an_interrupted_run_keeps_what_was_committed(lake: Lake, make_recipe: Ca
     assert len(objects(lake)) == 12
 
 
-def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, small: Callable[..., str]) -> None:
+def test_a_killed_run_goes_on_where_it_was(tmp_path: Path) -> None:
     recipe = tmp_path / "small.toml"
     recipe.write_text(small().replace("count = 6", "count = 8").replace("batch = 4", "batch = 2"))
     killed = Lake.create(tmp_path / "killed")
@@ -133,7 +133,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, small: Callable[..., 
     assert len(killed.rows()) == 8
 
 
-def test_what_fails_is_reported_and_not_stored(lake: Lake, make_recipe: Callable) -> None:
+def test_what_fails_is_reported_and_not_stored(lake: Lake) -> None:
     # With a hundredth of the declared damping a sheet crumples where there is wind (`sim.run.batch.CRUMPLED`).
     recipe = make_recipe(material='damping = { low = 1e-9, high = 1e-3, scale = "log" }')
     recipe = replace(recipe, count=8, time=replace(recipe.time, settle=2.4))
@@ -146,7 +146,7 @@ def test_what_fails_is_reported_and_not_stored(lake: Lake, make_recipe: Callable
     assert not {failure["seed"] for failure in report.failed} & set(objects(lake))
 
 
-def test_another_branch_has_its_own_members(lake: Lake, make_recipe: Callable) -> None:
+def test_another_branch_has_its_own_members(lake: Lake) -> None:
     recipe = replace(make_recipe(), count=1)
     simulate(lake, recipe)
     lake.branch("trial")
@@ -156,12 +156,12 @@ def test_another_branch_has_its_own_members(lake: Lake, make_recipe: Callable) -
     assert len(lake.rows()) == 1
 
 
-def test_a_device_that_is_not_there_is_refused(lake: Lake, make_recipe: Callable) -> None:
+def test_a_device_that_is_not_there_is_refused(lake: Lake) -> None:
     with pytest.raises(UsageError, match="device 'cuda:97' is not there"):
         simulate(lake, make_recipe(), device="cuda:97")
 
 
-def test_progress_counts_members_those_that_are_there_too(lake: Lake, make_recipe: Callable) -> None:
+def test_progress_counts_members_those_that_are_there_too(lake: Lake) -> None:
     simulate(lake, replace(make_recipe(), count=2))
     seen: list[int] = []
     simulate(lake, make_recipe(), progress=seen.append)

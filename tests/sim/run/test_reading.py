@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from sim.limits import StrainLimits
 from sim.run import Crew, Shape, load, parse
 from sim.run.reading import SCENES
 from tests.refusals import unrefused
+from tests.sim.run.conftest import make_recipe
 
 MINIMAL = '[material]\nname = "camel-ponte-roma"\n[wind]\nspeed = 4.0\n'
 
@@ -159,7 +159,7 @@ def test_materials_of_a_users_own_files_are_read(tmp_path: Path) -> None:
         read('[material]\nfile = "yours.toml"\n[wind]\nspeed = 1\n', tmp_path)
 
 
-def test_an_effects_prior_may_be_asked_for_by_name(make_recipe: Callable) -> None:
+def test_an_effects_prior_may_be_asked_for_by_name() -> None:
     effect = make_recipe(more='[effects.gusts]\nintensity = "prior"\nlength = 40.0').effects["gusts"]
     low, high = EFFECTS["gusts"].parameters()["intensity"].prior
     assert effect.parameters["intensity"] == Range(low=low, high=high)

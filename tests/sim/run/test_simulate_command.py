@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +12,17 @@ import pytest
 from flagdata.ingest import read_folder
 from flagdata.lake import Lake, MeshSequence, read_meshes
 from tests.program import Run, invoke
+from tests.sim.run.conftest import small
 
 
 @pytest.fixture
-def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
+def run(tmp_path: Path) -> Run:
     Lake.create(tmp_path / "lake")
 
-    return lambda *arguments: invoke(capsys, "simulate", *arguments, "--lake", tmp_path / "lake")
+    return lambda *arguments: invoke("simulate", *arguments, "--lake", tmp_path / "lake")
 
 
-def test_artifacts_are_printed_one_a_line(run: Run, tmp_path: Path, small: Callable[..., str]) -> None:
+def test_artifacts_are_printed_one_a_line(run: Run, tmp_path: Path) -> None:
     recipe = tmp_path / "small.toml"
     recipe.write_text(small())
     code, out, err = run(recipe, "--count", "3", "--batch", "2")
@@ -35,7 +35,7 @@ def test_artifacts_are_printed_one_a_line(run: Run, tmp_path: Path, small: Calla
     assert (code, result["schema"], result["added"], len(result["existing"])) == (0, "flagdata.simulate/1", [], 3)
 
 
-def test_the_airs_inertia_acts_where_a_recipe_names_it(run: Run, tmp_path: Path, small: Callable[..., str]) -> None:
+def test_the_airs_inertia_acts_where_a_recipe_names_it(run: Run, tmp_path: Path) -> None:
     moved: list[np.ndarray] = []
     for share in ("0.0", "0.2"):
         recipe = tmp_path / f"share-{share}.toml"
@@ -53,7 +53,7 @@ def test_the_airs_inertia_acts_where_a_recipe_names_it(run: Run, tmp_path: Path,
     assert np.abs(moved[1]).max() < 0.95 * np.abs(moved[0]).max()
 
 
-def test_a_failed_member_makes_the_command_fail_and_is_named(run: Run, tmp_path: Path, small: Callable) -> None:
+def test_a_failed_member_makes_the_command_fail_and_is_named(run: Run, tmp_path: Path) -> None:
     recipe = tmp_path / "undamped.toml"
     text = small(material="damping = 0.0").replace("settle = 0.1", "settle = 2.4")
     recipe.write_text(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import xor
 from typing import Any
 
 import pytest
@@ -10,6 +12,11 @@ import pytest
 def case(name: str, **expected: Any) -> Any:
     """A row: its name, and the arguments of `check_refused` or `check_reported`."""
     return pytest.param(expected, id=name)
+
+
+def sentence(body: str) -> str:
+    """A sentence of NMEA 0183 with its checksum."""
+    return f"${body}*{reduce(xor, body.encode()):02X}"
 
 
 def csv(*rows: str, header: str = "time,wind_speed") -> bytes:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -14,35 +16,27 @@ from flagdata.errors import FlagdataError
 from flagdata.ingest import OpenFactsError, Reading, WindOptions, read_log
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor, WindLog
+from flagdata.timebase import iso
 
-Reader = Callable[..., WindLog]
-
-
-Made = Callable[..., Reading]
 SECOND = 1_000_000_000
 START = 1_777_636_800 * SECOND
 """2026-05-01T12:00:00Z."""
 
 
-@pytest.fixture
-def made() -> Made:
-    """Makes rows at so many seconds after `START`, each with the wind speed given, or one of its own."""
-
-    def rows(seconds: object, speed: object = None, *, step: float = 1e-9, **more: object) -> Reading:
-        time = START + np.round(np.asarray(seconds, dtype=np.float64) * SECOND).astype(np.int64)
-        own = {name: more.pop(name) for name in [*more] if name in CHANNELS}
-        speeds = 2 + np.modf(np.arange(len(time)) * 0.618034)[0] * 7 if speed is None else speed
-        channels = {"wind_speed": speeds, **own} if speed is not False else own
-        return Reading(
-            time=time,
-            channels={name: np.asarray(values, dtype=np.float64) for name, values in channels.items()},
-            flags=np.zeros(len(time), dtype=np.uint16),
-            line=np.arange(2, len(time) + 2),
-            step=round(step * SECOND),
-            **{"sensor": Sensor(name="test"), **more},  # type: ignore[arg-type]
-        )
-
-    return rows
+def made(seconds: object, speed: object = None, *, step: float = 1e-9, **more: object) -> Reading:
+    """Rows at so many seconds after `START`, each with the wind speed given, or one of its own."""
+    time = START + np.round(np.asarray(seconds, dtype=np.float64) * SECOND).astype(np.int64)
+    own = {name: more.pop(name) for name in [*more] if name in CHANNELS}
+    speeds = 2 + np.modf(np.arange(len(time)) * 0.618034)[0] * 7 if speed is None else speed
+    channels = {"wind_speed": speeds, **own} if speed is not False else own
+    return Reading(
+        time=time,
+        channels={name: np.asarray(values, dtype=np.float64) for name, values in channels.items()},
+        flags=np.zeros(len(time), dtype=np.uint16),
+        line=np.arange(2, len(time) + 2),
+        step=round(step * SECOND),
+        **{"sensor": Sensor(name="test"), **more},  # type: ignore[arg-type]
+    )
 
 
 @pytest.fixture
@@ -76,58 +70,72 @@ def answered(path: Path, options: WindOptions) -> WindLog:
             options = replace(options, expect=(*options.expect, *(question.example for question in error.questions)))
 
 
-@pytest.fixture
-def read(log_file: Callable[[str | bytes], Path]) -> Reader:
-    """Reads text or bytes as a log."""
-
-    def run(content: str | bytes, **options: object) -> WindLog:
-        return answered(log_file(content), WindOptions(**named(content, options)))  # type: ignore[arg-type]
-
-    return run
-
-
-@pytest.fixture
-def check_refused(log_file: Callable[[bytes], Path]) -> Callable[..., None]:
-    """Checks that a log is refused: by which error, with what in its place and in its sentence or fix."""
-
-    def check(
-        content: bytes,
-        error: type[FlagdataError],
-        where: str = "",
-        says: str = "",
-        options: Mapping[str, Any] | None = None,
-    ) -> None:
-        path = log_file(content)
-        with pytest.raises(FlagdataError) as caught:
-            answered(path, WindOptions(**named(content, options or {})))
-        assert isinstance(caught.value, error), caught.value
-        assert caught.value.fix
-        assert where in (caught.value.where or "")
-        assert says in str(caught.value)
-
-    return check
+@contextmanager
+def written(content: str | bytes) -> Iterator[Path]:
+    """A file of this text, as long as it is read."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "wind.log"
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        yield path
 
 
-@pytest.fixture
-def check_reported(log_file: Callable[[bytes], Path]) -> Callable[..., None]:
-    """Checks that a log is read with a finding of this kind, count and place, and so many samples flagged."""
+def read(content: str | bytes, **options: object) -> WindLog:
+    """A text or bytes read as a log."""
+    with written(content) as path:
+        return answered(path, WindOptions(**named(content, options)))  # type: ignore[arg-type]
 
-    def check(
-        content: bytes,
-        finding: str,
-        count: int | None = None,
-        where: str | None = None,
-        flag: SampleFlag = SampleFlag.OK,
-        flagged: int = 0,
-        samples: int | None = None,
-        options: Mapping[str, Any] | None = None,
-    ) -> None:
-        log = answered(log_file(content), WindOptions(**named(content, options or {})))
-        found = [f for f in log.findings if f.kind == finding]
-        assert found, [f.kind for f in log.findings]
-        assert count in (None, found[0].count)
-        assert where in (None, found[0].where)
-        assert samples in (None, len(log.series))
-        assert int(((log.series.flags & flag) != 0).sum()) == flagged
 
-    return check
+def shows(
+    log: WindLog,
+    name: str,
+    first: str = "",
+    *,
+    missing: Sequence[int] | None = None,
+    faults: Sequence[int] | None = None,
+    **channels: float | Sequence[float],
+) -> None:
+    """Check a log's format and first instant, the rows marked as missing or faulty, and channels: the first value by a
+    number, all values by a list."""
+    assert log.format == name
+    assert not first or iso(int(log.series.time[0])) == first
+    for flag, rows in ((SampleFlag.MISSING, missing), (SampleFlag.SENSOR_FAULT, faults)):
+        assert rows is None or np.flatnonzero(log.series.flags & flag).tolist() == rows
+    for channel, values in channels.items():
+        found = log.series.channels[channel]
+        assert (found[0] if isinstance(values, (int, float)) else found) == pytest.approx(values), channel
+
+
+def check_refused(
+    content: bytes,
+    error: type[FlagdataError],
+    where: str = "",
+    says: str = "",
+    options: Mapping[str, Any] | None = None,
+) -> None:
+    """Check that a log is refused: by which error, with what in its place and in its sentence or fix."""
+    with pytest.raises(FlagdataError) as caught:
+        read(content, **(options or {}))
+    assert isinstance(caught.value, error), caught.value
+    assert caught.value.fix
+    assert where in (caught.value.where or "")
+    assert says in str(caught.value)
+
+
+def check_reported(
+    content: bytes,
+    finding: str,
+    count: int | None = None,
+    where: str | None = None,
+    flag: SampleFlag = SampleFlag.OK,
+    flagged: int = 0,
+    samples: int | None = None,
+    options: Mapping[str, Any] | None = None,
+) -> None:
+    """Check that a log is read with a finding of this kind, count and place, and so many samples flagged."""
+    log = read(content, **(options or {}))
+    found = [f for f in log.findings if f.kind == finding]
+    assert found, [f.kind for f in log.findings]
+    assert count in (None, found[0].count)
+    assert where in (None, found[0].where)
+    assert samples in (None, len(log.series))
+    assert int(((log.series.flags & flag) != 0).sum()) == flagged

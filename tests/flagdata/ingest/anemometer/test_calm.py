@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flagdata.signals import WindLog
+from tests.flagdata.ingest.anemometer.conftest import read
 
-Read = Callable[..., WindLog]
 EVERY = 4
 """One row of so many is calm, the third of each."""
 
@@ -36,18 +36,18 @@ def check(log: WindLog, scale: float) -> None:
 
 @pytest.mark.parametrize("word", ["Calm", "CALM", "calm wind", "C", "Windstille", "calme", "静穏"])
 @pytest.mark.parametrize("direction", ["", "0", "Calm", "270"])
-def test_a_word_for_calm_air_in_a_speed_is_zero_without_a_direction(read: Read, word: str, direction: str) -> None:
+def test_a_word_for_calm_air_in_a_speed_is_zero_without_a_direction(word: str, direction: str) -> None:
     check(read("time,wind_speed,wind_direction\n" + rows("{:.1f}", "{}", (word, direction))), 1.0)
 
 
-def test_it_is_so_by_a_line_of_columns_and_by_a_recipe(read: Read) -> None:
+def test_it_is_so_by_a_line_of_columns_and_by_a_recipe() -> None:
     text = rows("{:.1f}", "{}", ("Calm", ""))
     check(read("a,b,c\n" + text, columns="time,wind_speed[kn],wind_direction[deg]"), 1852 / 3600)
     log = read("time,wind_speed,wind_direction\n" + text, recipe="generic-csv")
     assert np.flatnonzero(log.series.channels["wind_speed"] == 0).tolist() == [2, 6, 10, 14, 18]
 
 
-def test_it_is_so_beyond_the_first_rows(read: Read) -> None:
+def test_it_is_so_beyond_the_first_rows() -> None:
     stamps = [f"2026-05-01T{at // 3600:02d}:{at // 60 % 60:02d}:{at % 60:02d}Z" for at in range(2000)]
     cells = ["Calm" if at == 1990 else f"{3 + at % 7 / 10:.1f}" for at in range(2000)]
     body = "".join(f"{stamp},{cell}\n" for stamp, cell in zip(stamps, cells, strict=True))
@@ -55,7 +55,7 @@ def test_it_is_so_beyond_the_first_rows(read: Read) -> None:
     assert np.flatnonzero(log.series.channels["wind_speed"] == 0).tolist() == [1990]
 
 
-def test_a_word_that_a_recipe_calls_missing_is_missing(read: Read, log_file: Callable[..., object]) -> None:
+def test_a_word_that_a_recipe_calls_missing_is_missing(log_file: Callable[..., object]) -> None:
     recipe = log_file(
         'name = "own"\nabout = "made"\nsource = "made"\n[file]\nmissing = ["calm"]\n'
         '[time]\ncolumns = ["time"]\nformat = "iso"\n'
@@ -68,7 +68,7 @@ def test_a_word_that_a_recipe_calls_missing_is_missing(read: Read, log_file: Cal
     assert np.flatnonzero(np.isnan(log.series.channels["wind_speed"])).tolist() == [3]
 
 
-def test_other_words_in_a_speed_are_still_missing_values(read: Read) -> None:
+def test_other_words_in_a_speed_are_still_missing_values() -> None:
     cells = ["VRB" if at % EVERY == 2 else f"{3 + at / 10:.1f}" for at in range(20)]
     body = "".join(f"2026-05-01T12:{at:02d}:00Z,{cell}\n" for at, cell in enumerate(cells))
     log = read("time,wind_speed\n" + body)

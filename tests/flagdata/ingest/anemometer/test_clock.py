@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +14,11 @@ from flagdata.ingest.anemometer.samples.order import in_order
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
+from tests.flagdata.ingest.anemometer.cases import sentence
+from tests.flagdata.ingest.anemometer.conftest import made, read
 
 S = 1_000_000_000
 NOON = 1_777_636_800 * S
-Read = Callable[..., WindLog]
-Made = Callable[..., Reading]
 CHOICES: tuple[tuple[ClockChoice, int], ...] = (("first", 0), ("last", 1))
 """Whose stamps are right → how many times the jump all rows are shifted by."""
 
@@ -49,7 +48,7 @@ BACK = [
 
 @pytest.mark.parametrize(("n", "row", "size", "period", "words"), BACK)
 def test_a_clock_set_back_loses_no_row_and_is_named_with_its_line(
-    n: int, row: int, size: float, period: float, words: str, made: Made
+    n: int, row: int, size: float, period: float, words: str
 ) -> None:
     log, plain = made(jumped(n, row, size, period)), (period * np.arange(n))
     found = in_order(log, where="x")
@@ -67,7 +66,7 @@ def test_a_clock_set_back_loses_no_row_and_is_named_with_its_line(
         assert (said(given, "clock-set-back").severity, said(given, "clock-set-back").fix) == (Severity.NOTE, None)
 
 
-def test_a_clock_set_back_by_a_second_shows_through_unsteady_stamps(made: Made) -> None:
+def test_a_clock_set_back_by_a_second_shows_through_unsteady_stamps() -> None:
     # the time of each row is off by up to a fifth of the step, so the rows show the size of the jump together
     noise = stream(7, "clock").uniform(-0.1, 0.1, 400)
     found = in_order(made(jumped(400, 200, -1, 0.5) + noise), where="x")
@@ -78,7 +77,7 @@ def test_a_clock_set_back_by_a_second_shows_through_unsteady_stamps(made: Made) 
 
 @pytest.mark.parametrize(("choice", "shift"), CHOICES)
 def test_an_interval_of_whole_hours_is_reported_and_changes_nothing_unless_the_user_says_so(
-    choice: ClockChoice, shift: int, made: Made
+    choice: ClockChoice, shift: int
 ) -> None:
     log = made(jumped(9000, 4000, 3600))
     found = in_order(log, where="x")
@@ -93,7 +92,7 @@ def test_an_interval_of_whole_hours_is_reported_and_changes_nothing_unless_the_u
 @pytest.mark.parametrize(("choice", "shift"), CHOICES)
 @pytest.mark.parametrize("period", [1, 60])
 def test_one_stamp_twice_in_a_steady_log_is_a_clock_set_back_by_one_step_where_the_user_says_that_it_was_set(
-    period: int, choice: ClockChoice, shift: int, made: Made
+    period: int, choice: ClockChoice, shift: int
 ) -> None:
     log = made(jumped(200, 80, -period, period))
     found = in_order(log, where="x")
@@ -111,26 +110,26 @@ QUIET = {
 
 
 @pytest.mark.parametrize("name", QUIET)
-def test_what_buffers_and_outages_leave_is_no_clock(name: str, made: Made) -> None:
+def test_what_buffers_and_outages_leave_is_no_clock(name: str) -> None:
     found = in_order(made(QUIET[name]), where="x")
     assert {"clock-set-back", "clock-set-on"}.isdisjoint(one.kind for one in found.findings)
     assert len(found.time) == len(QUIET[name])
 
 
-def test_a_clock_set_back_and_on_again_is_continued_through_both(made: Made) -> None:
+def test_a_clock_set_back_and_on_again_is_continued_through_both() -> None:
     at = np.arange(12_000.0)
     at[4000:9000] -= 3600
     assert after(in_order(made(at), where="x")) == list(range(12_000))
 
 
-def test_a_clock_that_was_set_only_after_the_first_rows_is_named(made: Made) -> None:
+def test_a_clock_that_was_set_only_after_the_first_rows_is_named() -> None:
     at = np.arange(2000.0)
     at[:50] -= 9000 * 86_400
     assert "was not set yet" in said(in_order(made(at), where="x"), "clock-set-on").what
     assert after(in_order(made(at), where="x", choice="last")) == list(range(2000))
 
 
-def test_a_clock_that_starts_anew_years_back_is_refused_with_all_ways_out(made: Made) -> None:
+def test_a_clock_that_starts_anew_years_back_is_refused_with_all_ways_out() -> None:
     at = np.arange(9000.0)
     at[5000:] -= 9000 * 86_400
     with pytest.raises(TimeError) as caught:
@@ -144,14 +143,7 @@ def test_a_clock_that_starts_anew_years_back_is_refused_with_all_ways_out(made: 
         WindOptions(clock="both")  # type: ignore[arg-type]
 
 
-def sentence(body: str) -> str:
-    code = 0
-    for letter in body.encode():
-        code ^= letter
-    return f"${body}*{code:02X}"
-
-
-def test_a_streams_clock_set_back_for_good_leaves_its_rate(read: Read) -> None:
+def test_a_streams_clock_set_back_for_good_leaves_its_rate() -> None:
     lines = []
     for second in range(300):
         clock = 43_200 + second - (3600 if second >= 100 else 0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from pathlib import Path
 
 import numpy as np
@@ -187,6 +186,3 @@ def test_stamps_by_arrow_are_those_of_the_pattern(monkeypatch: pytest.MonkeyPatc
     for name in ("ns", "utc", "valid", "distant"):
         np.testing.assert_array_equal(getattr(quick, name), getattr(slow, name), err_msg=name)
     assert quick.step == slow.step
-
-
-EVENING = dt.datetime(2026, 5, 1, 23)  # noqa: DTZ001  a logger that writes no zone

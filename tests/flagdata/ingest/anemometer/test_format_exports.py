@@ -12,19 +12,13 @@ import pytest
 from flagdata.errors import InputError, TimeError
 from flagdata.ingest import WindOptions, anemometers
 from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
-
-Read = Callable[..., WindLog]
+from tests.flagdata.ingest.anemometer.conftest import read, shows
 
 
 def kinds(log: WindLog) -> dict[str, int]:
     return {finding.kind: finding.count for finding in log.findings}
-
-
-def first(log: WindLog) -> str:
-    return iso(int(log.series.time[0]))
 
 
 def nrg(*, zone: str = "UTC-5:00", unit: str = "m/s") -> str:
@@ -58,12 +52,12 @@ def nrg(*, zone: str = "UTC-5:00", unit: str = "m/s") -> str:
     return "\n".join([*head, "Data", "\t".join(columns), *rows])
 
 
-def test_nrg_channels_are_identified_by_their_history(read: Read) -> None:
+def test_nrg_channels_are_identified_by_their_history() -> None:
     log = read(nrg())
-    assert (log.format, first(log)) == ("nrg", "2026-05-01T17:00:00Z")
-    assert log.series.channels["wind_speed"].tolist() == [5, 6, 7, 8, 9]
-    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(200))
-    assert log.series.channels["air_temperature"][0] == pytest.approx(288.15)
+    direction = np.radians(200)
+    shows(
+        log, "nrg", "2026-05-01T17:00:00Z", wind_speed=[5, 6, 7, 8, 9], wind_direction=direction, air_temperature=288.15
+    )
     assert (log.series.sensor.name, log.series.sensor.height, log.series.sensor.averaging) == ("NRG S1", 40.0, 600.0)
     several = next(finding for finding in log.findings if finding.kind == "several-anemometers")
     assert "Ch2" in several.what
@@ -72,15 +66,15 @@ def test_nrg_channels_are_identified_by_their_history(read: Read) -> None:
     assert "--sniff" not in several.fix
 
 
-def test_an_nrg_zone_that_the_user_contradicts_is_reported(read: Read) -> None:
+def test_an_nrg_zone_that_the_user_contradicts_is_reported() -> None:
     log = read(nrg(), zone="-04:00")
-    assert first(log) == "2026-05-01T16:00:00Z"
+    shows(log, "nrg", "2026-05-01T16:00:00Z")
     assert kinds(log)["zone-contradicts"] == 1
 
 
-def test_nrg_speeds_are_in_the_unit_of_their_column_and_a_cut_row_is_left_out(read: Read) -> None:
+def test_nrg_speeds_are_in_the_unit_of_their_column_and_a_cut_row_is_left_out() -> None:
     log = read(nrg(unit="mph") + "\n2026-05-01 12:50:00\t5.0")
-    assert log.series.channels["wind_speed"][0] == pytest.approx(5 * 0.44704)
+    shows(log, "nrg", wind_speed=5 * 0.44704)
     assert kinds(log)["cut-off"] == 1
 
 
@@ -98,16 +92,15 @@ def windographer(*, unit: str = "", calm: str = "Calm threshold = 0 m/s") -> str
     return "\n".join([*head, "\t".join(names), *rows])
 
 
-def test_windographer_speeds_without_a_unit_are_in_that_of_the_calm_threshold(read: Read) -> None:
+def test_windographer_speeds_without_a_unit_are_in_that_of_the_calm_threshold() -> None:
     log = read(windographer(calm="Calm threshold = 0 mph"), zone="UTC")
-    assert log.format == "windographer"
-    assert log.series.channels["wind_speed"][0] == pytest.approx(9.5 * 0.44704)
+    shows(log, "windographer", wind_speed=9.5 * 0.44704)
     assert {"unit-from-preamble", "several-anemometers", "stamps-at-start"} <= set(kinds(log))
 
 
-def test_windographer_units_of_columns_go_before_and_without_any_nothing_is_read(read: Read) -> None:
+def test_windographer_units_of_columns_go_before_and_without_any_nothing_is_read() -> None:
     log = read(windographer(unit=" [km/h]"), zone="UTC")
-    assert log.series.channels["wind_speed"][0] == pytest.approx(9.5 / 3.6)
+    shows(log, "windographer", wind_speed=9.5 / 3.6)
     assert "unit-from-preamble" not in kinds(log)
     with pytest.raises(InputError, match="its unit is ''"):
         read(windographer(calm=""), zone="UTC")
@@ -123,21 +116,18 @@ def zentra(rows: list[str], *, padded: bool = True) -> str:
 
 
 @pytest.mark.parametrize("padded", [True, False])
-def test_zentra_columns_are_unit_and_name_and_its_time_is_local(read: Read, padded: bool) -> None:
+def test_zentra_columns_are_unit_and_name_and_its_time_is_local(padded: bool) -> None:
     rows = [f"9/30/2026 19:{5 * i:02d},307,1.1{i},1.7{i},97.78,25" for i in range(6)]
     log = read(zentra(rows, padded=padded), zone="+03:00")
-    assert (log.format, first(log), len(log.series)) == ("zentra", "2026-09-30T16:00:00Z", 6)
-    assert log.series.channels["wind_speed"][0] == pytest.approx(1.10)
-    assert log.series.channels["air_pressure"][0] == pytest.approx(97_780)
+    shows(log, "zentra", "2026-09-30T16:00:00Z", wind_speed=1.10, air_pressure=[97_780] * 6)
     assert "air_temperature" not in log.series.channels
     assert log.series.sensor.name == "ATMOS 22 Ultrasonic Anemometer on z6-01234"
 
 
-def test_error_codes_of_zentra_are_missing_and_no_zone_is_refused(read: Read) -> None:
+def test_error_codes_of_zentra_are_missing_and_no_zone_is_refused() -> None:
     rows = [f"9/30/2026 19:{5 * i:02d},307,1.1{i},1.7{i},97.78,25" for i in range(6)]
     rows[2:4] = ["9/30/2026 19:10,#N/A,-9999,#N/A,97.78,25", "9/30/2026 19:15,307,-9992,1.7,97.78,25"]
-    log = read(zentra(rows), zone="UTC")
-    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [2, 3]
+    shows(read(zentra(rows), zone="UTC"), "zentra", missing=[2, 3])
     with pytest.raises(TimeError, match="no time zone"):
         read(zentra(rows))
 
@@ -153,21 +143,18 @@ def resaved(stamps: list[str]) -> str:
     return "\n".join([*head, *rows, ""])
 
 
-def test_a_toa5_table_saved_by_a_spreadsheet_is_read_with_its_own_order_of_dates(read: Read) -> None:
+def test_a_toa5_table_saved_by_a_spreadsheet_is_read_with_its_own_order_of_dates() -> None:
     log = read(resaved([f"{day}/01/2026 12:00:00+01:00" for day in range(9, 16)]))
-    assert (log.format, first(log)) == ("toa5", "2026-01-09T11:00:00Z")
-    assert log.series.channels["wind_speed"][0] == pytest.approx(8.37)
-    assert log.series.channels["air_temperature"][0] == pytest.approx(273.65)
-    assert log.series.channels["air_pressure"][0] == pytest.approx(93_500)
+    shows(log, "toa5", "2026-01-09T11:00:00Z", wind_speed=8.37, air_temperature=273.65, air_pressure=93_500)
     assert kinds(log)["several-anemometers"] == 1
 
 
-def test_a_toa5_table_with_ambiguous_dates_is_refused_unless_the_order_is_given(read: Read) -> None:
+def test_a_toa5_table_with_ambiguous_dates_is_refused_unless_the_order_is_given() -> None:
     text = resaved([f"09/01/2026 12:0{i}:00" for i in range(4)])
     with pytest.raises(TimeError, match="day/month or month/day") as caught:
         read(text, zone="UTC")
     assert "--date-order" in (caught.value.fix or "")
-    assert first(read(text, zone="UTC", date_order="mdy")) == "2026-09-01T12:00:00Z"
+    shows(read(text, zone="UTC", date_order="mdy"), "toa5", "2026-09-01T12:00:00Z")
 
 
 def weatherlink(speeds: Sequence[float], *, blanks: bool = False, wind_above_dir: bool = True) -> str:
@@ -190,32 +177,28 @@ MILES = (1, 2, 3, 5, 8, 9)
 @pytest.mark.parametrize("layout", [{}, {"blanks": True}, {"blanks": True, "wind_above_dir": False}])
 @pytest.mark.parametrize(("unit", "scale"), [("mph", 1.0), ("km/h", 1.609344), ("m/s", 0.44704)])
 def test_the_unit_of_weatherlinks_print_shows_in_whole_miles_and_is_to_be_confirmed(
-    read: Read, unit: str, scale: float, layout: dict[str, bool]
+    unit: str, scale: float, layout: dict[str, bool]
 ) -> None:
     log = read(weatherlink([round(speed * scale, 1) for speed in MILES], **layout), zone="UTC")
-    assert (log.format, first(log), iso(int(log.series.time[2]))) == (
-        "weatherlink",
-        "2026-05-25T10:30:00Z",
-        "2026-05-25T12:30:00Z",
-    )
+    shows(log, "weatherlink", "2026-05-25T10:30:00Z", wind_direction=[np.radians(22.5)] * 6)
+    assert iso(int(log.series.time[2])) == "2026-05-25T12:30:00Z"
     assert log.series.channels["wind_speed"] == pytest.approx(np.array(MILES) * 0.44704, abs=0.05)
-    assert log.series.channels["wind_direction"] == pytest.approx([np.radians(22.5)] * 6)
     assert log.drafted
     assert not log.stated
     assert f"in {unit}" in log.reasons[1]
     assert recipes.parse(log.drafted, where="the draft").channels["wind_speed"].unit == unit
 
 
-def test_a_unit_that_the_user_gives_of_weatherlinks_print_needs_no_confirmation(read: Read) -> None:
+def test_a_unit_that_the_user_gives_of_weatherlinks_print_needs_no_confirmation() -> None:
     given = read(weatherlink((1.6, 3.2, 4.8)), zone="UTC", unit="km/h")
-    assert given.series.channels["wind_speed"] == pytest.approx(np.array([1.6, 3.2, 4.8]) / 3.6)
+    shows(given, "weatherlink", wind_speed=[1.6 / 3.6, 3.2 / 3.6, 4.8 / 3.6])
     assert not given.drafted
     with pytest.raises(InputError, match="states no unit of 'Wind Speed'") as caught:
         read(weatherlink((1.6, 3.2, 4.8)), zone="UTC")
     assert "--unit" in (caught.value.fix or "")
 
 
-def test_weatherlink_com_names_its_units(read: Read) -> None:
+def test_weatherlink_com_names_its_units() -> None:
     head = (
         '"Date & Time","Temp - °C","Hum - %","Barometer - mb","Avg Wind Speed - km/h","Prevailing Wind Direction",'
         '"High Wind Speed - km/h"'
@@ -223,11 +206,8 @@ def test_weatherlink_com_names_its_units(read: Read) -> None:
     rows = [f'"5/{13 + i}/26 12:05 AM","20.1","55","1013","{18 + i}.0","SW","30"' for i in range(4)]
     rows.append('"5/17/26 12:05 AM","--","--","--","--","--","--"')
     log = read("\n".join(["Station,Somewhere", *[head], *rows, ""]), zone="UTC")
-    assert (log.format, first(log)) == ("davis", "2026-05-13T00:05:00Z")
-    assert log.series.channels["wind_speed"][0] == pytest.approx(5.0)
-    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(225))
+    shows(log, "davis", "2026-05-13T00:05:00Z", missing=[4], wind_speed=5.0, wind_direction=np.radians(225))
     assert "air_pressure" not in log.series.channels
-    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4]
 
 
 ECOWITT = (
@@ -237,40 +217,33 @@ ECOWITT = (
 
 
 @pytest.mark.parametrize(("unit", "scale"), [("m/s", 1.0), ("km/h", 1 / 3.6), ("mph", 0.44704), ("knots", 1852 / 3600)])
-def test_ecowitt_names_its_units_in_brackets(read: Read, unit: str, scale: float) -> None:
+def test_ecowitt_names_its_units_in_brackets(unit: str, scale: float) -> None:
     rows = [f"2026-09-18 14:{25 + i},21.0,15.0,80,{3 + i}.5,6.0,{180 + i},1000.1,1013.0" for i in range(4)]
     text = "\n".join(
         [ECOWITT.replace("m/s", unit), *rows, "2026-09-18 14:29,21.0,--.-,--,--.-,--.-,---,1000.0,1013.0", "2026-09"]
     )
     log = read(text, zone="UTC")
-    assert log.format == "ecowitt"
-    assert log.series.channels["wind_speed"][0] == pytest.approx(3.5 * scale)
-    assert log.series.channels["air_temperature"][0] == pytest.approx(288.15)
-    assert log.series.channels["air_pressure"][0] == pytest.approx(100_010)
-    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4]
+    shows(log, "ecowitt", missing=[4], wind_speed=3.5 * scale, air_temperature=288.15, air_pressure=100_010)
     assert kinds(log)["cut-off"] == 1
 
 
-def test_ecowitt_groups_in_a_line_above_belong_to_the_names(read: Read) -> None:
+def test_ecowitt_groups_in_a_line_above_belong_to_the_names() -> None:
     groups = ["Time", "Outdoor", "", "Indoor", "", "Wind", "", "", "Pressure", ""]
     names = ["", "Temperature(℃)", "Humidity(%)", "Temperature(℃)", "Humidity(%)", "Wind Speed(m/s)", "Wind Gust(m/s)"]
     names += ["Wind Direction(º)", "Relative(hPa)", "Absolute(hPa)"]
     head = [",".join(f'"{cell}"' for cell in cells) for cells in (groups, names)]
     rows = [f'"2026/9/18 9:{15 + i}","15.0","80","21.0","50","3.{i}","6.0","180","1013.0","1000.0"' for i in range(4)]
     log = read("\n".join([*head, *rows, ""]), zone="UTC")
-    assert (log.format, first(log)) == ("ecowitt", "2026-09-18T09:15:00Z")
-    assert log.series.channels["wind_speed"].tolist() == [3.0, 3.1, 3.2, 3.3]
-    assert log.series.channels["air_temperature"][0] == pytest.approx(288.15)
-    assert log.series.channels["air_pressure"][0] == pytest.approx(100_000)
+    air = {"air_temperature": 288.15, "air_pressure": 100_000}
+    shows(log, "ecowitt", "2026-09-18T09:15:00Z", wind_speed=[3.0, 3.1, 3.2, 3.3], **air)
 
 
-def test_easyweather_directions_are_points_of_the_compass(read: Read) -> None:
+def test_easyweather_directions_are_points_of_the_compass() -> None:
     names = ["No", "Time", "Indoor Temperature(°C)", "Outdoor Temperature(°C)", "Absolute Pressure(hpa)", "Wind(km/h)"]
     head = "\t".join([*names, "Gust(km/h)", "Direction"])
     rows = [f"{i}\t2026-09-18 14:{25 + i}\t21,0\t15,0\t1000,0\t{3 + i},6\t7,2\tWSW" for i in range(4)]
     log = read("\n".join([head, *rows, ""]), zone="UTC")
-    assert log.series.channels["wind_speed"][0] == pytest.approx(1.0)
-    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(247.5))
+    shows(log, "ecowitt", wind_speed=1.0, wind_direction=np.radians(247.5))
 
 
 def hobo(unit: str = "m/s") -> str:
@@ -285,30 +258,25 @@ def hobo(unit: str = "m/s") -> str:
     return "\n".join(['"Plot Title: Roof"', head, *rows, ""])
 
 
-def test_hobo_states_zone_and_units_in_its_heading(read: Read) -> None:
+def test_hobo_states_zone_and_units_in_its_heading() -> None:
     log = read(hobo())
-    assert (log.format, first(log)) == ("hobo", "2026-07-15T17:05:00Z")
-    assert log.series.channels["wind_speed"][0] == pytest.approx(2.5)
-    assert log.series.channels["wind_direction"][0] == pytest.approx(np.pi / 2)
-    assert log.series.channels["relative_humidity"][0] == pytest.approx(0.55)
-    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4, 5]
-    assert read(hobo("mph")).series.channels["wind_speed"][0] == pytest.approx(2.5 * 0.44704)
+    shows(log, "hobo", "2026-07-15T17:05:00Z", missing=[4, 5], wind_speed=2.5, wind_direction=np.pi / 2)
+    shows(log, "hobo", relative_humidity=0.55)
+    shows(read(hobo("mph")), "hobo", wind_speed=2.5 * 0.44704)
 
 
-def test_hobo_in_an_unknown_unit_is_refused(read: Read) -> None:
+def test_hobo_in_an_unknown_unit_is_refused() -> None:
     with pytest.raises(InputError, match="its unit is 'Bft'"):
         read(hobo("Bft"))
 
 
-def test_hobolink_writes_the_sensor_before_the_unit(read: Read) -> None:
+def test_hobolink_writes_the_sensor_before_the_unit() -> None:
     head = 'Line#,Date,"Wind Speed (S-WSB 10:11-1),m/s,Roof","Wind Direction (S-WDA 10:12-1),Deg,Roof"'
     rows = [f"{i},07/{15 + i}/26 12:05:00,{2 + i}.5,90" for i in range(4)]
-    log = read("\n".join([head, *rows, ""]), zone="UTC")
-    assert log.format == "hobo"
-    assert log.series.channels["wind_speed"].tolist() == [2.5, 3.5, 4.5, 5.5]
+    shows(read("\n".join([head, *rows, ""]), zone="UTC"), "hobo", wind_speed=[2.5, 3.5, 4.5, 5.5])
 
 
-def test_eddypro_units_are_those_of_its_third_line(read: Read) -> None:
+def test_eddypro_units_are_those_of_its_third_line() -> None:
     head = [
         "file_info,,,,air_properties,,,rotated_wind,,",
         "filename,date,time,DOY,sonic_temperature,air_temperature,air_pressure,u_rot,wind_speed,wind_dir",
@@ -317,10 +285,8 @@ def test_eddypro_units_are_those_of_its_third_line(read: Read) -> None:
     rows = [f"f{i}.raw,2026-05-01,{12 + i}:30,121.5,290.1,289.5,101325,2.5,2.{5 + i},200" for i in range(4)]
     rows.append("not_enough_data,2026-05-01,16:30,121.7,-9999.0,-9999.0,-9999.0,-9999.0,-9999.0,-9999.0")
     log = read("\n".join([*head, *rows, ""]), zone="UTC")
-    assert (log.format, first(log), log.series.sensor.averaging) == ("eddypro", "2026-05-01T12:30:00Z", 3600.0)
-    assert log.series.channels["wind_speed"][0] == pytest.approx(2.5)
-    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(200))
-    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4]
+    shows(log, "eddypro", "2026-05-01T12:30:00Z", missing=[4], wind_speed=2.5, wind_direction=np.radians(200))
+    assert log.series.sensor.averaging == 3600.0
 
 
 EDDYPRO = {
@@ -358,24 +324,22 @@ def eddypro(units: Sequence[str]) -> str:
 
 
 @pytest.mark.parametrize("lost", ["filename", "date", "DOY", "H_strg", "air_temperature"])
-def test_eddypro_units_that_lack_a_cell_are_refused_with_the_line_that_reads_them(read: Read, lost: str) -> None:
+def test_eddypro_units_that_lack_a_cell_are_refused_with_the_line_that_reads_them(lost: str) -> None:
     text = eddypro([unit for name, unit in EDDYPRO.items() if name != lost])
     with pytest.raises(InputError, match="1 fewer of them, do not stand below their names") as caught:
         read(text, zone="UTC")
     (line,) = re.findall(r'--columns "([^"]*)"', caught.value.fix or "")
     found = read(text, zone="UTC", columns=line)
-    assert first(found) == "2026-05-01T12:00:00Z"
-    assert found.series.channels["wind_speed"] == pytest.approx([2 + at / 10 for at in range(10)])
-    assert np.degrees(found.series.channels["wind_direction"]) == pytest.approx(np.arange(200, 210))
-    assert found.series.channels["air_temperature"] == pytest.approx(289.5)
+    winds = {"wind_speed": [2 + at / 10 for at in range(10)], "wind_direction": np.radians(range(200, 210)).tolist()}
+    shows(found, "delimited", "2026-05-01T12:00:00Z", air_temperature=[289.5] * 10, **winds)
 
 
-def test_eddypro_units_that_end_early_but_stand_below_their_names_are_taken(read: Read) -> None:
+def test_eddypro_units_that_end_early_but_stand_below_their_names_are_taken() -> None:
     found = read(eddypro(list(EDDYPRO.values())[:-2]), zone="UTC")
     assert (found.format, len(found.series)) == ("eddypro", 10)
 
 
-def test_eddypro_directions_in_the_unit_of_another_column_are_refused_with_a_step(read: Read) -> None:
+def test_eddypro_directions_in_the_unit_of_another_column_are_refused_with_a_step() -> None:
     with pytest.raises(InputError, match=r"wind_dir in \[K\+1\]") as caught:
         read(eddypro([unit if name != "wind_dir" else "[K+1]" for name, unit in EDDYPRO.items()]), zone="UTC")
     assert "--columns" in (caught.value.fix or "")
@@ -389,15 +353,12 @@ def test_statistics_of_components_are_no_wind_of_a_table_read_without_its_format
     assert labels == ()  # one: components that were turned into the mean wind are none of their own
 
 
-def test_flux_networks_have_fixed_units_and_stamp_the_end(read: Read) -> None:
+def test_flux_networks_have_fixed_units_and_stamp_the_end() -> None:
     head = "TIMESTAMP_START,TIMESTAMP_END,WS_F,WS_1_1_1,WD_1_1_1,TA_1_1_1,PA_1_1_1,RH_1_1_1"
     rows = [f"2026050112{30 * (i % 2):02d},2026050112{30 + i},9.9,2.{5 + i},200,15.0,101.3,60" for i in range(4)]
     rows.append("202605011300,202605011330,9.9,-9999,-9999,-9999,-9999,-9999")
     log = read("\n".join([head, *rows, ""]), zone="-05:00")
-    assert (log.format, first(log)) == ("fluxnet", "2026-05-01T17:30:00Z")
-    assert log.series.channels["wind_speed"][0] == pytest.approx(2.5)
-    assert log.series.channels["air_pressure"][0] == pytest.approx(101_300)
-    assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [4]
+    shows(log, "fluxnet", "2026-05-01T17:30:00Z", missing=[4], wind_speed=2.5, air_pressure=101_300)
     filled = head.replace(",WS_1_1_1", ",WS_F_QC")
     with pytest.raises(InputError, match="no column of wind speed"):
         read("\n".join([filled, *rows, ""]), zone="-05:00")
@@ -410,31 +371,27 @@ def surfrad_row(minute: int, speed: float, flag: int) -> str:
     return f" 2026 121  5  1 12 {minute:2d} 12.000  40.00 {cells}"
 
 
-def test_surfrad_is_in_utc_and_its_quality_flag_is_heeded(read: Read) -> None:
+def test_surfrad_is_in_utc_and_its_quality_flag_is_heeded() -> None:
     rows = [surfrad_row(i, 3.5 + i, 0) for i in range(4)] + [surfrad_row(4, -9999.9, 1), surfrad_row(5, 4.0, 2)]
     log = read("\n".join([" Somewhere", "   40.05  -88.37  230 m version 1", *rows, rows[0][:60]]))
-    assert (log.format, first(log)) == ("surfrad", "2026-05-01T12:00:00Z")
+    shows(log, "surfrad", "2026-05-01T12:00:00Z", faults=[4, 5], air_pressure=100_000)
     assert log.series.channels["wind_speed"][:4].tolist() == [3.5, 4.5, 5.5, 6.5]
-    assert log.series.channels["air_pressure"][0] == pytest.approx(100_000)
     assert log.series.sensor.height == 10.0
-    assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [4, 5]
     assert kinds(log)["cut-off"] == 1
 
 
-def test_icos_atmosphere_is_in_utc_and_its_flag_is_heeded(read: Read) -> None:
+def test_icos_atmosphere_is_in_utc_and_its_flag_is_heeded() -> None:
     heading = "#Site;SamplingHeight;Year;Month;Day;Hour;Minute;DecimalDate;AT;WS;WS-Flag;WD"
     rows = "LIN;40.0;2026;05;01;12;00;2026.33;12.1;4.2;O;210\nLIN;40.0;2026;05;01;13;00;2026.33;12.2;9.9;K;215\n"
     log = read(f"# TITLE: meteorology\n{heading}\n{rows}")
-    assert log.format == "icos"
-    assert log.series.time[0] == 1_777_636_800_000_000_000
+    shows(log, "icos", "2026-05-01T12:00:00Z")
     assert log.series.sensor.height == 40.0
     assert kinds(log)["sensor-fault"] == 1
 
 
-def test_icos_ecosystem_raw_files_have_one_stamp_and_fixed_units(read: Read) -> None:
+def test_icos_ecosystem_raw_files_have_one_stamp_and_fixed_units() -> None:
     log = read("TIMESTAMP,TA_1_1_1,WS_1_1_1\n20260501120000,12.1,4.2\n20260501120010,12.1,4.4\n", zone="UTC")
-    assert log.format == "icos-ecosystem"
-    assert log.series.channels["wind_speed"].tolist() == [4.2, 4.4]
+    shows(log, "icos-ecosystem", wind_speed=[4.2, 4.4])
     assert log.series.sensor.averaging is None
     minutes = read("TIMESTAMP,WS_1_1_1\n" + "".join(f"2026050112{at:02d},{at}.5\n" for at in range(5)), zone="UTC")
     assert np.diff(minutes.series.time).tolist() == [60_000_000_000] * 4

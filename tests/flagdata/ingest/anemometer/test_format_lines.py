@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
-from flagdata.ingest import checksum
 from flagdata.ingest.anemometer.formats import canboat
 from flagdata.ingest.anemometer.formats.makers import SerialLines, crc16
 from flagdata.ingest.anemometer.formats.serial_lines import Defect, split_stamp
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
-
-Read = Callable[..., WindLog]
+from tests.flagdata.ingest.anemometer.cases import sentence
+from tests.flagdata.ingest.anemometer.conftest import read
 
 
 def stamped(lines: list[str], *, start: int = 0) -> str:
@@ -145,12 +142,12 @@ def test_lines_that_are_no_reading_are_divided_by_what_they_are(
 
 
 @pytest.mark.parametrize("status", ["01", "02", "04", "08", "09", "10"])
-def test_each_fault_code_of_gill_leaves_the_row_out_of_averages(read: Read, status: str) -> None:
+def test_each_fault_code_of_gill_leaves_the_row_out_of_averages(status: str) -> None:
     log = read(stamped([*POLAR, POLAR[0].replace(",00,", f",{status},")]))
     assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [6]
 
 
-def test_a_gill_log_reports_wrong_checksums_and_a_cut_last_line(read: Read) -> None:
+def test_a_gill_log_reports_wrong_checksums_and_a_cut_last_line() -> None:
     lines = [*POLAR, "\x02Q,229,002.74,M,00,\x0317", "\x02Q,229,00"]
     log = read(stamped(lines))
     assert log.format == "gill"
@@ -159,7 +156,7 @@ def test_a_gill_log_reports_wrong_checksums_and_a_cut_last_line(read: Read) -> N
     assert (found["checksum-errors"], found["cut-off"], found["read-by-description"]) == (1, 1, 1)
 
 
-def test_components_of_a_gill_blow_towards_its_north_mark(read: Read) -> None:
+def test_components_of_a_gill_blow_towards_its_north_mark() -> None:
     # manual, 9.2: U positive from the south mark, V positive from the east: 1 m/s each is wind from the south-east
     lines = [f"Q,+00{1 + i}.00,+00{1 + i}.00,M,00," for i in range(4)]
     log = read(stamped(lines), azimuth=0.0)
@@ -169,20 +166,20 @@ def test_components_of_a_gill_blow_towards_its_north_mark(read: Read) -> None:
     assert turned.series.channels["wind_direction"] == pytest.approx([np.radians(225)] * 4)
 
 
-def test_lines_without_a_stamp_are_refused_with_what_to_do(read: Read) -> None:
+def test_lines_without_a_stamp_are_refused_with_what_to_do() -> None:
     with pytest.raises(TimeError, match="carry no time") as caught:
         read("\n".join(POLAR))
     assert "stamp" in (caught.value.fix or "")
 
 
-def test_stamps_without_a_zone_need_one(read: Read) -> None:
+def test_stamps_without_a_zone_need_one() -> None:
     text = stamped(POLAR).replace("Z,", ",")
     with pytest.raises(TimeError, match="no time zone"):
         read(text)
     assert iso(int(read(text, zone="+02:00").series.time[0])) == "2026-05-01T10:00:00Z"
 
 
-def test_a_north_mark_that_points_elsewhere_turns_directions(read: Read) -> None:
+def test_a_north_mark_that_points_elsewhere_turns_directions() -> None:
     log = read(stamped(POLAR), azimuth=np.radians(180))
     assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(49))
 
@@ -204,7 +201,7 @@ def test_the_checksum_of_vaisala_is_the_manuals(message: str, crc: str) -> None:
     assert crc16(message) == crc
 
 
-def test_vaisala_messages_of_wind_and_weather_are_read_together(read: Read) -> None:
+def test_vaisala_messages_of_wind_and_weather_are_read_together() -> None:
     lines = []
     for i in range(4):
         lines += [f"0R1,Dm=2{i}0D,Sm=1.{i}M", "0R2,Ta=23.6C,Ua=14.2P,Pa=1026.6H"]
@@ -216,7 +213,7 @@ def test_vaisala_messages_of_wind_and_weather_are_read_together(read: Read) -> N
     assert log.series.channels["air_pressure"][-1] == pytest.approx(100_000)
 
 
-def test_vaisalas_mark_of_invalid_data_is_a_fault_and_a_wrong_checksum_is_left_out(read: Read) -> None:
+def test_vaisalas_mark_of_invalid_data_is_a_fault_and_a_wrong_checksum_is_left_out() -> None:
     good = "0r1,Dm=283D,Sm=1.0M"
     lines = [f"{good}{crc16(good)}"] * 3 + ["0R1,Dm=000#,Sm=0.0#", f"{good}xyz", "0R1,Dm=28"]
     log = read(stamped(lines))
@@ -229,7 +226,7 @@ TRISONICA = (
 )
 
 
-def test_trisonica_tags_give_horizontal_wind_and_weather(read: Read) -> None:
+def test_trisonica_tags_give_horizontal_wind_and_weather() -> None:
     log = read(stamped([TRISONICA, TRISONICA.replace("00.07", "01.07"), TRISONICA.replace("00.07", "02.07")]))
     first = {name: values[0] for name, values in log.series.channels.items()}
     assert log.format == "trisonica"
@@ -241,7 +238,7 @@ def test_trisonica_tags_give_horizontal_wind_and_weather(read: Read) -> None:
     assert first["air_pressure"] == pytest.approx(100_605)
 
 
-def test_a_young_log_is_read_and_its_components_have_no_azimuth(read: Read) -> None:
+def test_a_young_log_is_read_and_its_components_have_no_azimuth() -> None:
     polar = [f" {2 + i}.50 {100 + i}.0 0.0 346.70 25.14" for i in range(5)]
     log = read(stamped([*polar, " 2.50 10"]))
     assert (log.format, len(log.series), kinds(log)["cut-off"]) == ("young", 5, 1)
@@ -249,7 +246,7 @@ def test_a_young_log_is_read_and_its_components_have_no_azimuth(read: Read) -> N
         read(stamped([f" {2 + i}.50 1.00 0.10 346.70 25.14" for i in range(5)]), azimuth=0.0)
 
 
-def test_metek_lines_are_stamped_by_the_instruments_own_clock(read: Read) -> None:
+def test_metek_lines_are_stamped_by_the_instruments_own_clock() -> None:
     text = "".join(f"T:23.07.09 14:45:0{i}\nM:v=46{i} d=4 t=2186\n" for i in range(5))
     log = read(text + "M:v=4", zone="UTC")
     assert (log.format, len(log.series)) == ("metek", 5)
@@ -258,7 +255,7 @@ def test_metek_lines_are_stamped_by_the_instruments_own_clock(read: Read) -> Non
     assert kinds(log)["cut-off"] == 1
 
 
-def test_a_metek_telegram_of_another_kind_is_a_fault_and_no_value_is_missing(read: Read) -> None:
+def test_a_metek_telegram_of_another_kind_is_a_fault_and_no_value_is_missing() -> None:
     lines = [f"M:x = {300 + i} y = 0 z = 0 t = 2186" for i in range(4)]
     log = read(stamped([*lines, "E:x = 1 y = 0 z = 0 t = 2186", "M:x = -9999 y = 0 z = 0 t = 2186"]))
     assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [4]
@@ -274,7 +271,7 @@ def raw(second: int, *, speed: int = 500, angle: int = 15_708, reference: int = 
     return f"2026-05-01T12:00:{second:02d}.000Z,2,130306,{device},255,8,{wind_bytes(speed, angle, reference)}\n"
 
 
-def test_raw_nmea_2000_wind_is_hundredths_of_metres_a_second(read: Read) -> None:
+def test_raw_nmea_2000_wind_is_hundredths_of_metres_a_second() -> None:
     log = read("".join(raw(i, speed=500 + 7 * i) for i in range(6)))
     assert log.format == "canboat"
     assert log.series.channels["apparent_wind_speed"][:2] == pytest.approx([5.0, 5.07])
@@ -291,12 +288,12 @@ def test_raw_nmea_2000_wind_is_hundredths_of_metres_a_second(read: Read) -> None
         (3, "theoretical_wind_speed", "theoretical_wind_direction"),
     ],
 )
-def test_the_reference_of_nmea_2000_decides_the_channel(read: Read, reference: int, speed: str, angle: str) -> None:
+def test_the_reference_of_nmea_2000_decides_the_channel(reference: int, speed: str, angle: str) -> None:
     log = read("".join(raw(i, speed=500 + i, reference=reference) for i in range(4)))
     assert set(log.series.channels) == {speed, angle}
 
 
-def test_the_three_forms_of_canboat_give_the_same_wind(read: Read) -> None:
+def test_the_three_forms_of_canboat_give_the_same_wind() -> None:
     forms: dict[str, list[str]] = {"raw": [], "text": [], "json": []}
     for i in range(4):
         at = f"2026-05-01T12:00:0{i}.000Z"
@@ -326,14 +323,14 @@ def test_json_in_si_units_has_radians() -> None:
     assert sample[0] == pytest.approx({"apparent_wind_speed": 2.0, "apparent_wind_direction": 1.5})
 
 
-def test_no_value_on_nmea_2000_is_missing_and_a_cut_line_is_left_out(read: Read) -> None:
+def test_no_value_on_nmea_2000_is_missing_and_a_cut_line_is_left_out() -> None:
     lines = [raw(i, speed=500 + i) for i in range(5)]
     log = read("".join([*lines, raw(5, speed=0xFFFF), raw(6)[:-8]]))
     assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [5]
     assert kinds(log)["cut-off"] == 1
 
 
-def test_several_devices_on_nmea_2000_are_distinguished_by_address(read: Read) -> None:
+def test_several_devices_on_nmea_2000_are_distinguished_by_address() -> None:
     text = "".join(raw(2 * i, speed=500 + i) + raw(2 * i + 1, device=7) for i in range(4))
     with pytest.raises(InputError, match="several devices") as caught:
         read(text)
@@ -341,7 +338,7 @@ def test_several_devices_on_nmea_2000_are_distinguished_by_address(read: Read) -
     assert len(read(text, talker="36").series) == 4
 
 
-def test_a_fixed_platform_makes_apparent_wind_wind_unless_it_moves(read: Read) -> None:
+def test_a_fixed_platform_makes_apparent_wind_wind_unless_it_moves() -> None:
     text = "".join(raw(i, speed=500 + i) for i in range(5))
     log = read(text, platform="fixed", azimuth=np.radians(90))
     assert log.series.channels["wind_speed"][0] == pytest.approx(5.0)
@@ -351,12 +348,8 @@ def test_a_fixed_platform_makes_apparent_wind_wind_unless_it_moves(read: Read) -
         read(text + moving, platform="fixed")
 
 
-def nmea(body: str) -> str:
-    return f"${body}*{checksum(body):02X}"
-
-
-def test_stamped_sentences_are_read_at_their_own_stamps(read: Read) -> None:
-    lines = [nmea(f"IIMWV,{226 + i}.0,R,00{2 + i}.4,N,A") for i in range(6)]
+def test_stamped_sentences_are_read_at_their_own_stamps() -> None:
+    lines = [sentence(f"IIMWV,{226 + i}.0,R,00{2 + i}.4,N,A") for i in range(6)]
     log = read(stamped([*lines, lines[0][:-1] + "0"]), platform="fixed")
     assert (log.format, len(log.series)) == ("nmea-stamped", 6)
     assert np.diff(log.series.time).tolist() == [10**9] * 5
@@ -366,36 +359,36 @@ def test_stamped_sentences_are_read_at_their_own_stamps(read: Read) -> None:
     assert "time-interpolated" not in kinds(log)
 
 
-def test_sentences_of_n2kd_without_status_are_taken_with_a_finding(read: Read) -> None:
-    lines = [nmea(f"02MWV,{327 + i}.6,R,1.89,N") for i in range(4)]
+def test_sentences_of_n2kd_without_status_are_taken_with_a_finding() -> None:
+    lines = [sentence(f"02MWV,{327 + i}.6,R,1.89,N") for i in range(4)]
     log = read(stamped(lines), platform="fixed")
     assert kinds(log)["no-status"] == 4
     assert log.series.channels["wind_speed"] == pytest.approx([1.89 * 1852 / 3600] * 4)
 
 
-def test_sentences_after_stamps_with_names_of_months_are_read(read: Read) -> None:
+def test_sentences_after_stamps_with_names_of_months_are_read() -> None:
     lines = "".join(f"[01-May-2026 12:00:0{second}] $WIMWV,210.0,R,8.4,N,A\n" for second in range(3))
     log = read(lines, zone="UTC")
     assert log.series.time[0] == 1_777_636_800_000_000_000
 
 
-def test_a_stream_of_several_talkers_without_time_names_both_at_once(read: Read) -> None:
+def test_a_stream_of_several_talkers_without_time_names_both_at_once() -> None:
     with pytest.raises(FlagdataError, match=r"several talkers .* and the stream carries no time") as caught:
         read("$36MWV,353.4,R,0.92,M\n$37MWV,353.4,R,0.92,M\n$36MWV,350.4,R,0.97,M\n")
     assert "--talker" in caught.value.fix
     assert "ZDA" in caught.value.fix
 
 
-def test_components_of_calm_air_have_no_direction(read: Read) -> None:
+def test_components_of_calm_air_have_no_direction() -> None:
     lines = ["Q,+000.00,+000.00,M,00,", *(f"Q,+00{1 + i}.00,+00{1 + i}.00,M,00," for i in range(4))]
     direction = read(stamped(lines), azimuth=0.0).series.channels["wind_direction"]
     assert np.isnan(direction[0])
     assert direction[1:] == pytest.approx([np.radians(135)] * 4)
 
 
-def test_stamps_as_asctime_writes_them_are_read_before_sentences(read: Read) -> None:
+def test_stamps_as_asctime_writes_them_are_read_before_sentences() -> None:
     body = [f"WIMWV,{100 + at},T,003.{at},M,A" for at in range(8)]
-    lines = [f"[Tue Jul 17 12:48:{36 + at:02d}.971 2018] ${text}*{checksum(text):02X}" for at, text in enumerate(body)]
+    lines = [f"[Tue Jul 17 12:48:{36 + at:02d}.971 2018] {sentence(text)}" for at, text in enumerate(body)]
     log = read("\n".join(lines), zone="-07:00")
     assert log.format == "nmea-stamped"
     assert iso(int(log.series.time[0])) == "2018-07-17T19:48:36.971Z"
@@ -403,7 +396,7 @@ def test_stamps_as_asctime_writes_them_are_read_before_sentences(read: Read) -> 
     assert split_stamp("Jul  7 12:48:36 2018 > $X")[0] == "2018-07-07T12:48:36"
 
 
-def test_milliseconds_in_brackets_before_another_mark_are_a_computers_stamp(read: Read) -> None:
+def test_milliseconds_in_brackets_before_another_mark_are_a_computers_stamp() -> None:
     text = "".join(
         f"[17776368{at:02d}{at * 31 % 1000:03d}][**] $WIMWV,{200 + at}.0,R,{3 + at % 5}.0,N,A\n" for at in range(20)
     )
@@ -417,7 +410,7 @@ def test_milliseconds_in_brackets_before_another_mark_are_a_computers_stamp(read
     [({}, "if its platform moves", "--platform fixed"), ({"platform": "moving"}, "of a moving platform", "")],
 )
 def test_wind_over_ground_on_a_network_is_reported_as_computed_where_something_moves(
-    read: Read, options: dict[str, str], says: str, fix: str
+    options: dict[str, str], says: str, fix: str
 ) -> None:
     log = read("".join(raw(i, speed=500 + i, reference=0) for i in range(4)), **options)
     (said,) = [finding for finding in log.findings if finding.kind == "computed-true-wind"]

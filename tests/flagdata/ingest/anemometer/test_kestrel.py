@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
 from flagdata.errors import InputError
 from flagdata.schema import SampleFlag
-from flagdata.signals import WindLog
 from flagdata.timebase import iso
-
-Read = Callable[..., WindLog]
+from tests.flagdata.ingest.anemometer.conftest import read
 
 AMERICAN = (
     "Device Name,WEATHER - 1\r\nDevice Model,5500L\r\nSerial Number,1\r\n"
@@ -23,7 +19,7 @@ AMERICAN = (
 )
 
 
-def test_an_american_export_is_month_first_with_half_days(read: Read) -> None:
+def test_an_american_export_is_month_first_with_half_days() -> None:
     log = read(AMERICAN, zone="America/New_York")
     assert [iso(t) for t in log.series.time] == ["2026-06-13T15:59:58Z", "2026-06-13T16:00:00Z"]
     channels = log.series.channels
@@ -34,7 +30,7 @@ def test_an_american_export_is_month_first_with_half_days(read: Read) -> None:
     assert np.degrees(channels["wind_direction"]) == pytest.approx([350, 10])
 
 
-def test_a_continental_export_has_decimal_commas(read: Read) -> None:
+def test_a_continental_export_has_decimal_commas() -> None:
     text = (
         "Device Name;K;;\nDevice Model;5500;;\nFORMATTED DATE-TIME;Direction ° True;Wind Speed;Temperature\n"
         "YYYY-MM-DD HH:MM:SS;Deg;km/h;°C\n2026-06-13 12:00:00;180;36,5;21,4\n2026-06-13 12:00:02;180;7,2;21,4\n"
@@ -44,12 +40,12 @@ def test_a_continental_export_has_decimal_commas(read: Read) -> None:
     assert "date-order" not in {f.kind for f in log.findings}
 
 
-def test_a_header_that_promises_another_date_order_is_a_warning(read: Read) -> None:
+def test_a_header_that_promises_another_date_order_is_a_warning() -> None:
     text = AMERICAN.replace("MM/DD/YYYY", "YYYY-MM-DD")
     assert [f.severity.value for f in read(text, zone="UTC").findings if f.kind == "date-order"] == ["warning"]
 
 
-def test_the_impellers_data_sheet_is_the_sensors(read: Read) -> None:
+def test_the_impellers_data_sheet_is_the_sensors() -> None:
     sensor = read(AMERICAN, zone="UTC").series.sensor
     assert sensor.name == "Kestrel 5500L"
     # ±3 % or ±0.1 m/s, taken as rectangular: divided by √3
@@ -57,7 +53,7 @@ def test_the_impellers_data_sheet_is_the_sensors(read: Read) -> None:
     assert sensor.accuracy == pytest.approx(0.1 / np.sqrt(3), rel=0.01)
 
 
-def test_speeds_below_the_impellers_start_are_in_its_dead_zone(read: Read) -> None:
+def test_speeds_below_the_impellers_start_are_in_its_dead_zone() -> None:
     log = read(AMERICAN.replace(",10.0,", ",1.0,"), zone="UTC")  # 1 mph = 0.447 m/s < 0.6 m/s
     assert log.series.flags.tolist() == [SampleFlag.DEAD_ZONE, 0]
 
@@ -72,7 +68,7 @@ QUOTED = (
 @pytest.mark.parametrize(
     "text", [QUOTED.replace('"21,4"', "21.4"), QUOTED.replace('"3,5"', '"3,500"').replace('"4,0"', '"4,000"')]
 )
-def test_a_comma_in_quotes_is_no_decimal_comma_where_that_is_in_doubt(read: Read, text: str) -> None:
+def test_a_comma_in_quotes_is_no_decimal_comma_where_that_is_in_doubt(text: str) -> None:
     with pytest.raises(InputError, match="unreadable values of wind_speed"):
         read(text.replace('"21,4"', "21"), zone="UTC")
 
@@ -86,7 +82,7 @@ PHONE = (
 )
 
 
-def test_the_phones_export_names_its_last_columns_in_the_line_of_units(read: Read) -> None:
+def test_the_phones_export_names_its_last_columns_in_the_line_of_units() -> None:
     log = read(PHONE, zone="UTC")
     assert log.format == "kestrel"
     assert [iso(t) for t in log.series.time] == ["2026-06-13T11:59:58Z", "2026-06-13T12:00:00Z"]

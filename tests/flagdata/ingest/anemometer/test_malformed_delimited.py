@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -12,8 +11,7 @@ from flagdata.errors import FlagdataError, InputError, TimeError, UnknownNameErr
 from flagdata.ingest import OpenFactsError
 from flagdata.schema import SampleFlag
 from tests.flagdata.ingest.anemometer.cases import GOOD, ROW, case, csv, stamped
-
-Check = Callable[..., None]
+from tests.flagdata.ingest.anemometer.conftest import check_refused, check_reported
 
 NEXT = "2026-05-01T12:00:01Z,3.2"
 
@@ -355,10 +353,10 @@ REPORTED = [
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any], check_refused: Check) -> None:
+def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any]) -> None:
     check_refused(**case)
 
 
 @pytest.mark.parametrize("case", REPORTED)
-def test_a_defect_is_reported_with_its_number_and_flagged(case: dict[str, Any], check_reported: Check) -> None:
+def test_a_defect_is_reported_with_its_number_and_flagged(case: dict[str, Any]) -> None:
     check_reported(**case)

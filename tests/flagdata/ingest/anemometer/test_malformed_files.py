@@ -5,7 +5,6 @@ from __future__ import annotations
 import gzip
 import io
 import zipfile
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,7 @@ from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError
 from flagdata.ingest import OpenFactsError
 from flagdata.ingest.anemometer import Limits
 from tests.flagdata.ingest.anemometer.cases import case
-
-Check = Callable[..., None]
+from tests.flagdata.ingest.anemometer.conftest import check_refused
 
 
 def csv(*rows: str, header: str = "time,wind_speed") -> bytes:
@@ -82,5 +80,5 @@ REFUSED = [
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any], check_refused: Check) -> None:
+def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any]) -> None:
     check_refused(**case)

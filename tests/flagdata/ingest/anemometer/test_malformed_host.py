@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.schema import SampleFlag
-from flagdata.signals import WindLog
 from tests.flagdata.ingest.anemometer.cases import case
-
-Check = Callable[..., None]
+from tests.flagdata.ingest.anemometer.conftest import check_refused, check_reported, read
 
 UTC = {"zone": "UTC"}
 
@@ -82,19 +79,19 @@ REPORTED = [
 ]
 
 
-def test_a_log_without_header_loses_no_line(read: Callable[..., WindLog]) -> None:
+def test_a_log_without_header_loses_no_line() -> None:
     content = "\n".join(map(host_line, range(5))).encode()
     assert len(read(content, recipe="serial-speed", zone="UTC").series) == 5
 
 
-def test_two_numbers_are_no_decimal_comma(check_reported: Check) -> None:
+def test_two_numbers_are_no_decimal_comma() -> None:
     lines = hosted(*map(host_line, range(9)), host_line(9, '"3,2"'))
     check_reported(lines, finding="non-data-lines", count=1, samples=9, options=UTC)
 
 
 @pytest.mark.timeout(20)
 @pytest.mark.parametrize("filler", [" ", "1", "-", "1,", "1e", "\t"])
-def test_long_lines_of_anything_take_linear_time(filler: str, read: Callable[..., WindLog]) -> None:
+def test_long_lines_of_anything_take_linear_time(filler: str) -> None:
     # quadratic time in 60,000 characters would be minutes
     junk = [f"2026-05-01T12:00:1{i}.5,{filler * (60_000 // len(filler))}x" for i in range(3)]
     log = read(hosted(*map(host_line, range(9)), *junk), recipe="serial-speed", zone="UTC")
@@ -102,10 +99,10 @@ def test_long_lines_of_anything_take_linear_time(filler: str, read: Callable[...
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any], check_refused: Check) -> None:
+def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any]) -> None:
     check_refused(**case)
 
 
 @pytest.mark.parametrize("case", REPORTED)
-def test_a_defect_is_reported_with_its_number_and_flagged(case: dict[str, Any], check_reported: Check) -> None:
+def test_a_defect_is_reported_with_its_number_and_flagged(case: dict[str, Any]) -> None:
     check_reported(**case)

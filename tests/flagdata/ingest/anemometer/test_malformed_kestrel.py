@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -10,8 +9,7 @@ import pytest
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.schema import SampleFlag
 from tests.flagdata.ingest.anemometer.cases import case
-
-Check = Callable[..., None]
+from tests.flagdata.ingest.anemometer.conftest import check_refused, check_reported
 
 UTC = {"zone": "UTC"}
 
@@ -104,10 +102,10 @@ REPORTED = [
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any], check_refused: Check) -> None:
+def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any]) -> None:
     check_refused(**case)
 
 
 @pytest.mark.parametrize("case", REPORTED)
-def test_a_defect_is_reported_with_its_number_and_flagged(case: dict[str, Any], check_reported: Check) -> None:
+def test_a_defect_is_reported_with_its_number_and_flagged(case: dict[str, Any]) -> None:
     check_reported(**case)

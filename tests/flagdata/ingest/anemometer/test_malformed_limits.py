@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,7 @@ from flagdata.errors import LimitError
 from flagdata.ingest import read_log
 from flagdata.ingest.anemometer import Limits
 from tests.flagdata.ingest.anemometer.cases import GOOD, ROW, case, csv, stamped
-
-Check = Callable[..., None]
+from tests.flagdata.ingest.anemometer.conftest import check_refused
 
 REFUSED = [
     case("rows", content=stamped(*GOOD), error=LimitError, says="10 lines", options={"limits": Limits(rows=10)}),
@@ -25,7 +23,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any], check_refused: Check) -> None:
+def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any]) -> None:
     check_refused(**case)
 
 

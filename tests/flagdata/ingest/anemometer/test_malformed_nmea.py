@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
-from flagdata.ingest import OpenFactsError, checksum
+from flagdata.ingest import OpenFactsError
 from flagdata.schema import SampleFlag
-from tests.flagdata.ingest.anemometer.cases import case
-
-Check = Callable[..., None]
-
-
-def sentence(body: str) -> str:
-    return f"${body}*{checksum(body):02X}"
+from tests.flagdata.ingest.anemometer.cases import case, sentence
+from tests.flagdata.ingest.anemometer.conftest import check_refused, check_reported
 
 
 def nmea(*bodies: str) -> bytes:
@@ -175,10 +169,10 @@ REPORTED = [
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any], check_refused: Check) -> None:
+def test_what_cannot_be_read_is_refused_with_place_and_fix(case: dict[str, Any]) -> None:
     check_refused(**case)
 
 
 @pytest.mark.parametrize("case", REPORTED)
-def test_a_defect_is_reported_with_its_number_and_flagged(case: dict[str, Any], check_reported: Check) -> None:
+def test_a_defect_is_reported_with_its_number_and_flagged(case: dict[str, Any]) -> None:
     check_reported(**case)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable
 from functools import reduce
 from operator import xor
 
@@ -15,19 +14,15 @@ from flagdata.ingest import Head, checksum
 from flagdata.ingest.anemometer.formats.nmea import Nmea, StampedNmea
 from flagdata.ingest.anemometer.formats.sentences import ChecksumError, clock, split, tag_time
 from flagdata.schema import SampleFlag
-from flagdata.signals import WindLog
 from flagdata.timebase import iso
+from tests.flagdata.ingest.anemometer.cases import sentence
+from tests.flagdata.ingest.anemometer.conftest import read
 
-Read = Callable[..., WindLog]
 DATE = dt.date(2026, 5, 1)
 
 
-def line(body: str) -> str:
-    return f"${body}*{reduce(xor, body.encode()):02X}"
-
-
 def stream(*bodies: str) -> str:
-    return "\r\n".join([*(line(b) for b in bodies), ""])
+    return "\r\n".join([*map(sentence, bodies), ""])
 
 
 # Sentences as gpsd's "NMEA Revealed" and vendors' manuals print them, checksums included.
@@ -75,20 +70,20 @@ def test_what_is_no_time_of_day(text: str) -> None:
     assert clock(text) is None
 
 
-def test_wind_takes_its_time_from_the_sentences_around_it(read: Read) -> None:
+def test_wind_takes_its_time_from_the_sentences_around_it() -> None:
     # one wind sentence in the middle of two lines between seconds 0 and 3, one third on
     log = read(stream("GPZDA,120000,01,05,2026,,", "WIMWV,010,R,5.0,M,A", "GPHDT,1,T", "GPZDA,120003,01,05,2026,,"))
     assert iso(int(log.series.time[0])) == "2026-05-01T12:00:01Z"
     assert log.series.flags.tolist() == [SampleFlag.TIME_UNSURE]
 
 
-def test_the_stream_may_begin_and_end_with_wind(read: Read) -> None:
+def test_the_stream_may_begin_and_end_with_wind() -> None:
     wind = "WIMWV,010,R,5.0,M,A"
     log = read(stream(wind, "GPZDA,120000,01,05,2026,,", wind, "GPZDA,120002,01,05,2026,,", wind))
     assert [iso(t)[11:] for t in log.series.time.tolist()] == ["11:59:59Z", "12:00:01Z", "12:00:03Z"]
 
 
-def test_midnight_adds_a_day(read: Read) -> None:
+def test_midnight_adds_a_day() -> None:
     times = [
         "GPGGA,235958,,,,,,,,,,,,,",
         "GPGGA,235959,,,,,,,,,,,,,",
@@ -99,14 +94,14 @@ def test_midnight_adds_a_day(read: Read) -> None:
     assert [iso(t)[:10] for t in log.series.time.tolist()] == ["2026-12-31", "2026-12-31", "2027-01-01", "2027-01-01"]
 
 
-def test_a_date_from_rmc_serves_times_from_gga(read: Read) -> None:
+def test_a_date_from_rmc_serves_times_from_gga() -> None:
     rmc = "GPRMC,120001,A,,,,,0.1,,010526,,"
     body = [s for i in range(6) for s in (f"GPGGA,12000{i},,,,,,,,,,,,,", "WIMWV,010,R,5.0,M,A")]
     log = read(stream(*body[:4], rmc, *body[4:]))
     assert iso(int(log.series.time[0])).startswith("2026-05-01T12:00:00")
 
 
-def test_the_most_trusted_time_sentence_is_used(read: Read) -> None:
+def test_the_most_trusted_time_sentence_is_used() -> None:
     # GLL lags by 7 s here; ZDA is there as often and goes before it
     wind = "WIMWV,1,R,5.0,M,A"
     body = [
@@ -119,10 +114,10 @@ def test_the_most_trusted_time_sentence_is_used(read: Read) -> None:
     assert iso(int(log.series.time[0])).startswith("2026-05-01T12:00:07")
 
 
-def test_tag_blocks_carry_whole_instants(read: Read) -> None:
+def test_tag_blocks_carry_whole_instants() -> None:
     def tagged(second: int) -> str:
         tag = f"s:x,c:{1_777_636_800 + second}"
-        return f"\\{tag}*{reduce(xor, tag.encode()):02X}\\" + line("WIMWV,010,R,5.0,M,A")
+        return f"\\{tag}*{reduce(xor, tag.encode()):02X}\\" + sentence("WIMWV,010,R,5.0,M,A")
 
     log = read("\r\n".join(tagged(i) for i in range(5)))
     assert [iso(t) for t in log.series.time.tolist()] == [f"2026-05-01T12:00:0{i}Z" for i in range(5)]
@@ -137,17 +132,17 @@ def times(*bodies: str) -> str:
     return stream(*(s for i, b in enumerate(bodies) for s in (f"GPZDA,1200{i:02d},01,05,2026,,", b)))
 
 
-def test_knots_kilometres_and_miles_become_metres_a_second(read: Read) -> None:
+def test_knots_kilometres_and_miles_become_metres_a_second() -> None:
     log = read(times("WIMWV,1,R,10,N,A", "WIMWV,1,R,36,K,A", "WIMWV,1,R,10,M,A", "WIMWV,1,R,10,S,A"))
     assert log.series.channels["apparent_wind_speed"] == pytest.approx([10 * 1852 / 3600, 10, 10, 4.4704])
 
 
-def test_of_a_speed_in_several_units_the_finest_is_read(read: Read) -> None:
+def test_of_a_speed_in_several_units_the_finest_is_read() -> None:
     log = read(times("WIVWR,80,L,20.5,N,10.5,M,38,K", "WIVWR,80,L,20.5,N,10.5,M,37.9,K"))
     assert log.series.channels["apparent_wind_speed"] == pytest.approx([20.5 * 1852 / 3600, 37.9 / 3.6])
 
 
-def test_a_talker_without_values_is_left_out_beside_one_that_has_some(read: Read) -> None:
+def test_a_talker_without_values_is_left_out_beside_one_that_has_some() -> None:
     empty = f"IIMDA{',' * 20}"
     log = read(times("WIMWV,1,R,10,N,A", empty, "WIMWV,1,R,12,N,A"))
     assert len(log.series.time) == 2
@@ -155,7 +150,7 @@ def test_a_talker_without_values_is_left_out_beside_one_that_has_some(read: Read
     assert any("talker II are empty" in found.what for found in log.findings)
 
 
-def test_text_before_sentences_that_may_be_a_time_is_reported(read: Read) -> None:
+def test_text_before_sentences_that_may_be_a_time_is_reported() -> None:
     lines = times("WIMWV,1,R,10,N,A", "WIMWV,1,R,12,N,A").splitlines()
     log = read("\r\n".join(f"day 121 at 43{index:03d} {line}" for index, line in enumerate(lines)))
     (found,) = [found for found in log.findings if found.kind == "text-before-sentences"]
@@ -163,12 +158,12 @@ def test_text_before_sentences_that_may_be_a_time_is_reported(read: Read) -> Non
     assert "day 121 at 43000" in found.what
 
 
-def test_sentences_of_a_makers_own_are_sentences(read: Read) -> None:
+def test_sentences_of_a_makers_own_are_sentences() -> None:
     log = read(f"{times('WIMWV,1,R,10,N,A', 'WIMWV,1,R,10,N,A')}\r\n{stream('PSMDCN,2')}")
     assert not [found for found in log.findings if found.kind == "malformed-lines"]
 
 
-def test_mwd_is_wind_over_ground(read: Read) -> None:
+def test_mwd_is_wind_over_ground() -> None:
     log = read(
         times("WIMWD,090.0,T,087.0,M,10.0,N,5.14,M", "WIMWD,100.0,T,097.0,M,10.0,N,,M", "WIMWD,110.0,T,,M,,N,5.3,M")
     )
@@ -178,38 +173,38 @@ def test_mwd_is_wind_over_ground(read: Read) -> None:
     assert np.isnan(log.series.channels["wind_direction_magnetic"][2])
 
 
-def test_a_fixed_mast_measures_wind_over_ground(read: Read) -> None:
+def test_a_fixed_mast_measures_wind_over_ground() -> None:
     log = read(times("WIMWV,350,R,5,M,A", "WIMWV,020,R,6,M,A"), platform="fixed", azimuth=np.radians(30))
     assert log.series.channels["wind_speed"] == pytest.approx([5, 6])
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([20, 50])
 
 
-def test_a_fixed_mast_of_unknown_azimuth_keeps_its_own_direction(read: Read) -> None:
+def test_a_fixed_mast_of_unknown_azimuth_keeps_its_own_direction() -> None:
     log = read(times("WIMWV,350,R,5,M,A", "WIMWV,020,R,6,M,A"), platform="fixed")
     assert sorted(log.series.channels) == ["apparent_wind_direction", "wind_speed"]
 
 
-def test_an_azimuth_without_directions_is_refused(read: Read) -> None:
+def test_an_azimuth_without_directions_is_refused() -> None:
     with pytest.raises(UsageError, match="no directions"):
         read(times("WIMWV,,R,5,M,A", "WIMWV,,R,6,M,A"), platform="fixed", azimuth=0.5)
 
 
-def test_an_azimuth_beside_wind_over_ground_is_refused(read: Read) -> None:
+def test_an_azimuth_beside_wind_over_ground_is_refused() -> None:
     with pytest.raises(UsageError, match="over ground itself"):
         read(times("WIMWD,090.0,T,087.0,M,10.0,N,5.1,M", "WIMWV,1,R,6,M,A"), platform="fixed", azimuth=0.5)
 
 
-def test_a_platform_given_as_moving_is_taken_as_moving(read: Read) -> None:
+def test_a_platform_given_as_moving_is_taken_as_moving() -> None:
     log = read(times("WIMWV,1,R,5,M,A", "WIMWV,1,R,6,M,A"), platform="moving")
     assert next(f for f in log.findings if f.kind == "apparent-wind-only").fix is None
 
 
-def test_one_talker_of_several_can_be_chosen(read: Read) -> None:
+def test_one_talker_of_several_can_be_chosen() -> None:
     text = times("WIMWV,1,R,5,M,A", "IIMWV,1,R,6,M,A", "WIMWV,1,R,7,M,A")
     assert read(text, talker="WI").series.channels["apparent_wind_speed"].tolist() == [5, 7]
 
 
-def test_relative_and_theoretical_never_share_a_channel(read: Read) -> None:
+def test_relative_and_theoretical_never_share_a_channel() -> None:
     log = read(times("WIMWV,010,R,5,M,A", "WIMWV,020,T,3,M,A"))
     assert log.series.channels["apparent_wind_speed"][0] == 5
     assert np.isnan(log.series.channels["apparent_wind_speed"][1])
@@ -220,7 +215,7 @@ def test_our_checksum_is_the_standards() -> None:
     assert checksum("GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,") == 0x47
 
 
-def test_a_stream_of_two_kinds_of_wind_says_how_many_of_each_and_how_often(read: Read) -> None:
+def test_a_stream_of_two_kinds_of_wind_says_how_many_of_each_and_how_often() -> None:
     # one sentence every 2 s, relative and theoretical in turn: each kind comes every 4 s
     bodies = []
     for second in range(0, 40, 2):
@@ -234,16 +229,16 @@ def test_a_stream_of_two_kinds_of_wind_says_how_many_of_each_and_how_often(read:
     assert "10 relative (MWV,R), one every 4 s; 10 theoretical (MWV,T), one every 4 s" in finding.what
 
 
-def test_a_stream_of_one_kind_of_wind_needs_no_such_count(read: Read) -> None:
+def test_a_stream_of_one_kind_of_wind_needs_no_such_count() -> None:
     log = read(stream("GPZDA,120000.00,01,05,2026,00,00", "WIMWV,010.0,R,5.0,M,A", "GPZDA,120002.00,01,05,2026,00,00"))
     assert "wind-kinds" not in {f.kind for f in log.findings}
 
 
 def _signed(*bodies: str) -> str:
-    return "".join(f"${body}*{checksum(body):02X}\n" for body in bodies)
+    return "".join(f"{sentence(body)}\n" for body in bodies)
 
 
-def test_sentences_that_others_stand_for_are_counted(read: Callable[..., WindLog]) -> None:
+def test_sentences_that_others_stand_for_are_counted() -> None:
     rows: list[str] = []
     for at in range(6):
         rows += [f"GPZDA,1200{2 * at:02d},01,05,2026,00,00", f"IIMWV,31{at},T,08.{at}0,N,A"]
@@ -255,7 +250,7 @@ def test_sentences_that_others_stand_for_are_counted(read: Callable[..., WindLog
 
 
 @pytest.mark.parametrize("first", [False, True])
-def test_one_time_gives_a_few_readings_its_second(read: Callable[..., WindLog], first: bool) -> None:
+def test_one_time_gives_a_few_readings_its_second(first: bool) -> None:
     winds = ["WIMWV,080.5,R,10.0,N,A", "WIMWV,120.0,T,12.0,N,A", "WIMWV,081.0,R,11.0,N,A"]
     stamp = ["GPZDA,120000,01,05,2026,00,00"]
     log = read(_signed(*(stamp + winds if first else winds + stamp)))
@@ -266,7 +261,7 @@ def test_one_time_gives_a_few_readings_its_second(read: Callable[..., WindLog], 
     assert "one-time" in {finding.kind for finding in log.findings}
 
 
-def test_one_time_of_a_long_stream_is_not_enough(read: Callable[..., WindLog]) -> None:
+def test_one_time_of_a_long_stream_is_not_enough() -> None:
     rows = [f"WIMWV,0{at}.5,R,1{at % 9}.0,N,A" for at in range(10, 40)]
     with pytest.raises(TimeError, match="only one time"):
         read(_signed(*rows, "GPZDA,120000,01,05,2026,00,00"))
@@ -286,7 +281,7 @@ def bursts(order: tuple[int, ...], *, skipped: int = 0, step: int = 75, count: i
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (1, 2, 3, 0), (3, 1, 0, 2)])
-def test_a_sentence_of_a_burst_has_the_time_of_its_burst(read: Read, order: tuple[int, ...]) -> None:
+def test_a_sentence_of_a_burst_has_the_time_of_its_burst(order: tuple[int, ...]) -> None:
     log = read(bursts(order))
     known = np.isfinite(log.series.channels["apparent_wind_speed"])
     seconds = (log.series.time - log.series.time[0]) / 1e9
@@ -298,14 +293,14 @@ def test_a_sentence_of_a_burst_has_the_time_of_its_burst(read: Read, order: tupl
     assert (log.series.flags & SampleFlag.TIME_UNSURE).all()
 
 
-def test_a_stream_that_begins_within_a_burst_is_timed_by_the_bursts_end(read: Read) -> None:
+def test_a_stream_that_begins_within_a_burst_is_timed_by_the_bursts_end() -> None:
     log = read(bursts((0, 1, 2, 3), skipped=2))
     known = np.isfinite(log.series.channels["apparent_wind_speed"])
     assert iso(int(log.series.time[known][0]))[11:19] == "11:01:15"
 
 
 @pytest.mark.parametrize("bodies", [1, 6])
-def test_marks_a_second_apart_or_winds_that_come_more_often_are_still_interpolated(read: Read, bodies: int) -> None:
+def test_marks_a_second_apart_or_winds_that_come_more_often_are_still_interpolated(bodies: int) -> None:
     wind = ["WIMWV,010,R,5.0,M,A"] * bodies
     step = 1 if bodies == 1 else 60
     clocks = [f"12{at * step // 60:02d}{at * step % 60:02d}" for at in range(6)]
@@ -313,7 +308,7 @@ def test_marks_a_second_apart_or_winds_that_come_more_often_are_still_interpolat
     assert "time-interpolated" in {finding.kind for finding in log.findings}
 
 
-def test_older_sentences_are_called_by_their_own_names(read: Read) -> None:
+def test_older_sentences_are_called_by_their_own_names() -> None:
     bodies = []
     for second in range(0, 20, 2):
         bodies += [f"GPZDA,1200{second:02d}.00,01,05,2026,00,00", f"IIVWR,80,L,5.{second % 7},N,,,,"]
@@ -336,7 +331,7 @@ MDA = "WIMDA,29.8,I,1.0,B,22.0,C,,,78.3,,18.0,C,260.3,T,249.9,M,1.8,N,0.9,M"
     ],
 )
 def test_a_wind_over_ground_is_reported_as_computed_where_something_moves(
-    read: Read, speed: str, options: dict[str, str], says: str, fix: str
+    speed: str, options: dict[str, str], says: str, fix: str
 ) -> None:
     times = [f"GPRMC,12000{second}.00,A,5759.0,N,01144.3,E,{speed},28.27,010526,,,A" for second in (0, 1)]
     log = read(stream(times[0], MDA, times[1]), **options)
@@ -345,7 +340,7 @@ def test_a_wind_over_ground_is_reported_as_computed_where_something_moves(
     assert fix in (said.fix or "")
 
 
-def test_a_wind_that_the_stream_states_over_ground_is_called_so_on_a_fixed_platform(read: Read) -> None:
+def test_a_wind_that_the_stream_states_over_ground_is_called_so_on_a_fixed_platform() -> None:
     times = [f"GPZDA,12000{second}.00,01,05,2026,00,00" for second in (0, 2)]
     log = read(stream(times[0], MDA, times[1]), platform="fixed")
     (said,) = [f for f in log.findings if f.kind == "fixed-platform"]
@@ -356,8 +351,14 @@ def test_a_wind_that_the_stream_states_over_ground_is_called_so_on_a_fixed_platf
     ("lines", "says"),
     [
         (["$IIVWR,80,L,5.1,N,,,,"] * 3, "3 of the first 3 lines are NMEA 0183 sentences, none of them with a checksum"),
-        ([line(MDA)] * 2, "2 of the first 2 lines are NMEA 0183 sentences with right checksums; 0 more have a wrong"),
-        ([line(MDA), f"${MDA}"], "2 of the first 2 lines are NMEA 0183 sentences, 1 of them with a checksum; 0 more"),
+        (
+            [sentence(MDA)] * 2,
+            "2 of the first 2 lines are NMEA 0183 sentences with right checksums; 0 more have a wrong",
+        ),
+        (
+            [sentence(MDA), f"${MDA}"],
+            "2 of the first 2 lines are NMEA 0183 sentences, 1 of them with a checksum; 0 more",
+        ),
     ],
 )
 def test_only_checksums_that_are_there_are_reported_as_right(lines: list[str], says: str) -> None:
@@ -367,11 +368,12 @@ def test_only_checksums_that_are_there_are_reported_as_right(lines: list[str], s
 
 
 WITHOUT_WIND = [
-    line(body) for body in ("GPRMC,120000.00,A,5759.0,N,01144.3,E,5.2,28.27,010526,,,A", "IIMTW,16.8,C", "IIMTW,16.9,C")
+    sentence(body)
+    for body in ("GPRMC,120000.00,A,5759.0,N,01144.3,E,5.2,28.27,010526,,,A", "IIMTW,16.8,C", "IIMTW,16.9,C")
 ]
 
 
-def test_a_log_without_wind_is_refused_as_such(read: Read) -> None:
+def test_a_log_without_wind_is_refused_as_such() -> None:
     with pytest.raises(InputError, match="not a log of a known format") as caught:
         read("\n".join(WITHOUT_WIND))
     assert "hold no sentence of wind" in str(caught.value.fix)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import reduce
 from operator import xor
 
-from flagdata.signals import WindLog
+from tests.flagdata.ingest.anemometer.conftest import read
 
 
 def gill(at: int) -> str:
@@ -55,7 +55,7 @@ KINDS: Mapping[str, tuple[str, Mapping[str, object], str]] = {
 }
 
 
-def test_each_note_is_reported_where_it_applies(read: Callable[..., WindLog]) -> None:
+def test_each_note_is_reported_where_it_applies() -> None:
     found = {kind: read(text, **options).findings for kind, (text, options, _) in KINDS.items()}
     said = {kind: [one.what for one in findings if one.kind == kind] for kind, findings in found.items()}
     lacking = {kind: said[kind] for kind, (*_, words) in KINDS.items() if words not in " ".join(said[kind])}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +17,8 @@ from flagdata.ingest.anemometer.samples.order import in_order
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
+from tests.flagdata.ingest.anemometer.conftest import made, read
 
-Read = Callable[..., WindLog]
-Made = Callable[..., Reading]
 START = 1_777_636_800 * 10**9
 
 
@@ -77,7 +76,7 @@ SPREAD: dict[str, tuple[Sequence[float] | np.ndarray, float, Sequence[float] | n
 
 
 @pytest.mark.parametrize("name", SPREAD)
-def test_rows_that_share_a_stamp_get_instants_of_their_own(name: str, made: Made) -> None:
+def test_rows_that_share_a_stamp_get_instants_of_their_own(name: str) -> None:
     stamps, step, expected, kind = SPREAD[name]
     found = in_order(made(stamps, step=step), where="x")
     assert seconds(found) == pytest.approx(list(expected), abs=1e-8)
@@ -92,7 +91,7 @@ def test_rows_that_share_a_stamp_get_instants_of_their_own(name: str, made: Made
     assert gaps(found).findings == found.findings
 
 
-def test_equal_milliseconds_of_a_fast_logger_lose_no_row(made: Made) -> None:
+def test_equal_milliseconds_of_a_fast_logger_lose_no_row() -> None:
     time = np.arange(2000) * 0.005
     found = in_order(made(np.insert(time, 1000, time[1000]), step=MS), where="x")
     assert len(found.time) == 2001
@@ -117,7 +116,7 @@ SHARED: dict[str, tuple[np.ndarray, float]] = {
 
 
 @pytest.mark.parametrize("name", SHARED)
-def test_where_the_file_does_not_say_when_a_row_was_read_it_is_refused(name: str, made: Made) -> None:
+def test_where_the_file_does_not_say_when_a_row_was_read_it_is_refused(name: str) -> None:
     stamps, step = SHARED[name]
     with pytest.raises(TimeError, match="does not say when each was read") as caught:
         in_order(made(stamps, step=step), where="x")
@@ -125,7 +124,7 @@ def test_where_the_file_does_not_say_when_a_row_was_read_it_is_refused(name: str
     assert "[rows]" in (caught.value.fix or "")
 
 
-def test_rows_lost_between_coarse_stamps_are_a_gap_of_their_length(made: Made) -> None:
+def test_rows_lost_between_coarse_stamps_are_a_gap_of_their_length() -> None:
     row = np.arange(2400)
     found = gaps(in_order(made(row // 4 + 600 * (row >= 1200), step=1), where="x"))
     (gap,) = [one for one in found.findings if one.kind == "gaps"]
@@ -133,7 +132,7 @@ def test_rows_lost_between_coarse_stamps_are_a_gap_of_their_length(made: Made) -
 
 
 @pytest.mark.parametrize("copies", [[5] * 30, [2] * 3, [1, 1, 1, 1, 5, *[1] * 7], [1, 2, 1], [5], [3, 1, 2, 4]])
-def test_copies_of_a_row_are_left_out_and_never_spread(copies: Sequence[int], made: Made) -> None:
+def test_copies_of_a_row_are_left_out_and_never_spread(copies: Sequence[int]) -> None:
     plain = made(60 * np.arange(len(copies)))
     found = in_order(plain.take(np.repeat(np.arange(len(copies)), copies)), where="x")
     assert seconds(found) == (60 * np.arange(len(copies))).tolist()
@@ -141,12 +140,12 @@ def test_copies_of_a_row_are_left_out_and_never_spread(copies: Sequence[int], ma
     assert [(one.kind, one.count) for one in found.findings] == [("duplicate-rows", sum(copies) - len(copies))]
 
 
-def test_readings_that_change_within_a_stamp_are_no_copies(made: Made) -> None:
+def test_readings_that_change_within_a_stamp_are_no_copies() -> None:
     speed = np.round(stream(4, "coarse").uniform(3, 4, 400), 1)  # one in ten repeats the one before
     assert len(in_order(made(np.arange(400) // 4, speed, step=1), where="x").time) == 400
 
 
-def test_a_download_that_overlaps_the_one_before_is_left_out(made: Made) -> None:
+def test_a_download_that_overlaps_the_one_before_is_left_out() -> None:
     plain = made(np.arange(1200))
     found = in_order(plain.take(np.concatenate([np.arange(800), np.arange(700, 1200)])), where="x")
     assert seconds(found) == list(range(1200))
@@ -154,7 +153,7 @@ def test_a_download_that_overlaps_the_one_before_is_left_out(made: Made) -> None
     assert [(one.kind, one.count) for one in found.findings] == [("repeated-stretch", 100)]
 
 
-def test_an_empty_row_takes_no_reading_with_it_where_it_is_out_of_order_and_stays_where_it_is_not(made: Made) -> None:
+def test_an_empty_row_takes_no_reading_with_it_where_it_is_out_of_order_and_stays_where_it_is_not() -> None:
     speed = np.arange(30.0)
     speed[[7, 21]] = np.nan
     stamps = np.arange(30)
@@ -166,7 +165,7 @@ def test_an_empty_row_takes_no_reading_with_it_where_it_is_out_of_order_and_stay
         assert kinds(found) == ["empty-rows"]
 
 
-def test_order_is_kept_and_nothing_lost_when_rows_come_a_little_late(made: Made) -> None:
+def test_order_is_kept_and_nothing_lost_when_rows_come_a_little_late() -> None:
     found = in_order(made([0, 1, 3, 2, 4], [0, 1, 3, 2, 4]), where="x")
     assert found.channels["wind_speed"].tolist() == [0, 1, 2, 3, 4]
     assert found.flags.tolist() == [0, 0, SampleFlag.TIME_UNSURE, 0, 0]
@@ -183,9 +182,7 @@ WILD: dict[str, dict[int, float]] = {
 
 @pytest.mark.parametrize("choice", [None, "first", "last"])
 @pytest.mark.parametrize("name", WILD)
-def test_the_fewest_possible_rows_are_left_out_for_wild_stamps(
-    name: str, choice: ClockChoice | None, made: Made
-) -> None:
+def test_the_fewest_possible_rows_are_left_out_for_wild_stamps(name: str, choice: ClockChoice | None) -> None:
     time = np.arange(100.0)
     for row, by in WILD[name].items():
         time[row] += by
@@ -211,7 +208,7 @@ ROWS = {
 
 
 @pytest.mark.parametrize("name", ROWS)
-def test_rows_out_of_order_are_asked_about_and_sorted_where_the_user_says_so(name: str, made: Made) -> None:
+def test_rows_out_of_order_are_asked_about_and_sorted_where_the_user_says_so(name: str) -> None:
     plain, order = made(600 * np.arange(N)), ROWS[name]
     with pytest.raises(TimeError) as caught:
         in_order(plain.take(order), where="x")
@@ -224,7 +221,7 @@ def test_rows_out_of_order_are_asked_about_and_sorted_where_the_user_says_so(nam
     assert finding.count == N - len(longest_rise(order))
 
 
-def test_rows_that_come_unevenly_may_be_out_of_order_and_the_message_says_how_to_sort_them(made: Made) -> None:
+def test_rows_that_come_unevenly_may_be_out_of_order_and_the_message_says_how_to_sort_them() -> None:
     plain = made(UNSTEADY)
     moved = np.r_[0:100, 140:200, 100:140, 200:N]
     try:
@@ -236,7 +233,7 @@ def test_rows_that_come_unevenly_may_be_out_of_order_and_the_message_says_how_to
     assert all("--clock sort" in fix for fix in fixes)
 
 
-def test_a_table_is_sorted_by_its_wall_clock_before_daylight_saving_is_looked_at(read: Read) -> None:
+def test_a_table_is_sorted_by_its_wall_clock_before_daylight_saving_is_looked_at() -> None:
     """The clocks of Amsterdam go back on 25 October 2026 at 03:00; rows of two hours, in an order of their own."""
     start = dt.datetime(2026, 10, 24, 13)  # noqa: DTZ001
     stamps = [start + dt.timedelta(minutes=120 * at) for at in range(30)]
@@ -246,7 +243,7 @@ def test_a_table_is_sorted_by_its_wall_clock_before_daylight_saving_is_looked_at
     assert found.series.time[0] == np.datetime64("2026-10-24T11:00", "ns").astype(np.int64)
 
 
-def test_a_word_on_the_clock_is_offered_only_where_it_would_have_the_rows_read(made: Made) -> None:
+def test_a_word_on_the_clock_is_offered_only_where_it_would_have_the_rows_read() -> None:
     """So many steps back are of no clock that was set."""
     many = np.cumsum([17, 61, 23, 140, 9, 88, 35, 201, 47, 12] * 4)[np.argsort((7 * np.arange(40)) % 41)]
     for choice in (None, "first"):
@@ -258,18 +255,18 @@ def test_a_word_on_the_clock_is_offered_only_where_it_would_have_the_rows_read(m
 
 
 @pytest.mark.parametrize("choice", ["first", "last", "sort"])
-def test_a_clock_option_that_nothing_calls_for_is_reported_as_unused(choice: ClockChoice, made: Made) -> None:
+def test_a_clock_option_that_nothing_calls_for_is_reported_as_unused(choice: ClockChoice) -> None:
     (finding,) = in_order(made(np.arange(100)), where="x", choice=choice).findings
     assert f"--clock {choice} is not used" in finding.what
 
 
-def test_a_stream_has_no_rows_to_sort(read: Read) -> None:
+def test_a_stream_has_no_rows_to_sort() -> None:
     lines = (f"$GPZDA,12000{s},01,05,2026,00,00\n$WIMWV,10.0,R,{3 + s % 3},M,A\n" for s in range(9))
     with pytest.raises(UsageError, match="order in which they came"):
         read("".join(lines), clock="sort")
 
 
-def test_a_date_a_row_is_its_midnight(read: Read, tmp_path: Path) -> None:
+def test_a_date_a_row_is_its_midnight(tmp_path: Path) -> None:
     recipe = tmp_path / "dates.toml"
     recipe.write_text(
         'name = "dates"\nabout = "a"\nsource = "b"\n[time]\ncolumns = ["time"]\nformat = "%Y-%m-%d"\n'

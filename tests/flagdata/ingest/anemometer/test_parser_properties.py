@@ -6,8 +6,6 @@ import contextlib
 import datetime as dt
 import tempfile
 from collections.abc import Sequence
-from functools import reduce
-from operator import xor
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +18,7 @@ from flagdata.ingest import FORMATS, Head, WindOptions, read_log, sniff
 from flagdata.ingest.anemometer import average
 from flagdata.signals import WindLog
 from flagdata.units import UNITS
+from tests.flagdata.ingest.anemometer.cases import sentence
 
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 SECOND = 1_000_000_000
@@ -91,8 +90,7 @@ def test_a_written_nmea_stream_is_read_back(values: Sequence[float], unit: tuple
             f"WIMWV,{angle:03d},R,{value:05.2f},{unit[0]},A",
         )
     ]
-    lines = [f"${body}*{reduce(xor, body.encode()):02X}" for body in bodies]
-    log = read("\r\n".join([*lines, ""]).encode())
+    log = read("\r\n".join([*map(sentence, bodies), ""]).encode())
     # wind follows its ZDA by one of two lines a second: half a second later
     assert log.series.time.tolist() == [t + SECOND // 2 for t in times(len(values), 1000)]
     read_back = UNITS[unit[1]].from_si(log.series.channels["apparent_wind_speed"])

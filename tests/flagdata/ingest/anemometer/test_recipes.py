@@ -15,8 +15,8 @@ from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
 from flagdata.units import UNITS
+from tests.flagdata.ingest.anemometer.conftest import read
 
-Read = Callable[..., WindLog]
 PLAIN = """
 name = "mine"
 about = "a test"
@@ -143,7 +143,7 @@ def test_an_optional_column_may_be_absent(tmp_path: Path) -> None:
     assert with_it.series.channels["air_temperature"] == pytest.approx([293.15])
 
 
-def test_a_testo_style_export_is_identified_and_read(read: Read) -> None:
+def test_a_testo_style_export_is_identified_and_read() -> None:
     text = "Date;Time;m/s;°C\n01.05.2026;12:00:00;3,25;21,5\n01.05.2026;12:00:01;----;21,5\n"
     log = read(text, zone="+02:00")
     assert "testo-csv" in log.reasons[0]
@@ -152,7 +152,7 @@ def test_a_testo_style_export_is_identified_and_read(read: Read) -> None:
     assert iso(int(log.series.time[0])) == "2026-05-01T10:00:00Z"
 
 
-def test_a_skywatch_style_export_is_identified_and_read(read: Read) -> None:
+def test_a_skywatch_style_export_is_identified_and_read() -> None:
     text = "Date,Time,Wind speed [km/h],Temperature [°C]\n2026-05-01,12:00:00,36.0,20\n2026-05-01,12:00:01,18.0,20\n"
     log = read(text, zone="UTC")
     assert "skywatch-csv" in log.reasons[0]
@@ -166,7 +166,7 @@ def test_a_byte_order_mark_settles_the_encoding(log_file: Callable[[bytes], Path
     assert log.findings == ()
 
 
-def test_line_ends_of_any_kind_count_lines_alike(read: Read) -> None:
+def test_line_ends_of_any_kind_count_lines_alike() -> None:
     rows = ["time,wind_speed", "2026-05-01T12:00:00Z,3", "2026-05-01T12:00:01Z,x", "2026-05-01T12:00:02Z,4"]
     for end in ("\n", "\r\n", "\r"):
         assert [f.where for f in read(end.join([*rows, ""])).findings] == ["line 3"]
@@ -186,7 +186,7 @@ GILL = "laptop_time,raw_line\n" + "".join(
 )
 
 
-def test_a_sonics_own_status_and_unit_decide_what_is_used(read: Read) -> None:
+def test_a_sonics_own_status_and_unit_decide_what_is_used() -> None:
     log = read(GILL, zone="UTC")
     assert "gill-windsonic" in log.reasons[2]
     assert log.series.channels["wind_speed"][:2].tolist() == [2.74, 3.0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,11 +20,10 @@ from flagdata.ingest.anemometer.samples import rules, zero
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindLog, WindSeries
+from tests.flagdata.ingest.anemometer.conftest import made, read
 
 S = 1_000_000_000
 T0 = 1_777_636_800 * S
-Read = Callable[..., WindLog]
-Made = Callable[..., Reading]
 
 
 def kinds(found: Reading | WindLog) -> list[str]:
@@ -64,7 +63,7 @@ FREE: dict[str, tuple[np.ndarray, float, Mapping[str, object]]] = {
 
 
 @pytest.mark.parametrize("name", FREE)
-def test_what_chance_and_resolution_explain_is_not_stale(name: str, made: Made) -> None:
+def test_what_chance_and_resolution_explain_is_not_stale(name: str) -> None:
     speed, period, more = FREE[name]
     found = rules.stale(made(period * np.arange(len(speed)), speed, **more))
     assert flagged(found) == []
@@ -102,7 +101,7 @@ STALE: dict[str, tuple[np.ndarray, float, Mapping[str, object], range]] = {
 
 
 @pytest.mark.parametrize("name", STALE)
-def test_a_frozen_reading_is_stale_from_its_second_row(name: str, made: Made) -> None:
+def test_a_frozen_reading_is_stale_from_its_second_row(name: str) -> None:
     speed, period, more, rows = STALE[name]
     found = rules.stale(made(period * np.arange(len(speed)), speed, **more))
     assert flagged(found) == list(rows)
@@ -112,16 +111,14 @@ def test_a_frozen_reading_is_stale_from_its_second_row(name: str, made: Made) ->
     assert ("wind_speed and wind_direction" in found.findings[0].what) == ("wind_direction" in more)
 
 
-def test_calm_is_not_stale(made: Made) -> None:
+def test_calm_is_not_stale() -> None:
     calm = rules.dead_zone(made(np.arange(300), np.zeros(300)))
     assert kinds(calm) == ["dead-zone"]
     assert kinds(rules.stale(calm)) == ["dead-zone"]
 
 
 @pytest.mark.parametrize(("interval", "resolution"), [(1.0, 0.1), (1.0, 0.5), (60.0, 0.1), (600.0, 0.5), (0.05, 0.01)])
-def test_light_wind_of_the_night_is_not_stale_beside_the_gusts_of_the_day(
-    interval: float, resolution: float, made: Made
-) -> None:
+def test_light_wind_of_the_night_is_not_stale_beside_the_gusts_of_the_day(interval: float, resolution: float) -> None:
     """Gusts of 20 % with a memory of 5 s about a mean of 1.2 m/s at night and up to 5.2 m/s by day."""
     n = 20_000
     rho = np.exp(-interval / 5)
@@ -133,7 +130,7 @@ def test_light_wind_of_the_night_is_not_stale_beside_the_gusts_of_the_day(
     assert len(flagged(rules.stale(made(interval * np.arange(n), np.abs(speed))))) < 100
 
 
-def test_a_frozen_reading_is_stale_though_another_kind_of_wind_goes_on_between(made: Made) -> None:
+def test_a_frozen_reading_is_stale_though_another_kind_of_wind_goes_on_between() -> None:
     n = 2000
     both = np.full((2, 2 * n), np.nan)
     both[0, ::2], both[1, 1::2] = gusts(n), gusts(n) + 1
@@ -144,7 +141,7 @@ def test_a_frozen_reading_is_stale_though_another_kind_of_wind_goes_on_between(m
     assert [one.count for one in found.findings] == [99]
 
 
-def test_jitter_of_stamps_is_no_gap_and_a_dropout_is(made: Made) -> None:
+def test_jitter_of_stamps_is_no_gap_and_a_dropout_is() -> None:
     time = np.cumsum(stream(7, "jitter").uniform(0.004, 0.006, 2000))
     assert rules.gaps(made(time)).findings == ()
     time[1000:] += 0.433
@@ -155,7 +152,7 @@ def test_jitter_of_stamps_is_no_gap_and_a_dropout_is(made: Made) -> None:
     assert one.value == pytest.approx(2.0)
 
 
-def test_a_gap_names_its_interval_and_the_time_lost_in_it(made: Made) -> None:
+def test_a_gap_names_its_interval_and_the_time_lost_in_it() -> None:
     (gap,) = rules.gaps(made([0, 1, 2, 3, 11, 12, 13, 14])).findings
     assert gap.what == (
         "1 interval longer than the usual 1 s, 7.000 s lost in all; "
@@ -174,7 +171,7 @@ def test_a_gap_names_its_interval_and_the_time_lost_in_it(made: Made) -> None:
     ],
 )
 def test_a_direction_that_stays_while_the_speed_varies_is_reported(
-    speed: np.ndarray, direction: np.ndarray, says: str, made: Made
+    speed: np.ndarray, direction: np.ndarray, says: str
 ) -> None:
     found = rules.one_direction(made(60 * np.arange(len(speed)), speed, wind_direction=direction))
     assert kinds(found) == (["direction-stays"] if says else [])
@@ -198,12 +195,12 @@ def intense(mean: float, intensity: float) -> np.ndarray:
     ],
 )
 def test_a_speed_that_hardly_varies_is_reported_unless_it_is_calm_or_the_log_short(
-    mean: float, intensity: float, step: float, steady: bool, made: Made
+    mean: float, intensity: float, step: float, steady: bool
 ) -> None:
     assert kinds(rules.steady(made(step * np.arange(60), intense(mean, intensity)))) == ["steady-wind"] * steady
 
 
-def test_flutter_beside_the_nyquist_limit_is_flagged_with_its_alias_and_below_it_is_not(made: Made) -> None:
+def test_flutter_beside_the_nyquist_limit_is_flagged_with_its_alias_and_below_it_is_not() -> None:
     # at 60 frames a second 29.5 Hz cannot be distinguished from 60 - 29.5 = 30.5 Hz or 89.5 Hz
     own = QualityRules(frame_rate_of=("flutter_frequency",))
     frequency = np.where(np.arange(300) < 200, 6.0, 29.5)
@@ -214,7 +211,7 @@ def test_flutter_beside_the_nyquist_limit_is_flagged_with_its_alias_and_below_it
     assert not flagged(rules.at_nyquist(made(np.arange(200) / 30, flutter_frequency=below, rules=own)))
 
 
-def test_rows_after_today_are_reported_and_kept(made: Made) -> None:
+def test_rows_after_today_are_reported_and_kept() -> None:
     now = T0 + 3 * 86_400 * S
     found = rules.future(made([86_400, 3 * 86_400, 5 * 86_400]), now=now)
     assert [(one.kind, one.count, one.where) for one in found.findings] == [("stamps-in-future", 1, "line 4")]
@@ -234,7 +231,7 @@ def out_of_range(log: WindLog) -> list[tuple[int, str | None, str]]:
 
 
 @pytest.mark.parametrize("speed", ["1e30", "-1e30", "1e308", "151", "999.9"])
-def test_an_impossible_speed_is_flagged_reported_and_in_no_mean(read: Read, speed: str) -> None:
+def test_an_impossible_speed_is_flagged_reported_and_in_no_mean(speed: str) -> None:
     log = read(table("4,10,20,1013,50", f"{speed},10,20,1013,50", "5,10,20,1013,50", f"{speed},10,20,1013,50"))
     assert [bool(flag & SampleFlag.OUT_OF_RANGE) for flag in log.series.flags] == [False, True, False, True]
     ((count, where, what),) = out_of_range(log)
@@ -251,9 +248,7 @@ def test_an_impossible_speed_is_flagged_reported_and_in_no_mean(read: Read, spee
         ("4,10,20,1013,400", "relative_humidity"),
     ],
 )
-def test_an_impossible_direction_or_air_is_left_out_and_leaves_the_wind_usable(
-    read: Read, row: str, channel: str
-) -> None:
+def test_an_impossible_direction_or_air_is_left_out_and_leaves_the_wind_usable(row: str, channel: str) -> None:
     log = read(table("4,10,20,1013,50", row))
     assert np.isfinite(log.series.channels[channel]).tolist() == [True, False]
     ((count, where, what),) = out_of_range(log)
@@ -261,7 +256,7 @@ def test_an_impossible_direction_or_air_is_left_out_and_leaves_the_wind_usable(
     assert not log.series.flags.any()  # the speed beside it is as good as ever
 
 
-def test_signed_directions_and_full_circles_are_possible(read: Read) -> None:
+def test_signed_directions_and_full_circles_are_possible() -> None:
     log = read(table("4,-180,20,1013,50", "4,-90,20,1013,50", "4,360,20,1013,50"))
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([180, 270, 0])
     assert out_of_range(log) == []
@@ -289,7 +284,7 @@ name = "vane"
 
 @pytest.mark.parametrize(("vane", "turned"), [("rotation = 20", 10), ("offset = 45", 35)])
 def test_a_recipe_narrows_what_is_possible_and_turns_a_vane_past_north(
-    read: Read, tmp_path: Path, vane: str, turned: float
+    tmp_path: Path, vane: str, turned: float
 ) -> None:
     recipe = tmp_path / "vane.toml"
     recipe.write_text(RECIPE.format(vane=vane))
@@ -299,7 +294,7 @@ def test_a_recipe_narrows_what_is_possible_and_turns_a_vane_past_north(
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([turned] * 3)
 
 
-def test_an_impossible_angle_of_a_stream_is_left_out_and_reported(read: Read) -> None:
+def test_an_impossible_angle_of_a_stream_is_left_out_and_reported() -> None:
     bodies = (
         "GPZDA,120000.00,01,05,2026,00,00",
         *(f"WIMWV,{at},R,5.0,M,A" for at in ("010.0", "999.0", "010.0")),
@@ -320,7 +315,7 @@ def test_an_impossible_angle_of_a_stream_is_left_out_and_reported(read: Read) ->
         ("wind_speed", "-0.3", "200 out of range"),
     ],
 )
-def test_a_log_without_one_usable_wind_is_refused(read: Read, header: str, row: str, why: str) -> None:
+def test_a_log_without_one_usable_wind_is_refused(header: str, row: str, why: str) -> None:
     rows = "".join(f"2026-05-01T12:{i // 60:02d}:{i % 60:02d}Z,{row}\n" for i in range(200))
     with pytest.raises(
         InputError, match=rf"nothing to measure: not one value of the wind in 200 rows .*\({why}\)"
@@ -329,7 +324,7 @@ def test_a_log_without_one_usable_wind_is_refused(read: Read, header: str, row: 
     assert caught.value.fix
 
 
-def test_a_log_without_one_usable_wind_is_kept_for_what_else_it_measured(read: Read) -> None:
+def test_a_log_without_one_usable_wind_is_kept_for_what_else_it_measured() -> None:
     rows = "".join(f"2026-05-01T12:{i // 60:02d}:{i % 60:02d}Z,,{20 + i % 3}\n" for i in range(200))
     log = read(f"time,wind_speed,air_temperature\n{rows}")
     (finding,) = [f for f in log.findings if f.kind == "no-usable-wind"]
@@ -363,7 +358,7 @@ def test_what_is_no_calm_air_shows_no_zero_offset(name: str) -> None:
 
 
 @pytest.fixture
-def idle(made: Made) -> Reading:
+def idle() -> Reading:
     """20 s idle at -0.35 m/s, then gusts that begin 0.4 m/s above it; a hundred rows a second."""
     return made(0.01 * np.arange(4000), -0.35 + np.concatenate([np.zeros(2000), [0.4], gusts(1999)]))
 
@@ -404,19 +399,19 @@ def test_a_minute_of_calm_may_hide_anything_below_the_jump_out_of_it(idle: Readi
 
 
 @pytest.mark.parametrize("offset", [0.1, "estimate"])
-def test_a_zero_offset_of_what_has_no_speed_is_refused(read: Read, offset: float | str) -> None:
+def test_a_zero_offset_of_what_has_no_speed_is_refused(offset: float | str) -> None:
     head = '"TOA5","a"\r\n"TIMESTAMP","Ux","Uy"\r\n"TS","m/s","m/s"\r\n"","",""\r\n'
     with pytest.raises(UsageError, match="components"):
         read(head + '"2026-05-01 12:00:00",3,4\r\n', zone="UTC", zero_offset=offset)
 
 
-def test_an_azimuth_for_a_vane_is_refused(read: Read) -> None:
+def test_an_azimuth_for_a_vane_is_refused() -> None:
     text = "time,wind_speed,wind_direction\n2026-05-01T12:00:00Z,3,90\n"
     with pytest.raises(UsageError, match="rotation"):
         read(text, azimuth=1.0)
 
 
-def test_sonic_components_give_speed_and_direction(read: Read) -> None:
+def test_sonic_components_give_speed_and_direction() -> None:
     head = (
         '"TOA5","a","b","c","d","e","f","g"\r\n"TIMESTAMP","RECORD","Ux","Uy","Uz"\r\n'
         '"TS","RN","m/s","m/s","m/s"\r\n"","","","",""\r\n'

@@ -5,24 +5,18 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from functools import reduce
-from operator import xor
 from pathlib import Path
 
 import pytest
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest import Drafted, OpenFactsError, WindOptions, read_log
+from tests.flagdata.ingest.anemometer.cases import sentence
 
 Write = Callable[[str | bytes], Path]
 REFUSED, ASKED, SHOWN = "refused", "asked", "shown"
 REPORTED = "reported"
 """Read by the exact format that recognised it, with a finding about the very thing."""
-
-
-def sentence(text: str) -> str:
-    """A sentence of NMEA 0183 with its checksum."""
-    return f"${text}*{reduce(xor, text.encode(), 0):02X}"
 
 
 def rows(form: str, count: int = 30) -> str:

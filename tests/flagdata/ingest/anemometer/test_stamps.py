@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -17,8 +16,8 @@ from flagdata.ingest.anemometer.instants import dates
 from flagdata.ingest.anemometer.instants.dates import date_form
 from flagdata.ingest.anemometer.instants.stamps import parse
 from flagdata.ingest.anemometer.instants.zones import to_utc
-from flagdata.signals import WindLog
 from flagdata.timebase import wall_status
+from tests.flagdata.ingest.anemometer.conftest import read
 
 S = 1_000_000_000
 PLACE = ZoneInfo("Europe/Amsterdam")
@@ -346,7 +345,7 @@ def test_a_leap_day_is_of_a_leap_year_alone(form: str) -> None:
         completed(form, every(60, 48, start), start.date().replace(year=2023))
 
 
-def test_lines_of_an_instrument_after_dates_without_a_year(read: Callable[..., WindLog]) -> None:
+def test_lines_of_an_instrument_after_dates_without_a_year() -> None:
     text = "".join(f"{at:%b %d %H:%M:%S} $WIMWV,{k}.0,R,{3 + k % 2}.5,M,A\n" for k, at in enumerate(every(10, 20)))
     with pytest.raises(TimeError, match="--date YYYY-12-31"):
         read(text, zone="UTC")

@@ -15,18 +15,12 @@ from flagdata.ingest.anemometer.samples import rules
 from flagdata.lake import Lake
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
-from flagdata.signals import Sensor, WindLog
+from flagdata.signals import Sensor
+from tests.flagdata.ingest.anemometer.cases import sentence
+from tests.flagdata.ingest.anemometer.conftest import read
 
 S = 1_000_000_000
 T0 = 1_777_636_800 * S
-Read = Callable[..., WindLog]
-
-
-def sentence(body: str) -> str:
-    code = 0
-    for letter in body.encode():
-        code ^= letter
-    return f"${body}*{code:02X}"
 
 
 def burst_stream(seconds: range, speed: Callable[[int], float]) -> str:
@@ -79,7 +73,7 @@ def test_channels_that_share_rows_are_one_kind_whatever_is_missing() -> None:
     assert rows.tolist() == [0, 1, 2, 3]
 
 
-def test_an_apparent_wind_that_stays_at_zero_is_no_calm(read: Read) -> None:
+def test_an_apparent_wind_that_stays_at_zero_is_no_calm() -> None:
     text = burst_stream(range(300), lambda s: 0.0 if s >= 100 else 8.0 + s % 7)
     found = read(text)
     kinds = {f.what.split()[0]: f for f in found.findings if f.kind == "stays-at-zero"}
@@ -89,12 +83,12 @@ def test_an_apparent_wind_that_stays_at_zero_is_no_calm(read: Read) -> None:
     assert int(((found.series.flags & SampleFlag.STALE) != 0)[apparent].sum()) == 200
 
 
-def test_a_moment_of_calm_past_a_boat_is_left_alone(read: Read) -> None:
+def test_a_moment_of_calm_past_a_boat_is_left_alone() -> None:
     found = read(burst_stream(range(300), lambda s: 0.0 if 100 <= s < 130 else 8.0 + s % 7))
     assert "stays-at-zero" not in [f.kind for f in found.findings]
 
 
-def test_a_mast_whose_log_never_reads_anything_but_zero_is_reported(read: Read) -> None:
+def test_a_mast_whose_log_never_reads_anything_but_zero_is_reported() -> None:
     rows = "".join(f"2026-05-01T12:{i // 60:02d}:{i % 60:02d}Z,{{}}\n" for i in range(200))
     zero = read("time,wind_speed\n" + rows.format(*["0.0"] * 200))
     assert [f.count for f in zero.findings if f.kind == "stays-at-zero"] == [200]
@@ -114,14 +108,14 @@ def track(metres: float, n: int = 120) -> str:
     )
 
 
-def test_a_table_from_a_platform_given_as_moving_holds_apparent_wind(read: Read) -> None:
+def test_a_table_from_a_platform_given_as_moving_holds_apparent_wind() -> None:
     found = read("time,wind_speed\n2026-05-01T12:00:00Z,3\n2026-05-01T12:00:01Z,4\n", platform="moving")
     assert found.series.channels["apparent_wind_speed"].tolist() == [3.0, 4.0]
     assert "wind_speed" not in found.series.channels
     assert "apparent-wind-only" in [f.kind for f in found.findings]
 
 
-def test_positions_that_move_make_a_tables_wind_apparent(read: Read) -> None:
+def test_positions_that_move_make_a_tables_wind_apparent() -> None:
     found = read(track(2000))
     assert "wind_speed" not in found.series.channels
     (finding,) = [f for f in found.findings if f.kind == "apparent-wind-only"]
@@ -129,11 +123,11 @@ def test_positions_that_move_make_a_tables_wind_apparent(read: Read) -> None:
     assert "over 1785 m" in finding.what
 
 
-def test_positions_that_only_scatter_are_those_of_a_mast(read: Read) -> None:
+def test_positions_that_only_scatter_are_those_of_a_mast() -> None:
     assert "wind_speed" in read(track(20)).series.channels
 
 
-def test_a_platform_given_as_fixed_may_not_move(read: Read) -> None:
+def test_a_platform_given_as_fixed_may_not_move() -> None:
     assert "fixed-platform" in [f.kind for f in read(track(20), platform="fixed").findings]
     with pytest.raises(InputError, match="--platform moving"):
         read(track(2000), platform="fixed")
@@ -145,14 +139,14 @@ TOA5 = (
 )
 
 
-def test_every_format_takes_a_platform(read: Read) -> None:
+def test_every_format_takes_a_platform() -> None:
     rows = "".join(f'"2026-05-01 12:{i:02d}:00",{i},{3 + i % 4}\n' for i in range(30))
     found = read(TOA5 + rows, platform="moving", zone="UTC")
     assert found.format == "toa5"
     assert "apparent_wind_speed" in found.series.channels
 
 
-def test_wind_over_ground_from_a_platform_that_moves_is_taken_by_its_users_word(read: Read) -> None:
+def test_wind_over_ground_from_a_platform_that_moves_is_taken_by_its_users_word() -> None:
     log = read(track(2000), platform="corrected")
     assert "wind_speed" in log.series.channels
     assert "computed-true-wind" in [finding.kind for finding in log.findings]

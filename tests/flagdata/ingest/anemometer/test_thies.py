@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import UsageError
-from flagdata.signals import WindLog
+from tests.flagdata.ingest.anemometer.conftest import read
 
-Read = Callable[..., WindLog]
 SPEEDS = [2.0 + at % 7 / 10 for at in range(30)]
 FORMS = {
     "VD": "{speed:04.1f} {away:03d}",
@@ -36,7 +35,7 @@ def bodies(form: str) -> list[str]:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_each_fixed_telegram_is_read_behind_a_stamp(read: Read, form: str) -> None:
+def test_each_fixed_telegram_is_read_behind_a_stamp(form: str) -> None:
     parsed = read(log(bodies(form)), zone="UTC", unit=None if form == "V4DT" else "m/s")
     assert "malformed-lines" not in {finding.kind for finding in parsed.findings}
     found = parsed.series.channels
@@ -47,13 +46,13 @@ def test_each_fixed_telegram_is_read_behind_a_stamp(read: Read, form: str) -> No
         np.testing.assert_allclose(found["sonic_temperature"], 294.65)
 
 
-def test_frames_that_were_lost_or_written_out_are_not_needed(read: Read) -> None:
+def test_frames_that_were_lost_or_written_out_are_not_needed() -> None:
     for frame in (lambda body: framed(body)[1:-2], lambda body: f"<STX>{framed(body)[1:-2]}<ETX>"):
         found = read(log(bodies("VDT"), frame=frame), zone="UTC", unit="m/s").series.channels
         np.testing.assert_allclose(found["wind_speed"], SPEEDS)
 
 
-def test_a_wrong_checksum_is_left_out_and_no_value_is_none(read: Read) -> None:
+def test_a_wrong_checksum_is_left_out_and_no_value_is_none() -> None:
     telegrams = [*bodies("VDT")[:9], "FF.F FFF +FF.F 01", *bodies("VDT")[10:]]
     found = read(log(telegrams).replace(" 204 ", " 304 "), zone="UTC", unit="m/s")
     assert len(found.series) == 29
@@ -61,7 +60,7 @@ def test_a_wrong_checksum_is_left_out_and_no_value_is_none(read: Read) -> None:
     assert {"checksum-errors", "missing-values"} <= {finding.kind for finding in found.findings}
 
 
-def test_a_unit_is_asked_for_where_the_telegrams_state_none_and_refused_where_they_do(read: Read) -> None:
+def test_a_unit_is_asked_for_where_the_telegrams_state_none_and_refused_where_they_do() -> None:
     with pytest.raises(UsageError, match="state no unit") as caught:
         read(log(bodies("VDT")), zone="UTC")
     assert "--unit" in (caught.value.fix or "")
@@ -69,6 +68,6 @@ def test_a_unit_is_asked_for_where_the_telegrams_state_none_and_refused_where_th
         read(log(bodies("V4DT")), zone="UTC", unit="m/s")
 
 
-def test_without_stamps_the_rate_and_the_start_are_asked_for_and_taken(read: Read) -> None:
+def test_without_stamps_the_rate_and_the_start_are_asked_for_and_taken() -> None:
     found = read(log(bodies("VD"), stamped=False), unit="m/s", rate=1.0, start=1_777_636_800_000_000_000)
     assert np.diff(found.series.time).tolist() == [10**9] * 29

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
 from flagdata.schema import SampleFlag
-from flagdata.signals import WindLog
-
-Read = Callable[..., WindLog]
+from tests.flagdata.ingest.anemometer.conftest import read
 
 
 def table(columns: Sequence[tuple[str, str, str]], rows: Sequence[Sequence[object]], *, rate: int = 1) -> str:
@@ -51,22 +49,20 @@ WS = ("WS_ms_Avg", "meters/second", "Avg")
         ("Press", "kPa", "air_pressure", 101.3, 101_300),
     ],
 )
-def test_usual_column_names_find_their_channel(
-    read: Read, name: str, unit: str, channel: str, value: float, si: float
-) -> None:
+def test_usual_column_names_find_their_channel(name: str, unit: str, channel: str, value: float, si: float) -> None:
     columns = [(name, unit, "Smp")] if channel == "wind_speed" else [WS, (name, unit, "Smp")]
     log = read(table(columns, [[5, value][-len(columns) :]] * 3), zone="UTC")
     assert log.series.channels[channel] == pytest.approx([si] * 3)
 
 
-def test_columns_that_are_not_read_are_listed_with_their_units(read: Read) -> None:
+def test_columns_that_are_not_read_are_listed_with_their_units() -> None:
     log = read(table([WS, ("SlrW_Avg", "W/m^2", "Avg"), ("BattV", "Volts", "Min")], [[3, 500, 12.6]] * 2), zone="UTC")
     found = next(f for f in log.findings if f.kind == "columns-not-read")
     assert found.what == "SlrW_Avg [W/m^2], BattV [Volts]"
 
 
 @pytest.mark.parametrize(("processing", "averaging"), [("Smp", 0.0), ("Avg", 1.0), ("WVc", 1.0), ("Max", None)])
-def test_the_header_says_how_long_the_logger_averages(read: Read, processing: str, averaging: float | None) -> None:
+def test_the_header_says_how_long_the_logger_averages(processing: str, averaging: float | None) -> None:
     log = read(table([("WS_ms", "m/s", processing)], [[3 + i % 3] for i in range(10)]), zone="UTC")
     assert log.series.sensor.averaging == averaging
 
@@ -78,31 +74,31 @@ def csat(words: Sequence[int]) -> str:
     return table(U, [[1.5 + 0.1 * (i % 7), 0.3, 0.1, word] for i, word in enumerate(words)], rate=20)
 
 
-def test_the_csat3s_counter_is_no_fault(read: Read) -> None:
+def test_the_csat3s_counter_is_no_fault() -> None:
     # bits 0 to 5 count measurements, 0 to 63 and round again
     log = read(csat([i % 64 for i in range(200)]), zone="UTC")
     assert not log.series.flags.any()
 
 
 @pytest.mark.parametrize("bit", [12, 13, 14, 15])
-def test_each_warning_bit_of_the_csat3_is_a_fault(read: Read, bit: int) -> None:
+def test_each_warning_bit_of_the_csat3_is_a_fault(bit: int) -> None:
     log = read(csat([(i % 64) | (1 << bit if i == 100 else 0) for i in range(200)]), zone="UTC")
     assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [100]
 
 
-def test_a_diagnostic_that_does_not_count_is_a_fault_wherever_it_is_not_zero(read: Read) -> None:
+def test_a_diagnostic_that_does_not_count_is_a_fault_wherever_it_is_not_zero() -> None:
     log = read(csat([0, 0, 4, 0, 61_503, 0]), zone="UTC")
     assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [2, 4]
 
 
-def test_records_show_what_the_stamps_alone_would_hide(read: Read) -> None:
+def test_records_show_what_the_stamps_alone_would_hide() -> None:
     text = table([("WS_ms", "m/s", "Smp")], [[3 + i % 3] for i in range(10)]).replace(",7,4", ",9,4")
     log = read(text, zone="UTC")
     lost = next(f for f in log.findings if f.kind == "records-lost")
     assert (lost.count, lost.where) == (2, "line 12")
 
 
-def test_a_direction_that_was_averaged_as_a_number_is_a_warning(read: Read) -> None:
+def test_a_direction_that_was_averaged_as_a_number_is_a_warning() -> None:
     rows = [(3 + at % 7 / 10, (350 + at) % 360) for at in range(30)]
     warned = {
         how: "direction-mean-of-numbers"

@@ -13,8 +13,8 @@ import pytest
 from flagdata.errors import FlagdataError, UsageError
 from flagdata.ingest import WindOptions, read_log
 from flagdata.signals import WindLog
+from tests.flagdata.ingest.anemometer.conftest import read
 
-Read = Callable[..., WindLog]
 Write = Callable[[str], Path]
 _START = 1_777_636_800 * 10**9
 """2026-05-01T12:00:00Z."""
@@ -29,7 +29,7 @@ def sentence(text: str) -> str:
 
 
 @pytest.mark.parametrize("decimal", [".", ","])
-def test_rows_of_a_table_are_counted_from_the_start_at_the_rate(read: Read, decimal: str) -> None:
+def test_rows_of_a_table_are_counted_from_the_start_at_the_rate(decimal: str) -> None:
     rows = "".join(f"{7.2 + at};{180 + at}\n".replace(".", decimal) for at in range(8))
     log = read(f"Wind speed (km/h);Direction\n{rows}", start=_START, rate=4.0)
     assert since_start(log) == [at / 4 for at in range(8)]
@@ -38,7 +38,7 @@ def test_rows_of_a_table_are_counted_from_the_start_at_the_rate(read: Read, deci
     assert [finding.kind for finding in log.findings if "as given" in finding.what] == ["rate-given"]
 
 
-def test_sentences_of_the_most_frequent_wind_tick_and_the_others_come_with_them(read: Read) -> None:
+def test_sentences_of_the_most_frequent_wind_tick_and_the_others_come_with_them() -> None:
     rows = "".join(sentence(f"WIMWV,{100 + at}.0,R,{4 + at}.0,N,A") + sentence("YXXDR,C,16.0,C,T") for at in range(6))
     log = read(rows, start=_START, rate=2.0, platform="fixed", azimuth=0.0)
     assert since_start(log) == [at / 2 for at in range(6)]
@@ -74,7 +74,7 @@ def test_options_without_a_rate_keep_their_hash() -> None:
     assert WindOptions(rate=2.0, start=_START).as_dict()["rate"] == 2.0
 
 
-def test_generated_stamps_give_no_finding(read: Read) -> None:
+def test_generated_stamps_give_no_finding() -> None:
     kinds = [f"$IIVWR,{80 + at},L,5.{at},N,,,,\n$IIVWT,{70 + at},L,4.{at},N,,,,\n" for at in range(6)]
     log = read("".join(kinds), start=_START, rate=1.0)
     assert since_start(log) == [at / 2 for at in range(12)]
@@ -86,6 +86,6 @@ def test_generated_stamps_give_no_finding(read: Read) -> None:
     assert said["counted-together"].count == 6
 
 
-def test_lines_of_an_instrument_are_on_the_clock_that_was_given(read: Read) -> None:
+def test_lines_of_an_instrument_are_on_the_clock_that_was_given() -> None:
     log = read("".join(f"Q,{at:03d},00{at}.10,M,00,\n" for at in range(6)), start=_START, rate=1.0)
     assert "they carry no time of their own: they are on the clock that was given" in log.reasons

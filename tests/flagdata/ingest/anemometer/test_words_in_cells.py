@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import reduce
-from operator import xor
-
 import numpy as np
 import pytest
 
 from flagdata.schema import SampleFlag
-from flagdata.signals import WindLog
+from tests.flagdata.ingest.anemometer.cases import sentence
+from tests.flagdata.ingest.anemometer.conftest import read
 
-Read = Callable[..., WindLog]
 N = 60
 
 
@@ -23,7 +19,7 @@ def rows(cells: list[str]) -> str:
 @pytest.mark.parametrize(
     ("cell", "unit", "limit"), [("<0.3", "m/s", 0.3), ("< 0.5", "m/s", 0.5), ("<1.8", "km/h", 0.5)]
 )
-def test_a_speed_below_the_threshold_is_zero_and_flagged(read: Read, cell: str, unit: str, limit: float) -> None:
+def test_a_speed_below_the_threshold_is_zero_and_flagged(cell: str, unit: str, limit: float) -> None:
     text = rows([cell if at % 20 == 5 else f"{4 + at % 7 / 10:.1f}" for at in range(N)])
     log = read(text, columns=f"time,wind_speed[{unit}]")
     still = [5, 25, 45]
@@ -35,12 +31,8 @@ def test_a_speed_below_the_threshold_is_zero_and_flagged(read: Read, cell: str, 
     assert said.value == pytest.approx(limit)
 
 
-def ft(body: str) -> str:
-    return f"${body}*{reduce(xor, body.encode(), 0):02X}"
-
-
-def test_sentences_of_an_ft_sensor_with_a_fault_are_flagged_and_damaged_ones_are_left_out(read: Read) -> None:
-    sentences = [ft(f"WI,WVP=00{4 + at % 5}.4,21{at % 9},{int(at == 7)}") for at in range(30)]
+def test_sentences_of_an_ft_sensor_with_a_fault_are_flagged_and_damaged_ones_are_left_out() -> None:
+    sentences = [sentence(f"WI,WVP=00{4 + at % 5}.4,21{at % 9},{int(at == 7)}") for at in range(30)]
     sentences[9] = sentences[9][:-2] + "00"
     lines = (f"2026-05-01T12:00:{at:02d}Z {sentence}\n" for at, sentence in enumerate(sentences))
     log = read("".join(lines))

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 
 from flagdata.signals import WindLog
-
-Read = Callable[..., WindLog]
+from tests.flagdata.ingest.anemometer.conftest import read
 
 
 def reported(log: WindLog, kind: str) -> list[str]:
@@ -16,7 +13,7 @@ def reported(log: WindLog, kind: str) -> list[str]:
 
 
 @pytest.mark.parametrize(("receiver", "said"), [("171300", "19.5 h behind"), ("124130", "")])
-def test_a_receiver_whose_time_differs_is_reported(read: Read, receiver: str, said: str) -> None:
+def test_a_receiver_whose_time_differs_is_reported(receiver: str, said: str) -> None:
     day = "010924" if said else "020924"
     lines = "".join(
         f"2024-09-02T12:41:3{at}.168+00:00 $IIMWV,032,R,03.{at},N,A\n"

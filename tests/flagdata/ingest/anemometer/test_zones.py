@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 
 from flagdata.ingest.anemometer.instants.zones import stated_zone
 from flagdata.signals import WindLog
-
-Read = Callable[..., WindLog]
+from tests.flagdata.ingest.anemometer.conftest import read
 
 _NRG = (
     "SymphoniePRO Desktop Application\tVersion 3\nTime Zone: UTC-05:00\nChannel: 1\nDescription: cup\n\n"
@@ -50,7 +47,7 @@ def test_what_names_no_zone_or_two_states_none(text: str) -> None:
     assert stated_zone(text.split("\n")) is None
 
 
-def test_a_zone_that_contradicts_the_preamble_is_reported_by_every_reader(read: Read) -> None:
+def test_a_zone_that_contradicts_the_preamble_is_reported_by_every_reader() -> None:
     for name in ("nrg", "delimited"):
         log = read(_NRG, format=name, zone="+01:00")
         found = [finding for finding in log.findings if finding.kind == "zone-contradicts"]

@@ -34,76 +34,52 @@ def number_of(image: UInt8Array) -> int:
     return sum(int(image[middle[bit // 6], middle[bit % 6]] > 128) << bit for bit in range(18))
 
 
-@pytest.fixture(name="numbered", scope="session")
-def numbered_fixture() -> Callable[[int], UInt8Array]:
-    return numbered
+PLAIN = CameraOptions(start=START, size=SIDE)
+"""Options under which the numbered pictures come out one to one."""
 
 
-@pytest.fixture(name="number_of", scope="session")
-def number_of_fixture() -> Callable[[UInt8Array], int]:
-    return number_of
-
-
-@pytest.fixture(scope="session")
-def start() -> int:
-    return START
-
-
-@pytest.fixture(scope="session")
-def plain() -> CameraOptions:
-    """Options under which the numbered pictures come out one to one."""
-    return CameraOptions(start=START, size=SIDE)
-
-
-@pytest.fixture(scope="session")
-def write_video() -> Callable[..., Path]:
+def write_video(
+    path: Path,
+    stamps: Sequence[int],
+    *,
+    tick: Fraction = Fraction(1, 1000),
+    codec: str = "libx264",
+    container: str | None = None,
+    pixel_format: str = "yuv420p",
+    encoder: dict[str, str] | None = None,
+    muxer: dict[str, str] | None = None,
+    metadata: dict[str, str] | None = None,
+    rotation: int | None = None,
+    aspect: Fraction | None = None,
+    picture: Callable[[int], UInt8Array] = numbered,
+    rate: int | Fraction = 25,
+) -> Path:
     """Writes a file of numbered frames, one for each of `stamps` (in units of `tick`)."""
-
-    def write(
-        path: Path,
-        stamps: Sequence[int],
-        *,
-        tick: Fraction = Fraction(1, 1000),
-        codec: str = "libx264",
-        container: str | None = None,
-        pixel_format: str = "yuv420p",
-        encoder: dict[str, str] | None = None,
-        muxer: dict[str, str] | None = None,
-        metadata: dict[str, str] | None = None,
-        rotation: int | None = None,
-        aspect: Fraction | None = None,
-        picture: Callable[[int], UInt8Array] = numbered,
-        rate: int | Fraction = 25,
-    ) -> Path:
-        with av.open(str(path), "w", format=container, options=muxer or {}) as out:
-            out.metadata.update(metadata or {})
-            first = picture(0)
-            stream = out.add_stream(codec, rate=rate)
-            stream.width, stream.height = first.shape[1], first.shape[0]
-            stream.pix_fmt = pixel_format
-            stream.codec_context.time_base = tick
-            stream.codec_context.thread_count = 1
-            if encoder is None and codec == "libx264":
-                encoder = {"preset": "ultrafast", "crf": "12"}
-            stream.options = encoder or {}
-            if rotation is not None:
-                stream.set_display_rotation(rotation)
-            if aspect is not None:
-                stream.codec_context.sample_aspect_ratio = aspect
-            for number, stamp in enumerate(stamps):
-                frame = av.VideoFrame.from_ndarray(picture(number), format="gray").reformat(
-                    format=pixel_format, threads=1
-                )
-                frame.pts, frame.time_base = stamp, tick
-                out.mux(stream.encode(frame))
-            out.mux(stream.encode())
-        return path
-
-    return write
+    with av.open(str(path), "w", format=container, options=muxer or {}) as out:
+        out.metadata.update(metadata or {})
+        first = picture(0)
+        stream = out.add_stream(codec, rate=rate)
+        stream.width, stream.height = first.shape[1], first.shape[0]
+        stream.pix_fmt = pixel_format
+        stream.codec_context.time_base = tick
+        stream.codec_context.thread_count = 1
+        if encoder is None and codec == "libx264":
+            encoder = {"preset": "ultrafast", "crf": "12"}
+        stream.options = encoder or {}
+        if rotation is not None:
+            stream.set_display_rotation(rotation)
+        if aspect is not None:
+            stream.codec_context.sample_aspect_ratio = aspect
+        for number, stamp in enumerate(stamps):
+            frame = av.VideoFrame.from_ndarray(picture(number), format="gray").reformat(format=pixel_format, threads=1)
+            frame.pts, frame.time_base = stamp, tick
+            out.mux(stream.encode(frame))
+        out.mux(stream.encode())
+    return path
 
 
 @pytest.fixture(scope="session")
-def cfr60(tmp_path_factory: pytest.TempPathFactory, write_video: Callable[..., Path]) -> Path:
+def cfr60(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two seconds of H.264 at 60 Hz in MP4, without B-frames, a key frame every 12."""
     path = tmp_path_factory.mktemp("cfr") / "cfr60.mp4"
     return write_video(

@@ -18,6 +18,7 @@ from flagdata.ingest import CameraIngest, CameraOptions, ingest_camera, open_cam
 from flagdata.ingest.camera.joined import in_order
 from flagdata.lake import Lake
 from flagdata.timebase import parse
+from tests.flagdata.ingest.camera.conftest import write_video
 
 CREATED = "2026-05-01T10:00:00.000000Z"
 TEN = parse(CREATED)
@@ -25,7 +26,7 @@ SECOND = 1_000_000_000
 
 
 @pytest.fixture
-def film(tmp_path: Path, write_video: Callable[..., Path]) -> Callable[..., Path]:
+def film(tmp_path: Path) -> Callable[..., Path]:
     """Writes a film at 25 Hz of some frames and creation time under a name."""
 
     def write(name: str, frames: int, created: str = CREATED) -> Path:
@@ -190,7 +191,7 @@ def test_only_video_files_are_joined_whichever_comes_first(tmp_path: Path, film:
     ],
 )
 def test_chapters_of_other_kinds_are_not_joined_and_the_difference_is_named(
-    change: dict[str, Any], what: str, tmp_path: Path, write_video: Callable[..., Path]
+    change: dict[str, Any], what: str, tmp_path: Path
 ) -> None:
     plain: dict[str, Any] = {"tick": Fraction(1, 25), "container": "mp4"}
     first = write_video(tmp_path / "a.mp4", range(10), **plain)

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from flagdata.findings import Severity
-from flagdata.ingest import CameraOptions, propose_crop
+from flagdata.ingest import propose_crop
 from flagdata.ingest.camera.clock import Counter, restart
+from tests.flagdata.ingest.camera.conftest import PLAIN, START, number_of, write_video
 from tests.flagdata.ingest.camera.reading import grid_of, read
 
 TICK = Fraction(1, 90_000)
@@ -33,7 +34,7 @@ def counted(stamps: list[int | None], *, length: int | None = FULL, tick: Fracti
 
 
 @pytest.fixture
-def take(tmp_path: Path, write_video: Callable[..., Path]) -> Callable[..., Path]:
+def take(tmp_path: Path) -> Callable[..., Path]:
     """Writes a transport stream of numbered frames whose clock begins at some time [s]."""
 
     def write(seconds: float, frames: int) -> Path:
@@ -52,18 +53,13 @@ def take(tmp_path: Path, write_video: Callable[..., Path]) -> Callable[..., Path
 # Seconds at which the second take's clock begins; the first one's runs from 5000 s on for 0.8 s.
 @pytest.mark.parametrize("second", [4000, 4998, 0])
 def test_a_clock_that_starts_anew_ends_the_recording_and_is_no_wrap(
-    second: int,
-    tmp_path: Path,
-    take: Callable[..., Path],
-    plain: CameraOptions,
-    number_of: Callable[..., int],
-    start: int,
+    second: int, tmp_path: Path, take: Callable[..., Path]
 ) -> None:
     joined = tmp_path / "joined.ts"
     joined.write_bytes(take(5000, 20).read_bytes() + take(second, 12).read_bytes())
-    info, frames, found = read(joined, plain)
+    info, frames, found = read(joined, PLAIN)
     assert [number_of(f.image) for f in frames] == list(range(20))
-    assert grid_of(frames, start) == list(range(20))
+    assert grid_of(frames, START) == list(range(20))
     assert info.duration == pytest.approx(19 * 0.04)
     reset = found["clock-reset"]
     assert (reset.severity, reset.where, reset.count) == (Severity.ERROR, "frame 20", 12)
@@ -74,22 +70,20 @@ def test_a_clock_that_starts_anew_ends_the_recording_and_is_no_wrap(
 
 
 def test_frames_of_the_second_clock_stay_out_when_it_passes_the_first(
-    tmp_path: Path, take: Callable[..., Path], plain: CameraOptions, number_of: Callable[..., int]
+    tmp_path: Path, take: Callable[..., Path]
 ) -> None:
     # The second clock begins 2 s before the first one's end and runs for 3 s.
     joined = tmp_path / "joined.ts"
     joined.write_bytes(take(100, 20).read_bytes() + take(98.8, 75).read_bytes())
-    _, frames, found = read(joined, plain)
+    _, frames, found = read(joined, PLAIN)
     assert [number_of(f.image) for f in frames] == list(range(20))
     assert found["clock-reset"].count == 75
 
 
-def test_a_wrap_within_reordered_frames_runs_on(
-    take: Callable[..., Path], plain: CameraOptions, number_of: Callable[..., int], start: int
-) -> None:
-    _, frames, found = read(take((FULL - 10 * PERIOD) / 90_000, 20), plain)
+def test_a_wrap_within_reordered_frames_runs_on(take: Callable[..., Path]) -> None:
+    _, frames, found = read(take((FULL - 10 * PERIOD) / 90_000, 20), PLAIN)
     assert [number_of(f.image) for f in frames] == list(range(20))
-    assert grid_of(frames, start) == list(range(20))
+    assert grid_of(frames, START) == list(range(20))
     assert not set(found) & {"clock-reset", "frames-missing", "stamps-disordered"}
 
 

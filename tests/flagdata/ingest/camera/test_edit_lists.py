@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest import CameraOptions, open_camera
+from flagdata.ingest import open_camera
 from flagdata.ingest.camera.boxes import boxes
+from tests.flagdata.ingest.camera.conftest import PLAIN, START, number_of, write_video
 from tests.flagdata.ingest.camera.reading import MS, read
 
 FRAMES = 100
@@ -52,7 +51,7 @@ def edited(path: Path, entries: list[Entry], *, wide: bool = False) -> Path:
 
 
 @pytest.fixture(params=["mp4", "mov"])
-def film(request: pytest.FixtureRequest, tmp_path: Path, write_video: Callable[..., Path]) -> Path:
+def film(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     encoder = {"preset": "veryfast", "bf": "2", "g": "12"}
     return write_video(
         tmp_path / "film", range(FRAMES), tick=Fraction(1, 50), rate=50, container=request.param, encoder=encoder
@@ -73,17 +72,11 @@ def film(request: pytest.FixtureRequest, tmp_path: Path, write_video: Callable[.
 )
 @pytest.mark.parametrize("wide", [False, True])
 def test_each_frame_of_an_edited_film_comes_once_at_its_time_and_the_edits_are_reported(
-    entries: list[Entry],
-    says: str,
-    wide: bool,
-    film: Path,
-    plain: CameraOptions,
-    number_of: Callable[[np.ndarray], int],
-    start: int,
+    entries: list[Entry], says: str, wide: bool, film: Path
 ) -> None:
-    _, frames, found = read(edited(film, entries, wide=wide), replace(plain, rate="native"))
+    _, frames, found = read(edited(film, entries, wide=wide), replace(PLAIN, rate="native"))
     assert [number_of(f.image) for f in frames] == list(range(FRAMES))
-    assert [f.time - start for f in frames] == [k * 20 * MS for k in range(FRAMES)]
+    assert [f.time - START for f in frames] == [k * 20 * MS for k in range(FRAMES)]
     assert says in found["edit-list-passed-over"].what
     assert not found.keys() & {"frames-not-shown", "frames-missing", "stamps-duplicate", "frames-undecoded"}
 
@@ -97,33 +90,26 @@ def test_each_frame_of_an_edited_film_comes_once_at_its_time_and_the_edits_are_r
     ],
 )
 def test_a_film_that_is_trimmed_or_begins_later_is_shown_as_its_edit_list_says(
-    entries: list[Entry],
-    shown: range,
-    film: Path,
-    plain: CameraOptions,
-    number_of: Callable[[np.ndarray], int],
-    start: int,
+    entries: list[Entry], shown: range, film: Path
 ) -> None:
-    _, frames, found = read(edited(film, entries), replace(plain, rate="native"))
+    _, frames, found = read(edited(film, entries), replace(PLAIN, rate="native"))
     numbers = [number_of(f.image) for f in frames]
     # FFmpeg may keep a frame or two about the ends of what is shown.
     assert abs(numbers[0] - shown[0]) <= 2
     assert abs(numbers[-1] - shown[-1]) <= 2
     assert numbers == list(range(numbers[0], numbers[-1] + 1))
-    assert [f.time - start for f in frames] == [k * 20 * MS for k in range(len(frames))]
+    assert [f.time - START for f in frames] == [k * 20 * MS for k in range(len(frames))]
     assert "edit-list-passed-over" not in found
     assert ("frames-not-shown" in found) == (len(frames) < FRAMES)
 
 
-def test_a_film_of_which_the_edit_list_shows_nothing_is_refused_with_a_remedy(film: Path, plain: CameraOptions) -> None:
+def test_a_film_of_which_the_edit_list_shows_nothing_is_refused_with_a_remedy(film: Path) -> None:
     with pytest.raises(InputError, match="shows none of its 100 frames") as refused:
-        open_camera(edited(film, [(0.0, 0.0, 1.0)]), plain)
+        open_camera(edited(film, [(0.0, 0.0, 1.0)]), PLAIN)
     assert "-ignore_editlist 1" in refused.value.fix
 
 
-def test_a_phones_slow_motion_is_reported_with_its_rate_which_works(
-    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, start: int
-) -> None:
+def test_a_phones_slow_motion_is_reported_with_its_rate_which_works(tmp_path: Path) -> None:
     stated = {"com.android.capture.fps": "240.000000"}
     film = write_video(
         tmp_path / "slow.mp4",
@@ -134,12 +120,12 @@ def test_a_phones_slow_motion_is_reported_with_its_rate_which_works(
         metadata=stated,
         muxer={"movflags": "use_metadata_tags"},
     )
-    options = replace(plain, rate="native")
+    options = replace(PLAIN, rate="native")
     finding = read(film, options)[2]["capture-rate"]
     assert (finding.value, finding.fix) == (240, "give the camera's rate: --true-fps 240")
     _, frames, found = read(film, replace(options, true_fps=240.0))
     assert "capture-rate" not in found
-    assert frames[-1].time - start == round(59e9 / 240)
+    assert frames[-1].time - START == round(59e9 / 240)
     stated["com.android.capture.fps"] = "29.97"
     usual = write_video(
         tmp_path / "usual.mp4",

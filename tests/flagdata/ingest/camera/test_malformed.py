@@ -7,7 +7,6 @@ import struct
 import wave
 import zipfile
 import zlib
-from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise, product
@@ -25,6 +24,7 @@ from flagdata.ingest.camera import Limits
 from flagdata.ingest.camera.boxes import top
 from flagdata.ingest.camera.sequence import heads
 from flagdata.signals import Frame
+from tests.flagdata.ingest.camera.conftest import PLAIN, START, number_of, numbered, write_video
 
 FRAMES = 50
 # name → container, codec, encoder options, muxer options
@@ -39,9 +39,7 @@ BASES = {
 
 
 @pytest.fixture(scope="module")
-def bases(
-    tmp_path_factory: pytest.TempPathFactory, write_video: Callable[..., Path], numbered: Callable[..., np.ndarray]
-) -> dict[str, bytes]:
+def bases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     grain = np.random.default_rng(3)
 
     def grainy(picture: np.ndarray) -> np.ndarray:
@@ -85,13 +83,11 @@ def marked(findings: tuple[Finding, ...]) -> bool:
     return any(f.severity is not Severity.NOTE for f in findings)
 
 
-def test_a_file_cut_anywhere_is_refused_or_kept_and_marked(
-    bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions, number_of: Callable[..., int], start: int
-) -> None:
+def test_a_file_cut_anywhere_is_refused_or_kept_and_marked(bases: dict[str, bytes], tmp_path: Path) -> None:
     path = tmp_path / "cut"
     for base, share in product(BASES, (0.0005, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99)):
         path.write_bytes(bases[base][: int(len(bases[base]) * share)])
-        outcome = kept_or_refused(path, plain)
+        outcome = kept_or_refused(path, PLAIN)
         if isinstance(outcome, FlagdataError):
             # Only the head of a file, or an MP4 without its index, leaves nothing to keep.
             assert share <= 0.1 or base in ("mp4", "faststart"), (base, share)
@@ -99,17 +95,15 @@ def test_a_file_cut_anywhere_is_refused_or_kept_and_marked(
         frames, findings = outcome
         # What was kept is right: each picture is the one whose time it carries, to within its stated error. The last
         # may be the torn one.
-        off = [abs(number_of(f.image) * 0.04 - (f.time - start) / 1e9) - f.stamp_error for f in frames]
+        off = [abs(number_of(f.image) * 0.04 - (f.time - START) / 1e9) - f.stamp_error for f in frames]
         assert max(off[:-1], default=0) < 1e-6, (base, share)
         assert marked(findings) or len(frames) == FRAMES, (base, share)
 
 
-def test_an_mp4_without_index_says_that_it_was_not_closed(
-    bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
-) -> None:
+def test_an_mp4_without_index_says_that_it_was_not_closed(bases: dict[str, bytes], tmp_path: Path) -> None:
     path = tmp_path / "unclosed.mp4"
     path.write_bytes(bases["mp4"][: len(bases["mp4"]) // 2])
-    outcome = kept_or_refused(path, plain)
+    outcome = kept_or_refused(path, PLAIN)
     assert isinstance(outcome, InputError)
     assert "moov" in outcome.fix
 
@@ -118,12 +112,7 @@ def test_an_mp4_without_index_says_that_it_was_not_closed(
     "movflags", ["frag_keyframe", "frag_keyframe+empty_moov+default_base_moof", "dash+frag_keyframe+global_sidx"]
 )
 def test_of_a_fragmented_film_cut_in_any_box_all_whole_fragments_are_kept_and_the_cut_is_reported(
-    movflags: str,
-    tmp_path: Path,
-    plain: CameraOptions,
-    write_video: Callable[..., Path],
-    number_of: Callable[..., int],
-    start: int,
+    movflags: str, tmp_path: Path
 ) -> None:
     whole = write_video(
         tmp_path / "whole.mp4",
@@ -142,37 +131,31 @@ def test_of_a_fragmented_film_cut_in_any_box_all_whole_fragments_are_kept_and_th
         middle = (box.at + box.end) // 2
         for cut in (box.at + 3, box.body, middle, box.end - 1, *([box.end] if box.kind == b"moof" else [])):
             path.write_bytes(data[:cut])
-            outcome = kept_or_refused(path, replace(plain, rate="native"))
+            outcome = kept_or_refused(path, replace(PLAIN, rate="native"))
             assert not isinstance(outcome, FlagdataError), (box, cut, outcome)
             frames, findings = outcome
             numbers = [number_of(frame.image) for frame in frames]
             # Within a fragment that is cut, what comes before the cut may be shown with traces of it.
             assert numbers[:complete] == list(range(complete)), (box, cut)
-            assert [(frame.time - start) // 40_000_000 for frame in frames[:complete]] == numbers[:complete]
+            assert [(frame.time - START) // 40_000_000 for frame in frames[:complete]] == numbers[:complete]
             assert "truncated" in {finding.kind for finding in findings}, (box, cut)
 
 
 @pytest.mark.parametrize("movflags", ["frag_keyframe", "frag_keyframe+empty_moov", "faststart", "empty_moov"])
-def test_a_film_cut_before_its_first_frame_is_refused_with_what_is_missing(
-    movflags: str, tmp_path: Path, plain: CameraOptions, write_video: Callable[..., Path]
-) -> None:
+def test_a_film_cut_before_its_first_frame_is_refused_with_what_is_missing(movflags: str, tmp_path: Path) -> None:
     whole = write_video(tmp_path / "whole.mp4", range(20), tick=Fraction(1, 25), muxer={"movflags": movflags})
     data, path = whole.read_bytes(), tmp_path / "cut.mp4"
     end = next(box.at for box in top(whole)[0] if box.kind == b"mdat") + 40
     for cut in range(10, end, 17):
         path.write_bytes(data[:cut])
-        outcome = kept_or_refused(path, plain)
+        outcome = kept_or_refused(path, PLAIN)
         assert isinstance(outcome, FlagdataError)
         assert "moov" in outcome.fix or "copy it from the camera again" in outcome.fix, (cut, outcome)
 
 
 @pytest.mark.parametrize("container", ["matroska", "webm", "mov", "avi", "mpegts"])
 def test_a_film_with_sound_that_is_cut_is_reported_as_cut_where_frames_are_missing(
-    container: str,
-    tmp_path: Path,
-    plain: CameraOptions,
-    numbered: Callable[..., np.ndarray],
-    number_of: Callable[..., int],
+    container: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "sound"
     codecs = {"webm": ("libvpx", "libopus")}.get(container, ("mpeg4", "mp2"))
@@ -193,14 +176,14 @@ def test_a_film_with_sound_that_is_cut_is_reported_as_cut_where_frames_are_missi
         out.mux(picture.encode())
         out.mux(sound.encode())
     data = path.read_bytes()
-    whole = kept_or_refused(path, plain)
+    whole = kept_or_refused(path, PLAIN)
     assert not isinstance(whole, FlagdataError)
     assert len(whole[0]) == FRAMES
     assert "truncated" not in {finding.kind for finding in whole[1]}
     for share in (0.3, 0.5, 0.7, 0.9):
         # A transport stream that is cut between its packets of 188 bytes betrays nothing.
         path.write_bytes(data[: int(len(data) * share) // 188 * 188 + 94])
-        outcome = kept_or_refused(path, plain)
+        outcome = kept_or_refused(path, PLAIN)
         assert not isinstance(outcome, FlagdataError)
         numbers = [number_of(frame.image) for frame in outcome[0]]
         assert numbers == sorted(set(numbers))
@@ -208,9 +191,7 @@ def test_a_film_with_sound_that_is_cut_is_reported_as_cut_where_frames_are_missi
         assert "truncated" in {finding.kind for finding in outcome[1]}
 
 
-def test_flipped_bytes_anywhere_never_end_in_a_traceback(
-    bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
-) -> None:
+def test_flipped_bytes_anywhere_never_end_in_a_traceback(bases: dict[str, bytes], tmp_path: Path) -> None:
     for data, seed in product(bases.values(), range(6)):
         random = np.random.default_rng(seed)
         flipped = bytearray(data)
@@ -220,19 +201,17 @@ def test_flipped_bytes_anywhere_never_end_in_a_traceback(
         for place in np.concatenate([random.integers(0, size, 10), heads, tails]):
             flipped[place] ^= int(random.integers(1, 256))
         (tmp_path / "flipped").write_bytes(flipped)
-        kept_or_refused(tmp_path / "flipped", plain)
+        kept_or_refused(tmp_path / "flipped", PLAIN)
 
 
-def test_a_hole_in_the_middle_is_refused_or_marked(
-    bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
-) -> None:
+def test_a_hole_in_the_middle_is_refused_or_marked(bases: dict[str, bytes], tmp_path: Path) -> None:
     unmarked = []
     for base, data in bases.items():
         a, b = int(len(data) * 0.4), int(len(data) * 0.5)
         noise = np.random.default_rng(1).bytes(b - a)
         for hole, middle in {"zeros": bytes(b - a), "noise": noise, "removed": b"", "repeated": data[a:b] * 2}.items():
             (tmp_path / "hole").write_bytes(data[:a] + middle + data[b:])
-            outcome = kept_or_refused(tmp_path / "hole", plain)
+            outcome = kept_or_refused(tmp_path / "hole", PLAIN)
             if not isinstance(outcome, FlagdataError) and not marked(outcome[1]):
                 unmarked.append((base, hole))
     assert unmarked == []
@@ -291,28 +270,26 @@ OTHER = {
 }
 
 
-def test_what_is_no_video_is_refused_with_the_way_out(tmp_path: Path, plain: CameraOptions) -> None:
+def test_what_is_no_video_is_refused_with_the_way_out(tmp_path: Path) -> None:
     path = tmp_path / "a.mp4"
     for name, data in OTHER.items():
         path.write_bytes(data)
-        outcome = kept_or_refused(path, plain)
+        outcome = kept_or_refused(path, PLAIN)
         assert isinstance(outcome, InputError | LimitError), name
         assert outcome.fix, name
         with pytest.raises(FlagdataError):
             probe(path)
 
 
-def test_one_frame_without_a_rate_is_kept(tmp_path: Path, plain: CameraOptions) -> None:
+def test_one_frame_without_a_rate_is_kept(tmp_path: Path) -> None:
     """It needs none."""
     path = tmp_path / "a.mp4"
     path.write_bytes(b"YUV4MPEG2 W16 H16 F0:0 C420\nFRAME\n" + bytes(384))
-    outcome = kept_or_refused(path, plain)
+    outcome = kept_or_refused(path, PLAIN)
     assert isinstance(outcome, FlagdataError) or len(outcome[0]) == 1
 
 
-def test_frames_beyond_the_limit_are_refused_by_the_header(
-    bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
-) -> None:
+def test_frames_beyond_the_limit_are_refused_by_the_header(bases: dict[str, bytes], tmp_path: Path) -> None:
     path = tmp_path / "a.mp4"
     path.write_bytes(bases["mp4"])
     for limits, word in (
@@ -321,11 +298,11 @@ def test_frames_beyond_the_limit_are_refused_by_the_header(
         (Limits(total_pixels=49 * 96 * 96), "in all"),
         (Limits(duration=1.9), "limit of 2 s"),
     ):
-        outcome = kept_or_refused(path, replace(plain, limits=limits))
+        outcome = kept_or_refused(path, replace(PLAIN, limits=limits))
         assert isinstance(outcome, LimitError)
         assert word in outcome.what
     exact = Limits(frame_pixels=96 * 96, frames=50, total_pixels=50 * 96 * 96, duration=1.97)
-    assert not isinstance(kept_or_refused(path, replace(plain, limits=exact)), FlagdataError)
+    assert not isinstance(kept_or_refused(path, replace(PLAIN, limits=exact)), FlagdataError)
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:
@@ -338,10 +315,8 @@ def _bomb(width: int, height: int) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", header) + _chunk(b"IDAT", zlib.compress(bytes(1 << 20)))
 
 
-def test_a_small_png_of_absurd_size_is_refused_by_its_header_also_later_in_a_sequence(
-    tmp_path: Path, plain: CameraOptions, numbered: Callable[..., np.ndarray]
-) -> None:
-    timed = replace(plain, sequence_fps=25.0)
+def test_a_small_png_of_absurd_size_is_refused_by_its_header_also_later_in_a_sequence(tmp_path: Path) -> None:
+    timed = replace(PLAIN, sequence_fps=25.0)
     for width, height in ((30_000, 30_000), (100_000, 1000), (2**31 - 1, 1), (10_000, 9_000)):
         (tmp_path / "0001.png").write_bytes(_bomb(width, height) + _chunk(b"IEND", b""))
         assert isinstance(kept_or_refused(tmp_path, timed), LimitError), (width, height)
@@ -350,18 +325,16 @@ def test_a_small_png_of_absurd_size_is_refused_by_its_header_also_later_in_a_seq
     assert isinstance(kept_or_refused(tmp_path, timed), LimitError)
 
 
-def test_an_animated_picture_of_absurd_size_is_refused(tmp_path: Path, plain: CameraOptions) -> None:
+def test_an_animated_picture_of_absurd_size_is_refused(tmp_path: Path) -> None:
     frame = b"\x21\xf9\x04\x00\x0a\x00\x00\x00\x2c" + struct.pack("<HHHHB", 0, 0, 60_000, 60_000, 0)
     body = frame + b"\x02\x02\x4c\x01\x00"
     data = b"GIF89a" + struct.pack("<HHBBB", 60_000, 60_000, 0x80, 0, 0) + bytes(6) + body * 20 + b"\x3b"
     path = tmp_path / "bomb.gif"
     path.write_bytes(data)
-    assert isinstance(kept_or_refused(path, plain), LimitError)
+    assert isinstance(kept_or_refused(path, PLAIN), LimitError)
 
 
-def test_an_mp4_with_a_wrong_frame_count_or_duration_costs_nothing(
-    bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
-) -> None:
+def test_an_mp4_with_a_wrong_frame_count_or_duration_costs_nothing(bases: dict[str, bytes], tmp_path: Path) -> None:
     data = bases["faststart"]
     # stts: version, entries = 1, (count, delta); 50 frames of some delta.
     at = data.index(b"stts") + 8
@@ -370,15 +343,15 @@ def test_an_mp4_with_a_wrong_frame_count_or_duration_costs_nothing(
     for name, entry in (("many", (0xFFFFFFFF, delta)), ("slow", (count, 0x7FFFFFFF)), ("still", (count, 0))):
         path = tmp_path / f"{name}.mp4"
         path.write_bytes(data[: at + 4] + struct.pack(">II", *entry) + data[at + 12 :])
-        outcome = kept_or_refused(path, plain)
+        outcome = kept_or_refused(path, PLAIN)
         # However far apart the frames claim to be, the instants between them are not filled with copies.
         assert isinstance(outcome, LimitError) or len(outcome[0]) <= 6 * FRAMES, name
 
 
 @pytest.mark.parametrize("name", ["", "nothing.mp4", "\x00", "a" * 5000])
-def test_paths_that_lead_nowhere_are_not_found(name: str, tmp_path: Path, plain: CameraOptions) -> None:
+def test_paths_that_lead_nowhere_are_not_found(name: str, tmp_path: Path) -> None:
     with pytest.raises((NotFoundError, InputError)):
-        open_camera(Path(f"{tmp_path}/{name}"), plain)
+        open_camera(Path(f"{tmp_path}/{name}"), PLAIN)
 
 
 @pytest.mark.parametrize("form", ["TIFF", "PNG", "WEBP", "BMP", "GIF"])

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+
+from tests.flagdata.ingest.camera.conftest import write_video
 
 SCRIPT = """
 import resource, sys
@@ -19,7 +20,7 @@ print(count, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
-def test_memory_does_not_grow_with_the_length(tmp_path: Path, write_video: Callable[..., Path]) -> None:
+def test_memory_does_not_grow_with_the_length(tmp_path: Path) -> None:
     noise = np.random.default_rng(2).integers(0, 256, (480, 640), dtype=np.uint8)
 
     def peak(frames: int) -> tuple[int, int]:

@@ -15,6 +15,7 @@ from PIL import Image
 
 from flagdata.errors import RefusedError
 from flagdata.ingest import CameraOptions, CropBox, open_camera, parse_crop, propose_crop
+from tests.flagdata.ingest.camera.conftest import PLAIN, write_video
 
 WIDE, HIGH = 384, 216
 
@@ -46,7 +47,7 @@ def scene(
 
 
 @pytest.fixture
-def film(tmp_path: Path, write_video: Callable[..., Path]) -> Callable[..., Path]:
+def film(tmp_path: Path) -> Callable[..., Path]:
     def write(name: str, picture: Callable[[int], np.ndarray], *, frames: int = 300) -> Path:
         return write_video(
             tmp_path / name,
@@ -121,15 +122,15 @@ def test_the_picture_shows_the_image_the_motion_and_the_box(film: Callable[..., 
     assert yellow.sum() > 500
 
 
-def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[..., Path], plain: CameraOptions) -> None:
+def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[..., Path]) -> None:
     path = film("flag.mp4", lambda n: scene(n, flag=(200, 60, 80)), frames=100)
-    with open_camera(path, replace(plain, crop="auto")) as stream:
+    with open_camera(path, replace(PLAIN, crop="auto")) as stream:
         frames = list(stream)
         assert stream.proposal is not None
         assert stream.info.crop == stream.proposal.box.as_tuple() == propose_crop(path).box.as_tuple()
         assert {f.kind for f in stream.findings} >= {"crop-proposed"}
     assert len(frames) == 100
-    with open_camera(path, plain) as stream:
+    with open_camera(path, PLAIN) as stream:
         assert stream.proposal is None
 
 
@@ -144,11 +145,11 @@ def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[...,
     ids=["tip", "corner", "whole flag", "elsewhere"],
 )
 def test_a_crop_that_cuts_through_what_moves_is_reported_with_the_edges(
-    crop: str, edges: dict[str, int], film: Callable[..., Path], plain: CameraOptions
+    crop: str, edges: dict[str, int], film: Callable[..., Path]
 ) -> None:
     """The flag is from 200 to 280 px across and from 60 to 140 px down; blur and compression widen it by a few."""
     path = film("flag.mp4", lambda n: scene(n, flag=(200, 60, 80)), frames=60)
-    with open_camera(path, replace(plain, crop=parse_crop(crop))) as stream:
+    with open_camera(path, replace(PLAIN, crop=parse_crop(crop))) as stream:
         found = [finding for finding in stream.findings if finding.kind == "crop-cuts-motion"]
         assert len(list(stream)) == 60
     assert len(found) == bool(edges)
@@ -167,9 +168,7 @@ def test_a_single_frame_shows_no_motion(film: Callable[..., Path]) -> None:
         propose_crop(film("one.mp4", lambda n: scene(n, flag=(200, 60, 80)), frames=1))
 
 
-def test_a_stream_that_cannot_seek_is_sampled_from_its_beginning(
-    tmp_path: Path, write_video: Callable[..., Path]
-) -> None:
+def test_a_stream_that_cannot_seek_is_sampled_from_its_beginning(tmp_path: Path) -> None:
     flag = (200, 60, 80)
     path = write_video(
         tmp_path / "raw.h264",

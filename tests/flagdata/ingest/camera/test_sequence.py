@@ -12,12 +12,13 @@ from PIL import Image
 
 from flagdata.errors import InputError, TimeError
 from flagdata.ingest import CameraOptions, open_camera
+from tests.flagdata.ingest.camera.conftest import PLAIN, START, number_of, numbered
 from tests.flagdata.ingest.camera.reading import read
 
 
 @pytest.fixture
-def options(plain: CameraOptions) -> CameraOptions:
-    return replace(plain, sequence_fps=50.0)
+def options() -> CameraOptions:
+    return replace(PLAIN, sequence_fps=50.0)
 
 
 def save(folder: Path, names: dict[int, str], numbered: Callable[..., np.ndarray], *, mode: str = "L") -> Path:
@@ -44,13 +45,7 @@ def save(folder: Path, names: dict[int, str], numbered: Callable[..., np.ndarray
     ],
 )
 def test_images_are_taken_by_number_at_the_given_rate(
-    suffix: str,
-    mode: str,
-    tmp_path: Path,
-    options: CameraOptions,
-    numbered: Callable[..., np.ndarray],
-    number_of: Callable[..., int],
-    start: int,
+    suffix: str, mode: str, tmp_path: Path, options: CameraOptions
 ) -> None:
     folder = tmp_path / "images"
     folder.mkdir()
@@ -62,25 +57,21 @@ def test_images_are_taken_by_number_at_the_given_rate(
         image.save(folder / f"img_{number}.{suffix}", **({"quality": 95} if suffix == "jpg" else {}))
     info, frames, found = read(folder, options)
     assert [number_of(f.image) for f in frames] == [0, 2, 4, 6, 8, 10]
-    assert [f.time - start for f in frames] == [i * 40_000_000 for i in range(6)]
+    assert [f.time - START for f in frames] == [i * 40_000_000 for i in range(6)]
     assert (info.container, info.container_rate) == ("image-sequence", 50.0)
     assert ("alpha-ignored" in found) == (mode in ("RGBA", "LA"))
     if suffix != "jpg" and mode != "1":
         assert np.array_equal(frames[1].image, numbered(2))
 
 
-def test_a_missing_number_is_a_missing_frame(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray], number_of: Callable[..., int]
-) -> None:
+def test_a_missing_number_is_a_missing_frame(tmp_path: Path, options: CameraOptions) -> None:
     names = {n: f"f{n:04d}.png" for n in [*range(100, 105), *range(108, 112)]}
     _, frames, found = read(save(tmp_path / "gap", names, numbered), replace(options, sequence_fps=25.0))
     assert [number_of(f.image) for f in frames] == [100, 101, 102, 103, 104, 108, 109, 110, 111]
     assert found["frames-missing"].count == 3
 
 
-def test_numbers_in_steps_of_ten_are_frames_one_after_the_other(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
-) -> None:
+def test_numbers_in_steps_of_ten_are_frames_one_after_the_other(tmp_path: Path, options: CameraOptions) -> None:
     names = {n: f"f{n * 10:04d}.png" for n in range(5)}
     info, frames, found = read(save(tmp_path / "tens", names, numbered), replace(options, sequence_fps=25.0))
     assert len(frames) == 5
@@ -88,24 +79,20 @@ def test_numbers_in_steps_of_ten_are_frames_one_after_the_other(
     assert info.duration == pytest.approx(0.16)
 
 
-def test_names_without_numbers_follow_by_name_and_say_so(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray], number_of: Callable[..., int]
-) -> None:
+def test_names_without_numbers_follow_by_name_and_say_so(tmp_path: Path, options: CameraOptions) -> None:
     names = {0: "a.png", 1: "b.png", 2: "c.png"}
     _, frames, found = read(save(tmp_path / "names", names, numbered), replace(options, sequence_fps=25.0))
     assert [number_of(f.image) for f in frames] == [0, 1, 2]
     assert "order-by-name" in found
 
 
-def test_no_rate_is_guessed(tmp_path: Path, plain: CameraOptions, numbered: Callable[..., np.ndarray]) -> None:
+def test_no_rate_is_guessed(tmp_path: Path) -> None:
     folder = save(tmp_path / "images", {0: "0.png", 1: "1.png"}, numbered)
     with pytest.raises(TimeError, match="no time stamps"):
-        open_camera(folder, plain)
+        open_camera(folder, PLAIN)
 
 
-def test_an_unreadable_image_in_the_middle_is_left_out_and_counted(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray], number_of: Callable[..., int]
-) -> None:
+def test_an_unreadable_image_in_the_middle_is_left_out_and_counted(tmp_path: Path, options: CameraOptions) -> None:
     folder = save(tmp_path / "images", {n: f"{n}.png" for n in range(6)}, numbered)
     data = (folder / "3.png").read_bytes()
     (folder / "3.png").write_bytes(data[: len(data) // 2])
@@ -117,13 +104,7 @@ def test_an_unreadable_image_in_the_middle_is_left_out_and_counted(
     assert found["size-changed"].count == 1
 
 
-def test_exif_turns_and_dates_a_photograph(
-    tmp_path: Path,
-    options: CameraOptions,
-    numbered: Callable[..., np.ndarray],
-    number_of: Callable[..., int],
-    start: int,
-) -> None:
+def test_exif_turns_and_dates_a_photograph(tmp_path: Path, options: CameraOptions) -> None:
     folder = tmp_path / "photos"
     folder.mkdir()
     for number in range(3):
@@ -134,7 +115,7 @@ def test_exif_turns_and_dates_a_photograph(
         Image.fromarray(np.ascontiguousarray(stored)).save(folder / f"p{number}.jpg", exif=exif, quality=95)
     info, frames, _ = read(folder, replace(options, start=None, sequence_fps=25.0))
     assert [number_of(f.image) for f in frames] == [0, 1, 2]
-    assert (info.start, info.rotation) == (start + 250_000_000, 90)
+    assert (info.start, info.rotation) == (START + 250_000_000, 90)
 
 
 @pytest.mark.parametrize("content", [{}, {"notes.txt": b"x"}, {"a.png": b""}, {"a.png": b"\x89PNG\r\n\x1a\n"}])
@@ -147,16 +128,14 @@ def test_a_folder_without_a_readable_image_is_refused(
         open_camera(tmp_path, options)
 
 
-def test_two_kinds_of_images_in_one_folder_are_refused(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
-) -> None:
+def test_two_kinds_of_images_in_one_folder_are_refused(tmp_path: Path, options: CameraOptions) -> None:
     folder = save(tmp_path / "mixed", {0: "0.png", 1: "1.jpg"}, numbered)
     with pytest.raises(InputError, match="several kinds"):
         open_camera(folder, options)
 
 
 def test_notes_of_an_operating_system_are_no_images_and_change_neither_order_nor_count(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray], number_of: Callable[..., int]
+    tmp_path: Path, options: CameraOptions
 ) -> None:
     folder = save(tmp_path / "images", {n: f"f_{n}.png" for n in range(14)}, numbered)
     for name in (*(f"._f_{n}.png" for n in range(14)), ".DS_Store", "Thumbs.db", "desktop.ini", "._f_0.jpg"):
@@ -169,27 +148,18 @@ def test_notes_of_an_operating_system_are_no_images_and_change_neither_order_nor
 
 
 @pytest.mark.parametrize("odd", [0, 5, 11])
-def test_an_image_of_another_size_is_left_out_wherever_it_is(
-    odd: int,
-    tmp_path: Path,
-    options: CameraOptions,
-    numbered: Callable[..., np.ndarray],
-    number_of: Callable[..., int],
-    start: int,
-) -> None:
+def test_an_image_of_another_size_is_left_out_wherever_it_is(odd: int, tmp_path: Path, options: CameraOptions) -> None:
     folder = save(tmp_path / "images", {n: f"{n}.png" for n in range(12)}, numbered)
     Image.fromarray(np.zeros((40, 30), dtype=np.uint8)).save(folder / f"{odd}.png")
     _, frames, found = read(folder, replace(options, rate="native"))
     kept = [n for n in range(12) if n != odd]
     assert [number_of(f.image) for f in frames] == kept
-    assert [(f.time - start) // 20_000_000 for f in frames] == kept
+    assert [(f.time - START) // 20_000_000 for f in frames] == kept
     assert found["size-changed"].count == 1
     assert "than most" in found["size-changed"].what
 
 
-def test_as_many_images_of_one_size_as_of_another_are_refused(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
-) -> None:
+def test_as_many_images_of_one_size_as_of_another_are_refused(tmp_path: Path, options: CameraOptions) -> None:
     folder = save(tmp_path / "images", {n: f"{n}.png" for n in range(4)}, numbered)
     for n in (0, 2):
         Image.fromarray(np.zeros((40, 30), dtype=np.uint8)).save(folder / f"{n}.png")
@@ -201,9 +171,7 @@ def test_as_many_images_of_one_size_as_of_another_are_refused(
 
 
 @pytest.mark.parametrize("mode", ["RGBA", "LA", "P"])
-def test_transparency_of_any_image_is_reported(
-    mode: str, tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
-) -> None:
+def test_transparency_of_any_image_is_reported(mode: str, tmp_path: Path, options: CameraOptions) -> None:
     folder = save(tmp_path / "images", {n: f"{n}.png" for n in range(6)}, numbered)
     palette = {"transparency": b"\x00\xff"} if mode == "P" else {}
     Image.fromarray(numbered(4)).convert(mode).save(folder / "4.png", **palette)
@@ -212,9 +180,7 @@ def test_transparency_of_any_image_is_reported(
     assert np.array_equal(frames[4].image, numbered(4))
 
 
-def test_gray_of_fewer_bits_than_it_is_stored_in_shows_and_says_so(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray], number_of: Callable[..., int]
-) -> None:
+def test_gray_of_fewer_bits_than_it_is_stored_in_shows_and_says_so(tmp_path: Path, options: CameraOptions) -> None:
     for bits, suffix in ((10, "png"), (12, "tif"), (12, "png"), (14, "png"), (16, "png")):
         folder = tmp_path / f"{bits}{suffix}"
         folder.mkdir()
@@ -227,7 +193,7 @@ def test_gray_of_fewer_bits_than_it_is_stored_in_shows_and_says_so(
 
 
 def test_an_image_that_is_to_be_turned_otherwise_than_the_rest_is_upright_and_reported(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
+    tmp_path: Path, options: CameraOptions
 ) -> None:
     turned = {1: 0, 6: 1, 3: 2, 8: 3}  # Exif's number → quarter turns anticlockwise of the stored picture
     for most in (1, 6):
@@ -245,9 +211,7 @@ def test_an_image_that_is_to_be_turned_otherwise_than_the_rest_is_upright_and_re
         assert found["orientation-changed"].count == len(values) - values.count(most)
 
 
-def test_pages_behind_the_first_are_reported_as_not_read(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
-) -> None:
+def test_pages_behind_the_first_are_reported_as_not_read(tmp_path: Path, options: CameraOptions) -> None:
     for suffix in ("tif", "png", "webp"):
         folder = tmp_path / suffix
         folder.mkdir()
@@ -258,9 +222,7 @@ def test_pages_behind_the_first_are_reported_as_not_read(
         assert read(folder, options)[2]["pages-not-read"].count == 2
 
 
-def test_images_of_other_formats_are_named_in_the_refusal(
-    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
-) -> None:
+def test_images_of_other_formats_are_named_in_the_refusal(tmp_path: Path, options: CameraOptions) -> None:
     for n in range(3):
         (tmp_path / f"{n}.heic").write_bytes(b"heic")
     with pytest.raises(InputError, match=r"3 of \.heic") as refused:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flagdata.ingest import CameraOptions
+from tests.flagdata.ingest.camera.conftest import PLAIN, number_of, numbered
 from tests.flagdata.ingest.camera.reading import read
 
 FRAMES = 8
@@ -37,13 +36,7 @@ FRAMES = 8
     ],
 )
 def test_a_film_with_transparency_is_read_below_it_and_says_so(
-    name: str,
-    codec: str,
-    pixels: str,
-    tmp_path: Path,
-    plain: CameraOptions,
-    numbered: Callable[..., np.ndarray],
-    number_of: Callable[..., int],
+    name: str, codec: str, pixels: str, tmp_path: Path
 ) -> None:
     path, clear = tmp_path / name, "a" in pixels
     with av.open(str(path), "w") as out:
@@ -62,14 +55,12 @@ def test_a_film_with_transparency_is_read_below_it_and_says_so(
             frame.pts, frame.time_base = k, Fraction(1, 25)
             out.mux(stream.encode(frame))
         out.mux(stream.encode())
-    _, frames, found = read(path, replace(plain, rate="native"))
+    _, frames, found = read(path, replace(PLAIN, rate="native"))
     assert [number_of(frame.image) for frame in frames] == list(range(FRAMES))
     assert ("alpha-ignored" in found) == clear
 
 
-def test_a_palettes_transparency_is_transparency(
-    tmp_path: Path, plain: CameraOptions, numbered: Callable[..., np.ndarray]
-) -> None:
+def test_a_palettes_transparency_is_transparency(tmp_path: Path) -> None:
     for transparent in (False, True):
         path = tmp_path / f"{transparent}.avi"
         pictures = tmp_path / f"{transparent}.png"
@@ -83,5 +74,5 @@ def test_a_palettes_transparency_is_transparency(
                 packet.pts = packet.dts = k
                 packet.time_base, packet.stream, packet.is_keyframe = Fraction(1, 25), stream, True
                 out.mux(packet)
-        found = read(path, replace(plain, rate="native"))[2]
+        found = read(path, replace(PLAIN, rate="native"))[2]
         assert ("alpha-ignored" in found) == transparent

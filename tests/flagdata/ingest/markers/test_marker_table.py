@@ -114,13 +114,11 @@ def test_a_chunk_lost_from_the_store_does_not_pass_for_markers_lost(table: Path,
         read_markers(path)
 
 
-def test_the_command_identifies_marker_tables_by_their_columns(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-):
+def test_the_command_identifies_marker_tables_by_their_columns(table: Path, tmp_path: Path):
     assert is_marker_table(table)
     assert not is_marker_table(_written(tmp_path, "time,wind_speed", "0,3"))
     lake = Lake.create(tmp_path / "lake")
-    ended = invoke(capsys, "ingest", table, "--lake", lake.path, "--json")
+    ended = invoke("ingest", table, "--lake", lake.path, "--json")
     assert ended.code == 0
     (entry,) = ended.document["results"]
     assert entry["report"]["kind"] == "markers"

@@ -17,8 +17,8 @@ from tests.program import Run, invoke
 
 
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    return lambda *arguments: invoke(capsys, "ingest", *arguments, "--lake", lake.path)
+def run(lake: Lake) -> Run:
+    return lambda *arguments: invoke("ingest", *arguments, "--lake", lake.path)
 
 
 def test_a_folder_becomes_one_artifact_once(lake: Lake, make_folder: Callable[..., Path]) -> None:
