@@ -168,8 +168,8 @@ class LazyGroup(click.Group):
         if cmd_name not in self.verbs:
             return None
         module, _, attribute = self.verbs[cmd_name][0].partition(":")
-        found = getattr(import_module(module), attribute)
-        return getattr(found, "command", found)
+        verb = getattr(import_module(module), attribute)
+        return verb if isinstance(verb, click.Command) else verb.command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -6,17 +6,18 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from flagdata.errors import CorruptError
+from flagdata.errors import CorruptError, InputError
 
 SIZE_LIMIT = 64 << 20
 """Longest text that is parsed [characters]; a cloth model's mesh is in its recipe. Lists within a list take most memory
 for their length, 30 bytes a character: 2 GB at most."""
 NESTING_LIMIT = 100
 """Most tables and lists within one another."""
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 _DEEP_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{NESTING_LIMIT}}}", re.MULTILINE)
 
@@ -50,16 +51,38 @@ def to_toml(content: Mapping[str, Any], *, inside: str = "") -> str:
 
     Args:
         inside: the table's own name, with a dot behind it.
+
+    Raises:
+        InputError: a value that TOML has no form for.
     """
     tables = {key: value for key, value in content.items() if isinstance(value, Mapping)}
     lists = {key: value for key, value in content.items() if _are_tables(value)}
     plain = {key: value for key, value in content.items() if key not in {*tables, *lists}}
-    # JSON writes these as TOML does.
-    parts = ["".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in plain.items())]
-    parts += [f"\n[{inside}{key}]\n{to_toml(value, inside=f'{inside}{key}.')}" for key, value in tables.items()]
+    parts = ["".join(f"{_toml_key(key)} = {_toml_value(value)}\n" for key, value in plain.items())]
+    for key, value in tables.items():
+        path = f"{inside}{_toml_key(key)}"
+        parts.append(f"\n[{path}]\n{to_toml(value, inside=f'{path}.')}")
     for key, value in lists.items():
-        parts += [f"\n[[{inside}{key}]]\n{to_toml(inner_table, inside=f'{inside}{key}.')}" for inner_table in value]
+        path = f"{inside}{_toml_key(key)}"
+        parts += [f"\n[[{path}]]\n{to_toml(inner_table, inside=f'{path}.')}" for inner_table in value]
     return "".join(parts)
+
+
+def _toml_key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else _toml_value(key)
+
+
+def _toml_value(value: Any) -> str:
+    """Writes a value as JSON does where TOML has the same form, and a number that is not finite as TOML does."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")  # which JSON does not escape
+    if isinstance(value, bool | int | float):
+        return json.dumps(value)
+    if isinstance(value, Sequence):
+        return f"[{', '.join(map(_toml_value, value))}]"
+    raise InputError(f"{value!r} has no form in TOML", where="recipe", fix="give numbers, texts, lists or tables")
 
 
 def _are_tables(value: Any) -> bool:

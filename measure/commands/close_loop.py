@@ -14,7 +14,7 @@ from flagdata.console import LocalPath, document, echo, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.option_types import POSITIVE
 from flagdata.options import AsJson, argument, command, option, options, typed
-from flagdata.shared_options import NamedLake, OnBranch
+from flagdata.shared_options import WRITTEN, NamedLake, OnBranch
 from measure.closing.command_line import TEST, nulls_given, refuse, stage_bars
 from measure.closing.findings import with_warnings
 from measure.cloth.command_line import JudgingFilms, refuse_of_others
@@ -38,6 +38,12 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
     """How recordings of one cloth are read and judged, and what is written."""
 
     sources: tuple[str, ...] = argument("Recordings of one cloth.", "SOURCE...", default=())
+    verbose: bool = option(
+        "Print all that was weighed, the errors before and after, and what was assumed; by default the conclusion "
+        "alone.",
+        default=False,
+        section=WRITTEN,
+    )
     draft: Path | None = option(
         "Write a recipe of the cloth and the recordings as the command line states them, to be completed, and judge "
         "nothing.",
@@ -172,7 +178,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     from measure.closing.artifacts import answer_of
     from measure.closing.close import close_loop as close
     from measure.closing.models import models
-    from measure.closing.output import FILES, JOINT, KINDS, deliver, deliver_joint
+    from measure.closing.output import FILES, JOINT, KINDS, Delivery, deliver, deliver_joint
     from measure.closing.sources import read
     from measure.cloth.sources import films_among
     from measure.forecasting.strengths import Suspicion, on_markers
@@ -216,6 +222,8 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         _draft(chosen, tracked, lake)
         return
 
+    delivery = Delivery(out=out, lake=lake, branch=branch, as_json=chosen.as_json, verbose=chosen.verbose)
+
     def of_markers(level: float | None) -> tuple[VerdictAnswer, Material]:
         """Returns the answer by markers, and the cloth's nominal material."""
         null_options = nulls_given(recipe, chosen, level=level)
@@ -256,7 +264,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
 
     if not two_kinds:
         answer = of_films(chosen.level) if films else of_markers(chosen.level)[0]
-        deliver(answer, out=out, lake=lake, branch=branch, as_json=chosen.as_json)
+        deliver(answer, delivery)
         return
     from measure.closing.joint import joined
     from measure.cloth.simulation import mean_bending
@@ -271,7 +279,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         level=level_of_both,
         nominal={"area_weight": nominal.density, "bending": mean_bending(nominal)},
     )
-    deliver_joint(joint, (by_markers, by_films), out=out, lake=lake, branch=branch, as_json=chosen.as_json)
+    deliver_joint(joint, (by_markers, by_films), delivery)
 
 
 def _refuse_beside(chosen: CloseLoopCommand, sources: tuple[str, ...]) -> None:

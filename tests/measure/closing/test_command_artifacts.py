@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 import sim.run.models
+from flagdata.documents import to_toml
 from flagdata.errors import CorruptError, InputError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
-from measure.closing import VerdictAnswer, acting, answer_of, output
+from measure.closing import VerdictAnswer, acting, answer_of
 from measure.closing.artifacts import fingerprint, keep, read
 from measure.closing.models import models
 from measure.loop import LoopOptions
@@ -202,7 +203,7 @@ def test_a_verdict_leaves_a_larger_model_where_an_effect_acts(
 @pytest.mark.parametrize(("place", "stage"), [(0, 0), (1, 1)], ids=["base", "larger"])
 def test_a_model_has_the_parameters_of_the_verdict(specimen: Specimen, place: int, stage: int) -> None:
     model = models(concluded(Conclusion.EFFECT), experiment(specimen, speed=5.0), name="x", seed=0)[place]
-    text = output.dumps(model.content)
+    text = to_toml(model.content)
     crew = Crew(of_content(tomllib.loads(text), name="x", folder=Path(), where="x"))
     member, nominal = crew.member(0), named("camel-ponte-roma")
     density, bending, damping = (values[stage] for values in FITTED.values())
@@ -245,7 +246,7 @@ def test_a_cloth_of_any_outline_held_anywhere_keeps_its_mesh_and_pins(specimen: 
         material=replace(specimen.material, name="of a mill", bending=1.5 * specimen.material.bending),
     )
     (model,) = models(concluded(Conclusion.SUFFICIENT), experiment(odd), name="odd", seed=0)
-    crew = Crew(of_content(tomllib.loads(output.dumps(model.content)), name="odd", folder=Path(), where="odd"))
+    crew = Crew(of_content(tomllib.loads(to_toml(model.content)), name="odd", folder=Path(), where="odd"))
     scene = crew.member(0).scene
     np.testing.assert_array_equal(scene.mesh.rest, rest)
     np.testing.assert_array_equal(scene.position[list(held)], anchors)
@@ -290,9 +291,9 @@ def test_toml_reads_back_as_it_was_written() -> None:
         "list": [[1.0, 2.0], [3.0, 4.0]],
         "table": {"inner": {"odd key": "ü", "n": -1}, "empty": {}},
     }
-    assert tomllib.loads(output.dumps(content)) == content
+    assert tomllib.loads(to_toml(content)) == content
 
 
 def test_what_toml_has_no_form_for_is_refused() -> None:
     with pytest.raises(InputError, match="no form"):
-        output.dumps({"nothing": None})
+        to_toml({"nothing": None})
