@@ -8,9 +8,20 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.cloth.arrays import options_of, sources_of
-    from measure.cloth.calibration import Calibration, CalibrationOptions, designs_of
+    from measure.cloth.calibration import Calibration
     from measure.cloth.command import simulations_of
-    from measure.cloth.design import TOGETHER, Design, announced, lasting, nulls, pairs, simulated, weighable
+    from measure.cloth.design import (
+        TOGETHER,
+        CalibrationOptions,
+        Design,
+        announced,
+        designs_of,
+        lasting,
+        nulls,
+        pairs,
+        simulated,
+        weighable,
+    )
     from measure.cloth.emulator import Emulator, informative
     from measure.cloth.evidence import Experiments
     from measure.cloth.loop import FilmLoopOptions, solve

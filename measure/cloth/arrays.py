@@ -16,8 +16,8 @@ from flagdata.errors import InputError
 from flagdata.lake import Lake
 from flagdata.provenance import array_hash
 from flagdata.stated import Stated
-from measure.cloth.calibration import Calibration, CalibrationOptions, calibrate
-from measure.cloth.design import FAR
+from measure.cloth.calibration import Calibration, calibrate
+from measure.cloth.design import FAR, CalibrationOptions
 from measure.cloth.prior import AZIMUTH, ELEVATION, Uncertain, fabric, stated_angle
 from measure.cloth.recording import Observed, cut
 from measure.cloth.simulation import Flag

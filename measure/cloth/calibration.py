@@ -11,16 +11,15 @@ from typing import Any
 import numpy as np
 
 from flagdata.arrays import BoolArray, FloatArray, IntArray
-from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
-from measure.cloth.design import FAR, Design, simulated
+from measure.cloth.design import CalibrationOptions, designs_of, simulated
 from measure.cloth.emulator import TAKEN_APART, Emulator, informative
 from measure.cloth.numerics import Correction, corrected, with_errors
 from measure.cloth.posterior import Posterior, Sight, posterior, weighed
-from measure.cloth.prior import AZIMUTH, CLOTH, ELEVATION, FABRIC, NUISANCES, Fabric, Uncertain
+from measure.cloth.prior import CLOTH, NUISANCES, Uncertain
 from measure.cloth.recording import LEAST_IN_ALL, LEFT_OUT, Observed, check_in_all, constant_wind, shown, usable
-from measure.cloth.simulation import OBSERVED, Flag
+from measure.cloth.simulation import OBSERVED
 from measure.ends import PILED, WITHIN, Bound, Span, span
 from measure.observables.observable import WINDOW
 
@@ -43,44 +42,6 @@ _LOOK = (
 )
 _APART = 2.0
 """σ from which on a summary is named as what is unlike."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class CalibrationOptions:
-    """How a flag is calibrated.
-
-    Attributes:
-        flag: its size and attachment.
-        azimuth, elevation: of the camera's axis to the wind, as far as they are known.
-        distance: of the camera [m].
-        simulations: for each recording.
-        level: of the intervals.
-        seed: of all draws.
-        material: what the flag is stated to be made of; None for any fabric.
-    """
-
-    flag: Flag
-    azimuth: Uncertain = AZIMUTH
-    elevation: Uncertain = ELEVATION
-    distance: float = FAR
-    simulations: int = 128
-    level: float = 0.9
-    seed: int = 0
-    material: Fabric | None = None
-
-    def recipe(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "flag_size": [self.flag.length, self.flag.height],
-            "attachment": self.flag.attachment,
-            "azimuth": self.azimuth.prior.as_dict(),
-            "elevation": self.elevation.prior.as_dict(),
-            "distance": self.distance,
-            "simulations": self.simulations,
-            "level": self.level,
-            "seed": self.seed,
-            **({} if self.material is None else {"material": self.material.name}),
-        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -318,35 +279,6 @@ def calibrate(
     return answered(simulations, options, left_out=left_out)
 
 
-def designs_of(recordings: Sequence[Observed], options: CalibrationOptions) -> list[Design]:
-    """Returns what is simulated for each of several recordings of one cloth.
-
-    Raises:
-        InputError: a recording that is given twice, or too short recordings in all.
-    """
-    check_in_all(recordings)
-    names = [f"{recording.source} {recording.name} {recording.first:g}" for recording in recordings]
-    twice = [recording.name for number, recording in enumerate(recordings) if names[number] in names[:number]]
-    if twice:
-        raise InputError(f"{twice[0]} is given twice", where="recordings", fix="give each recording of the flag once")
-    return [
-        Design(
-            flag=options.flag,
-            log=recording.log,
-            duration=recording.duration,
-            azimuth=options.azimuth,
-            elevation=options.elevation,
-            count=options.simulations,
-            seed=options.seed,
-            distance=options.distance,
-            recording=name,
-            place=name if recording.place is None else recording.place,
-            fabric=FABRIC if options.material is None else options.material.drawn,
-        )
-        for recording, name in zip(recordings, names, strict=True)
-    ]
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Simulated:
     """A recording with its simulations.
@@ -499,9 +431,8 @@ def checked(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Ch
         rest = np.setdiff1d(np.arange(len(weights[0])), fold_members)
         sights = [simulation.rows(rest).sight(options) for simulation in recordings]
         seed = child_seed(options.seed, "check", fold)
-        weight = weighed(sights, [simulation.summaries[fold_members] for simulation in recordings], seed=seed)[
-            CLOTH[0].name
-        ]
+        summaries = [simulation.summaries[fold_members] for simulation in recordings]
+        weight = weighed(sights, summaries, seed=seed)[CLOTH[0].name]
         truth = weights[0][fold_members]
         low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
         contained += int(((low <= truth) & (truth <= high)).sum())

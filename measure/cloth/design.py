@@ -18,13 +18,14 @@ from functools import cached_property
 from io import BytesIO
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from flagdata import workload
 from flagdata.arrays import FloatArray, IntArray, read_arrays
 from flagdata.durable import put_if_absent
-from flagdata.errors import CorruptError
+from flagdata.errors import CorruptError, InputError
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed, stream
 from flagdata.tables import Range, Scale
@@ -36,10 +37,12 @@ from measure.cloth.prior import (
     FABRIC,
     NUISANCES,
     STRETCHING,
+    Fabric,
     Uncertain,
     clock_error,
     draws,
 )
+from measure.cloth.recording import Observed, check_in_all
 from measure.cloth.simulation import BATCH, LITTLE, Discretisation, Flag, FlagBatch
 from measure.cloth.wind import Log
 from measure.forecasting.strengths import Strengths, all_strengths
@@ -164,6 +167,73 @@ class Design:
         steps = [batch.step or 0.0 for batch in batches]
         sizes = [len(batch.seeds) for batch in batches]
         return np.flatnonzero(np.repeat(np.array(steps) == max(steps), sizes))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrationOptions:
+    """How a flag is calibrated.
+
+    Attributes:
+        flag: its size and attachment.
+        azimuth, elevation: of the camera's axis to the wind, as far as they are known.
+        distance: of the camera [m].
+        simulations: for each recording.
+        level: of the intervals.
+        seed: of all draws.
+        material: what the flag is stated to be made of; None for any fabric.
+    """
+
+    flag: Flag
+    azimuth: Uncertain = AZIMUTH
+    elevation: Uncertain = ELEVATION
+    distance: float = FAR
+    simulations: int = 128
+    level: float = 0.9
+    seed: int = 0
+    material: Fabric | None = None
+
+    def recipe(self) -> dict[str, Any]:
+        """Returns JSON values."""
+        return {
+            "flag_size": [self.flag.length, self.flag.height],
+            "attachment": self.flag.attachment,
+            "azimuth": self.azimuth.prior.as_dict(),
+            "elevation": self.elevation.prior.as_dict(),
+            "distance": self.distance,
+            "simulations": self.simulations,
+            "level": self.level,
+            "seed": self.seed,
+            **({} if self.material is None else {"material": self.material.name}),
+        }
+
+
+def designs_of(recordings: Sequence[Observed], options: CalibrationOptions) -> list[Design]:
+    """Returns what is simulated for each of several recordings of one cloth.
+
+    Raises:
+        InputError: a recording that is given twice, or too short recordings in all.
+    """
+    check_in_all(recordings)
+    names = [f"{recording.source} {recording.name} {recording.first:g}" for recording in recordings]
+    twice = [recording.name for number, recording in enumerate(recordings) if names[number] in names[:number]]
+    if twice:
+        raise InputError(f"{twice[0]} is given twice", where="recordings", fix="give each recording of the flag once")
+    return [
+        Design(
+            flag=options.flag,
+            log=recording.log,
+            duration=recording.duration,
+            azimuth=options.azimuth,
+            elevation=options.elevation,
+            count=options.simulations,
+            seed=options.seed,
+            distance=options.distance,
+            recording=name,
+            place=name if recording.place is None else recording.place,
+            fabric=FABRIC if options.material is None else options.material.drawn,
+        )
+        for recording, name in zip(recordings, names, strict=True)
+    ]
 
 
 def simulated(

@@ -261,11 +261,6 @@ class Weighing:
     factors: FloatArray
     misfits: Misfits
 
-    def rows(self, which: Sequence[int]) -> Weighing:
-        """Selects some experiments."""
-        chosen = np.asarray(which, dtype=np.int64)
-        return Weighing(effects=self.effects, factors=self.factors[chosen], misfits=self.misfits.rows(which))
-
 
 def hypothesis(sights: Sequence[Sight], effect: Weighable | None) -> Hypothesis:
     """Returns the base model, or it with an effect."""

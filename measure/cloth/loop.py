@@ -17,8 +17,7 @@ import numpy as np
 from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding
-from measure.cloth.calibration import CalibrationOptions
-from measure.cloth.design import Weighable, weighable
+from measure.cloth.design import CalibrationOptions, Weighable, weighable
 from measure.cloth.emulator import TAKEN_APART
 from measure.cloth.evidence import Experiments, Fit, Sight, Weighing, fitted, hypothesis, misfits, weigh
 from measure.cloth.recording import Observed, constant_wind

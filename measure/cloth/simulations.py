@@ -11,8 +11,18 @@ import numpy as np
 from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
-from measure.cloth.calibration import CalibrationOptions, designs_of
-from measure.cloth.design import TOGETHER, Design, Pairs, Weighable, lasting, nulls, pairs, read
+from measure.cloth.design import (
+    TOGETHER,
+    CalibrationOptions,
+    Design,
+    Pairs,
+    Weighable,
+    designs_of,
+    lasting,
+    nulls,
+    pairs,
+    read,
+)
 from measure.cloth.emulator import Emulator, informative
 from measure.cloth.evidence import Experiments, Sight
 from measure.cloth.numerics import Correction, Finer, with_errors

@@ -168,7 +168,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         moves no rejection."""
         scored = score(rows_of(own, [place]), base, rows_of(null, by), kinds[by], along, level=LEVEL)
         others = weighed.misfits.rows(np.flatnonzero(by).tolist())
-        return judge(weighing.rows([place]), others, kinds[by], scored, level=LEVEL, departure=0.0)
+        single = replace(weighing, factors=weighing.factors[[place]], misfits=weighing.misfits.rows([place]))
+        return judge(single, others, kinds[by], scored, level=LEVEL, departure=0.0)
 
     rows: list[dict[str, Any]] = []
     for number, kind in enumerate(kinds.tolist()):

@@ -26,6 +26,7 @@ from measure.cloth import (
     Normal,
     Observed,
     Uncertain,
+    designs_of,
     draws,
 )
 from measure.cloth import calibration as module
@@ -294,9 +295,9 @@ def test_rows_of_one_place_share_the_anemometers_gain() -> None:
 def test_ten_seconds_are_enough_beside_ten_others_and_not_alone() -> None:
     """As three winds of a tunnel, each filmed for ten seconds."""
     short = [replace(one, readings=one.readings[:4]) for one in (_observed(0.17), _observed(0.17, seed=10))]
-    assert [design.duration for design in module.designs_of(short, _OPTIONS)] == [10.0, 10.0]
+    assert [design.duration for design in designs_of(short, _OPTIONS)] == [10.0, 10.0]
     with pytest.raises(InputError, match="10 s of film have a log"):
-        module.designs_of(short[:1], _OPTIONS)
+        designs_of(short[:1], _OPTIONS)
 
 
 def test_pixels_err_by_the_film_and_by_the_window() -> None:
