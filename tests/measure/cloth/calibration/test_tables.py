@@ -193,4 +193,6 @@ def test_a_log_beside_a_table_is_on_its_clock_with_the_offsets_uncertainty(tmp_p
         declared(rows_of(path, SIZE), parse("2.0"), names=("log", "t"))
     own = _write(tmp_path / "own.csv", "time,wind,droop", [[START + 2.5 * n, 5.0, 0.3] for n in range(10)])
     with pytest.raises(InputError, match="in one of them"):
-        _one(own, wind_log=Beside(series=_series(times, times), clock=given("a", "b", start=0, end=9, offset=0, sigma=1)))
+        _one(
+            own, wind_log=Beside(series=_series(times, times), clock=given("a", "b", start=0, end=9, offset=0, sigma=1))
+        )
