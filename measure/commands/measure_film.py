@@ -176,11 +176,10 @@ def _answer(measurement: Measurement) -> Answer:
         end=np.array([window.end for window in measurement.windows]),
         p=np.array([window.p for window in measurement.windows]),
         value={
-            name: np.array([nan if q.value is None else q.value for q in windows_of])
-            for name, windows_of in rows.items()
+            name: np.array([nan if q.value is None else q.value for q in by_window]) for name, by_window in rows.items()
         },
-        low={name: np.array([q.span.low for q in windows_of]) for name, windows_of in rows.items()},
-        high={name: np.array([q.span.high for q in windows_of]) for name, windows_of in rows.items()},
+        low={name: np.array([q.span.low for q in by_window]) for name, by_window in rows.items()},
+        high={name: np.array([q.span.high for q in by_window]) for name, by_window in rows.items()},
     )
     draws = {name: measurement.draws[:, column] for column, name in enumerate(measurement.names)}
     return Answer(sentence=measurement.sentence, quantities=quantities, draws=draws, windows=windows)

@@ -269,14 +269,14 @@ def _cloth(recipe: RecordingRecipe) -> tuple[float, float, float]:
 def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
     """Assembles the flag in its wind, `_SETTLE` before the first frame; the wind's time begins with the log."""
     flat = recipe.mesh
-    handles_held = Handles(vertices=handles.corners(flat.rest))
+    attachment = Handles(vertices=handles.corners(flat.rest))
     area_weight, bending, damping = _cloth(recipe)
     base = named(MATERIAL)
     material = replace(base.scaled(bending=bending), density=area_weight, damping=max(damping - recipe.step, 0.0))
     start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
-    start = roughened(start, handles_held, stream(recipe.seed, "demo", "start"), _ROUGH)
+    start = roughened(start, attachment, stream(recipe.seed, "demo", "start"), _ROUGH)
     speed = recipe.wind
-    scene = Scene(mesh=flat, position=start, material=material, handles=handles_held, wind=(speed, 0.0, 0.0))
+    scene = Scene(mesh=flat, position=start, material=material, handles=attachment, wind=(speed, 0.0, 0.0))
     gusts = Gusts(intensity=recipe.intensity).with_series(
         stream(recipe.seed, "demo", "gusts"),
         batch=1,
@@ -286,8 +286,8 @@ def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
         rate=AIR_RATE,
     )
     acting = recipe.acting
-    undeclared = [] if acting is None else [EFFECTS[acting.effect](**{acting.parameter: acting.strength})]
-    system, state = apply([gusts, *undeclared], *assemble([scene], dtype=torch.float32))
+    acting_effects = [] if acting is None else [EFFECTS[acting.effect](**{acting.parameter: acting.strength})]
+    system, state = apply([gusts, *acting_effects], *assemble([scene], dtype=torch.float32))
     return system, replace(state, time=BEFORE - _SETTLE)
 
 

@@ -164,12 +164,12 @@ def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object])
     """Simulates positions (frame, vertex, 3, recording) [m]."""
     nominal = named(MATERIAL)
     material = replace(nominal.scaled(density=recipe.density, bending=recipe.bending), damping=recipe.damping)
-    handles_held = Handles(vertices=handles.corners(flat.rest))
+    attachment = Handles(vertices=handles.corners(flat.rest))
     scenes = []
     for index, speed in enumerate(recipe.speeds):
         start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
-        start = roughened(start, handles_held, stream(recipe.seed, "tracked", "start", index), _ROUGH)
-        scenes.append(Scene(mesh=flat, position=start, material=material, handles=handles_held, wind=(speed, 0.0, 0.0)))
+        start = roughened(start, attachment, stream(recipe.seed, "tracked", "start", index), _ROUGH)
+        scenes.append(Scene(mesh=flat, position=start, material=material, handles=attachment, wind=(speed, 0.0, 0.0)))
     effect = EFFECTS[recipe.effect](**{recipe.parameter: recipe.strength})
     method = Symplectic(outer=_OUTER)
     system, state = apply([effect], *assemble(scenes))

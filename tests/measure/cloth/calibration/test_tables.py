@@ -181,7 +181,7 @@ def test_a_log_beside_a_table_is_on_its_clock_with_the_offsets_uncertainty(tmp_p
     rows: list[list[float | str]] = [[START + 5.0 + 0.5 * n, 0.3] for n in range(60)]
     path = _write(tmp_path / "t.csv", "time,droop", rows)
     clock = declared(rows_of(path, SIZE), parse("2.0±0.25"), names=("log", "t"))
-    found = _one(path, beside=Beside(series=_series(times, 5.0 + times / 10), clock=clock))
+    found = _one(path, wind_log=Beside(series=_series(times, 5.0 + times / 10), clock=clock))
     # The first row's span begins at 4.75 s of the table's clock, which is 6.75 s of the log's.
     assert found.speed[0] == pytest.approx(5.0 + (6.75 + 1.25) / 10, abs=0.01)
     assert found.log.clock == pytest.approx(0.25, rel=1e-3)
@@ -193,4 +193,6 @@ def test_a_log_beside_a_table_is_on_its_clock_with_the_offsets_uncertainty(tmp_p
         declared(rows_of(path, SIZE), parse("2.0"), names=("log", "t"))
     own = _write(tmp_path / "own.csv", "time,wind,droop", [[START + 2.5 * n, 5.0, 0.3] for n in range(10)])
     with pytest.raises(InputError, match="in one of them"):
-        _one(own, beside=Beside(series=_series(times, times), clock=given("a", "b", start=0, end=9, offset=0, sigma=1)))
+        _one(
+            own, wind_log=Beside(series=_series(times, times), clock=given("a", "b", start=0, end=9, offset=0, sigma=1))
+        )
