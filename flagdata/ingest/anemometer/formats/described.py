@@ -109,7 +109,7 @@ class Described:
 
     def completed(self, source: TextFile, options: WindOptions) -> Completed:
         """Reads what the heading of a file states."""
-        return complete(self.open, source.head(_LINES), options, where=str(source.path), rename=self.named)
+        return complete(self.open, source.head(_LINES), options, where=str(source.path), relabel=self.named)
 
     def named(self, heading: Heading, lines: Sequence[str]) -> Heading:
         """Returns the heading with the names by which the recipe knows its columns."""
@@ -149,14 +149,14 @@ class Described:
 
 
 def complete(
-    open_recipe: OpenRecipe, lines: Sequence[str], options: WindOptions, *, where: str, rename: Any = None
+    open_recipe: OpenRecipe, lines: Sequence[str], options: WindOptions, *, where: str, relabel: Any = None
 ) -> Completed:
     """Completes a recipe by the heading of a file.
 
     Args:
         lines: the first lines of the file.
         options: `date_order` and `unit` count where the recipe and the heading state neither.
-        rename: (heading, lines) → the heading with other names of its columns.
+        relabel: (heading, lines) → the heading with other names of its columns.
 
     Raises:
         InputError: no such heading, no rows, a column that is not there or whose unit is not known.
@@ -167,7 +167,7 @@ def complete(
     if heading is None:
         fix = "export it again, or name another --as or --sensor"
         raise InputError(f"the file has no heading of a {data['about']}", where=f"{where}, line 1", fix=fix)
-    heading = rename(heading, lines) if rename is not None else heading
+    heading = relabel(heading, lines) if relabel is not None else heading
     rows = [row for row in cells_of_lines(lines[heading.rows :], heading.delimiter) if any(map(str.strip, row))]
     at_rows = f"{where}, line {heading.rows + 1}"
     facts = _facts(data, lines[: heading.rows + 1])
