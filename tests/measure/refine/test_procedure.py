@@ -26,7 +26,7 @@ from measure.refine.section import section
 from models.estimator import Estimator
 from sim.run import Recipe
 
-SETTINGS = Settings(budget=28, batch=8, seed=4)
+SETTINGS = Settings(budget=36, batch=8, seed=4)
 WHOLE = replace(SETTINGS, to_floor=False)
 
 
@@ -40,7 +40,7 @@ def target(recipe: Recipe, view: FixedView) -> Target:
 
 @pytest.fixture(scope="module")
 def whole(recipe: Recipe, estimator: Estimator, target: Target, tmp_path_factory: pytest.TempPathFactory) -> Refinement:
-    """All 28 evaluations."""
+    """All 36 evaluations."""
     return refine(target, estimator, recipe, settings=WHOLE, cache=tmp_path_factory.mktemp("whole"))
 
 
@@ -56,7 +56,7 @@ def test_killed_and_resumed_it_gives_the_same_result(
     films = Simulator.films
 
     def dying(self: Simulator, requests: list[FilmRequest]) -> list[object]:
-        if sum(made) >= 16:
+        if sum(made) >= 24:
             raise KeyboardInterrupt
         made.append(len(requests))
         return films(self, requests)  # pyright: ignore[reportReturnType]
@@ -68,7 +68,7 @@ def test_killed_and_resumed_it_gives_the_same_result(
     again: list[int] = []
     monkeypatch.setattr(Simulator, "films", lambda self, r: again.append(len(r)) or films(self, r))
     resumed = refine(target, estimator, recipe, settings=WHOLE, cache=tmp_path / "b")
-    assert sum(made) + sum(again) == whole.evaluations == SETTINGS.budget
+    assert sum(made) + sum(again) == whole.evaluations == 36
     np.testing.assert_array_equal(resumed.traces[0].points, whole.traces[0].points)
     np.testing.assert_array_equal(resumed.traces[0].distances, whole.traces[0].distances)
     assert resumed.intervals == whole.intervals
@@ -93,7 +93,7 @@ def test_what_no_simulation_looks_like_is_never_at_the_floor(
 
 
 def test_two_clips_share_a_cloth_and_have_a_wind_each(recipe: Recipe, estimator: Estimator, target: Target) -> None:
-    found = refine([target, replace(target, name="again")], estimator, recipe, settings=replace(SETTINGS, budget=24))
+    found = refine([target, replace(target, name="again")], estimator, recipe, settings=replace(SETTINGS, budget=28))
     a, b = (trace.points for trace in found.traces)
     np.testing.assert_array_equal(a[:, :16], b[:, :16])
     assert not np.array_equal(a[:, 16], b[:, 16])
