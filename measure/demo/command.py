@@ -68,7 +68,9 @@ class Showing(AsJson):
 
     def __post_init__(self) -> None:
         if self.full and self.markers:
-            raise UsageError("--full cannot be combined with --markers", fix="show one after the other, each in a folder of its own")
+            raise UsageError(
+                "--full cannot be combined with --markers", fix="show one after the other, each in a folder of its own"
+            )
 
     @property
     def story(self) -> Story:
