@@ -27,7 +27,7 @@ import functools
 import inspect
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import closing
 from dataclasses import MISSING, Field, dataclass, field, fields
 from typing import Any, ParamSpec, TypeVar, dataclass_transform
@@ -35,8 +35,8 @@ from typing import Any, ParamSpec, TypeVar, dataclass_transform
 import click
 from click.core import ParameterSource
 
-from flagdata.console import document
-from flagdata.errors import FlagdataError
+from flagdata.console import document, say
+from flagdata.errors import FlagdataError, UsageError
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -77,6 +77,7 @@ class Option:
         names: on the command line; none for the field's name.
         section: of a long help.
         argument: whether the command takes it by position.
+        was: its names of the last version, which are read with a warning.
         click: more that `click.Option` or `click.Argument` is given.
     """
 
@@ -84,6 +85,7 @@ class Option:
     names: tuple[str, ...] = ()
     section: str = REST
     argument: bool = False
+    was: tuple[str, ...] = ()
     click: Mapping[str, Any] = field(default_factory=dict)
 
     def spelled(self, key: str) -> str:
@@ -97,6 +99,7 @@ def option(
     default: Any = MISSING,
     section: str = REST,
     kw_only: bool = True,
+    was: tuple[str, ...] = (),
     **more: Any,
 ) -> Any:
     """States an option as the default of a field.
@@ -107,9 +110,10 @@ def option(
         default: where it is not given; without one it is required.
         section: of a long help.
         kw_only: whether the Python call takes it by keyword alone.
+        was: its names of the last version.
         more: of `click.Option`, as `type`, `metavar` and `envvar`.
     """
-    row = Option(about=about, names=names, section=section, click=more)
+    row = Option(about=about, names=names, section=section, was=was, click=more)
     return field(default=default, kw_only=kw_only, metadata={"option": row})
 
 
@@ -155,15 +159,22 @@ class SectionedOption(click.Option):
 
     Attributes:
         section: its title.
+        was: its names of the last version.
     """
 
-    def __init__(self, *names: Any, section: str = REST, **more: Any) -> None:
+    def __init__(self, *names: Any, section: str = REST, was: tuple[str, ...] = (), **more: Any) -> None:
         super().__init__(*names, **more)
         self.section = section
+        self.was = was
 
 
 class LongCommand(click.Command):
-    """A command whose help prints its options in their sections."""
+    """A command whose help prints its options in their sections, and that reads their names of the last version."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        options = [param for param in self.params if isinstance(param, SectionedOption)]
+        renamed = {old: option.opts[0] for option in options for old in option.was}
+        return super().parse_args(ctx, [_present(word, renamed, args) for word in args])
 
     def sections(self) -> dict[str, list[click.Option]]:
         """Returns title → options, in the order of `SECTIONS`; those without a section last."""
@@ -216,6 +227,22 @@ def command(
     return made
 
 
+def _present(word: str, renamed: Mapping[str, str], words: Collection[str]) -> str:
+    """Returns a word of a command line with the name that an option has now, and warns of the old one.
+
+    Raises:
+        UsageError: there are both names among the words.
+    """
+    name, equals, value = word.partition("=")
+    if name not in renamed:
+        return word
+    present = renamed[name]
+    if any(other.partition("=")[0] == present for other in words):
+        raise UsageError(f"{name} is called {present} now, and both are given", where=name, fix="keep one of them")
+    say(f"{name} is called {present} now", mark="warning")
+    return f"{present}{equals}{value}"
+
+
 def _parameter(key: str, place: Field[Any], row: Option) -> click.Parameter:
     """Returns the parameter of a field; its kind is read from the annotation where the option states no other."""
     kind = str(place.type).removesuffix(" | None")
@@ -234,7 +261,9 @@ def _parameter(key: str, place: Field[Any], row: Option) -> click.Parameter:
     names = row.names or (row.spelled(key),)
     default = {} if required else {"default": more.pop("default", place.default)}
     about = f"{row.about.removesuffix('.')}; also {more['envvar']}." if "envvar" in more else row.about
-    return SectionedOption([*names, key], section=row.section, help=about, required=required, **default, **more)
+    return SectionedOption(
+        [*names, key], section=row.section, was=row.was, help=about, required=required, **default, **more
+    )
 
 
 def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable[P, R]]:
@@ -250,13 +279,15 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
     converts = {key: plain for key, (place, _) in rows.items() if (plain := converter(str(place.type))) is not None}
     floats = {key for key, (place, _) in rows.items() if str(place.type).removesuffix(" | None") == "float"}
     signature = inspect.signature(form)
+    renamed = {_keyword(old): key for key, (_, row) in rows.items() for old in row.was}
     spelled = {name: key for key, (_, row) in rows.items() for name in (*row.names, row.spelled(key))}
     ordered = sorted((signature.parameters[key] for key in rows), key=lambda one: one.kind)
 
     def made(run: Callable[[Any], R]) -> Callable[P, R]:
         @functools.wraps(run)
         def call(*positional: P.args, **named: P.kwargs) -> R:
-            values = bind(*positional, **named).arguments
+            present = {_present(key, renamed, named): value for key, value in named.items()}
+            values = bind(*positional, **present).arguments
             plain = {key: converts[key](value, key) if key in converts else value for key, value in values.items()}
             plain |= {key: float(plain[key]) for key in floats & plain.keys() if plain[key] is not None}
             try:
@@ -338,6 +369,11 @@ def verb(
         return call
 
     return made
+
+
+def _keyword(name: str) -> str:
+    """Returns the argument of a Python call that has the name of an option."""
+    return name.removeprefix("--").replace("-", "_")
 
 
 def _arguments(rows: Mapping[str, tuple[Field[Any], Option]]) -> str:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from flagdata.stated import Stated
 
 LAKE = "The lake's folder, or s3://bucket/prefix."
+ATTACHMENTS = ("corners", "hoist")
 RECORDING = "The recording"
 FILM = "The film"
 FLAG = "The flag and the camera"
@@ -229,7 +230,7 @@ class FlagAndCamera:
         "How the flag is held: at both corners of its hoist, or along all of it.",
         default="corners",
         section=FLAG,
-        type=click.Choice(["corners", "hoist"]),
+        type=click.Choice(ATTACHMENTS),
     )
     azimuth_deg: float | tuple[float, float] | str | Stated | None = option(
         "Of the camera's axis to the wind [°], 90 from the side, as in 70±7; by default 30:150.",

@@ -26,7 +26,7 @@ from flagdata.signals import WindAverage
 from flagdata.timebase import NANOSECONDS
 
 Progress = Callable[[int], object]
-_GIVEN = "use --by given --offset SECONDS --offset-sigma SECONDS"
+_GIVEN = "use --by given --clock-offset SECONDS --offset-sigma SECONDS"
 _PASSED = 3.0  # m of air, about twice the length of the flags that people film
 _QUICKEST, _SLOWEST = 0.3, 1.0  # s
 _UNCERTAIN = 0.3  # s; beyond it few estimates would be certain enough
@@ -66,7 +66,7 @@ class ClockOptions:
         if self.offset is not None and not math.isfinite(self.offset):
             raise UsageError(
                 f"the clock offset {self.offset} s is not finite",
-                where="--offset",
+                where="--clock-offset",
                 fix="give a finite number of seconds",
             )
         if self.offset_sigma is not None and not (math.isfinite(self.offset_sigma) and self.offset_sigma > 0):
@@ -77,7 +77,7 @@ class ClockOptions:
             )
         if (self.offset is not None) != (self.by is Method.GIVEN):
             number = "an" if self.by is Method.GIVEN else "no"
-            raise UsageError(f"alignment by {self.by} needs {number} offset", where="--offset", fix=_GIVEN)
+            raise UsageError(f"alignment by {self.by} needs {number} offset", where="--clock-offset", fix=_GIVEN)
         if (self.offset_sigma is not None) == (self.by is Method.ESTIMATE):
             if self.by is Method.ESTIMATE:
                 raise UsageError(

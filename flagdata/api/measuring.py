@@ -249,12 +249,15 @@ class Closing:
     )
     rate: float | None = option("Frames a second [Hz].", default=None)
     material: str = option("Nominal material, of catalogs/materials.", default="camel-ponte-roma")
-    pins: str | Sequence[tuple[float, float]] = option(
-        "Where it is held: hoist-corners, top-corners, hoist, or places (u, v) on the flat cloth [m].",
-        default="hoist-corners",
+    attachment: str | Sequence[tuple[float, float]] = option(
+        "How it is held: corners (of the hoist), top-corners, hoist, or places (u, v) on the flat cloth [m].",
+        default="corners",
+        was=("--pins",),
     )
-    size: tuple[float, float] | None = option(
-        "Width and height of the flat cloth [m]; by default the outline of the markers.", default=None
+    flag_size: tuple[float, float] | None = option(
+        "Width and height of the flat cloth [m]; by default the outline of the markers.",
+        default=None,
+        was=("--size",),
     )
     density_uncertainty: float | None = option(
         "Relative standard uncertainty of the material's area weight; by default 0.3.", default=None

@@ -29,13 +29,17 @@ class ByClock(NamedRecording, Rehearsed, OnBranch, OnLake):
     """How a clock model is found, and what the recording that it makes is called."""
 
     by: str = option(
-        "Trust the stamps, take --offset, or estimate it from the flag's motion.",
+        "Trust the stamps, take --clock-offset, or estimate it from the flag's motion.",
         default="estimate",
         section=CLOCK,
         type=click.Choice(["stamps", "given", "estimate"]),
     )
-    offset: float | None = option(
-        "Seconds added to the camera's clock (--by given).", default=None, section=CLOCK, metavar="S"
+    clock_offset: float | None = option(
+        "Seconds added to the camera's clock (--by given).",
+        default=None,
+        section=CLOCK,
+        was=("--offset",),
+        metavar="S",
     )
     offset_sigma: float | None = option(
         "Its standard uncertainty [s]; by stamps: how well the clocks are known to agree.",
@@ -94,7 +98,7 @@ class ByClock(NamedRecording, Rehearsed, OnBranch, OnLake):
         )
         return ClockOptions(
             by=Method(self.by),
-            offset=self.offset,
+            offset=self.clock_offset,
             offset_sigma=self.offset_sigma,
             search=None if search == usual else search,
             response=self.response,
@@ -117,7 +121,7 @@ def align(chosen: Aligning) -> Mapping[str, Any]:
     """Puts a camera and an anemometer of a lake, or two anemometers, on one clock, as `flagdata align` does.
 
     ```python
-    aligned = flagdata.align("flag", "anemometer", lake="field.lake", by="given", offset=-0.4, offset_sigma=0.1)
+    aligned = flagdata.align("flag", "anemometer", lake="field.lake", by="given", clock_offset=-0.4, offset_sigma=0.1)
     aligned["recording"], aligned["clock"]["offset"]  # id, s
     ```
 
@@ -147,7 +151,7 @@ def realign(chosen: Realigning) -> Mapping[str, Any]:
     """Writes a recording anew with another clock model, from the same artifacts, as `flagdata realign` does.
 
     ```python
-    flagdata.realign("flag", lake="field.lake", by="given", offset=-0.35, offset_sigma=0.05)
+    flagdata.realign("flag", lake="field.lake", by="given", clock_offset=-0.35, offset_sigma=0.05)
     ```
 
     Returns:

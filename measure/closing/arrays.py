@@ -51,13 +51,13 @@ def closed(chosen: Closing) -> Closed:
 def _setup(chosen: Closing) -> Setup:
     if chosen.material not in MATERIALS.names():
         raise UnknownNameError.of("material", chosen.material, MATERIALS.names(), where="material")
-    names, pins = [hold.value for hold in Hold], chosen.pins
-    if isinstance(pins, str) and pins not in names:
-        raise UnknownNameError.of("attachment", pins, names, where="pins")
+    names, attachment = ["corners", *(hold.value for hold in Hold)], chosen.attachment
+    if isinstance(attachment, str) and attachment not in names:
+        raise UnknownNameError.of("attachment", attachment, names, where="attachment")
     return Setup(
         material=named(chosen.material),
-        pins=Hold(pins) if isinstance(pins, str) else tuple((float(u), float(v)) for u, v in pins),
-        outline=None if chosen.size is None else sheet(*chosen.size),
+        pins=Hold(attachment) if isinstance(attachment, str) else tuple((float(u), float(v)) for u, v in attachment),
+        outline=None if chosen.flag_size is None else sheet(*chosen.flag_size),
         density_uncertainty=DENSITY_UNCERTAINTY if chosen.density_uncertainty is None else chosen.density_uncertainty,
     )
 

@@ -98,7 +98,7 @@ def _beside(
         )
     if not any(map(_is_log, winds)):
         options = {
-            "offset": reading.offset,
+            "clock-offset": reading.offset,
             "sensor": reading.sensor,
             "zone": reading.zone,
             "accept": reading.confirm.accept,

@@ -12,9 +12,10 @@ from flagdata.api.measuring import Calibrating, OfFlag
 from flagdata.caches import user_cache
 from flagdata.calibrated import Calibrated, Weighed
 from flagdata.dataset.source import lake_of
-from flagdata.errors import InputError
+from flagdata.errors import InputError, UnknownNameError
 from flagdata.lake import Lake
 from flagdata.provenance import array_hash
+from flagdata.shared_options import ATTACHMENTS
 from flagdata.stated import Stated
 from measure.cloth.calibration import Calibration, calibrate
 from measure.cloth.design import FAR, CalibrationOptions
@@ -46,7 +47,7 @@ def options_of(chosen: OfFlag, size: FlagSize, *, simulations: int, level: float
         return usual if value is None else stated_angle(usual, Stated.of(value), where=f"--{name}")
 
     return CalibrationOptions(
-        flag=Flag(length=size.length, height=size.height, attachment=chosen.attachment),
+        flag=Flag(length=size.length, height=size.height, attachment=_attachment(chosen.attachment)),
         azimuth=angle("azimuth", chosen.azimuth_deg, AZIMUTH),
         elevation=angle("elevation", chosen.elevation_deg, ELEVATION),
         distance=FAR if chosen.distance is None else chosen.distance,
@@ -157,3 +158,14 @@ def _answer(calibration: Calibration) -> Calibrated:
         findings=calibration.findings,
         document=calibration.as_dict(),
     )
+
+
+def _attachment(name: str | None) -> str:
+    """Returns how a filmed flag is held, by both corners of its hoist unless it is stated.
+
+    Raises:
+        UnknownNameError: films have no such attachment.
+    """
+    if name not in (None, *ATTACHMENTS):
+        raise UnknownNameError.of("attachment", name, ATTACHMENTS, where="--attachment")
+    return name or ATTACHMENTS[0]

@@ -22,13 +22,10 @@ OF_MARKERS = (
     "winds",
     "axis",
     "north",
-    "offset",
     "sensor",
     "zone",
     "accept",
     "density_uncertainty",
-    "size",
-    "pins",
     "rate",
     "unit",
     "up",
@@ -38,11 +35,28 @@ OF_MARKERS = (
 )
 
 
+OF_BOTH = ("material", "flag_size", "attachment", "clock_offset")
+"""Options of films that are about markers and meshes as well."""
+
+
 @options
 class OfFilms(OfFlag):
     """What is stated of films and of tables of observables; see `flagdata calibrate`."""
 
-    flag_size: str | None = option(f"Of films: {LENGTHS.lower()}.", default=None, section=FLAG, metavar="LxH")
+    flag_size: str | None = option(
+        f"{LENGTHS}. Films need it; of markers it is their outline by default.",
+        default=None,
+        section=FLAG,
+        was=("--size",),
+        metavar="LxH",
+    )
+    attachment: str | None = option(  # pyright: ignore[reportIncompatibleVariableOverride]  as the source states
+        "How the cloth is held: at both corners of its hoist, or along all of the hoist; of markers also top-corners, "
+        "or u,v;u,v;… [m]. By default corners, of markers as the source states.",
+        default=None,
+        section=FLAG,
+        was=("--pins",),
+    )
     area_weight: Stated | None = option(
         "Of films: a cloth that was weighed [kg/m²], as in 0.155±0.005; by default that of any flag.",
         default=None,
@@ -89,7 +103,7 @@ def refuse_of_others(chosen: JudgingFilms, *, films: bool) -> None:
     """
     rows = described(type(chosen))
     for name in OF_MARKERS if films else described(OfFilms):
-        if name in typed(chosen) and name != "material":
+        if name in typed(chosen) and name not in OF_BOTH:
             kind = "films and tables of observables" if films else "markers and meshes"
             other_kind = "markers and meshes" if films else "films and tables of observables"
             spelled = rows[name][1].spelled(name)

@@ -328,4 +328,4 @@ def is_film(source: str, *, lake: Lake | None, at: str, otherwise: bool = False)
         return otherwise
     rows = lake.rows({}, at=at, columns=COLUMNS).to_pylist()
     kinds = {row["kind"] for row in meant(rows, source, kinds=FILMED)}
-    return bool(kinds & set(FILMED)) if kinds else otherwise
+    return bool(kinds & set(FILMED)) if kinds else otherwise and not meant(rows, source)

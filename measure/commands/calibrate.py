@@ -76,7 +76,7 @@ def calibrate(chosen: CalibrateCommand) -> None:
     \b
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
       flagdata calibrate monday.csv tuesday.csv --flag-size 1.5x1.0 --lake lake --json
-      flagdata calibrate tracked.csv --log 3f2a9c --offset 0.3±0.1 --lake lake --flag-size 0.9x0.6
+      flagdata calibrate tracked.csv --log 3f2a9c --clock-offset 0.3±0.1 --lake lake --flag-size 0.9x0.6
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --only anemometer --name garden
     """
     _check_only(chosen)

@@ -12,7 +12,7 @@ import click
 from flagdata.commands.confirm import on_command_line
 from flagdata.console import LocalPath, document, echo, say
 from flagdata.errors import UnknownNameError, UsageError
-from flagdata.option_types import POSITIVE
+from flagdata.option_types import POSITIVE, STATED
 from flagdata.options import AsJson, argument, command, option, options, typed
 from flagdata.shared_options import WRITTEN, NamedLake, OnBranch
 from measure.closing.command_line import TEST, nulls_given, refuse, stage_bars
@@ -21,15 +21,16 @@ from measure.cloth.command_line import JudgingFilms, refuse_of_others
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
+    from flagdata.stated import Stated
     from measure.closing.artifacts import VerdictAnswer
     from measure.closing.sources import SourceOptions
-    from measure.observe import Setup, Up
+    from measure.observe import Hold, Setup, Up
     from measure.observe.recipe import ExperimentRecipe
     from sim.material import Material
 
 MARKERS, WIND = "Markers and meshes", "The wind beside markers"
 _RECIPE = ".toml"
-_OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "rate", "unit", "noise", "up")
+_OF_SOURCES = ("winds", "axis", "north", "clock_offset", "sensor", "zone", "accept", "rate", "unit", "noise", "up")
 """Options that say how sources of the command line are read."""
 
 
@@ -58,17 +59,6 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         default=None,
         section=MARKERS,
         type=click.FloatRange(0, 1, min_open=True),
-    )
-    size: str | None = option(
-        "Size of the flat cloth [m]; by default the outline of the markers.",
-        default=None,
-        section=MARKERS,
-        metavar="WxH",
-    )
-    pins: str | None = option(
-        "Where it is held: hoist-corners, top-corners, hoist, or u,v;u,v;… [m]; by default as the source states.",
-        default=None,
-        section=MARKERS,
     )
     rate: float | None = option(
         "Frames per second, if the source does not state them.",
@@ -100,8 +90,14 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         section=WIND,
         metavar="DEG",
     )
-    offset: float | None = option(
-        "Time from the first sample of the log to the first frame [s].", default=None, section=WIND
+    clock_offset: Stated | None = option(
+        "Seconds added to the clock of the recordings to reach the log's: of markers one number, counted from the "
+        "first sample of the log; of tables as in 0.3±0.1, by default estimated.",
+        default=None,
+        section=WIND,
+        was=("--offset",),
+        type=STATED,
+        metavar="S±SIGMA",
     )
     sensor: str | None = option(
         "Recipe that says how to read a log that does not say so itself.",
@@ -161,14 +157,15 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     Or SOURCE is a film with its log, a recording of --lake by its name or id, or a table of observables as `flagdata
     calibrate` takes it: then what a flag shows in windows of 2.5 s is compared, and --flag-size is needed; the options
     of flag, camera, film and tables are about these. Films beside markers of the same cloth are judged together: each
-    kind at half of the level, with one joint answer.
+    kind at half of the level, with one joint answer; --flag-size, --attachment and --clock-offset are about the films
+    then, and a recipe states those of the markers.
 
     A SOURCE that ends in .toml is a recipe of cloth, pins, wind and test, which may name the recordings of markers and
     meshes as well; --draft writes one.
 
     \b
       flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8
-      flagdata close-loop tracks.csv --wind anemometer.csv --material camel-ponte-roma --pins hoist-corners
+      flagdata close-loop tracks.csv --wind anemometer.csv --material camel-ponte-roma --attachment corners
       flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8 --draft flag.toml
       flagdata close-loop flag.toml --lake lake
       flagdata close-loop monday tuesday --lake lake --flag-size 1.5x1.0 --azimuth 70±7
@@ -198,7 +195,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     films = films_among(chosen.recordings, lake=lake, at=branch, sized=chosen.flag_size is not None, tracked=in_recipe)
     tracked = tuple(source for source in chosen.recordings if source not in films)
     if in_recipe:
-        _refuse_beside(chosen, tracked)
+        _refuse_beside(chosen, tracked, films=bool(films))
     two_kinds = bool(films) and (in_recipe or bool(tracked))
     names = {kind: name if name is None or not two_kinds else f"{name}-{kind}" for kind in KINDS}
     if two_kinds:
@@ -235,11 +232,11 @@ def close_loop(chosen: CloseLoopCommand) -> None:
             suspected=None if chosen.suspect is None else Suspicion.parse(chosen.suspect, on_markers()),
             **null_options,
         )
-        setup = _setup(Setup() if recipe is None else recipe.setup, chosen)
+        setup = _setup(Setup() if recipe is None else recipe.setup, chosen, joint=two_kinds)
         if recipe is not None and in_recipe:
             observed = recipes.read(replace(recipe, setup=setup), lake)
         else:
-            reading = _reading(chosen, recipe)
+            reading = _reading(chosen, recipe, joint=two_kinds)
             observed = observe(read(tracked, chosen.winds, reading, lake), setup)
         refuse(observed.findings)
         recordings, cloth = observed.experiment.recordings, observed.experiment.specimen
@@ -282,19 +279,19 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     deliver_joint(joint, (by_markers, by_films), delivery)
 
 
-def _refuse_beside(chosen: CloseLoopCommand, sources: tuple[str, ...]) -> None:
+def _refuse_beside(chosen: CloseLoopCommand, sources: tuple[str, ...], *, films: bool) -> None:
     """Options that would be ignored beside a recipe that names its recordings."""
     if sources:
         raise UsageError("the recipe names its recordings", where="SOURCE", fix="leave SOURCE or [[recording]] out")
     for name in _OF_SOURCES:
-        if name in typed(chosen):
-            spelled = "wind" if name == "winds" else name
+        if name in typed(chosen) and not (films and name == "clock_offset"):
+            spelled = "wind" if name == "winds" else name.replace("_", "-")
             raise UsageError(
                 "the recipe says how its recordings are read", where=f"--{spelled}", fix="write it into the recipe"
             )
 
 
-def _reading(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> SourceOptions:
+def _reading(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None, *, joint: bool = False) -> SourceOptions:
     """Returns how sources of the command line are read."""
     from measure.closing.sources import SourceOptions
 
@@ -302,7 +299,7 @@ def _reading(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Sourc
         rate=chosen.rate,
         unit=chosen.unit,
         noise=chosen.noise,
-        offset=chosen.offset,
+        offset=None if joint else _seconds(chosen.clock_offset),
         up=_up(chosen, recipe),
         sensor=chosen.sensor,
         zone=chosen.zone,
@@ -310,6 +307,21 @@ def _reading(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Sourc
         confirm=on_command_line(chosen.accept, as_json=chosen.as_json),
         north=None if chosen.north is None else math.radians(chosen.north),
     )
+
+
+def _seconds(offset: Stated | None) -> float | None:
+    """Returns the seconds from the first sample of a log to the first frame.
+
+    Raises:
+        UsageError: they are uncertain.
+    """
+    if offset is None:
+        return None
+    if not offset.exact:
+        raise UsageError(
+            f"the clock offset {offset.text} s of markers is not one number", where="--clock-offset", fix="give 2.5"
+        )
+    return offset.low
 
 
 def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None) -> None:
@@ -378,9 +390,9 @@ def _up(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Up:
     return Up(chosen.up)
 
 
-def _setup(setup: Setup, chosen: CloseLoopCommand) -> Setup:
+def _setup(setup: Setup, chosen: CloseLoopCommand, *, joint: bool = False) -> Setup:
     """Replaces what the command line states in a setup."""
-    from measure.observe import Hold, sheet
+    from measure.observe import sheet
     from sim.material import MATERIALS, named
 
     if chosen.material is not None:
@@ -389,17 +401,25 @@ def _setup(setup: Setup, chosen: CloseLoopCommand) -> Setup:
         setup = replace(setup, material=named(chosen.material))
     if chosen.density_uncertainty is not None:
         setup = replace(setup, mass_known=True, density_uncertainty=chosen.density_uncertainty)
-    if chosen.size is not None:
+    if chosen.flag_size is not None and not joint:
         try:
-            width, height = (float(part) for part in chosen.size.lower().split("x"))
+            width, height = (float(part) for part in chosen.flag_size.lower().split("x"))
         except ValueError as error:
-            raise UsageError(f"{chosen.size!r} is not a size", where="--size", fix="give 1.5x1.0, in metres") from error
+            what = f"{chosen.flag_size!r} is not a size"
+            raise UsageError(what, where="--flag-size", fix="give 1.5x1.0, in metres") from error
         setup = replace(setup, outline=sheet(width, height))
-    if chosen.pins is not None:
-        attachment: Hold | tuple[tuple[float, float], ...]
-        attachment = Hold(chosen.pins) if chosen.pins in {h.value for h in Hold} else _places(chosen.pins)
-        setup = replace(setup, pins=attachment)
+    if chosen.attachment is not None and not joint:
+        setup = replace(setup, pins=_held(chosen.attachment))
     return setup
+
+
+def _held(text: str) -> Hold | tuple[tuple[float, float], ...]:
+    from measure.observe import Hold
+
+    try:
+        return Hold(text)
+    except ValueError:
+        return _places(text)
 
 
 def _places(text: str) -> tuple[tuple[float, float], ...]:
@@ -409,7 +429,7 @@ def _places(text: str) -> tuple[tuple[float, float], ...]:
             u, v = (float(value) for value in part.split(","))
         except ValueError as error:
             raise UsageError(
-                f"{part!r} is no place on the cloth", where="--pins", fix="give hoist-corners, or u,v;u,v in metres"
+                f"{part!r} is no place on the cloth", where="--attachment", fix="give corners, or u,v;u,v in metres"
             ) from error
         places.append((u, v))
     return tuple(places)

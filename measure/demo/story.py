@@ -249,7 +249,13 @@ def _aligned(shell: Transcript, recording: Recording) -> None:
         pair = ("align", artifacts["camera"][:10], artifacts["wind"][:10], "--lake", "lake")
         estimated = shell.attempt(*pair, "--search", "60", "--plot", "alignment.png")
         step.found = estimated or _REFUSED + shell.show(
-            *pair, "--by", "given", "--offset", f"{recording.noted.clock:.1f}", "--offset-sigma", f"{CLOCK_SIGMA:g}"
+            *pair,
+            "--by",
+            "given",
+            "--clock-offset",
+            f"{recording.noted.clock:.1f}",
+            "--offset-sigma",
+            f"{CLOCK_SIGMA:g}",
         )
         shell.show("tag", "demo", "--lake", "lake")
         shell.show("ls", "--lake", "lake")

@@ -417,7 +417,7 @@ def _pins(descriptions: Sequence[Known], setup: Setup, low: FloatArray) -> Hold 
         raise InputError(
             "where the cloth is held is not known",
             where="cloth",
-            fix=f"name its pins (--pins): {', '.join(Hold)}, or their rest coordinates",
+            fix=f"say how it is held (--attachment): {', '.join(Hold)}, or their rest coordinates",
         )
     for points in pins[1:]:
         if points.shape != pins[0].shape or not np.allclose(points, pins[0]):

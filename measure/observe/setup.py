@@ -26,6 +26,11 @@ class Hold(StrEnum):
     HOIST = "hoist"
     """All of the hoist."""
 
+    @classmethod
+    def _missing_(cls, value: object) -> Hold | None:
+        """Reads `corners`, as films name the ends of the hoist."""
+        return cls.HOIST_CORNERS if value == "corners" else None
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Setup:

@@ -37,7 +37,7 @@ FORMS = {
 }
 OTHERWISE = {
     "calibrate": {"workers"},  # a notebook begins no processes of its own accord
-    "close_loop": {"wind", "rest", "material", "pins", "workers"},  # arrays state what sources on a disk know
+    "close_loop": {"wind", "rest", "material", "attachment", "workers"},  # arrays state what sources on a disk know
 }
 """Parameters of a call whose default is another one on the command line, or that are not there."""
 
@@ -209,6 +209,42 @@ class Made:
     def __post_init__(self) -> None:
         if self.window < 1:
             raise UsageError("the window is too short", where="--window", fix="give 1s or more")
+
+
+def test_the_name_of_the_last_version_is_read_with_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
+    taken: list[tuple[float, frozenset[str]]] = []
+
+    @options
+    class Renamed:
+        """One option that had another name."""
+
+        clock_offset: float = option("Seconds.", default=0.0, was=("--offset",))
+
+    @command(Renamed)
+    def shift(chosen: Renamed) -> None:
+        """Shift it."""
+        taken.append((chosen.clock_offset, typed(chosen)))
+
+    @called(Renamed)
+    def call(chosen: Renamed) -> None:
+        """Shifts it."""
+        taken.append((chosen.clock_offset, typed(chosen)))
+
+    said = []
+    for run in (
+        lambda: shift.main(["--offset", "2"], standalone_mode=False),
+        lambda: shift.main(["--offset=2"], standalone_mode=False),
+        lambda: call(offset=2),  # type: ignore[call-arg]
+        lambda: shift.main(["--clock-offset", "2"], standalone_mode=False),
+    ):
+        run()
+        said.append(capsys.readouterr().err.strip())
+    assert taken == [(2.0, {"clock_offset"})] * 4
+    warned = "warning: --offset is called --clock-offset now"
+    assert said == [warned, warned, "warning: offset is called clock_offset now", ""]
+    with pytest.raises(UsageError, match="both are given"):
+        shift.main(["--offset", "2", "--clock-offset", "3"], standalone_mode=False)
+    assert "--offset" not in shift.get_help(click.Context(shift)).replace("--clock-offset", "")
 
 
 @pytest.fixture

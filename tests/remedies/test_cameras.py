@@ -32,7 +32,7 @@ CASES = [
         (
             "declare second --speed 3 --sigma 0.2",
             OR,
-            "align second mast --by given --offset 830944805 --offset-sigma 0.1",
+            "align second mast --by given --clock-offset 830944805 --offset-sigma 0.1",
         ),
     ),
     Case(

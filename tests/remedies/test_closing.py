@@ -13,7 +13,7 @@ from tests.remedies.user import User
 
 BEGINS = "the loop begins"
 AXIS = ("--axis", "1,0,0")
-PINS = ("--pins", "hoist-corners")
+PINS = ("--attachment", "corners")
 MATERIAL = ("--material", "camel-ponte-roma")
 
 

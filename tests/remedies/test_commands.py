@@ -33,7 +33,7 @@ CASES = [
         "align/recording.py",
         "see flagdata ls --kind recording",
         "realign mast --by stamps --offset-sigma 1",
-        ("ls --kind recording", "realign first --by given --offset 1 --offset-sigma 0.1"),
+        ("ls --kind recording", "realign first --by given --clock-offset 1 --offset-sigma 0.1"),
         before=(STAMPS,),
         shows="recording +first",
         untried="align",
@@ -47,28 +47,28 @@ CASES = [
     ),
     Case(
         "align/methods.py",
-        "use --by given --offset SECONDS",
+        "use --by given --clock-offset SECONDS",
         "align first mast --by given",
-        ("align first mast --by given --offset 1 --offset-sigma 0.1",),
+        ("align first mast --by given --clock-offset 1 --offset-sigma 0.1",),
     ),
     Case(
         "align/methods.py",
-        "use --by given --offset SECONDS",
-        f"{STAMPS} --offset 3",
-        ("align first mast --by given --offset 3 --offset-sigma 0.1",),
+        "use --by given --clock-offset SECONDS",
+        f"{STAMPS} --clock-offset 3",
+        ("align first mast --by given --clock-offset 3 --offset-sigma 0.1",),
     ),
     Case(
         "align/methods.py",
-        "use --by given --offset SECONDS",
+        "use --by given --clock-offset SECONDS",
         "align first mast",
-        ("align first mast --by given --offset 1 --offset-sigma 0.1",),
+        ("align first mast --by given --clock-offset 1 --offset-sigma 0.1",),
         shows="recording",
     ),
     Case(
         "align/methods.py",
         "leave it out, or use --by given",
         "align first mast --offset-sigma 0.1",
-        ("align first mast --by given --offset 1 --offset-sigma 0.1",),
+        ("align first mast --by given --clock-offset 1 --offset-sigma 0.1",),
     ),
     Case(
         "align/present.py",
@@ -94,7 +94,7 @@ CASES = [
         files={"away.csv": AWAY},
         before=(
             "ingest away.csv --zone -10:00",
-            "align first away --by given --offset 43200 --offset-sigma 1 --name r",
+            "align first away --by given --clock-offset 43200 --offset-sigma 1 --name r",
         ),
         untried="--start --date",
     ),
@@ -225,7 +225,7 @@ def test_two_logs_are_aligned_as_the_remedies_say(user: User) -> None:
         "b",
         "--by",
         "given",
-        "--offset",
+        "--clock-offset",
         1,
         "--offset-sigma",
         1,
@@ -259,7 +259,7 @@ def test_salt_is_of_a_side(user: User) -> None:
 
 def test_a_recording_that_was_superseded_is_taken_off(user: User) -> None:
     old = user.succeeds(*STAMPS.split(), "--json").document["recording"]
-    command = ("realign", "first", "--by", "given", "--offset", 1, "--offset-sigma", "0.1")
+    command = ("realign", "first", "--by", "given", "--clock-offset", 1, "--offset-sigma", "0.1")
     fix = user.meets("commands/align.py", "flagdata withdraw takes it off", *command)
     assert old[:12] in fix
     user.follows("withdraw", old[:12], "-m", "superseded")

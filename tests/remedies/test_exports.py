@@ -45,8 +45,8 @@ def test_a_film_that_cannot_be_aligned_is_looked_at_or_its_offset_given(user: Us
     fix = user.meets("align/methods.py", "look at it with --plot FILE.png", "align", "first", "mast")
     user.follows("align", "first", "mast", "--plot", "FILE.png", code=3, shows="plot: FILE.png")
     assert (user.folder / "FILE.png").stat().st_size > 1000
-    assert "--by given --offset SECONDS --offset-sigma SECONDS" in fix
-    user.succeeds("align", "first", "mast", "--by", "given", "--offset", 1, "--offset-sigma", "0.1")
+    assert "--by given --clock-offset SECONDS --offset-sigma SECONDS" in fix
+    user.succeeds("align", "first", "mast", "--by", "given", "--clock-offset", 1, "--offset-sigma", "0.1")
 
 
 def sized(name: str, size: int) -> None:

@@ -33,7 +33,7 @@ def test_a_name_of_a_branch_is_listed_with_the_branch_that_was_asked(user: User)
 
 def test_a_name_of_several_is_made_certain_by_the_ids_that_are_listed(user: User) -> None:
     one = aligned(user)
-    user.succeeds("align", "first", "mast", "--by", "given", "--offset", 1, "--offset-sigma", "0.1")
+    user.succeeds("align", "first", "mast", "--by", "given", "--clock-offset", 1, "--offset-sigma", "0.1")
     user.meets("lake/store.py", "flagdata ls lists them", "show", "first")
     user.follows("ls", shows=one[:12])
     user.succeeds("show", one[:12])

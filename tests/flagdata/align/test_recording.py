@@ -136,7 +136,7 @@ def test_an_estimate_makes_a_recording_on_the_winds_clock_with_clips_in_one_comm
 
 def test_aligning_again_finds_the_recording_and_writes_nothing(gusty: tuple[Path, str, str]) -> None:
     folder, camera, wind = gusty
-    options = ("--by", "given", "--offset", "7.25", "--offset-sigma", "0.1", "--lake", str(folder))
+    options = ("--by", "given", "--clock-offset", "7.25", "--offset-sigma", "0.1", "--lake", str(folder))
     first = run("align", camera, wind, *options)
     head = Lake.open(folder).resolve(None)
     again = run("align", camera, wind, *options)
@@ -148,7 +148,7 @@ def test_aligning_again_finds_the_recording_and_writes_nothing(gusty: tuple[Path
 
 def test_another_session_for_a_recording_that_is_there_is_a_conflict(gusty: tuple[Path, str, str]) -> None:
     folder, camera, wind = gusty
-    options = ("--by", "given", "--offset", "6.5", "--offset-sigma", "0.1", "--lake", str(folder))
+    options = ("--by", "given", "--clock-offset", "6.5", "--offset-sigma", "0.1", "--lake", str(folder))
     run("align", camera, wind, *options, "--session", "one")
     with pytest.raises(ConflictError, match="session 'one'"):
         run("align", camera, wind, *options, "--session", "two")
@@ -157,7 +157,7 @@ def test_another_session_for_a_recording_that_is_there_is_a_conflict(gusty: tupl
 def test_an_offset_claimed_better_than_a_frame_is_flagged(gusty: tuple[Path, str, str]) -> None:
     folder, camera, wind = gusty
     said = run(
-        "align", camera, wind, "--by", "given", "--offset", "7", "--offset-sigma", "0.001", "--lake", str(folder)
+        "align", camera, wind, "--by", "given", "--clock-offset", "7", "--offset-sigma", "0.001", "--lake", str(folder)
     )
     assert "sigma-below-frame" in Lake.open(folder).artifact(str(said["recording"])).quality
 
@@ -172,7 +172,7 @@ def test_people_read_the_offset_with_its_interval(gusty: tuple[Path, str, str]) 
             wind,
             "--by",
             "given",
-            "--offset",
+            "--clock-offset",
             "-3.2",
             "--offset-sigma",
             "0.25",
@@ -190,7 +190,7 @@ def test_realign_writes_a_new_object_and_names_what_it_supersedes(gusty: tuple[P
     folder, camera, wind = gusty
     lake = Lake.open(folder)
     old = str(run("align", camera, wind, "--by", "stamps", "--offset-sigma", "2", "--lake", str(folder))["recording"])
-    said = run("realign", old, "--by", "given", "--offset", "7", "--offset-sigma", "0.2", "--lake", str(folder))
+    said = run("realign", old, "--by", "given", "--clock-offset", "7", "--offset-sigma", "0.2", "--lake", str(folder))
     new = lake.artifact(str(said["recording"]))
     assert new.object != lake.artifact(old).object
     assert new.parents == (camera, wind)
@@ -233,13 +233,13 @@ def test_a_steady_wind_is_refused_and_nothing_is_committed(tmp_path: Path) -> No
     ("options", "what"),
     [
         (["--by", "given"], "needs an offset"),
-        (["--offset", "3"], "needs no offset"),
-        (["--by", "given", "--offset", "3"], "needs the uncertainty"),
+        (["--clock-offset", "3"], "needs no offset"),
+        (["--by", "given", "--clock-offset", "3"], "needs the uncertainty"),
         (["--by", "stamps"], "needs the uncertainty"),
         (["--offset-sigma", "1"], "is estimated"),
-        (["--by", "given", "--offset", "3", "--offset-sigma", "1", "--search", "5"], "searches nothing"),
-        (["--by", "given", "--offset", "nan", "--offset-sigma", "1"], "offset nan s is not finite"),
-        (["--by", "given", "--offset", "1", "--offset-sigma", "0"], "uncertainty 0"),
+        (["--by", "given", "--clock-offset", "3", "--offset-sigma", "1", "--search", "5"], "searches nothing"),
+        (["--by", "given", "--clock-offset", "nan", "--offset-sigma", "1"], "offset nan s is not finite"),
+        (["--by", "given", "--clock-offset", "1", "--offset-sigma", "0"], "uncertainty 0"),
         (["--by", "stamps", "--offset-sigma", "1", "--plot", "x.png"], "no search to draw"),
     ],
 )
@@ -260,7 +260,7 @@ def test_arguments_in_the_wrong_order_are_refused(gusty: tuple[Path, str, str]) 
 def test_sessions_that_disagree_must_be_settled(tmp_path: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
     camera, wind = fill(lake, steady=False, seconds=15, camera_session="beach")
-    options = ("--by", "given", "--offset", "7", "--offset-sigma", "0.2", "--lake", str(lake.path))
+    options = ("--by", "given", "--clock-offset", "7", "--offset-sigma", "0.2", "--lake", str(lake.path))
     with pytest.raises(UsageError, match="'beach' and 'mast'"):
         run("align", camera, wind, *options)
     said = run("align", camera, wind, *options, "--session", "beach-mast")

@@ -158,7 +158,7 @@ def test_a_declared_wind_without_sense_is_refused(tmp_path: Path, speed: str, si
 
 def test_a_log_an_hour_from_its_film_is_warned_of_before_the_search(tmp_path: Path) -> None:
     lake, camera, wind = scene(tmp_path / "lake", log_shift=-3600.0)
-    offset = ("--by", "given", "--offset", "-3600", "--offset-sigma", "0.1")
+    offset = ("--by", "given", "--clock-offset", "-3600", "--offset-sigma", "0.1")
     said, stderr = invoke("align", camera, wind, *offset, "--lake", str(lake.path))
     assert "hours" not in stderr  # by the given offset they meet
     recording = lake.artifact(str(said["recording"]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -28,9 +29,9 @@ def test_a_recording_is_brought_in_aligned_tagged_and_exported(
     (again,) = flagdata.ingest(str(video), lake=str(lake.path), session="field")
     assert not again.created
     names = (film.artifact.id, wind.artifact.id)
-    found = flagdata.align(*names, lake=lake, by="given", offset=0, offset_sigma=0.1, window=1.0)
+    found = flagdata.align(*names, lake=lake, by="given", clock_offset=0, offset_sigma=0.1, window=1.0)
     same = run(
-        "align", *names, *["--by", "given", "--offset", "0", "--offset-sigma", "0.1", "--window", "1s", "--json"]
+        "align", *names, *["--by", "given", "--clock-offset", "0", "--offset-sigma", "0.1", "--window", "1s", "--json"]
     ).document
     assert (found["recording"], found["created"], same["created"]) == (same["recording"], True, False)
     (v1,) = flagdata.tag("v1", lake=lake)
@@ -49,7 +50,7 @@ def test_a_verb_of_a_lake_returns_what_its_command_prints_as_json(lake: Lake, vi
     made = flagdata.declare("film", speed=4, sigma=0.2, name="tunnel", lake=lake)
     assert run("ls", "--kind", "recording", "--json").document["artifacts"][0]["artifact"] == made["recording"]
     labelled = flagdata.label(["tunnel", "usable=true"], lake=lake)
-    assert (labelled["artifacts"], labelled["labels"]) == ([made["recording"]], {"usable": True})
+    assert (made["recording"] in labelled["artifacts"], labelled["labels"]) == (True, {"usable": True})
     for found, words in (
         (flagdata.ls(lake=lake, kind="clip"), ("ls", "--kind", "clip")),
         (flagdata.show("film", lake=lake), ("show", "film")),
@@ -61,7 +62,7 @@ def test_a_verb_of_a_lake_returns_what_its_command_prints_as_json(lake: Lake, vi
         (flagdata.expire(lake=lake, keep=1, dry_run=True), ("expire", "--keep", 1, "--dry-run")),
     ):
         printed = run(*words, "--json").document
-        assert {key: value for key, value in printed.items() if key != "schema"} == dict(found)
+        assert {key: value for key, value in printed.items() if key != "schema"} == json.loads(json.dumps(found))
         assert found
 
 

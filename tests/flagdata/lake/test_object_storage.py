@@ -471,7 +471,7 @@ def test_a_film_and_a_log_are_ingested_aligned_exported_and_loaded(
     place = ("--lake", remote_lake.path)
     came = invoke("ingest", film, wind_log, "--session", "field-1", "--json", *place).document
     camera, wind = (result["artifact"] for result in came["results"])
-    given = ("--by", "given", "--offset", "0", "--offset-sigma", "0.1")
+    given = ("--by", "given", "--clock-offset", "0", "--offset-sigma", "0.1")
     aligned = invoke("align", camera, wind, *given, "--json", *place).document
     assert len(aligned["clips"]) == 2  # 130 frames at 50 Hz are 65 at 25 Hz
     assert invoke("tag", "v1", *place).code == 0

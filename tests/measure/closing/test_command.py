@@ -51,11 +51,11 @@ def said(arguments: Sequence[str]) -> tuple[int, dict]:
         (["nowhere.csv", "--material", "camel-ponte-rom"], 2, "camel-ponte-rom"),
         (["nowhere.csv", "--density-uncertainty", "0"], 2, "density-uncertainty"),
         (["nowhere.csv", "--density-uncertainty", "2"], 2, "density-uncertainty"),
-        (["nowhere.csv", "--size", "1.5"], 2, "not a size"),
+        (["nowhere.csv", "--flag-size", "1.5"], 2, "not a flag's size"),
         (["nowhere.csv", "--suspect", "lifft"], 2, "lifft"),
         (["nowhere.csv", "--suspect", "vertical-wind"], 2, "above or below 0"),
         (["nowhere.csv", "--suspect", "hem-mass-"], 2, "less than none"),
-        (["nowhere.csv", "--pins", "hoist-corner"], 2, "no place"),
+        (["nowhere.csv", "--attachment", "hoist-corner"], 2, "no place"),
         (["nowhere.csv", "--up", "w"], 2, "unknown axis"),
         (["nowhere.csv", "--axis", "1,0"], 2, "three numbers"),
         (["nowhere.csv", "--axis", "0,0,0"], 2, "no direction"),
@@ -75,7 +75,7 @@ def test_winds_are_one_for_all_or_one_each(table: Path) -> None:
     assert (code, error["what"]) == (2, "there are 3 winds for 2 recordings")
 
 
-@pytest.mark.parametrize("option", ["--offset=2", "--sensor=generic-csv", "--zone=+02:00"])
+@pytest.mark.parametrize("option", ["--clock-offset=2", "--sensor=generic-csv", "--zone=+02:00"])
 def test_options_of_a_log_are_not_ignored_where_there_is_none(table: Path, option: str) -> None:
     code, error = said([str(table), "--rate", str(RATE), "--wind", "4", option])
     assert (code, error["where"]) == (2, option.partition("=")[0])
@@ -130,7 +130,8 @@ def test_beside_a_recipe_with_recordings_no_option_is_ignored(table: Path, tmp_p
 def test_a_draft_is_the_recipe_of_what_the_command_line_states(table: Path, tmp_path: Path) -> None:
     path = tmp_path / "deeper" / "flag.toml"
     path.parent.mkdir()
-    words = "--wind 4 --wind 8 --axis 0,2,0 --pins 0,0;0,0.4 --size 1.2x0.8 --material paper --density-uncertainty 0.02"
+    words = "--wind 4 --wind 8 --axis 0,2,0 --attachment 0,0;0,0.4 --flag-size 1.2x0.8 --material paper"
+    words += " --density-uncertainty 0.02"
     given = ("close-loop", table, *words.split(), "--noise", "0.001", "--rate", RATE, "--draft", path, "--json")
     ended = invoke(*given)
     assert (ended.code, ended.document["recipe"]) == (0, str(path))
@@ -138,7 +139,7 @@ def test_a_draft_is_the_recipe_of_what_the_command_line_states(table: Path, tmp_
     assert [(one.take, one.noise) for one in recipe.recordings] == [("calm", 1e-3), ("brisk", 1e-3)]
     assert [one.wind.velocity for one in recipe.recordings if one.wind] == [(0.0, 4.0, 0.0), (0.0, 8.0, 0.0)]
     chosen = CloseLoopCommand(
-        sources=(str(table),), pins="0,0;0,0.4", size="1.2x0.8", material="paper", density_uncertainty=0.02
+        sources=(str(table),), attachment="0,0;0,0.4", flag_size="1.2x0.8", material="paper", density_uncertainty=0.02
     )
     setup = setup_of(Setup(), chosen)
     assert recipe.setup.pins == setup.pins
@@ -169,9 +170,9 @@ def test_data_that_are_no_cloth_end_it_with_the_reason(table: Path) -> None:
             str(RATE),
             "--wind",
             "4",
-            "--size",
+            "--flag-size",
             f"{1e3 * WIDTH}x{1e3 * HEIGHT}",
-            "--pins",
+            "--attachment",
             "hoist",
             "--material",
             "camel-ponte-roma",

@@ -156,7 +156,7 @@ def test_where_no_offset_is_found_the_noted_one_is_given_and_the_card_says_so(
     codes["--search"] = 3
     card = aligned()
     assert "refused" in card.found
-    assert "--by given --offset -12.3 --offset-sigma 0.5" in card.found
+    assert "--by given --clock-offset -12.3 --offset-sigma 0.5" in card.found
     assert [truth.judgement for truth in card.truths] == [Judgement.GIVEN]
 
 

@@ -97,10 +97,21 @@ CORE = {
     "ingest markers": Verb(arguments=("ingest", "{folder}/markers.csv", *_LAKE)),
     "ingest record": Verb(arguments=("ingest", "{folder}/record.mcap", *_LAKE)),
     "align": Verb(
-        arguments=("align", "{camera}", "{wind}", "--by", "given", "--offset", "0", "--offset-sigma", "0.2", *_LAKE)
+        arguments=(
+            "align",
+            "{camera}",
+            "{wind}",
+            "--by",
+            "given",
+            "--clock-offset",
+            "0",
+            "--offset-sigma",
+            "0.2",
+            *_LAKE,
+        )
     ),
     "realign": Verb(
-        arguments=("realign", "{recording}", "--by", "given", "--offset", "0", "--offset-sigma", "0.3", *_LAKE)
+        arguments=("realign", "{recording}", "--by", "given", "--clock-offset", "0", "--offset-sigma", "0.3", *_LAKE)
     ),
     "declare": Verb(arguments=("declare", "{camera}", "--speed", "3", "--sigma", "0.2", *_LAKE)),
     "declare-cloths": Verb(arguments=("declare-cloths", "{folder}/cloths.csv", *_LAKE), one_step=False),

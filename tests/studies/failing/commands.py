@@ -40,7 +40,7 @@ def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callab
     third = ingest_camera(lake, write_video(folder / "third.mp4", frames=28), branch="side").artifact
     write_video(folder / "fourth.mp4", frames=26)
     fifth = ingest_camera(lake, write_video(folder / "fifth.mp4", frames=32)).artifact
-    aligned = ["align", fifth.id, wind.id, "--by", "given", "--offset", "0", "--offset-sigma", "0.1"]
+    aligned = ["align", fifth.id, wind.id, "--by", "given", "--clock-offset", "0", "--offset-sigma", "0.1"]
     with suppress(SystemExit):
         main([*aligned, "--lake", str(lake.path)])
     (recording,) = lake.rows("kind = 'recording'")["artifact"].to_pylist()
@@ -129,14 +129,25 @@ COMMANDS = {
     "ingest wind": Command(arguments=("ingest", "{folder}/second.csv", *_LAKE), state=rows),
     "ingest meshes": Command(arguments=("ingest", "{folder}/meshes", "--rate", "25", *_LAKE), state=rows),
     "align": Command(
-        arguments=("align", "{camera}", "{wind}", "--by", "given", "--offset", "0", "--offset-sigma", "0.1", *_LAKE),
+        arguments=(
+            "align",
+            "{camera}",
+            "{wind}",
+            "--by",
+            "given",
+            "--clock-offset",
+            "0",
+            "--offset-sigma",
+            "0.1",
+            *_LAKE,
+        ),
         state=rows,
     ),
     "declare": Command(arguments=("declare", "{camera}", "--speed", "3", "--sigma", "0.2", *_LAKE), state=rows),
     "declare-cloths": Command(arguments=("declare-cloths", "{folder}/cloths.csv", *_LAKE), state=rows, one_step=False),
     "realign": Command(
         arguments=(
-            *("realign", "{recording}", "--by", "given", "--offset", "0", "--offset-sigma", "0.3"),
+            *("realign", "{recording}", "--by", "given", "--clock-offset", "0", "--offset-sigma", "0.3"),
             *_LAKE,
         ),
         state=rows,

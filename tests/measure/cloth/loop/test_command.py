@@ -91,7 +91,7 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
     [
         ((), "the flag's size is missing"),
         (("--flag-size", "1.5x1.0", "--wind", "5"), "films and tables of observables"),
-        (("--flag-size", "1.5x1.0", "--pins", "hoist"), "--pins"),
+        (("--flag-size", "1.5x1.0", "--pins", "top-corners"), "top-corners"),
         (("--flag-size", "1.5x1.0", "--azimuth", "190"), "give degrees from 1 to 179"),
         (("--flag-size", "1.5x1.0", "--area-weight", "0"), "give one above 0"),
         (("--flag-size", "1.5x1.0", "--crop", "0,0,9,9"), "a table of observables has no pictures"),
@@ -159,6 +159,8 @@ def test_films_and_markers_of_a_cloth_are_judged_together(
     tracks = write_tracks(tmp_path / "tracks.csv", "calm", frames=110)
     lake, out = tmp_path / "lake", tmp_path / "out"
     Lake.create(lake)
+    cloth = tmp_path / "cloth.toml"
+    cloth.write_text(f'[cloth]\nwidth = {WIDTH}\nheight = {HEIGHT}\n[pins]\nat = "hoist"\n')
     done = run(
         *tables,
         tracks,
@@ -166,12 +168,9 @@ def test_films_and_markers_of_a_cloth_are_judged_together(
         str(RATE),
         "--wind",
         "5",
-        "--size",
-        f"{WIDTH}x{HEIGHT}",
+        cloth,
         "--material",
         "white-dots-on-blk",
-        "--pins",
-        "hoist",
         "--flag-size",
         "1.5x1.0",
         "--azimuth",
