@@ -241,7 +241,7 @@ def test_two_logs_are_aligned_as_the_remedies_say(user: User) -> None:
 
 def test_what_no_lake_was_named_for_is_found_in_one(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("FLAGDATA_LAKE")
-    user.meets("sources.py", "or name the lake by --lake", "observe", "first", "--flag-size", "1.5x1")
+    user.meets("examples/__init__.py", "or name the lake by --lake", "observe", "first", "--flag-size", "1.5x1")
     user.follows("observe", "first", "--flag-size", "1.5x1", "--lake", "lake", code=3)
 
 
