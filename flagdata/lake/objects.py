@@ -1,9 +1,9 @@
 """Immutable objects under the hash of their content: single MCAP files, Zarr folders, and folders of trained models.
 
 In a bucket they are `mcap/<sha256>.mcap`, and folders as `zarr/<treehash>.zarr/…`. A folder's files are put first and
-`.sums`, the lines whose SHA-256 is its name, last: without it the folder is not there. `.sums` is deleted first. Objects
-are read from a local copy, see `flagdata.object_cache`; of large records only the parts that are needed are fetched,
-see `flagdata.object_ranges`.
+`.sums`, the lines whose SHA-256 is its name, last: without it the folder is not there. `.sums` is deleted first.
+Objects are read from a local copy, see `flagdata.object_cache`; of large records only the parts that are needed are
+fetched, see `flagdata.object_ranges`.
 """
 
 from __future__ import annotations
