@@ -39,7 +39,11 @@ class EndedError(Exception):
 
     def __init__(self, *, late: bool) -> None:
         self.late = late
-        super().__init__("its time was up" if late else "it ended")
+        super().__init__(
+            "the child process was stopped, as its time was up"
+            if late
+            else "the child process has ended: it was refused memory, failed, or was closed"
+        )
 
 
 class Child:

@@ -119,7 +119,7 @@ def check_sums(folder: Path, *, fix: str) -> None:
         if name not in present:
             raise CorruptError("a file is missing", where=str(folder / name), fix=fix)
         if name not in sums:
-            raise CorruptError(f"{SUMS} does not state this file", where=str(folder / name), fix=fix)
+            raise CorruptError(f"{SUMS} does not list this file", where=str(folder / name), fix=fix)
         if file_hash(present[name]) != sums[name]:
             raise CorruptError("its bytes have changed since it was written", where=str(folder / name), fix=fix)
 

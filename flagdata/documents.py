@@ -190,4 +190,4 @@ def _inside(value: Any) -> Iterable[Any]:
 
 
 def _deep() -> LimitsError:
-    return LimitsError(f"tables or lists more than {NESTING_LIMIT} deep")
+    return LimitsError(f"tables or lists are nested more than {NESTING_LIMIT} deep")

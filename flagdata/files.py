@@ -77,7 +77,11 @@ def check_input(path: Path, *, noun: str = "file", limit: int | None = None) -> 
     if not status.st_size:
         raise InputError(f"the {noun} is empty", where=short_path, fix="copy or export it again")
     if limit is not None and status.st_size > limit:
-        raise LimitError(f"the {noun} has {status.st_size} bytes", where=short_path, fix=f"at most {limit} are read")
+        raise LimitError(
+            f"the {noun} has {status.st_size} bytes, more than {limit}",
+            where=short_path,
+            fix="give a smaller file, or split it",
+        )
 
 
 def open_regular(path: Place) -> BufferedIOBase:

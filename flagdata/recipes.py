@@ -32,7 +32,7 @@ class Found:
     Attributes:
         name: in the catalog, or of the file without its suffix.
         data: what the file holds.
-        folder: that files which it names are relative to; the working directory for the catalog's.
+        folder: to which paths inside the recipe are relative; the working directory for recipes of the catalog.
         where: for error messages.
     """
 
@@ -53,7 +53,7 @@ class Found:
 
 @dataclass(frozen=True, kw_only=True)
 class Shelf:
-    """The recipes of one kind.
+    """Finds the recipes of one kind: in the catalog, in installed packages, or in a user's file.
 
     Args:
         folder: of `catalogs`.
@@ -67,7 +67,8 @@ class Shelf:
 
     @cached_property
     def registry(self) -> Registry:
-        """The names of the catalog and of installed packages; only those of the latter can be looked up, as paths."""
+        """The names of the catalog and of installed packages; looking up a name of an installed package gives its
+        path, names of the catalog cannot be looked up."""
         entries = (entry.name for entry in self.place().iterdir())
         names = sorted(name.removesuffix(_SUFFIX) for name in entries if name.endswith(_SUFFIX))
         return Registry(self.noun, dict.fromkeys(names, ""), group=self.group, accepts=_is_recipe_path)
@@ -89,7 +90,7 @@ class Shelf:
         """Returns the recipe of that name in the catalog or in an installed package.
 
         Args:
-            where: the name stands, for the error message.
+            where: the place in which the name was written, for the error message.
 
         Raises:
             UnknownNameError: no such name; the nearest is suggested.
@@ -160,6 +161,6 @@ def parsed(text: str, *, where: str) -> dict[str, Any]:
     try:
         return from_toml(text)
     except LimitsError as error:
-        raise LimitError(str(error), where=where, fix="no recipe needs more") from None
+        raise LimitError(str(error), where=where, fix="shorten the file or nest less: no recipe needs more") from None
     except ValueError as error:
         raise InputError(str(error), where=where, fix="correct the file") from None

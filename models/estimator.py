@@ -280,7 +280,10 @@ def load(folder: Path) -> Estimator:
             card=card,
         )
     except (KeyError, TypeError, ValueError, RuntimeError, ArithmeticError, AttributeError, FlagdataError) as error:
-        raise CorruptError(f"the model does not fit this version: {error}", where=str(folder), fix=_FIX) from None
+        what = error.what if isinstance(error, FlagdataError) else f"{type(error).__name__}: {error}"
+        raise CorruptError(
+            f"this version of flagdata cannot load the model ({what})", where=str(folder), fix=_FIX
+        ) from None
 
 
 _FIX = "train it again, or update flagdata"

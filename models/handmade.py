@@ -109,8 +109,8 @@ def _of_clip(clip: Tensor, rate: float) -> Tensor:
     deviation = gray.square().mean().sqrt()
     if not bool(deviation > 1e-6 * (1 + mean.abs())):
         raise InputError(
-            "a clip without contrast, or with numbers that are not finite, has no features",
-            fix="leave it out, or point the camera at cloth",
+            "the hand-made features need contrast and finite numbers, and this clip lacks them",
+            fix="leave the clip out",
         )
     gray /= deviation
     change = gray[1:, 1:-1, 1:-1] - gray[:-1, 1:-1, 1:-1]

@@ -19,11 +19,13 @@ from sim.tables import GRIDS, Evaluation, StrainGrid, bending_segments, directio
 
 _COLUMN = 0.2  # 1 / tables.CURVATURE_SPACING
 _OF_MEMBERS = ("mass", "table_of", "segments", "damping")
+"""Fields whose last axis is the batch."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cloth:
-    """Constants of a batch. Batch innermost; every member has its own material on the shared mesh.
+    """Constants of a batch, which is the last axis of every tensor that has one. Every member has its own material on
+    the shared mesh.
 
     Attributes:
         mesh: the rest state.
@@ -39,7 +41,7 @@ class Cloth:
         mass: (vertex, batch) lumped [kg].
         samples: (table, n00, n11, n01, 4) stretching stiffness [N/m].
         table_of: (batch,) table of each member.
-        grid: where the samples are.
+        grid: the strains at which samples are taken.
         segments: (3, 5, batch) bending [N·m].
         damping: (batch,) d [s].
         face_slots: (k, vertex) rows of the stacked corner forces (3·face, …) to sum at each vertex, padded with 3·face.
@@ -77,7 +79,7 @@ class Cloth:
         dtype: torch.dtype = torch.float32,
         device: torch.device | str = "cpu",
     ) -> Cloth:
-        """Constants for one member a material.
+        """Builds a batch with one member for each material.
 
         Raises:
             InputError: no materials.
@@ -150,7 +152,8 @@ class Cloth:
         return first, second, third
 
     def shared_out(self, share: Tensor) -> Tensor:
-        """Sums at the vertices what each face (face, 3, batch) gives to each of its corners: (vertex, 3, batch)."""
+        """Sums, at each vertex, the shares (face, 3, batch) that faces give to each of their corners: (vertex, 3,
+        batch)."""
         return gather_sum([share], self._around)
 
     @cached_property

@@ -1,7 +1,7 @@
 """The physics from Python: cloth simulated and filmed.
 
-The options of each call are stated in a class. The packages behind the calls are named by strings: flagdata imports
-none of those that rest on it.
+Each call's options are a class here. The work is done in sim, which flagdata must not import: it is called by its name,
+"module:attribute".
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ if TYPE_CHECKING:
     from flagdata.simulated import Simulated
 
 _TABLES = ("scene", "material", "wind", "contact", "limits", "integrator", "time", "effects")
-_TABLE = "Table [{}] of a recipe with its keys, SI and radians, in place of that of the recipe."
+_TABLE = "Entries of the recipe's table [{}], SI and radians; each replaces the recipe's entry of the same key."
 
 
 @options
 class Members:
-    """How many members of a recipe are simulated."""
+    """How many members of a recipe are simulated: a member is one simulation, with values drawn from the recipe's
+    ranges."""
 
     count: int | None = option("How many members, instead of the recipe's.", default=None, type=POSITIVE, metavar="N")
     batch: int | None = option("How many at a time, instead of the recipe's.", default=None, type=POSITIVE, metavar="N")
@@ -56,7 +57,9 @@ class Simulating(Members, Computed):
     integrator: Mapping[str, Any] | None = option(_TABLE.format("integrator"), default=None)
     seed: int | None = option("Seed of all that is drawn.", default=None)
     precision: str | None = option("float32 or float64.", default=None)
-    workers: int | None = option("Batches at a time.", default=1)
+    workers: int | None = option(
+        "How many batches are simulated at the same time; None for one for each core.", default=1
+    )
 
 
 @called(Simulating)

@@ -246,7 +246,9 @@ def _rate(text: str, wanted: str) -> float:
     """A rate [Hz] from a number, with Hz behind it or not, or from the time between two: 10min is 1/600 Hz."""
     if (step := written_seconds(text)) is not None:
         if step <= 0:
-            raise UsageError(f"{text!r} is no time between two", where="--rate", fix=f"give {wanted}")
+            raise UsageError(
+                f"the time between two must be above 0, not {text!r}", where="--rate", fix=f"give {wanted}"
+            )
         return 1 / step
     return _number(re.sub(r"(?i)\s*hz$", "", text.strip()), "--rate", wanted)
 

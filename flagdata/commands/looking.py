@@ -96,7 +96,7 @@ def _relative(relative: Relative, *, details: bool) -> str:
 
 @options
 class Weighing(OfGarbage, AtVersion, OnLake):
-    """The version of which it is reported what takes space."""
+    """The version of which the disk usage is shown."""
 
 
 @verb(Weighing, example='flagdata.du(lake="field.lake")["total"]  # bytes')

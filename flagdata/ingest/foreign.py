@@ -125,9 +125,9 @@ def _mcap(path: Path) -> Examination:
 
 
 def _lerobot(folder: Path) -> Examination:
-    from flagdata.ingest.camera.lerobot import TIME, cameras, described, read, stamps_of, tables
+    from flagdata.ingest.camera.lerobot import TIME, cameras, description_of, read, stamps_of, tables
 
-    info = described(folder)
+    info = description_of(folder)
     fps = float(info["fps"])
     timed = TIME in info["features"]
     pictures = cameras(info)

@@ -1,10 +1,14 @@
-"""Garbage collection: delete unreferenced files that no running transaction holds.
+"""Garbage collection (`collect`): deletes files that nothing refers to and no running transaction holds. Disk usage
+(`usage`): what a lake's files take.
 
-Kept are all objects that a branch or tag shows, that a row withdrawn less than the grace period ago points to, that a
-living transaction has put or looked up, and whatever is younger than the grace period by the clock that gave it its
-time. Unfinished uploads in parts to a bucket go by the same rules. What the log says was erased goes at any age: its
-erasure was not finished. Staging folders go as soon as their owner is dead, which its lock proves; what lies there
-without a lease, after the grace period. All files of the catalog that some version is made of stay.
+- An object is kept if a branch or tag refers to it, if a row withdrawn less than the grace period ago points to it, or
+  if a running transaction has put it or looked it up.
+- A file younger than the grace period, by the clock that gave it its time, is kept.
+- An unfinished upload in parts to a bucket goes by the same rules.
+- An object that the log says was erased is deleted at any age: its erasure was not finished.
+- A staging folder is deleted as soon as its owner is dead, which its lock proves; one without a lease, after the grace
+  period.
+- A file of the catalog that some version is made of is kept.
 """
 
 from __future__ import annotations
@@ -40,7 +44,7 @@ _ORDER = [*(kind for kind in Kind if kind is not Kind.CLIP), Kind.CLIP]
 
 @dataclass(frozen=True, kw_only=True)
 class Garbage:
-    """What can go.
+    """What a collection would delete.
 
     Attributes:
         objects: by name.
@@ -144,7 +148,7 @@ def unneeded(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace:
 
 @dataclass(frozen=True, kw_only=True)
 class Share:
-    """What some of the files take.
+    """Rows, objects and bytes of a group of files.
 
     Attributes:
         artifacts: rows that point to these files.
@@ -159,7 +163,7 @@ class Share:
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """What a version needs.
+    """A branch, tag or version, and what its objects take.
 
     Attributes:
         name: of the branch or tag, or what the user wrote for a version.

@@ -188,7 +188,9 @@ def write_meshes(path: Path, sequence: MeshSequence | RaggedMeshSequence) -> Non
     import zarr
 
     if path.exists():
-        raise ConflictError("there is something already", where=str(path), fix="write each sequence to a new folder")
+        raise ConflictError(
+            "a file or folder is there already", where=str(path), fix="give a path at which nothing is yet"
+        )
     ragged = isinstance(sequence, RaggedMeshSequence)
     with disk_errors("writing meshes", path):
         group = zarr.open_group(path, mode="w-", zarr_format=3)
@@ -493,7 +495,9 @@ def write_markers(path: Path, sequence: MarkerSequence) -> None:
     import zarr
 
     if path.exists():
-        raise ConflictError("there is something already", where=str(path), fix="write each sequence to a new folder")
+        raise ConflictError(
+            "a file or folder is there already", where=str(path), fix="give a path at which nothing is yet"
+        )
     with disk_errors("writing markers", path):
         group = zarr.open_group(path, mode="w-", zarr_format=3)
         attributes = {

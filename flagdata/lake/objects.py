@@ -1,9 +1,9 @@
 """Immutable objects under the hash of their content: single MCAP files, Zarr folders, and folders of trained models.
 
 In a bucket they are `mcap/<sha256>.mcap`, and folders as `zarr/<treehash>.zarr/…`. A folder's files are put first and
-`.sums`, the lines whose SHA-256 is its name, last: without it the folder is not there. It is deleted first. Objects are
-read from a local copy, see `flagdata.object_cache`; of large records only the parts that are needed are fetched, see
-`flagdata.object_ranges`.
+`.sums`, the lines whose SHA-256 is its name, last: without it the folder is not there. `.sums` is deleted first.
+Objects are read from a local copy, see `flagdata.object_cache`; of large records only the parts that are needed are
+fetched, see `flagdata.object_ranges`.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class StoredObject:
 
 
 class Objects:
-    """The stores `mcap/`, `zarr/` and `model/` of a lake at `root`; one made before format 2 gets its last when
-    needed."""
+    """The stores `mcap/`, `zarr/` and `model/` of a lake at `root`; a lake made before format 2 gets `model/` when its
+    first model is stored."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -85,7 +85,8 @@ class Objects:
         return path
 
     def readable(self, name: str) -> Place:
-        """Returns where the record called `name` is read from, see `flagdata.record.Record`.
+        """Returns a place from which the record can be read, see `flagdata.record.Record`: the object itself; for a
+        bucket, a local copy, or the bucket's own object if it is large.
 
         Raises:
             NotFoundError: it is not there.
@@ -152,7 +153,7 @@ class Objects:
                 if self.is_whole(name):
                     os.utime(target)
                     self.remove(staged)
-                    self._mended(name)
+                    self._remove_note(name)
                     return False
                 if target.is_dir() or target.is_symlink():
                     with suppress(FileNotFoundError):  # another writer has moved it away
@@ -164,11 +165,14 @@ class Objects:
                 if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) or attempt == _ATTEMPTS - 1:
                     raise
         flush_folder(target.parent)
-        self._mended(name)
+        self._remove_note(name)
         return True
 
     def is_there(self, name: str, size: int | None) -> bool:
-        """Checks whether the object is there, has `size` bytes if that is known, and was not found damaged before."""
+        """Checks whether the object is there, has `size` bytes if that is known, and no note says that it is damaged.
+
+        Its bytes are not hashed: see `is_whole`.
+        """
         try:
             stored_size = self.size(name)
         except (NotFoundError, InputError):  # a link in its place
@@ -195,7 +199,7 @@ class Objects:
         """Take the note away that an object is damaged, if there is one and the lake can be written."""
         with suppress(OSError, FlagdataError):
             if self._note(name).exists():
-                self._mended(name)
+                self._remove_note(name)
 
     def delete(self, name: str) -> None:
         """Delete an object, and what is noted of it.
@@ -205,9 +209,9 @@ class Objects:
         """
         self.remove(self.path(name))
         with suppress(OSError):  # a note without its object says nothing
-            self._mended(name)
+            self._remove_note(name)
 
-    def _mended(self, name: str) -> None:
+    def _remove_note(self, name: str) -> None:
         self._note(name).unlink(missing_ok=True)
 
     def _note(self, name: str) -> Place:
@@ -409,7 +413,7 @@ class RemoteObjects(Objects):
                     upload.result()
             (remote / SUMS).write_bytes(sums_of(staged).encode())
         if fresh:
-            self._mended(name)
+            self._remove_note(name)
         kept(name, remote.suffix, staged)
         return fresh
 

@@ -23,10 +23,10 @@ from measure.observables import OBSERVABLES
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Band:
-    """What a model shows.
+    """The range of each observable that a model predicts, drawn as a band.
 
     Attributes:
-        limits: (low middle high, window, observable).
+        limits: (3, window, observable): low, middle and high.
         colour: of the band and of its middle.
     """
 
@@ -35,7 +35,7 @@ class Band:
 
 
 def against_wind(observed: Observed, names: Sequence[str], bands: Sequence[Band], *, dots: str, opacity: float) -> str:
-    """Draws a picture with a panel an observable, as a data URL.
+    """Draws each observable against the wind, a panel for each, and returns the picture as a data URL.
 
     Args:
         names: of the observables.
@@ -72,7 +72,7 @@ _DEGREES = ("azimuth", "elevation")
 def calibration_page(
     calibration: Calibration, provenance: Mapping[str, str], *, sections: Sequence[Section] = ()
 ) -> str:
-    """Writes the page.
+    """Returns the page, HTML.
 
     Args:
         provenance: rows of a table, in order.
@@ -95,7 +95,7 @@ def calibration_page(
                 "wind": f"{recording.observed.speed.mean():.1f}",
                 "misfit": f"{recording.misfit:.2g}",
                 "place": [shown_quantity(q) for q in view],
-                "picture": _windows(recording),
+                "picture": _windows_picture(recording),
             }
             for recording, view in zip(calibration.recordings, calibration.places, strict=True)
         ],
@@ -134,7 +134,9 @@ def _posterior(calibration: Calibration) -> str:
         logarithmic = isinstance(about.prior, Range) and about.prior.scale is Scale.LOG
         edges = np.geomspace(low, high, 41) if logarithmic else np.linspace(low, high, 41)
         axes.hist(calibration.draws.cloth[about.name], bins=edges, color=_BLUE)
-        axes.axhline(len(calibration.draws.cloth[about.name]) / 40, color=_RUST)
+        axes.axhline(
+            len(calibration.draws.cloth[about.name]) / 40, color=_RUST
+        )  # the prior: the bins have equal shares of it
         if logarithmic:
             axes.set_xscale("log")
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30 * low else (1.0,)))
@@ -145,7 +147,7 @@ def _posterior(calibration: Calibration) -> str:
     return figure_url(figure)
 
 
-def _windows(recording: Fitted) -> str:
+def _windows_picture(recording: Fitted) -> str:
     names = [name for name, used in zip(OBSERVED, recording.used, strict=True) if used]
     band = Band(limits=np.stack([recording.low, recording.middle, recording.high]), colour=_RUST)
     return against_wind(recording.observed, names, [band], dots=_BLUE, opacity=0.3)

@@ -1,11 +1,12 @@
-"""What is simulated for a recording, in batches, each kept under its hash: the base model, effects, null experiments.
+"""The simulations that calibrate and close-loop need of one recording: planned, run in batches, each batch kept in a
+file named by the hash of its inputs.
 
 An interrupted calibration goes on where it was, and another one of the same film, log and seed simulates nothing.
 
 The base model's simulations of a verdict are those of `flagdata calibrate`, so that a loop after a calibration makes
-none of them anew. Those with an effect are pairs of some of these: the same cloth, place and turbulence, so that the
-difference is the effect's and chaos's alone. Null experiments are of the same minutes of wind, of cloths and places
-over the same priors, each kind of numerics a batch.
+none of them anew. Each simulation with an effect repeats one of these with the same cloth, place and turbulence, so
+that the two differ by the effect and by chaos alone. Null experiments are of the same minutes of wind, of cloths
+and places over the same priors, each kind of numerics a batch.
 """
 
 from __future__ import annotations
@@ -93,9 +94,8 @@ class Design:
         count: of simulations.
         seed: of all draws.
         distance: of the camera [m].
-        recording: what recordings of one cloth differ by: their simulations are of the same cloths, each recording's in
-            turbulence of its own.
-        place: the same of places and anemometers, which recordings may share.
+        recording: label of the recording; recordings of one cloth have the same cloths and different turbulence.
+        place: label of the place; recordings at one place share its view and its anemometer.
         fabric: which measured tables the cloths have.
     """
 
@@ -161,8 +161,8 @@ class Design:
             seeds=tuple(child_seed(self.seed, "calibrate", "flag", self.recording, int(number)) for number in which),
         )
 
-    def damped(self) -> IntArray:
-        """Places of the simulations in the longest steps that the design has."""
+    def in_longest_steps(self) -> IntArray:
+        """Returns the indices of the simulations whose batch has the longest time step."""
         batches = self.batches()
         steps = [batch.step or 0.0 for batch in batches]
         sizes = [len(batch.seeds) for batch in batches]
@@ -248,10 +248,10 @@ def simulated(
     Raises:
         CorruptError: a kept batch that cannot be read.
     """
-    return read(design.batches(), folder=folder, workers=workers, advance=advance)[:, 0]
+    return readings_of(design.batches(), folder=folder, workers=workers, advance=advance)[:, 0]
 
 
-def read(
+def readings_of(
     batches: Sequence[FlagBatch], *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
 ) -> FloatArray:
     """Returns (flag, place, window, observable) of batches, in order; those that the folder lacks are simulated. As
@@ -289,7 +289,8 @@ def _read(path: Path) -> FloatArray:
 
 
 TOGETHER = 8
-"""Flags of a batch: eight take as long as one, and sixteen take 2.7 times as long."""
+"""Flags in a batch of pairs or nulls (a design's batches have `BATCH`): eight take as long as one, and sixteen take
+2.7 times as long."""
 PAIRS = 16
 """Flags with each effect, for each recording. More estimate an effect's change better and take as many more simulations
 for each effect and recording."""
@@ -313,13 +314,13 @@ class Pairs:
 
     Attributes:
         effect: which.
-        places: (pair,) among the design's simulations.
+        indices: (pair,) among the design's simulations.
         strengths: (pair,) beyond the null value.
         batches: of them, in that order.
     """
 
     effect: Weighable
-    places: IntArray
+    indices: IntArray
     strengths: FloatArray
     batches: tuple[FlagBatch, ...]
 
@@ -330,15 +331,15 @@ def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
     Args:
         until: part of the film that is simulated [s].
     """
-    candidates = design.damped()
+    candidates = design.in_longest_steps()
     rng = stream(design.seed, "films", "pairs", effect.name)
     count = min(PAIRS, len(candidates))
-    places = np.sort(rng.choice(candidates, count, replace=False))
+    indices = np.sort(rng.choice(candidates, count, replace=False))
     shares = (rng.permutation(count) + rng.random(count)) / count
     strengths = effect.prior.at(shares)
     batches = []
     for begin in range(0, count, TOGETHER):
-        part = places[begin : begin + TOGETHER]
+        part = indices[begin : begin + TOGETHER]
         batches.append(
             replace(
                 design.batch(part),
@@ -346,7 +347,7 @@ def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
                 effects=((effect.column, strengths[begin : begin + TOGETHER]),),
             )
         )
-    return Pairs(effect=effect, places=places, strengths=strengths, batches=tuple(batches))
+    return Pairs(effect=effect, indices=indices, strengths=strengths, batches=tuple(batches))
 
 
 def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed: int) -> list[list[FlagBatch]]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from flagdata.arrays import FloatArray, IntArray
 from flagdata.rng import stream
-from measure.cloth.design import Design, read
+from measure.cloth.design import Design, readings_of
 from measure.cloth.recording import Observed
 from measure.cloth.simulation import Discretisation, FlagBatch
 
@@ -80,24 +80,26 @@ class Finer:
     """Flags of a design that are simulated a second time.
 
     Attributes:
-        places: (flag,) among the design's simulations.
+        indices: (flag,) among the design's simulations.
         batches: of them, in that order.
     """
 
-    places: IntArray
+    indices: IntArray
     batches: tuple[FlagBatch, ...]
 
     @classmethod
     def of(cls, design: Design) -> Finer:
         """Chooses among the cloths that damp as much as the step does: those that hardly damp would cost ten times
         as much."""
-        places = np.flatnonzero(design.values()["damping"] >= (FINE.step or 0.0))
-        chosen = stream(design.seed, "calibrate", "finer").choice(places, min(FLAGS, len(places)), replace=False)
+        candidates = np.flatnonzero(design.values()["damping"] >= (FINE.step or 0.0))
+        chosen = stream(design.seed, "calibrate", "finer").choice(
+            candidates, min(FLAGS, len(candidates)), replace=False
+        )
         ordered = np.sort(chosen)
         parts = [ordered[first : first + TOGETHER] for first in range(0, len(ordered), TOGETHER)]
         until = min(LASTING, design.duration)
         return cls(
-            places=ordered,
+            indices=ordered,
             batches=tuple(replace(design.batch(part), until=until, discretisation=FINE) for part in parts),
         )
 
@@ -108,7 +110,7 @@ class Finer:
             fine: (flag, window, observable) of them.
             coarse: (simulation, window, observable) of all of the design's.
         """
-        change = fine - coarse[self.places][:, : fine.shape[1]]
+        change = fine - coarse[self.indices][:, : fine.shape[1]]
         finite = np.isfinite(change)
         windows = finite.sum(axis=1)
         repeated = windows > 1
@@ -149,5 +151,5 @@ def corrected(
         CorruptError: a kept batch that cannot be read.
     """
     finer = Finer.of(design)
-    fine = read(finer.batches, folder=folder, workers=workers, advance=advance)[:, 0]
+    fine = readings_of(finer.batches, folder=folder, workers=workers, advance=advance)[:, 0]
     return finer.correction(fine, readings)

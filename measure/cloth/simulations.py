@@ -21,7 +21,7 @@ from measure.cloth.design import (
     lasting,
     nulls,
     pairs,
-    read,
+    readings_of,
 )
 from measure.cloth.emulator import Emulator, informative
 from measure.cloth.evidence import Experiments, Sight
@@ -100,7 +100,7 @@ def gathered(
             if stage is not None:
                 stage(label, done, total)
 
-        return read(batches, folder=folder, workers=workers, advance=advance)[:, 0]
+        return readings_of(batches, folder=folder, workers=workers, advance=advance)[:, 0]
 
     base = [
         all_of(f"base model, {recording.name}", design.batches())
@@ -114,7 +114,7 @@ def gathered(
     of_effects = []
     for film, designed in zip(recordings, paired, strict=True):
         readings = all_of(f"effects, {film.name}", [batch for pair in designed for batch in pair.batches])
-        ends = np.cumsum([len(pair.places) for pair in designed])[:-1]
+        ends = np.cumsum([len(pair.indices) for pair in designed])[:-1]
         of_effects.append(tuple(zip(designed, np.split(readings, ends), strict=True)))
     read_nulls = [
         all_of(f"nulls, {recording.name}", designed) for recording, designed in zip(recordings, null, strict=True)
@@ -213,8 +213,8 @@ def sight(
         count = readings.shape[1]
         projection = Projection(speed=observed.speed[:count], changes=changes)
         with_it = projection.of(readings).reshape(len(readings), -1)
-        without = projection.of(base[pair.places][:, :count]).reshape(len(readings), -1)
-        paired = {name: v[pair.places] for name, v in values.items()}
+        without = projection.of(base[pair.indices][:, :count]).reshape(len(readings), -1)
+        paired = {name: v[pair.indices] for name, v in values.items()}
         response = responded(emulator, pair.effect, pair.strengths, paired, with_it, without)
         if response is not None:
             responses[pair.effect.name] = response

@@ -225,7 +225,9 @@ def opened(
     if is_table(source):
         if reading.crop is not None or reading.flag is not None:
             raise UsageError(
-                "a table of observables has no pictures", where="--crop, --flag", fix="give them to flagdata observe"
+                "a table of observables has no pictures that could be cropped or searched for a flag",
+                where="--crop, --flag",
+                fix="leave both out; flagdata observe takes them when it makes the table",
             )
         rows, parent = _of_table(Path(source), size, lake=lake, at=at, first=first, last=last, log=log, offset=offset)
         return Opened(name=source, parent=parent, rows=rows)

@@ -27,7 +27,7 @@ from sim.mesh import Diagonals, Mesh, grid
 from sim.scene import Scene, assemble, roughened
 
 MATERIAL = "camel-ponte-roma"
-_OUTER = 2e-3  # s; of the force beside the base model
+_OUTER = 2e-3  # s, time step of the force beside the base model
 _ROUGH = 2e-3  # m, standard deviation of the free vertices' start
 RECIPE = """\
 title = "tracked"
@@ -55,11 +55,11 @@ wind = {{ speed = {speed:g} }}
 
 @dataclass(frozen=True, kw_only=True)
 class TrackedRecipe:
-    """What to make.
+    """The experiment that is simulated.
 
     Attributes:
         seed: root of all random streams.
-        effect, parameter, strength: what acts and nobody declares.
+        effect, parameter, strength: what acts on the cloth and is not in the recipe file.
         speeds: of the wind, one a recording [m/s].
         duration: of each recording [s], after `settle` [s] that are not kept.
         rate: of the cameras [Hz].
@@ -115,7 +115,7 @@ class Tracks:
 
 
 def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int], object]) -> Tracks:
-    """Write `tracks.csv` and `tracked.toml` into `folder`.
+    """Simulates the flag and writes `tracks.csv` and `tracked.toml` into `folder`.
 
     Args:
         advance: called with the number of frames done.

@@ -1,4 +1,5 @@
-"""Draws of a film's windows, at each size of flag that is considered, as quantities of the flag itself."""
+"""From the network's draws for each window to the film's answer: posterior draws in SI units, combined over windows and
+over the flag sizes considered."""
 
 from __future__ import annotations
 
@@ -43,7 +44,7 @@ class WindowAnswer:
     Attributes:
         start, end: of its frames, at the smallest and largest size considered [s from the film's first frame].
         quantities: with their intervals.
-        p: that a familiar clip is at least as strange.
+        p: probability that a familiar clip is at least as strange.
     """
 
     start: float
@@ -67,9 +68,16 @@ class WindowAnswer:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Look:
-    """A window as the model sees it at each size: its posterior without what is known, logits (i, n, target) of draws
-    with it, its first network's summaries (i, dimension), reasons, and for each draw (i, n) the log Bayes factor of
-    what is known (0 if nothing is)."""
+    """One window as the network sees it, at each size considered (i).
+
+    Attributes:
+        start: of its frames [s from the film's first frame].
+        posterior: without what is known.
+        logits: (i, n, target) draws with it.
+        summaries: (i, dimension) of the first network.
+        reasons: why the window cannot be measured, for each size.
+        log_factor: (i, n) log Bayes factor of what is known, 0 if nothing is.
+    """
 
     start: float
     posterior: Mixture
@@ -97,8 +105,8 @@ class Look:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Joint:
-    """Turns logits at the sizes considered into quantities of the flag itself."""
+class FilmAnswer:
+    """Combines the windows' draws into the film's answer, and gives each window's own answer."""
 
     model: Estimator
     sizes: Sizes
@@ -167,8 +175,8 @@ class Joint:
         )
 
     def joint(self, looks: Sequence[Look], dependence: Dependence) -> tuple[FloatArray, FloatArray]:
-        """Combines all windows: draws (n, target), the wind their mean, and (m, target) places of the windows' own in
-        the network's range."""
+        """Combines all windows: draws (n, target), the wind their mean, and (m, target) the windows' own values as
+        shares, 0 to 1, of the network's range."""
         wind_columns = [column for column, name in enumerate(self.names) if name in OWN]
         cloth_columns = [column for column, name in enumerate(self.names) if name not in OWN]
         parts, places = [], []

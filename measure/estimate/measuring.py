@@ -16,7 +16,7 @@ from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
 from measure.estimate.answer import Quantity, sentence
 from measure.estimate.combine import OWN, Dependence
-from measure.estimate.joint import DRAWS, Joint, Look, WindowAnswer
+from measure.estimate.joint import DRAWS, FilmAnswer, Look, WindowAnswer
 from measure.estimate.options import Options
 from measure.film.similarity import Sizes, sizes, trained_on
 from measure.film.windows import Window, WindowLayout, WindowReader, findings_of
@@ -150,7 +150,7 @@ def measure(
         generator=stream(options.seed, "sizes"),
         trained=trained_on(model.targets),
     )
-    joint = Joint(model=model, sizes=considered, options=options)
+    joint = FilmAnswer(model=model, sizes=considered, options=options)
     scales = considered.scale.tolist()
     reader = WindowReader(film, model, scales, step=options.step, first=options.first, last=options.last)
     layout, distinct = reader.layout, reader.distinct
@@ -173,7 +173,7 @@ def measure(
         [look.reasons for look in looks], false_alarm=options.false_alarm, level=gate.level, faults=faults
     )
     sizes_kept = considered.only(gate_verdict.sizes)
-    answer = Joint(model=model, sizes=sizes_kept, options=options)
+    answer = FilmAnswer(model=model, sizes=sizes_kept, options=options)
     kept_looks = [look.only(gate_verdict.sizes) for look in looks]
     # One answer of the windows that count, its draws shared by cloth.
     used = _used(kept_looks, gate_verdict, layout)
@@ -217,7 +217,7 @@ def measure(
 
 
 @torch.no_grad()
-def _look(window: Window, gate: WindowGate, joint: Joint) -> Look:
+def _look(window: Window, gate: WindowGate, joint: FilmAnswer) -> Look:
     model, seed = joint.model, child_seed(joint.options.seed, "window", window.index)
     embeddings = model.embeddings(model.inputs(window.clips))
     posterior = model.posterior(embeddings)

@@ -17,7 +17,7 @@ from flagdata.errors import InputError
 from measure.observe.trajectory import Trajectory, WindTrack
 
 HORIZON = 0.04
-"""About this long a prediction is [s]: 25 frames a second, the paper's rate."""
+"""How far ahead a prediction reaches, about [s]: 25 frames a second, the paper's rate."""
 _SEGMENT = 2.0  # s
 _SHORTEST = 0.8  # s: a segment of recordings too short for two of the usual length
 _WARM_UP = 0.24  # s: six frames at 25 a second; the observer forgets its start in two
@@ -30,7 +30,7 @@ class Cut:
     Attributes:
         stride: recorded frames from one that is used to the next.
         period: between those [s].
-        warm: how many of them a segment begins with that do not count.
+        warm: frames of warm-up at a segment's start. Two more precede the first frame that counts.
         length: how many count.
     """
 
@@ -76,7 +76,7 @@ class Segment:
         start: of the first frame, since the recording's first [s].
         positions: (frame, marker, 3), warm-up included [m].
         wind: of the recording.
-        noise: of a coordinate [m].
+        noise: standard deviation of a coordinate's noise [m].
         anchors: (held, 3) where its cloth is tied [m]; None where the specimen says it.
         seen: (frame, marker) whether each position was tracked; None where all were.
         attachments: (frame, held, 3) where its cloth is held, if that moves [m].
@@ -108,8 +108,8 @@ class Segments:
 
     @classmethod
     def of(cls, recordings: Sequence[Trajectory]) -> Segments:
-        """Cuts recordings into segments; frames beyond a horizon of about 40 ms are used every so many, a remainder is
-        left out.
+        """Cuts recordings into segments; frames are thinned to about 40 ms apart; a remainder too short for a segment
+        is left out.
 
         Segments last 2 s, or half of what the shortest recording allows.
 
@@ -160,7 +160,8 @@ class Segments:
         return cls(items=tuple(items), markers=first.markers, cut=cut)
 
     def tied(self, anchors: Sequence[FloatArray]) -> Segments:
-        """Ties the segments' cloths where each recording's (held, 3) are [m]; but those that are carried."""
+        """Sets the anchors (held, 3) [m] of each segment to those of its recording, except of segments whose
+        attachments move."""
         return replace(
             self,
             items=tuple(
@@ -180,7 +181,7 @@ class Segments:
 
     @cached_property
     def noise(self) -> FloatArray:
-        """(segment,) of a coordinate [m]."""
+        """(segment,) standard deviation of a coordinate's noise [m]."""
         return np.array([item.noise for item in self.items])
 
     @cached_property

@@ -65,8 +65,8 @@ class Silhouettes:
         return (self.hoist[1] - np.arange(self.masks.shape[1]) - 0.5) / self.scale
 
     def middle_of(self, low: float, high: float) -> FloatArray:
-        """Computes the centroid (n, 2) [m] of the cloth between two shares of its area, counted away from the hoist;
-        NaN without."""
+        """Computes the centroid (n, 2) [m] of the part of the cloth's area between two shares, counted from the hoist
+        outwards; NaN where there is no cloth."""
         profile = self.masks.sum(axis=1).astype(np.float64)
         divisor = np.where(profile > 0, profile, 1.0)
         total = np.where(profile.any(axis=1), profile.sum(axis=1), np.nan)[:, None]
@@ -80,7 +80,8 @@ class Silhouettes:
         quarter of the free outline and the centroid of the `_TAIL` of the area that is farthest along the chord; NaN
         without cloth.
 
-        Against the mean of the edge's points, the first is too high where the flag droops, the second too low.
+        If the flag droops, the outline's middle is above the mean of the true edge's points and the tail's centroid
+        below it; their middle errs less.
         """
         edge = np.full((len(self.masks), 2), np.nan)
         for k, mask in enumerate(self.masks):
@@ -95,6 +96,8 @@ class Silhouettes:
         return places[along >= np.quantile(along, 1 - _TAIL)].mean(axis=0)
 
     def _along_outline(self, mask: BoolArray) -> FloatArray:
+        """Returns the mean of the middle quarter of the free outline: the outline is cut at the points nearest to the
+        hoist's two ends."""
         contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         border = np.asarray(max(contours, key=len), np.int64)[:, 0]
         places = np.stack([self.columns[border[:, 0]], self.rows[border[:, 1]]], axis=1)

@@ -20,7 +20,7 @@ from scipy.special import logsumexp
 from flagdata.arrays import FloatArray
 from flagdata.rng import stream
 from measure.refine.metamodel import Metamodel
-from measure.refine.space import BENDING, WIND, Space
+from measure.refine.space import BENDING, WIND_COLUMN, Space
 
 CLOTHS, WINDS, DRAWS = 2000, 121, 4000
 
@@ -94,7 +94,7 @@ def posterior(
         cell = (rng.random((draws, 1)) > share / share[:, -1:]).sum(axis=1)
         out[:, clip] = grid[cell] + step * (rng.random(draws) - 0.5)
     points = prior[chosen]
-    points[:, WIND] = 2 * (out[:, 0] - low) / (high - low) - 1
+    points[:, WIND_COLUMN] = 2 * (out[:, 0] - low) / (high - low) - 1
     return Posterior(points=points, winds=out, effective=float(1 / np.square(weight).sum()))
 
 

@@ -38,7 +38,7 @@ from measure.refine.metamodel import Metamodel, least
 from measure.refine.posterior import REGRESSORS, Posterior, bending_table, posterior, regressors
 from measure.refine.refinement import Interval, Refinement, Round, intervals_of
 from measure.refine.simulator import Simulator
-from measure.refine.space import DIMENSION, WIND, Space
+from measure.refine.space import DIMENSION, WIND_COLUMN, Space
 from measure.refine.target import Target, knows_view
 from measure.refine.trace import Trace
 from models.estimator import Estimator
@@ -311,7 +311,7 @@ class _Run:
         """Cloths (θ, 17) with the winds (clip, θ) [m/s] of each clip."""
         out = np.broadcast_to(base, (len(winds), len(base), DIMENSION)).copy()
         entry = self.space.wind
-        out[:, :, WIND] = np.clip(2 * (winds - entry.low) / (entry.high - entry.low) - 1, -1.0, 1.0)
+        out[:, :, WIND_COLUMN] = np.clip(2 * (winds - entry.low) / (entry.high - entry.low) - 1, -1.0, 1.0)
         return out
 
     def _posterior(

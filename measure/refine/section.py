@@ -17,7 +17,7 @@ from flagdata.pages.pictures import figure_url, moving, still
 from flagdata.pages.render import render
 from measure.refine.evaluator import Evaluator
 from measure.refine.refinement import METHOD, Refinement
-from measure.refine.space import QUANTITIES, WIND
+from measure.refine.space import QUANTITIES, WIND_COLUMN
 from measure.refine.trace import Trace
 
 STEPS = (0, 10, 20, 40)
@@ -53,7 +53,7 @@ def frames(trace: Trace, evaluator: Evaluator, *, steps: Sequence[int] = STEPS) 
         index = trace.incumbent(evaluations=step + 1)
         point = trace.points[index]
         evaluated = evaluator.evaluate(point[None], 1)[0]
-        wind = float(evaluator.simulator.space.values(point[None])[0, WIND])
+        wind = float(evaluator.simulator.space.values(point[None])[0, WIND_COLUMN])
         nearest.append(Shown(step=step, frame=evaluated.frame, wind=wind, distance=float(trace.distances[index])))
     return nearest
 
@@ -70,7 +70,9 @@ def trace_picture(refinement: Refinement, clip: int = 0) -> str:
     distance_axes.set(xlabel="evaluations", ylabel="squared distance to the target")
     distance_axes.legend(fontsize=8)
     space = refinement.evaluators[clip].simulator.space
-    wind_axes.plot(number, space.values(trace.points)[:, WIND], ".", color=_OTHER, markersize=4, label="evaluated")
+    wind_axes.plot(
+        number, space.values(trace.points)[:, WIND_COLUMN], ".", color=_OTHER, markersize=4, label="evaluated"
+    )
     if clip == 0:
         count = [r.evaluations for r in refinement.rounds]
         winds = [r.intervals[0] for r in refinement.rounds]

@@ -24,7 +24,7 @@ from flagdata.errors import InputError
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed, stream
 from flagdata.tables import Range
-from measure.refine.space import DENSITY, WIND, Space
+from measure.refine.space import DENSITY_COLUMN, WIND_COLUMN, Space
 from measure.refine.view import View
 from models.conditioning.conditioning import VERSION
 from models.training.conditioned import FitFilm
@@ -210,15 +210,15 @@ class SimulatedScene:
         damping = self.recipe.material.damping
         material = replace(
             scene.material,
-            density=float(values[DENSITY]),
-            bending=values[:DENSITY].reshape(BENDING_SHAPE),
+            density=float(values[DENSITY_COLUMN]),
+            bending=values[:DENSITY_COLUMN].reshape(BENDING_SHAPE),
             damping=(
                 damping.at(stream(request.seed, "damping").random())
                 if isinstance(damping, Range)
                 else scene.material.damping
             ),
         )
-        flag = replace(scene, position=start, material=material, wind=(float(values[WIND]), 0.0, 0.0))
+        flag = replace(scene, position=start, material=material, wind=(float(values[WIND_COLUMN]), 0.0, 0.0))
         return replace(self._template, scene=flag, seed=request.seed, parameters={})
 
     @cached_property

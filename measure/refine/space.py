@@ -21,7 +21,8 @@ from sim.material import BENDING_SHAPE, Material
 from sim.run.recipe import Recipe, Shape
 
 BENDING = BENDING_SHAPE[0] * BENDING_SHAPE[1]
-DENSITY, WIND = BENDING, BENDING + 1
+DENSITY_COLUMN, WIND_COLUMN = BENDING, BENDING + 1
+"""Columns of θ."""
 DIMENSION = BENDING + 2
 """Length of θ: bending coefficients 0 to 14 (three directions of five curvatures), density, wind speed."""
 
@@ -32,9 +33,9 @@ class ReportedQuantity:
 
     Attributes:
         name: as in tables.
-        unit: SI.
+        unit: SI; log10(…) for a logarithm.
         about: in words.
-        digits: that are shown behind the point.
+        digits: shown after the decimal point.
     """
 
     name: str
@@ -74,7 +75,8 @@ class Space:
 
     Attributes:
         material: whose bending coefficients are multiplied.
-        factor: of each bending coefficient; the scale is the prior's, coordinates are logarithmic.
+        factor: range of each bending coefficient's factor. Its scale is that of the prior; the search is always
+            logarithmic.
         common: of all bending coefficients together, likewise; None where there is none.
         density: [kg/m²].
         wind: [m/s].
@@ -221,8 +223,8 @@ class Space:
         logs = np.log10(values[:, :BENDING]).reshape(-1, _ROWS, _COLUMNS)
         return np.stack(
             [
-                values[:, WIND],
-                values[:, DENSITY],
+                values[:, WIND_COLUMN],
+                values[:, DENSITY_COLUMN],
                 logs.mean(axis=(1, 2)),
                 logs[:, 0].mean(axis=1) - logs[:, -1].mean(axis=1),
                 logs[:, :, -2:].mean(axis=(1, 2)) - logs[:, :, :2].mean(axis=(1, 2)),

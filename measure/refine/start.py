@@ -16,7 +16,7 @@ from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.stated import Stated
-from measure.refine.space import DENSITY, DIMENSION, WIND, Space
+from measure.refine.space import DENSITY_COLUMN, DIMENSION, WIND_COLUMN, Space
 from models.estimator import Estimator
 from models.restriction import Known, usable_aspect
 from models.targets import ASPECT
@@ -121,5 +121,5 @@ def completed(space: Space, drawn: FloatArray, *, seed: int) -> FloatArray:
         taken.add(index)
         out[i] = pool[index]
     values = space.values(out)
-    values[:, DENSITY], values[:, WIND] = drawn[:, 1], drawn[:, 0]
+    values[:, DENSITY_COLUMN], values[:, WIND_COLUMN] = drawn[:, 1], drawn[:, 0]
     return space.unit(values)

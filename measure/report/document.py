@@ -51,7 +51,11 @@ def from_document(document: Mapping[str, Any]) -> Verdict:
         content["ranking"] = [_current(candidate) for candidate in content["ranking"]]
     tag = content.pop("schema", None)
     if tag != SCHEMA:
-        raise InputError(f"the schema is {tag!r}", where="schema", fix=f"give a document of schema {SCHEMA!r}")
+        raise InputError(
+            f"this verdict cannot be read: its schema is {tag!r}, not {SCHEMA!r}",
+            where="verdict",
+            fix="close the loop again with this version, or update flagdata",
+        )
     return _read(content, Verdict, "verdict")
 
 

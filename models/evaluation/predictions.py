@@ -1,18 +1,16 @@
-"""What a trained model said of clips: the input to every score, kept in one file without pickle."""
+"""What a trained model said of clips: the input to every score."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import Float32Array, FloatArray, IntArray, read_arrays
-from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
+from flagdata.arrays import Float32Array, FloatArray, IntArray
+from flagdata.errors import InputError, UnknownNameError
 
-SCHEMA = "flagdata.predictions/1"
 WIND = "wind_speed"
 DENSITY = "density"
 
@@ -76,7 +74,7 @@ class Predictions:
             raise InputError(
                 f"the model has {self.parameters} parameters and takes {self.milliseconds} ms a clip",
                 where=where,
-                fix="give what was counted",
+                fix="give both as numbers of 0 or more",
             )
 
     @staticmethod
@@ -85,7 +83,7 @@ class Predictions:
             raise InputError(
                 f"{name} is {array.dtype} {array.shape}, not {dtype} {shape}",
                 where=where,
-                fix="one row a clip, one column a target, in the types that Predictions states",
+                fix="give one row for each clip and one column for each target, in the types that Predictions states",
             )
         if not np.isfinite(array).all():
             bad = int(np.argwhere(~np.isfinite(array))[0][0])
@@ -113,58 +111,3 @@ class Predictions:
         if target not in self.targets:
             raise UnknownNameError.of("target", target, self.targets, where=f"predictions of {self.label!r}")
         return self.targets.index(target)
-
-
-def save(predictions: Predictions, path: Path) -> None:
-    """Writes the predictions as a compressed .npz of plain arrays to exactly `path`."""
-    content: dict[str, NDArray] = {
-        "schema": np.array(SCHEMA),
-        "label": np.array(predictions.label),
-        "targets": np.array(predictions.targets),
-        "truth": predictions.truth,
-        "mean": predictions.mean,
-        "group": predictions.group,
-        "parameters": np.array(predictions.parameters, dtype=np.int64),
-        "milliseconds": np.array(predictions.milliseconds, dtype=np.float64),
-        "note": np.array(predictions.note),
-    }
-    if predictions.samples is not None:
-        content["samples"] = predictions.samples
-    if predictions.embedding is not None:
-        content["embedding"] = predictions.embedding
-    with path.open("wb") as target:
-        np.savez_compressed(target, **content)  # pyright: ignore[reportArgumentType]
-
-
-def load(path: Path) -> Predictions:
-    """Reads what `save` wrote.
-
-    Raises:
-        NotFoundError: the file does not exist.
-        InputError: it is truncated, is no predictions file or holds other types; pickled objects are refused.
-    """
-    fix = "write it with models.evaluation.predictions.save, or copy it again"
-    try:
-        content = read_arrays(path, what="a file of predictions", fix=fix)
-    except FileNotFoundError:
-        raise NotFoundError("the file does not exist", where=str(path), fix="check the path") from None
-    except CorruptError as cause:
-        raise InputError(f"cannot be read as predictions: {cause.what}", where=str(path), fix=fix) from None
-    tag = str(content.pop("schema", "none"))
-    if tag != SCHEMA:
-        raise InputError(f"the schema is {tag!r}, not {SCHEMA!r}", where=str(path), fix=fix)
-    try:
-        return Predictions(
-            label=str(content["label"]),
-            targets=tuple(str(name) for name in content["targets"]),
-            truth=content["truth"],
-            mean=content["mean"],
-            samples=content.get("samples"),
-            embedding=content.get("embedding"),
-            group=content["group"],
-            parameters=int(content["parameters"]),
-            milliseconds=float(content["milliseconds"]),
-            note=str(content["note"]),
-        )
-    except KeyError as missing:
-        raise InputError(f"the array {missing} is missing", where=str(path), fix=fix) from None

@@ -72,7 +72,7 @@ def accuracy_values(embedding: NDArray[np.floating], triplets: IntArray, resampl
 def _check(group: IntArray) -> None:
     if not possible(group):
         raise InputError(
-            "the clips have no triplet",
+            "there is no triplet among the clips: two of one simulation and one of another",
             where="the groups of clips",
             fix="give clips of at least two simulations, two or more of one of them",
         )

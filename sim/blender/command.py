@@ -30,7 +30,7 @@ def blender_setup(chosen: SettingUp) -> None:
 
     Blender's module needs Python 3.11 and NumPy 1. It gets a virtual environment of its own, so that flagdata's is free
     of both. About 1 GB is downloaded and kept; pip's own settings apply. The command may be repeated: it completes what
-    it began. A folder that holds anything else, an environment for other work too, is refused.
+    it began. A folder that holds anything else is refused, also a virtual environment made for other work.
 
     The environment in the default folder is found without further settings. For one elsewhere, set the variable
     FLAGDATA_BLENDER to the path of its Python.

@@ -1,4 +1,4 @@
-"""A film's record: frames, anemometer and parameters in one MCAP file, as a real recording has them."""
+"""The record of a simulated film: frames, anemometer and parameters in one MCAP file, as a real recording has them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sim.render.parameters import RenderParameters
 from sim.run.members import Member, Parameter
 
 FILL = "fill"
-"""Attachment that makes all records of a data set equally long."""
+"""Attachment that pads a record to a whole multiple of the camera's `frame_slot`, so that its length reveals little."""
 MEAN_WIND = "mean_wind_speed"
 
 
@@ -27,12 +27,12 @@ class Content:
     """What goes into a record.
 
     Attributes:
-        film: which.
+        film: its plan.
         times: (n,) of the frames [UTC ns].
         frames: as the camera codes them.
         wind: the anemometer's samples.
         parameters: numbers by name, SI.
-        zeta: what the picture was made with.
+        zeta: render parameters ζ.
         camera: its coding; the record's length is a whole multiple of its slot.
     """
 
@@ -46,7 +46,10 @@ class Content:
 
 
 def record_bytes(content: Content) -> bytes:
-    """Writes the file. The code's version is in the catalog, not in the file: the same film gives the same bytes."""
+    """Returns the record's bytes. It is written twice: the first one's length gives the padding of the second.
+
+    The code's version is in the catalog, not in the file: the same film gives the same bytes.
+    """
     with tempfile.TemporaryDirectory(prefix="flagdata-film-") as folder:
         padded = Path(folder) / "whole.mcap"
         _write(Path(folder) / "bare.mcap", content, fill=0)
@@ -87,7 +90,8 @@ def _write(path: Path, content: Content, *, fill: int) -> None:
 def parameters_of(member: Member, zeta: RenderParameters, drawn: Mapping[str, float], truth: Truth) -> dict[str, float]:
     """Returns θ, ζ and what the instruments drew, numbers by name in SI; lists as "name.0", "name.1", …
 
-    Where the anemometer is to be believed, the simulated mean wind has another name than ground truth goes by.
+    If the anemometer is the ground truth (`Truth.MEASURED`), the simulated mean wind is called mean_wind_speed, so that
+    nothing takes it for the truth.
     """
     numbers: dict[str, float] = {}
     for name, value in member.parameters.items():

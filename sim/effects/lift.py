@@ -18,7 +18,8 @@ from sim.effects.quantities import AIR_DENSITY, AirDensity
 
 @dataclass(frozen=True, kw_only=True)
 class Lift(ForceEffect):
-    """f = ½ ρ C a (w·n) (|w| n − (w·n) w/|w|): perpendicular to the relative wind w, of size ½ ρ C a |w|² sin α cos α.
+    """The force on a face of rest area a and unit normal n is f = ½ ρ C a (w·n) (|w| n − (w·n) w/|w|), perpendicular to
+    the relative wind w and of size ½ ρ C a |w|² sin α cos α.
 
     α is the angle between the wind and the face. The face's two normals give the same force.
 

@@ -1,4 +1,4 @@
-"""Where the cloth is at instants between its frames, for the blur of an exposure."""
+"""Where the cloth is at instants between its frames, for motion blur."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class VertexMotion:
     Attributes:
         positions: (all vertices, 3) at the frames' instants [m].
         rate: frames a second [Hz].
-        forth, back: (all vertices, 3) displacements within the frame's time after, and the one before [m].
+        forth, back: (all vertices, 3) displacements from a frame to the next one, and from the one before to it [m].
     """
 
     positions: Tensor

@@ -46,7 +46,7 @@ def test_every_bit_that_changes_is_found(folder: Path, name: str) -> None:
 
 def test_a_file_that_is_missing_or_was_added_is_named(folder: Path) -> None:
     (folder / "c.bin").write_bytes(b"")
-    with pytest.raises(CorruptError, match="does not state this file") as caught:
+    with pytest.raises(CorruptError, match="does not list this file") as caught:
         check_sums(folder, fix="restore it")
     assert (caught.value.where, caught.value.fix) == (str(folder / "c.bin"), "restore it")
     (folder / "c.bin").unlink()

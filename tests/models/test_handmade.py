@@ -158,7 +158,7 @@ def test_unfit_clips_are_errors() -> None:
         features(clip[:, :, :7], rate=RATE)
     with pytest.raises(InputError, match=f"do not resolve {BAND_EDGES[-1]:g} Hz"):
         features(clip, rate=24.0)
-    with pytest.raises(InputError, match="without contrast"):
+    with pytest.raises(InputError, match="need contrast"):
         features(torch.full((1, 1, T, 32, 32), 7.0), rate=RATE)
     clip[0, 0, 3, 4, 5] = torch.nan
     with pytest.raises(InputError, match="not finite"):

@@ -365,7 +365,7 @@ def test_units_that_lack_a_cell_are_read_by_the_columns_that_are_named(user: Use
 def test_a_component_is_no_speed_and_is_named_with_the_other(user: User) -> None:
     lines = (f"2026-05-01T12:00:{k:02d}Z,{-2 - k % 7 / 10:.1f},{1 + k % 5 / 10:.1f}\n" for k in S)
     (user.folder / "a.csv").write_text("time,wind_speed,v\n" + "".join(lines))
-    fix = user.meets("samples/rules.py", "name both components, ea", "ingest", "a.csv", "--sensor", "generic-csv")
+    fix = user.meets("samples/rules.py", "name both components and", "ingest", "a.csv", "--sensor", "generic-csv")
     assert "wind_x[m/s] and wind_y[m/s]" in fix
     user.follows("ingest", "a.csv", "--columns", "time,wind_x[m/s],wind_y[m/s]", "--azimuth", 270)
 

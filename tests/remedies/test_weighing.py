@@ -103,7 +103,7 @@ CASES = [
     ),
     Case(
         "cloth/sources.py",
-        "give them to flagdata observe",
+        "leave both out; flagdata observe takes them",
         f"calibrate t.csv {SIZED} --crop 0,0,9,9",
         ("observe --help", f"calibrate t.csv {SIZED}"),
         files={"t.csv": GUSTY},

@@ -168,8 +168,11 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     choice = options.zero_offset if options.zero_offset is not None else reading.rules.zero_offset
     ordered = in_order(reading, where=str(path), choice=options.clock)
     reading = zero.settle(rules.impossible(ordered), choice)
-    for rule in rules.RULES:
-        reading = rule(reading)
+    try:
+        for rule in rules.RULES:
+            reading = rule(reading)
+    except InputError as error:
+        raise InputError(error.what, where=f"{path}, {error.where}", fix=error.fix) from None
     reading = rules.future(reading, now=time.time_ns())
     answered = recipe.expect if isinstance(recipe, recipes.Recipe) else frozenset[str]()
     findings = (*reading.findings, *(() if reading.drafted else doubts.reported(reading, answered)))

@@ -299,12 +299,18 @@ def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoS
             fix=f"give --stream {' or '.join(streams)}",
         )
     kinds = sorted({stream.type for stream in container.streams if stream.type != "video"})
+    if is_cut(path) and is_mp4(path):
+        fix = _UNFINISHED
+    elif any(not stream.disposition & av.stream.Disposition.attached_pic for stream in container.streams.video):
+        fix = "convert the video, as by ffmpeg -i FILE -c:v libx264 NEW.mp4"
+    else:
+        fix = "give the video file"
     raise InputError(
         f"the file holds {', '.join(kinds)} but no video that can be decoded"
         if kinds
         else "the file holds no video that can be decoded",
         where=str(path),
-        fix=_UNFINISHED if is_cut(path) and is_mp4(path) else "give the video file",
+        fix=fix,
     )
 
 

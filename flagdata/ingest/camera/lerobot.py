@@ -1,7 +1,8 @@
-"""One episode of a LeRobot data set (version 3.0) as a camera's source: a film or pictures in the table of frames.
+"""One camera of one episode of a LeRobot data set (version 3.0), frame by frame for ingest: from its MP4, or from
+pictures in the table of frames.
 
-Frames have the instants of the feature `flagdata.time` where the data set has it, as those that flagdata exported;
-else they count from the episode's start by their column `timestamp`, and the user gives the start.
+If the data set has the feature `flagdata.time`, as flagdata's exports do, it gives each frame's instant in UTC.
+Otherwise times count from the episode's start (column `timestamp`), and the user gives the start.
 
 Source: lerobot 0.6, `lerobot.datasets`.
 """
@@ -42,15 +43,16 @@ from flagdata.parquet import read_parquet
 
 VERSION = "v3.0"
 TIME = "flagdata.time"
+"""Feature with each frame's instant [UTC ns]."""
 _NANOSECOND = Fraction(1, 1_000_000_000)
 _FIELD = re.compile(r"\{(\w+)(?::0?(\d?)d)?\}")
 _FARTHEST = 9.2e18  # ns; 64 bits hold a little more
-_PAST_END = 0.25  # frame periods before the episode's end up to which a frame of its film counts
+_EARLY = 0.25  # frame periods by which a decoded frame may precede the first one wanted and still count
 
 T = TypeVar("T")
 
 
-def described(folder: Path) -> Mapping[str, Any]:
+def description_of(folder: Path) -> Mapping[str, Any]:
     """Reads what meta/info.json states of a data set.
 
     Raises:
@@ -95,7 +97,7 @@ class EpisodeSource:
 
     def __init__(self, folder: Path, options: CameraOptions) -> None:
         self._where = str(folder)
-        info = described(folder)
+        info = description_of(folder)
         self._camera, self._kind = _chosen(cameras(info), options.topic, self._where)
         if options.sequence_fps is not None:
             raise TimeError("its frames have stamps", where=self._where, fix="leave out --sequence-fps")
@@ -210,7 +212,7 @@ class EpisodeSource:
                 container.seek(int((wanted - period) * av.time_base) if wanted > period else 0)
                 for frame in container.decode(stream):
                     at = frame.time
-                    if at is None or at < wanted - _PAST_END * period:
+                    if at is None or at < wanted - _EARLY * period:
                         continue
                     number = round((at - begin) / period)
                     if number >= len(self._stamps):

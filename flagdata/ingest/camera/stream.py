@@ -359,7 +359,9 @@ def open_source(path: Path, options: CameraOptions) -> PictureSource:
     if options.chapters:
         if options.episode is not None or options.topic is not None:
             message = "an episode" if options.episode is not None else "a topic"
-            raise UsageError(f"{message} of joined video files, which have none", where=str(path), fix="leave it out")
+            raise UsageError(
+                f"{message} was given, but joined video files have none", where=str(path), fix="leave it out"
+            )
         check_films((path, *options.chapters))
         return JoinedSource((path, *options.chapters), options)
     if is_lerobot(path):
@@ -368,7 +370,9 @@ def open_source(path: Path, options: CameraOptions) -> PictureSource:
         _no_stream(path, options)
         return EpisodeSource(path, options)
     if options.episode is not None:
-        raise UsageError("an episode of what is no LeRobot data set", where=str(path), fix="leave out --episode")
+        raise UsageError(
+            "an episode was given, but this is no LeRobot data set", where=str(path), fix="leave out --episode"
+        )
     if is_bag(path):
         from flagdata.ingest.mcap.pictures import TopicSource
 
@@ -376,7 +380,7 @@ def open_source(path: Path, options: CameraOptions) -> PictureSource:
         return TopicSource(path, options)
     if options.topic is not None:
         raise UsageError(
-            "a topic of what is no MCAP file or LeRobot data set", where=str(path), fix="leave out --topic"
+            "a topic was given, but this is no MCAP file or LeRobot data set", where=str(path), fix="leave out --topic"
         )
     if is_folder(path):
         _no_stream(path, options)
@@ -386,7 +390,7 @@ def open_source(path: Path, options: CameraOptions) -> PictureSource:
 
 def _no_stream(path: Path, options: CameraOptions) -> None:
     if options.stream is not None:
-        raise UsageError("a stream of what is no video file", where=str(path), fix="leave out --stream")
+        raise UsageError("a stream was given, but this is no video file", where=str(path), fix="leave out --stream")
 
 
 def propose_crop(path: Path | str, options: CameraOptions | None = None) -> CropProposal:

@@ -240,7 +240,7 @@ def messages(path: Path, topic: str, *, picked: Index | None = None) -> Iterator
             key = (part, message.channel)
             if key not in decoders:
                 channel = layouts[part].channels[message.channel]
-                decoders[key] = _decoder(layouts[part].schemas.get(channel.schema_id), channel)
+                decoders[key] = _decoder(layouts[part].path, layouts[part].schemas.get(channel.schema_id), channel)
             position = (part, message.block, message.offset)
             return Decoded(position=position, log_time=message.log_time, values=decoders[key](message.data))
 
@@ -378,7 +378,7 @@ def _readable(path: Path) -> Iterator[None]:
         ) from None
 
 
-def _decoder(schema: Schema | None, channel: Channel) -> Callable[[bytes], Mapping[str, Any]]:
+def _decoder(path: Path, schema: Schema | None, channel: Channel) -> Callable[[bytes], Mapping[str, Any]]:
     encoding = channel.message_encoding
     if encoding == "protobuf" and schema is not None:
         decode = DecoderFactory().decoder_for(encoding, schema)
@@ -390,8 +390,8 @@ def _decoder(schema: Schema | None, channel: Channel) -> Callable[[bytes], Mappi
         return cdr.decoder(schema.name, schema.data.decode(errors="replace"), ros1=encoding == "ros1")
     described = f" described by {schema.encoding}" if schema is not None and schema.encoding else ""
     raise InputError(
-        f"messages in {encoding}{described} are not read",
-        where=channel.topic,
+        f"messages in the encoding {encoding or 'none'}{described} cannot be decoded",
+        where=f"{path}, {channel.topic}",
         fix="record the topic in protobuf, JSON, ROS 2 (CDR with ros2msg) or ROS 1 (ros1msg)",
     )
 

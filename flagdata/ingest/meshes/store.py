@@ -164,12 +164,13 @@ def _report(
 
 
 _STRETCHED = 1.5
-"""Length of an edge over that in the material beyond which it is no cloth's: knits tear at 1.3 to 1.5, and a vertex
-that takes its neighbour's place doubles an edge."""
+"""Ratio of an edge's length in space to its length at rest above which it is not cloth: knits tear at 1.3 to 1.5, and
+a vertex that takes its neighbour's place doubles an edge."""
 _SUDDEN = 10.0
-"""Times the usual way between two frames beyond which a frame is elsewhere."""
+"""A frame has jumped if its vertices move more than this many times their usual way between frames,
+and more than `_FAR` of the cloth's size: both must hold."""
 _FAR = 0.2
-"""The same, in sizes of the cloth."""
+"""Share of the cloth's size, see `_SUDDEN`."""
 
 
 def continuity(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
@@ -341,7 +342,7 @@ def check_units(sequence: MeshSequence | RaggedMeshSequence, *, where: str) -> N
 
 def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
     """Reports what is odd and was kept: faces turned over or without area in the material, vertices of no face,
-    vertices that change places, pieces and slits."""
+    vertices that change places, pieces, slits and T-joints."""
     flipped = degenerate = loose = 0
     first: dict[str, int] = {}
     frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))

@@ -6,7 +6,7 @@ the balance holds is the wind that the motion shows. A rate that is twice the tr
 the true one divides it by 3.6 in terms of the wind that is given.
 
 In calm air the balance does not constrain the clock: the air's force and the inertia both go by the inverse square of
-the time. There a swinging cloth constrains it: its energy of motion comes from its height.
+the time. There a swinging cloth constrains it: its kinetic energy comes from its height.
 """
 
 from __future__ import annotations
@@ -29,13 +29,14 @@ _EXPLAINED = 0.4  # of the moment's variance: a balance that explains less says 
 # the rate twice or half the true one, km/h for m/s or the reverse, 25 of them give 1.68 or more, 0.54 or less:
 # reported.
 _SHOWN = (0.65, 1.5)
-_SWING = (0.4, 2.0)  # energy of motion over that from height; released reference runs give 0.77 to 0.87
+_SWING = (0.4, 2.0)  # kinetic energy over that from height; released reference runs give 0.77 to 0.87
 _CALM = 0.5  # m/s
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MarkerMotion:
-    """The model's mesh as the markers show it, between the frames on either side.
+    """Position, velocity and acceleration of the mesh's vertices, interpolated from the markers, by central
+    differences.
 
     Attributes:
         times: (frame,) [s].
@@ -86,8 +87,8 @@ def check_inertia(recording: Trajectory, specimen: Specimen) -> tuple[Finding, .
 
 
 def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
-    """Estimates the wind's speed that balances the moments about the pins, over the one given; None where they say
-    nothing.
+    """Estimates the ratio of the wind speed that balances the moments about the pins to the wind speed given; None if
+    the moments do not determine it.
 
     That is, the factor q of least ‖M_a − M_g − M_w(q U)‖² over all frames, each less its mean, where M are the moments
     of the accelerations, of gravity and of the base model's wind force.
@@ -127,8 +128,8 @@ def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
 
 
 def swing(recording: Trajectory, specimen: Specimen) -> float | None:
-    """Estimates growth of the energy of motion over loss of height, by least squares in time; None where neither
-    determines the other.
+    """Estimates the ratio of the kinetic energy gained to the potential energy lost, by least squares in time;
+    None where neither determines the other.
 
     It is 1 less what friction takes, and goes with the square of the frame rate.
     """

@@ -106,9 +106,9 @@ def check_scale(observation: Observation, edges: Edges, sigma: float) -> tuple[F
         u, v = (float(np.median(part)) for part in along)
         if abs(u - v) > _UNEVEN:
             raise InputError(
-                f"taut, the cloth is {u:.4g} times as long as at rest along u and {v:.4g} times along v",
+                f"pulled tight, the cloth is {u:.4g} times its length at rest along u, but {v:.4g} times along v",
                 where=where,
-                fix="the rest shape does not fit: check its width and height, and that u and v are not exchanged",
+                fix="check the width and height that were given, and that the columns u and v are not exchanged",
             )
     if scale <= _LONG:
         return ()

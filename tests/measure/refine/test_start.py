@@ -10,7 +10,7 @@ import torch
 
 from flagdata.rng import stream
 from flagdata.tables import Range
-from measure.refine import DENSITY, WIND, Space, start
+from measure.refine import DENSITY_COLUMN, WIND_COLUMN, Space, start
 from models.estimator import Estimator
 from sim.run import Recipe
 
@@ -19,8 +19,8 @@ def test_completed_points_have_the_given_wind_and_area_weight(recipe: Recipe) ->
     space = Space.of(recipe)
     given = np.array([[3.0, 0.12, -4.0, 0.1], [7.5, 0.165, -3.9, -0.2]])
     values = space.values(start.completed(space, given, seed=0))
-    np.testing.assert_allclose(values[:, WIND], given[:, 0])
-    np.testing.assert_allclose(values[:, DENSITY], given[:, 1])
+    np.testing.assert_allclose(values[:, WIND_COLUMN], given[:, 0])
+    np.testing.assert_allclose(values[:, DENSITY_COLUMN], given[:, 1])
 
 
 def test_an_area_weight_that_is_known_is_what_the_refinement_starts_from(estimator: Estimator, recipe: Recipe) -> None:

@@ -96,7 +96,7 @@ def test_the_document_holds_every_field_by_its_name() -> None:
 @pytest.mark.parametrize(
     ("change", "where", "what"),
     [
-        ({"schema": "flagdata.verdict/2"}, "schema", "flagdata.verdict/2"),
+        ({"schema": "flagdata.verdict/2"}, "verdict", "flagdata.verdict/2"),
         ({"conclusion": "perhaps"}, "verdict.conclusion", "perhaps"),
         ({"seconds": "long"}, "verdict.seconds", "of type str, not a number"),
         ({"seconds": True}, "verdict.seconds", "of type bool, not a number"),

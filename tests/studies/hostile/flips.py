@@ -135,7 +135,7 @@ def of_simulations(folder: Path) -> Kept:
     path = place / f"{design.digest(design.canonical(dict(asked[0].content())))[:32]}.npz"
     place.mkdir()
     np.savez_compressed(path, readings=np.random.default_rng(2).normal(size=(2, 1, 8, 4)))
-    return Kept(files=[path], read=lambda: design.read(asked, folder=place).tolist())
+    return Kept(files=[path], read=lambda: design.readings_of(asked, folder=place).tolist())
 
 
 def of_evaluations(folder: Path) -> Kept:

@@ -84,7 +84,8 @@ def since(attributes: Mapping[str, Any], *, where: str) -> Since:
     """Reads the units and the calendar of a time.
 
     Raises:
-        TimeError: a calendar that is not the one of clocks, a unit of no fixed length, or a date that cannot be read.
+        TimeError: a calendar that is not the one of clocks, a unit that is not known or of no fixed length, or a date
+            that cannot be read.
     """
     units, calendar = str(attributes["units"]), str(attributes.get("calendar", "standard")).lower()
     if calendar not in _CALENDARS:
@@ -95,7 +96,9 @@ def since(attributes: Mapping[str, Any], *, where: str) -> Since:
     unit = _UNITS.get(name := match["unit"].lower()) or _UNITS.get(name.removesuffix("s")) if match else None
     if match is None or unit is None:
         fix = "write the times in seconds, minutes, hours or days since a date"
-        raise TimeError(f"the times are in {units!r}, a unit of no fixed length", where=where, fix=fix)
+        raise TimeError(
+            f"the times are in {units!r}, whose unit is not known or has no fixed length", where=where, fix=fix
+        )
     date = _DATE.fullmatch(match["date"])
     fix = "write the date as in 'seconds since 2026-05-01 12:00:00 +00:00'"
     if date is None:
@@ -211,8 +214,15 @@ def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
         half = float(UNITS[unit].from_si(np.pi)) if standard == "wind_to_direction" else 0.0
         columns[heading] = (values + half) % (2 * half) if half else values
     if not any("wind" in heading for heading in columns):
-        fix = "give the variables of wind their standard names and one dimension, time; or export them as CSV"
-        raise InputError("the file has no variable of wind along time alone", where=where, fix=fix)
+        fix = (
+            "give the variables of wind their CF standard names (wind_speed, wind_from_direction), units, and time as "
+            "their only dimension; or export them as CSV"
+        )
+        raise InputError(
+            "no variable of the file is a wind with a standard name, a known unit, and time as its only dimension",
+            where=where,
+            fix=fix,
+        )
     stamps, findings = instants(raw[time].squeeze().values, raw[time].attrs, where=f"{where}, variable {time}")
     rows = zip(stamps.tolist(), *(values.tolist() for values in columns.values()), strict=True)
     lines = [",".join(["time", *columns])]

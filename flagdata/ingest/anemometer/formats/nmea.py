@@ -205,7 +205,7 @@ def reading_of(stream: Stream, time: Instants, options: WindOptions, *, where: s
         if np.isfinite(values).any():
             channels[name] = values
     if not channels:
-        fix = "check the sensor"
+        fix = "check that the sensor is connected and gives valid data"
         raise InputError("every wind sentence is empty or invalid", where=f"{where}, line {line[0]}", fix=fix)
     source = _sources(stream, "wind")
     channels, about = settled(channels, options, speeds=stream.speeds, source=source, where=where)

@@ -128,11 +128,11 @@ def negative(reading: Reading) -> Reading:
         if often and len(np.unique(values)) >= _SIGNED_KINDS and float(np.median(values)) < _SIGNED_LEVEL:
             share = 100 * len(values) / int(np.isfinite(speed).sum())
             raise InputError(
-                f"{name} is below zero in {share:.0f} % of its rows, down to {lowest:.3g} m/s, as a component of "
-                "the wind is and no speed",
+                f"{name} is negative in {share:.0f} % of its rows, down to {lowest:.3g} m/s: this looks like one "
+                "component of the wind, not its speed",
                 where=f"line {reading.line[below][0]}",
-                fix="name both components, each with its column, as wind_x[m/s] and wind_y[m/s] in --columns, and "
-                "add --azimuth 270 where they are towards east and north",
+                fix="name both components and their columns in --columns, as wind_x[m/s] and wind_y[m/s]; if they "
+                "point east and north, add --azimuth 270",
             )
         message = f"{{n}} negative values of {name}, down to {lowest:.3g} m/s; left out of averages"
         reading = reading.marked(

@@ -1,4 +1,4 @@
-"""The clock of a table's rows: stamps as their blocks come in, the order of the rows, and their instants in UTC."""
+"""The times of a table's rows: collects their stamps block by block, finds the rows' order, converts them to UTC."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class StatedTime:
     Attributes:
         start: the first row's instant [UTC ns].
         date: its day.
-        clock: whose stamps are right where they run back.
+        clock: which stamps are right where time runs back, see `ClockChoice`.
     """
 
     start: int | None = None
@@ -46,7 +46,15 @@ class StatedTime:
 
 @dataclass
 class RowClock:
-    """One clock's stamps as their blocks come in."""
+    """Collects the stamps of one clock block by block.
+
+    Attributes:
+        form: of the stamps, as a recipe names it.
+        columns: that make up a stamp.
+        step: finest resolution so far [ns].
+        bare_dates: stamps without a time of day.
+        ns, utc: see `Stamps`; of the rows kept.
+    """
 
     form: str
     columns: list[int]
@@ -71,8 +79,9 @@ class RowClock:
         self.utc.add(stamps.utc[keep])
         self.step = min(self.step, stamps.step)
 
-    def stated(self) -> bool:
-        """Checks whether every stamp states its zone, as Unix times do, or needs none, as counts since a start."""
+    def needs_no_zone(self) -> bool:
+        """Checks whether no zone has to be known: every stamp states its own, as Unix times do, or all count from a
+        start."""
         return dates.is_elapsed(self.form) or bool(self.utc.view().all())
 
     def order(self, line: IntArray, choice: ClockChoice | None) -> tuple[Order, tuple[Finding, ...]]:
@@ -92,7 +101,8 @@ class RowClock:
             text = "the newest row comes first: read from the end"
             findings = (Finding.of("newest-first", text, count=len(wall)),)
         if dates.is_elapsed(self.form) or dates.needs_date(self.form):
-            return order, findings  # the order of the rows is what gives their days
+            # such stamps have no day of their own: it follows from the rows' order, so they are not sorted
+            return order, findings
         sorting = clock.sorted_as_given(wall[order], line[order], choice)
         if sorting is None:
             return order, findings

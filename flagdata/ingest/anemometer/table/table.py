@@ -257,7 +257,7 @@ def read_table(
     order, new_findings = gathered.clock.order(gathered.line(), stamp_options.clock)
     line = gathered.line()[order]
     findings.extend(new_findings)
-    if zone_name is not None and gathered.host is None and gathered.clock.stated():
+    if zone_name is not None and gathered.host is None and gathered.clock.needs_no_zone():
         counts = dates.is_elapsed(gathered.clock.form)
         why = (
             "the stamps count from a start, which has a zone of its own"

@@ -264,7 +264,7 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None, topic:
 
         return netcdf.open_dataset(path, limits=limits)
     if topic is not None:
-        raise UsageError("a topic of what is no MCAP file", where=where, fix="leave out --topic")
+        raise UsageError("a topic was given, but this is no MCAP file", where=where, fix="leave out --topic")
     other_kind = signature(head)
     if other_kind:
         raise InputError(f"this is {other_kind[0]}, not a text log", where=where, fix=other_kind[1])

@@ -73,8 +73,8 @@ def refusal(path: Path, options: WindOptions) -> FlagdataError:
     ("variables", "says"),
     [
         ([SPEED, ("ff2", *SPEED[1:])], "several variables are wind_speed"),
-        ([("t", "air_temperature", "K", [280.0] * 4)], "no variable of wind along time alone"),
-        ([("ff", "wind_speed", "counts", [4.0] * 4)], "no variable of wind along time alone"),
+        ([("t", "air_temperature", "K", [280.0] * 4)], "no variable of the file is a wind"),
+        ([("ff", "wind_speed", "counts", [4.0] * 4)], "no variable of the file is a wind"),
     ],
 )
 def test_what_is_no_one_wind_is_refused(tmp_path: Path, variables: Sequence[Variable], says: str) -> None:

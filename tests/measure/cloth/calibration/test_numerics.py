@@ -22,13 +22,13 @@ def design() -> Design:
 def test_finer_flags_are_the_fits_own_but_for_the_mesh_and_the_steps(design: Design) -> None:
     finer = Finer.of(design)
     values = design.values()
-    assert len(finer.places) == len(set(finer.places.tolist())) == FLAGS
+    assert len(finer.indices) == len(set(finer.indices.tolist())) == FLAGS
     assert np.concatenate([one.values["area_weight"] for one in finer.batches]).tolist() == (
-        values["area_weight"][finer.places].tolist()
+        values["area_weight"][finer.indices].tolist()
     )
     seeds = [seed for batch in design.batches() for seed in batch.seeds]
-    assert [seed for one in finer.batches for seed in one.seeds] == [seeds[place] for place in finer.places]
-    assert values["damping"][finer.places].min() >= 2e-3  # what the shorter step damps by itself
+    assert [seed for one in finer.batches for seed in one.seeds] == [seeds[place] for place in finer.indices]
+    assert values["damping"][finer.indices].min() >= 2e-3  # what the shorter step damps by itself
     for one in finer.batches:
         assert (one.step, one.until, one.discretisation) == (2e-3, LASTING, FINE)
         mesh = FINE.mesh(design.flag.mesh(one.columns))
@@ -40,7 +40,7 @@ def test_the_mean_difference_corrects_and_its_scatter_beyond_chaos_is_drawn(desi
     rng, finer = stream(1, "tests", "numerics"), Finer.of(design)
     coarse = rng.normal(0.0, 0.1, (design.count, WINDOWS, len(OBSERVED)))
     own = 0.2 + 0.05 * rng.standard_normal((FLAGS, 1, len(OBSERVED)))
-    fine = own + coarse[finer.places][:, :SEEN] + rng.normal(0.0, 0.1, (FLAGS, SEEN, len(OBSERVED)))
+    fine = own + coarse[finer.indices][:, :SEEN] + rng.normal(0.0, 0.1, (FLAGS, SEEN, len(OBSERVED)))
     found = finer.correction(fine, coarse)
     error = np.hypot(0.05, 0.1 / np.sqrt(SEEN)) / np.sqrt(FLAGS)
     assert found.mean[0] == pytest.approx(0.2, abs=4 * error)

@@ -38,7 +38,7 @@ def test_a_pair_shares_cloth_place_and_turbulence_with_a_flag_without_the_effect
     seeds = [seed for batch in design.batches() for seed in batch.seeds]
     values = design.values()
     for number, batch in enumerate(made.batches):
-        own = made.places[number * TOGETHER : (number + 1) * TOGETHER]
+        own = made.indices[number * TOGETHER : (number + 1) * TOGETHER]
         assert [seeds[place] for place in own] == list(batch.seeds)
         assert np.array_equal(values["area_weight"][own], batch.values["area_weight"])
         assert np.array_equal(values["azimuth"][own], batch.places[:, 0, 0])
