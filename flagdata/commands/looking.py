@@ -96,7 +96,7 @@ def _relative(relative: Relative, *, details: bool) -> str:
 
 @options
 class Weighing(OfGarbage, AtVersion, OnLake):
-    """Of which version it is told what takes space."""
+    """Which version is weighed, and what of it is garbage."""
 
 
 @verb(Weighing, example='flagdata.du(lake="field.lake")["total"]  # bytes')
