@@ -136,9 +136,9 @@ def test_one_recording_that_cannot_be_used_is_left_out_and_the_stated_fabric_is_
 def test_options_of_films_are_refused_beside_markers(tmp_path: Path) -> None:
     path = tmp_path / "tracks.csv"
     path.write_text("frame,marker,u,v,x,y,z\n0,a,0,0,0,0,0\n")
-    done = run(path, "--wind", "5", "--flag-size", "1.5x1.0", "--out", tmp_path / "out")
+    done = run(path, "--wind", "5", "--azimuth", "70±7", "--out", tmp_path / "out")
     assert isinstance(done.exception, UsageError)
-    assert done.exception.where == "--flag-size"
+    assert done.exception.where == "--azimuth"
 
 
 def test_films_and_markers_of_a_cloth_are_judged_together(
