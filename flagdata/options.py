@@ -358,7 +358,8 @@ def verb(
             with closing(run(chosen)) as steps:  # type: ignore[type-var]  a generator
                 return next(steps, _NOTHING).content
 
-        shown = command(options(type(run.__name__, (form, AsJson), {"__module__": run.__module__})))(printed)
+        bases: Any = (form, AsJson)
+        shown = command(options(type(run.__name__, bases, {"__module__": run.__module__})))(printed)
         name = str(shown.name)
         about = (part for part in (inspect.getdoc(run) or "").split("\n\n") if not part.startswith("\b"))
         shows = (f"```python\n{example}\n```", f"Returns:\n    What `flagdata {name} --json` prints.")

@@ -32,9 +32,10 @@ def declare(chosen: Declaring) -> Iterator[Result]:
     lake = chosen.opened()
     lake.check_writable()
     film = lake.artifact(chosen.camera, at=chosen.branch, kinds=(Kind.CAMERA,))
-    names = {"name": chosen.name, "session": chosen.session}
     with progress(film.frame_count, label="copying", unit="frame") as advance:
-        stated, made = declared_recording(lake, film, wind, **names, branch=chosen.branch, progress=advance)
+        stated, made = declared_recording(
+            lake, film, wind, name=chosen.name, session=chosen.session, branch=chosen.branch, progress=advance
+        )
     yield Result("declare", {"wind": stated.id, **made.as_dict()})
     echo(f"wind {wind.speed:g} ± {wind.sigma:g} m/s declared: {stated.id}")
     echo(made.line)
