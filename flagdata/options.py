@@ -29,7 +29,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import closing
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from typing import Any, ParamSpec, TypeVar, dataclass_transform
 
 import click
@@ -138,10 +138,19 @@ def options(form: C) -> C:
 
 
 def described(form: type) -> dict[str, tuple[Field[Any], Option]]:
-    """Returns field → itself and its option: those of a class before those that it inherits."""
+    """Returns field → itself and its option: those of a class before those that it inherits.
+
+    What a class states in `HELP`, field → text, stands in place of the help that it inherits.
+    """
     table = {one.name: one for one in fields(form)}
     names = dict.fromkeys(name for base in form.__mro__ for name in vars(base).get("__annotations__", ()))
-    return {name: (table[name], table[name].metadata["option"]) for name in names if name in table}
+    texts: dict[str, str] = getattr(form, "HELP", {})
+    return {name: (table[name], _helped(table[name], texts.get(name))) for name in names if name in table}
+
+
+def _helped(of_option: Field[Any], text: str | None) -> Option:
+    row: Option = of_option.metadata["option"]
+    return row if text is None else replace(row, about=text)
 
 
 def typed(chosen: object) -> frozenset[str]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import click
 
@@ -37,10 +38,24 @@ class IngestCommand(Sources, Ingesting):
 class FilmCommand(Sources, FromCamera):
     """How films are read."""
 
+    HELP: ClassVar[Mapping[str, str]] = {
+        "topic": "MCAP of other programs: the topic of the pictures. LeRobot: the camera.",
+        "start": "Instant of the first frame, ISO 8601.",
+        "rate": "Frames per second to keep, 25 by default; native keeps all.",
+    }
+
 
 @options
 class WindCommand(Sources, FromAnemometer):
     """How logs are read."""
+
+    HELP: ClassVar[Mapping[str, str]] = {
+        "topic": "MCAP of other programs: the topic of the readings.",
+        "start": "Instant of the first row, ISO 8601, where stamps count from a start.",
+        "rate": "Readings per second of a log without timestamps, counted from --start; or the time from one to the "
+        "next, as in 10min.",
+        "unit": "Unit of a speed whose heading has none: m/s, km/h, mph, kn.",
+    }
 
     format: str | None = option(
         "An anemometer format; by content if not given.", "--as", default=None, section=SOURCE, metavar="FORMAT"
@@ -50,6 +65,11 @@ class WindCommand(Sources, FromAnemometer):
 @options
 class FramesCommand(Sources, FromFrames):
     """How meshes or markers are read."""
+
+    HELP: ClassVar[Mapping[str, str]] = {
+        "rate": "Frames per second of a source that does not state them.",
+        "unit": "Unit of the positions; m by default.",
+    }
 
 
 @command(FilmCommand)

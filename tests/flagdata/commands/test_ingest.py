@@ -210,6 +210,20 @@ def test_a_film_whose_start_nobody_knows_is_ingested_with_that_stated(run, lake:
     assert "start-unknown" in json.loads(out)["results"][0]["quality"]
 
 
+@pytest.mark.parametrize(
+    ("kind", "own", "others"),
+    [
+        ("film", "Instant of the first frame", ("anemometer", "Wind:", "Meshes")),
+        ("wind", "Readings per second of a log", ("Camera:", "Meshes", "frames per second")),
+        ("meshes", "Frames per second of a source", ("Camera:", "Wind:")),
+    ],
+)
+def test_the_help_of_a_kind_speaks_of_that_kind_alone(run: Run, kind: str, own: str, others: tuple[str, ...]) -> None:
+    said = " ".join(run(kind, "--help").out.split())
+    assert own in said
+    assert [word for word in others if word in said] == []
+
+
 def test_each_option_goes_to_the_sources_of_its_kind(
     run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path
 ) -> None:
