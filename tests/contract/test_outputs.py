@@ -70,7 +70,6 @@ ALLOWED = {
     "sim/compiler.py": "flagdata's own cache folder",
     "models/training/checkpoint.py": "the run folder of a training",
     "models/storage.py": "writes into folders that its callers make: staging, a run folder, shipped models",
-    "models/evaluation/predictions.py": "an interface in Python: the caller names a file of arrays",
 }
 
 ALWAYS = {

@@ -161,5 +161,5 @@ def test_unfit_clips_are_errors() -> None:
     with pytest.raises(InputError, match="need contrast"):
         features(torch.full((1, 1, T, 32, 32), 7.0), rate=RATE)
     clip[0, 0, 3, 4, 5] = torch.nan
-    with pytest.raises(InputError, match="not finite"):
+    with pytest.raises(InputError, match="finite numbers"):
         features(clip, rate=RATE)

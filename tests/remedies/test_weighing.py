@@ -224,7 +224,9 @@ def test_more_simulations_widen_intervals_that_are_too_narrow(user: User, monkey
 
     def checked(made: Any, options: calibrate.Options) -> calibrate.Check:
         found = plain(made, options)
-        return calibrate.Check(count=found.count, held=found.count * (options.simulations > 100), error=found.error)
+        return calibrate.Check(
+            count=found.count, contained=found.count * (options.simulations > 100), error=found.error
+        )
 
     monkeypatch.setattr(calibrate, "checked", checked)
     (user.folder / "t.csv").write_text(GUSTY)

@@ -65,4 +65,4 @@ def test_what_too_few_finer_flags_show_has_what_was_measured_once(design: Design
 
 def test_finer_flags_are_another_batch_than_the_fits(design: Design) -> None:
     one = Finer.of(design).batches[0]
-    assert one.content() != design.batch(Finer.of(design).places[:8]).content()
+    assert one.content() != design.batch(Finer.of(design).indices[:8]).content()

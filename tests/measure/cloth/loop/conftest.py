@@ -88,7 +88,7 @@ def simulate_cheaply(patch: pytest.MonkeyPatch) -> list[int]:
         asked.append(sum(len(batch.seeds) for batch in batches))
         return np.concatenate([readings(batch) for batch in batches])[:, None]
 
-    patch.setattr(simulations, "read", read)
+    patch.setattr(simulations, "readings_of", read)
     for module in (design, simulations):
         patch.setattr(module, "TOGETHER", 2)
     return asked

@@ -200,14 +200,14 @@ def test_a_recording_whose_simulations_show_something_else_is_left_out_with_the_
     cheap: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The verdict is that of the others, and says so."""
-    usual = simulations.read
+    usual = simulations.readings_of
 
     def read(batches: list[FlagBatch], **given: Any) -> FloatArray:
         """Of the third recording's flags none is seen."""
         found = usual(batches, **given)
         return np.full_like(found, np.nan) if batches[0].log.speed.mean() > 8 else found
 
-    monkeypatch.setattr(simulations, "read", read)
+    monkeypatch.setattr(simulations, "readings_of", read)
     recordings = [*both(DRAG), replace(recording(mean=9.0, seed=6), name="dusk")]
     found = close_loop(recordings, options(), folder=tmp_path)
     kind, said = found.findings[0]
