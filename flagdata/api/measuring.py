@@ -259,8 +259,12 @@ class Closing:
         default=None,
         was=("--size",),
     )
+    area_weight: tuple[float, float] | str | Stated | None = option(
+        "Of a cloth that was weighed [kg/m²], as in '0.155±0.005'; by default that of the material.", default=None
+    )
     density_uncertainty: float | None = option(
-        "Relative standard uncertainty of the material's area weight; by default 0.3.", default=None
+        "Relative standard uncertainty of the material's area weight, where no area_weight is given; by default 0.3.",
+        default=None,
     )
     noise: float | None = option("Standard deviation of a coordinate [m]; by default it is estimated.", default=None)
     level: float | None = option("Significance level of the test of the base model; 0.05 by default.", default=None)

@@ -14,6 +14,7 @@ from flagdata.api.measuring import Closing
 from flagdata.closed import Closed, Strength
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake.meshes import MeshSequence
+from flagdata.stated import Stated
 from measure.closing.close import close_loop
 from measure.closing.findings import checked, with_warnings
 from measure.loop.run import LoopOptions
@@ -54,12 +55,21 @@ def _setup(chosen: Closing) -> Setup:
     names, attachment = ["corners", *(hold.value for hold in Hold)], chosen.attachment
     if isinstance(attachment, str) and attachment not in names:
         raise UnknownNameError.of("attachment", attachment, names, where="attachment")
-    return Setup(
+    setup = Setup(
         material=named(chosen.material),
         pins=Hold(attachment) if isinstance(attachment, str) else tuple((float(u), float(v)) for u, v in attachment),
         outline=None if chosen.flag_size is None else sheet(*chosen.flag_size),
         density_uncertainty=DENSITY_UNCERTAINTY if chosen.density_uncertainty is None else chosen.density_uncertainty,
     )
+    if chosen.area_weight is None:
+        return setup
+    if chosen.density_uncertainty is not None:
+        raise UsageError(
+            "the uncertainty of the weight is given twice",
+            where="density_uncertainty",
+            fix="leave it out: area_weight states both",
+        )
+    return setup.weighed(Stated.of(chosen.area_weight), where="area_weight")
 
 
 def _tracked(chosen: Closing) -> list[Observation]:

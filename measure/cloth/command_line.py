@@ -35,7 +35,7 @@ OF_MARKERS = (
 )
 
 
-OF_BOTH = ("material", "flag_size", "attachment", "clock_offset")
+OF_BOTH = ("material", "flag_size", "attachment", "clock_offset", "area_weight")
 """Options of films that are about markers and meshes as well."""
 
 
@@ -58,7 +58,8 @@ class OfFilms(OfFlag):
         was=("--pins",),
     )
     area_weight: Stated | None = option(
-        "Of films: a cloth that was weighed [kg/m²], as in 0.155±0.005; by default that of any flag.",
+        "Of a cloth that was weighed [kg/m²], as in 0.155±0.005; by default that of any flag, of markers that of the "
+        "material.",
         default=None,
         section=FLAG,
         type=STATED,

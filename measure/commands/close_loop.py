@@ -54,8 +54,8 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         metavar="FILE.toml",
     )
     density_uncertainty: float | None = option(
-        "Relative standard uncertainty of the material's area weight: 0.02 for a cloth that was weighed to 2 %; by "
-        "default 0.3.",
+        "Relative standard uncertainty of the material's area weight, where no --area-weight is given: 0.02 for 2 %; "
+        "by default 0.3.",
         default=None,
         section=MARKERS,
         type=click.FloatRange(0, 1, min_open=True),
@@ -342,11 +342,14 @@ def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None
     setup = _setup(Setup(), chosen)
     size = () if setup.outline is None else setup.outline.max(axis=0).tolist()
     pins = {} if setup.pins is None else {"points" if isinstance(setup.pins, tuple) else "at": setup.pins}
+    weight: dict[str, float | None] = {"density_uncertainty": chosen.density_uncertainty}
+    if chosen.area_weight is not None and setup.material is not None:
+        weight = {"density": setup.material.density, "density_uncertainty": setup.density_uncertainty}
     content = {
         "title": chosen.name or chosen.draft.stem,
         "test": {"level": chosen.level, "nulls": chosen.nulls},
         "cloth": dict(zip(("width", "height"), size, strict=False)),
-        "material": {"name": chosen.material, "density_uncertainty": chosen.density_uncertainty},
+        "material": {"name": chosen.material, **weight},
         "pins": pins,
         **drafted(sources, chosen.winds, _reading(chosen, None), lake, folder=chosen.draft.resolve().parent),
     }
@@ -401,6 +404,14 @@ def _setup(setup: Setup, chosen: CloseLoopCommand, *, joint: bool = False) -> Se
         setup = replace(setup, material=named(chosen.material))
     if chosen.density_uncertainty is not None:
         setup = replace(setup, mass_known=True, density_uncertainty=chosen.density_uncertainty)
+    if chosen.area_weight is not None and not joint:
+        if chosen.density_uncertainty is not None:
+            raise UsageError(
+                "the uncertainty of the weight is given twice",
+                where="--density-uncertainty",
+                fix="leave it out: --area-weight states both",
+            )
+        setup = setup.weighed(chosen.area_weight, where="--area-weight")
     if chosen.flag_size is not None and not joint:
         try:
             width, height = (float(part) for part in chosen.flag_size.lower().split("x"))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from flagdata.arrays import FloatArray
-from flagdata.errors import InputError
+from flagdata.errors import InputError, UsageError
+from flagdata.stated import Stated
 from measure.observe.cloth import VERTICES
 from measure.observe.trajectory import DENSITY_UNCERTAINTY
 from sim.air import AirForce
@@ -85,6 +86,33 @@ class Setup:
             raise self._wrong(f"the gravity is {self.gravity!r}", "give m/s², downward")
         if self.vertices < 16:
             raise self._wrong(f"the model mesh has {self.vertices} vertices", "ask for at least 16")
+
+    def weighed(self, area_weight: Stated, *, where: str) -> Setup:
+        """Puts the area weight of a cloth that was weighed in place of its material's.
+
+        Args:
+            area_weight: value and standard deviation, or a range, uniform [kg/m²].
+            where: it was stated, for the error message.
+
+        Raises:
+            UsageError: it is stated without an uncertainty or is not above 0, or no material is named.
+        """
+        value = (area_weight.low + area_weight.high) / 2
+        sigma = area_weight.sigma or (area_weight.high - area_weight.low) / math.sqrt(12)
+        if self.material is None:
+            raise UsageError(
+                "a weight needs a material, whose stiffness is taken",
+                where=where,
+                fix="name the material by --material",
+            )
+        if not 0 < sigma <= value:
+            raise UsageError(
+                f"an area weight of {area_weight.text} kg/m² has no usable uncertainty",
+                where=where,
+                fix="give that of the weighing, as in 0.155±0.003",
+            )
+        material = replace(self.material, density=value)
+        return replace(self, material=material, mass_known=True, density_uncertainty=sigma / value)
 
     def _wrong(self, message: str, fix: str) -> InputError:
         return InputError(message, where="setup", fix=fix)

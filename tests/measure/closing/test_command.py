@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from flagdata.errors import NotFoundError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest import MarkerOptions, ingest_markers
 from flagdata.lake import Lake
+from flagdata.stated import Stated
 from measure.closing import SourceOptions
 from measure.closing.sources import read
 from measure.commands import CloseLoopCommand
@@ -222,6 +224,30 @@ def test_the_uncertainty_of_the_weight_on_the_command_line_is_that_of_the_setup(
     setup = setup_of(unweighed, CloseLoopCommand(density_uncertainty=0.02))
     assert (setup.mass_known, setup.density_uncertainty) == (True, 0.02)
     assert setup_of(unweighed, CloseLoopCommand()) == unweighed
+
+
+def test_a_weighed_cloth_has_the_weight_that_the_command_line_states() -> None:
+    """N(0.155, 0.003²) is 1.94 % of its value; a range is uniform, of standard deviation width / √12."""
+    given = CloseLoopCommand(material="paper", area_weight=Stated.of("0.155±0.003"))
+    setup = setup_of(Setup(mass_known=False), given)
+    assert setup.material is not None
+    assert (setup.material.density, setup.mass_known) == (0.155, True)
+    assert setup.density_uncertainty == pytest.approx(0.003 / 0.155)
+    between = setup_of(Setup(), CloseLoopCommand(material="paper", area_weight=Stated.of("0.15:0.16")))
+    assert between.density_uncertainty == pytest.approx(0.01 / math.sqrt(12) / 0.155)
+
+
+@pytest.mark.parametrize(
+    ("given", "what"),
+    [
+        ({"area_weight": Stated.of("0.155"), "material": "paper"}, "has no usable uncertainty"),
+        ({"area_weight": Stated.of("0.155±0.003")}, "needs a material"),
+        ({"area_weight": Stated.of("0.155±0.003"), "density_uncertainty": 0.02}, "is given twice"),
+    ],
+)
+def test_a_weight_that_cannot_be_used_is_refused(given: dict[str, Any], what: str) -> None:
+    with pytest.raises(UsageError, match=what):
+        setup_of(Setup(), CloseLoopCommand(**given))
 
 
 def test_recordings_of_a_bucket_are_those_of_their_table(table: Path, bucket_folder: str, tmp_path: Path) -> None:
