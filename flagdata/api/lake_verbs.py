@@ -120,8 +120,8 @@ def branch(chosen: Naming) -> tuple[Ref, ...]:
     """Begins a line of work in a lake, as `flagdata branch` does; without a name, lists the branches.
 
     ```python
-    (trial,) = flagdata.branch("trial", lake="field.lake", at="v2")
-    flagdata.ingest("flag.mp4", lake="field.lake", branch="trial")
+    (thursday,) = flagdata.branch("thursday", lake="field.lake", at="v1")
+    flagdata.ingest("flag.mp4", lake="field.lake", branch="thursday")
     ```
 
     Returns:

@@ -74,7 +74,7 @@ class Showing(InFull, AtVersion, OnLake):
     artifact: str = argument("Its id, name or file.", "ARTIFACT")
 
 
-@verb(Showing, example='flagdata.show("flag", lake="field.lake")["parents"]')
+@verb(Showing, example='flagdata.show("tunnel", lake="field.lake")["parents"]')
 def show(chosen: Showing) -> Iterator[Result]:
     """Show one artifact: what it says, what it was made from and what was made from it.
 

@@ -30,7 +30,7 @@ class Making(OnLake):
     )
 
 
-@verb(Making, example='flagdata.init("field.lake")')
+@verb(Making, example='flagdata.init("new.lake")')
 def init(chosen: Making) -> Iterator[Result]:
     """Create an empty lake in FOLDER, which may be s3://bucket/prefix, or where --lake says."""
     from flagdata.lake import Lake
@@ -177,7 +177,7 @@ class Withdrawing(OnBranch, OnLake):
     )
 
 
-@verb(Withdrawing, example='flagdata.withdraw(["flag"], message="out of focus", lake="field.lake")')
+@verb(Withdrawing, example='flagdata.withdraw(["tunnel"], message="out of focus", lake="field.lake")')
 def withdraw(chosen: Withdrawing) -> Iterator[Result]:
     """Hide artifacts from a branch, a recording with its clips.
 

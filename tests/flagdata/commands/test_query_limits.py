@@ -83,7 +83,9 @@ for name, sql in json.load(sys.stdin).items():
     except (LimitError, UsageError) as error:
         outcome = error.kind
     sql_process.sql_process().close()
-    peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) << 10
+    status = dict(line.split(":", 1) for line in open("/proc/self/status"))
+    own = int(status["VmHWM"].split()[0])  # ru_maxrss would count what started this process as well
+    peak = max(own, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) << 10
     print(json.dumps([name, outcome, largest, peak]), flush=True)
 """
 

@@ -11,8 +11,13 @@ import flagdata
 from flagdata.lake import Lake
 from sim.run import recipe_of, simulate
 from tests.docs.calls import example
+from tests.flagdata.conftest import write_video
 
-ELSEWHERE = {"measure", "example", "calibrate", "close_loop"}
+ELSEWHERE = {
+    "measure", "example", "calibrate", "close_loop", "build", "train", "evaluate",  # minutes
+    "clone", "push", "pull",  # a bucket
+    "declare_cloths",  # films of many cloths
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -24,6 +29,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory, field_lake: Lake) -> Path:
     shutil.copy(flag.log, made)
     shutil.copytree(field_lake.path, made / "field.lake")
     flagdata.ingest([made / flag.film.name, made / flag.log.name], lake=made / "field.lake", session="monday")
+    write_video(made / "tunnel.mp4", frames=130, creation_time="2026-05-01T10:01:10Z")
+    flagdata.ingest(made / "tunnel.mp4", lake=made / "field.lake", session="tunnel")
+    flagdata.branch("trial", lake=made / "field.lake")
+    flagdata.label(["tunnel", "usable=true"], lake=made / "field.lake", branch="trial")
+    record = next((made / "field.lake" / "mcap").glob("*.mcap")).read_bytes()
+    (made / "cut.mcap").write_bytes(record[: 3 * len(record) // 4])
     (made / "flag.toml").write_text("[scene]\ncolumns = 4\n[wind]\nspeed = 3\n[time]\nsettle = 0\nframes = 2\n")
     recipe = recipe_of(str(made / "flag.toml"), {"material": {"name": "camel-ponte-roma"}})
     simulate(Lake.create(made / "sim.lake"), recipe)

@@ -209,7 +209,10 @@ def test_a_weight_that_is_open_is_answered_with_the_winds_of_a_light_and_a_heavy
     (finding,) = [one for one in found.bounds if one.kind == "weight-open"]
     nowhere: Any = SimpleNamespace(known=None)
     series = beside(found, start=None, wind=None)
-    _report(_Done(measured=found, series=series, artifact=None, subject=nowhere, refinement=None), series=False)
+    _report(
+        _Done(measured=found, series=series, artifact=None, subject=nowhere, refinement=None, elsewhere=None),
+        series=False,
+    )
     assert f"  {finding.what}; weigh the cloth and give --area-weight\n" in capsys.readouterr().err
     light, heavy = re.findall(r"at ([\d.]+) kg/m² ([\d.]+) m/s", finding.what)
     scaling = model.learners[0].scaling

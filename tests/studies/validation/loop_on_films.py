@@ -46,7 +46,7 @@ from measure.cloth import (
     score,
     weighable,
 )
-from measure.cloth.design import Weighable, read
+from measure.cloth.design import Weighable, readings_of
 from measure.cloth.evidence import Weighing, weigh
 from measure.cloth.score_test import Judged, directions, judge
 from measure.cloth.simulations import Simulations, of_base, of_nulls, sights_of
@@ -133,7 +133,7 @@ def simulations(folder: Path) -> Simulations:
     null = nulls(own, (0, 1), kinds=KINDS, seed=SEED)
 
     def seen(batches: Sequence[FlagBatch]) -> FloatArray:
-        return read(batches, folder=folder, workers=workers)[:, 0]
+        return readings_of(batches, folder=folder, workers=workers)[:, 0]
 
     finer = [Finer.of(own[place]) for place in chosen()]
     base = tuple(seen(own[place].batches()) for place in chosen())
@@ -177,7 +177,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     for number, effect in enumerate(weighable(FLAG), start=1):
         if effect in effects():
             batches = truths(effect, number)
-            shown = tuple(read(batches[place], folder=folder)[:, 0] for place in chosen())
+            shown = tuple(readings_of(batches[place], folder=folder)[:, 0] for place in chosen())
             true, whole = of_nulls(
                 sights, recordings, replace(made, nulls=shown, kinds=np.arange(TOGETHER)), None, seed=SEED + number
             )

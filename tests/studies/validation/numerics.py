@@ -34,7 +34,7 @@ from measure.cloth import (
     Uncertain,
     numerics,
 )
-from measure.cloth.design import read
+from measure.cloth.design import readings_of
 
 DURATION = 30.0  # s
 BATCHES = {"little damping": 0, "middle": 3, "much damping": 7}
@@ -72,11 +72,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     rows: dict[str, dict[str, Any]] = {kind: {} for kind in OTHERS}
     for name, place in BATCHES.items():
         batch = own.batches()[place]
-        base = projection.of(read([batch], folder=folder)[:, 0])
+        base = projection.of(readings_of([batch], folder=folder)[:, 0])
         for kind in OTHERS:
             made = other(batch, kind)
             if made is not None:
-                rows[kind][name] = projection.of(read([made], folder=folder)[:, 0]) - base
+                rows[kind][name] = projection.of(readings_of([made], folder=folder)[:, 0]) - base
     sheet = {
         "observables": list(OBSERVED),
         "stated": {"bias": numerics.BIAS.tolist(), "sigma": numerics.SIGMA.tolist()},

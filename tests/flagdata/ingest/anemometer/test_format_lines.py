@@ -373,7 +373,7 @@ def test_sentences_after_stamps_with_names_of_months_are_read() -> None:
 
 
 def test_a_stream_of_several_talkers_without_time_names_both_at_once() -> None:
-    with pytest.raises(FlagdataError, match=r"several talkers .* and the stream carries no time") as caught:
+    with pytest.raises(FlagdataError, match=r"several talkers .* and the lines have no time") as caught:
         read("$36MWV,353.4,R,0.92,M\n$37MWV,353.4,R,0.92,M\n$36MWV,350.4,R,0.97,M\n")
     assert "--talker" in caught.value.fix
     assert "ZDA" in caught.value.fix

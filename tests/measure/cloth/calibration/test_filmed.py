@@ -110,7 +110,7 @@ def test_films_that_are_together_too_short_are_refused_before_a_picture_is_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _named(monkeypatch, {"monday": 15.0, "tuesday": 4.0})
-    with pytest.raises(InputError, match=r"15 s of film have a log beside them; tuesday is left out: 4 s of film"):
+    with pytest.raises(InputError, match=r"15 s of film have a log beside them; tuesday is left out: only 4 s of film"):
         sources_of(("monday", "tuesday"), OfFlag(), _SIZE, None, at="main")
 
 

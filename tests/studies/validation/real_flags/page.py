@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from flagdata.arrays import FloatArray
 from flagdata.markdown import table
 from tests.studies.validation.paper_flag.recipe import Group
 from tests.studies.validation.real_flags.paper import Paper, measured
@@ -21,7 +22,6 @@ from tests.studies.validation.real_flags.study import (
     VARIANTS,
     Fit,
     Predictions,
-    Values,
     judged,
     misfit,
     misfits,
@@ -47,7 +47,7 @@ three on the effect is known to change the number.
 
 
 def page(
-    base: Predictions, after: Predictions, fit: Fit, controls: Sequence[Fit], unfitted: Values, paper: Paper
+    base: Predictions, after: Predictions, fit: Fit, controls: Sequence[Fit], unfitted: FloatArray, paper: Paper
 ) -> str:
     """The page in Markdown."""
     return "\n".join(
@@ -104,7 +104,9 @@ def _sources() -> list[str]:
     return [table(["name", "condition", "source", "how sure"], rows), "", opened]
 
 
-def _verdict(base: Predictions, after: Predictions, fit: Fit, controls: Sequence[Fit], unfitted: Values) -> list[str]:
+def _verdict(
+    base: Predictions, after: Predictions, fit: Fit, controls: Sequence[Fit], unfitted: FloatArray
+) -> list[str]:
     low, high = fit.interval
     parameter = CANDIDATES[NAMED][0]
     counts = {name: _held(model) for name, model in (("base", base), ("after", after))}
@@ -232,6 +234,6 @@ def picture(base: Predictions, after: Predictions, target: Path) -> None:
     figure.savefig(target, dpi=100)
 
 
-def scores(values: Values) -> list[str]:
+def scores(values: FloatArray) -> list[str]:
     """Root mean square misfits of what fits and of what judges, of readings of the flags that stream."""
     return [f"{np.sqrt(np.nanmean(misfits(values, role) ** 2)):.2f}" for role in (Role.FIT, Role.JUDGE)]
