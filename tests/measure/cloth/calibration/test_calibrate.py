@@ -329,7 +329,7 @@ def test_two_films_of_a_flag_err_alike_as_far_as_its_look_goes(name: str) -> Non
 
 def test_the_shares_are_those_of_films_by_another_renderer() -> None:
     """The table is what the sheet has; a share that was made up would differ from it."""
-    results = Path(__file__).resolve().parents[3] / "docs" / "results"
+    results = Path(__file__).resolve().parents[4] / "docs" / "results"
     sheet = json.loads((results / "validate-observables.json").read_text(encoding="utf-8"))
     found = share(vtk(sheet["result"]["films"]))
     assert found == pytest.approx(observed.LASTING, abs=0.006)
