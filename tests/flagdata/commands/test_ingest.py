@@ -218,7 +218,10 @@ def test_a_film_whose_start_nobody_knows_is_ingested_with_that_stated(run, lake:
         ("meshes", "Frames per second of a source", ("Camera:", "Wind:")),
     ],
 )
-def test_the_help_of_a_kind_speaks_of_that_kind_alone(run: Run, kind: str, own: str, others: tuple[str, ...]) -> None:
+def test_the_help_of_a_kind_speaks_of_that_kind_alone(
+    run: Run, kind: str, own: str, others: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # where no file is named like a kind
     said = " ".join(run(kind, "--help").out.split())
     assert own in said
     assert [word for word in others if word in said] == []
