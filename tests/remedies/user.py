@@ -136,10 +136,10 @@ class User:
     def at(cls, origin: Path, folder: Path, patch: pytest.MonkeyPatch) -> User:
         """A user in `folder`, whose errors and findings are noted as they are made."""
         user = cls(origin, folder)
+        patch.chdir(folder.parent)  # notes where the tests were, before `begins` leaves
         user.begins()
         for made in (FlagdataError, Finding):
             patch.setattr(made, "__init__", _noting(made, user._made))
-        patch.chdir(folder)
         patch.setenv("FLAGDATA_LAKE", "lake")
         return user
 
