@@ -25,6 +25,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +81,14 @@ class Span:
         if self.bound is Bound.MOST:
             return f"at most {number(self.high)}{unit}"
         return "not constrained" if self.bound else f"[{number(self.low)}, {number(self.high)}]"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Returns JSON values: the interval, whose end is null where nothing bounds it, its level, and its bound."""
+        return {
+            "interval": self.ends(),
+            "level": self.level,
+            "bound": None if self.bound is None else self.bound.value,
+        }
 
     def ends(self) -> list[float | None]:
         """Returns both ends as JSON values; None for one at infinity."""

@@ -5,7 +5,7 @@ The options of each call are stated in a class, from which the command of the sa
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -107,12 +107,7 @@ def tag(chosen: Naming) -> tuple[Ref, ...]:
         UsageError: options that contradict each other.
     """
     lake = chosen.opened()
-    if chosen.name is None:
-        return tuple(lake.refs.tags().values())
-    if not chosen.delete:
-        return (lake.tag(chosen.name, at=chosen.at),)
-    lake.delete_tag(chosen.name, chosen.message, discard=chosen.discard)
-    return ()
+    return _named(chosen, lake.refs.tags, put=lake.tag, delete=lake.delete_tag)
 
 
 @called(Naming)
@@ -133,11 +128,18 @@ def branch(chosen: Naming) -> tuple[Ref, ...]:
         UsageError: options that contradict each other.
     """
     lake = chosen.opened()
+    return _named(chosen, lake.refs.branches, put=lake.branch, delete=lake.delete_branch)
+
+
+def _named(
+    chosen: Naming, listed: Callable[[], Mapping[str, Ref]], *, put: Callable[..., Ref], delete: Callable[..., object]
+) -> tuple[Ref, ...]:
+    """Lists the names of a kind, or puts or deletes one."""
     if chosen.name is None:
-        return tuple(lake.refs.branches().values())
+        return tuple(listed().values())
     if not chosen.delete:
-        return (lake.branch(chosen.name, at=chosen.at),)
-    lake.delete_branch(chosen.name, chosen.message, discard=chosen.discard)
+        return (put(chosen.name, at=chosen.at),)
+    delete(chosen.name, chosen.message, discard=chosen.discard)
     return ()
 
 

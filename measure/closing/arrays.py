@@ -21,7 +21,6 @@ from measure.loop.run import LoopOptions
 from measure.nulls.plan import FEWEST_NULLS
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
 from measure.observe.meshes import from_sequence
-from measure.observe.trajectory import DENSITY_UNCERTAINTY
 from measure.report import sentences
 from measure.report.document import as_document
 from measure.report.report_page import page
@@ -59,17 +58,9 @@ def _setup(chosen: Closing) -> Setup:
         material=named(chosen.material),
         pins=Hold(attachment) if isinstance(attachment, str) else tuple((float(u), float(v)) for u, v in attachment),
         outline=None if chosen.flag_size is None else sheet(*chosen.flag_size),
-        density_uncertainty=DENSITY_UNCERTAINTY if chosen.density_uncertainty is None else chosen.density_uncertainty,
     )
-    if chosen.area_weight is None:
-        return setup
-    if chosen.density_uncertainty is not None:
-        raise UsageError(
-            "the uncertainty of the weight is given twice",
-            where="density_uncertainty",
-            fix="leave it out: area_weight states both",
-        )
-    return setup.weighed(Stated.of(chosen.area_weight), where="area_weight")
+    weight = None if chosen.area_weight is None else Stated.of(chosen.area_weight)
+    return setup.weighed(weight, chosen.density_uncertainty)
 
 
 def _tracked(chosen: Closing) -> list[Observation]:

@@ -81,9 +81,7 @@ class Quantity:
             "unit": self.unit,
             "value": self.value,
             "sigma": self.sigma,
-            "interval": self.span.ends(),
-            "level": self.span.level,
-            "bound": None if self.span.bound is None else self.span.bound.value,
+            **self.span.as_dict(),
             "assumed": list(self.assumed),
             "determined": self.value is not None,
         }

@@ -402,16 +402,7 @@ def _setup(setup: Setup, chosen: CloseLoopCommand, *, joint: bool = False) -> Se
         if chosen.material not in MATERIALS.names():
             raise UnknownNameError.of("material", chosen.material, MATERIALS.names(), where="--material")
         setup = replace(setup, material=named(chosen.material))
-    if chosen.density_uncertainty is not None:
-        setup = replace(setup, mass_known=True, density_uncertainty=chosen.density_uncertainty)
-    if chosen.area_weight is not None and not joint:
-        if chosen.density_uncertainty is not None:
-            raise UsageError(
-                "the uncertainty of the weight is given twice",
-                where="--density-uncertainty",
-                fix="leave it out: --area-weight states both",
-            )
-        setup = setup.weighed(chosen.area_weight, where="--area-weight")
+    setup = setup.weighed(None if joint else chosen.area_weight, chosen.density_uncertainty)
     if chosen.flag_size is not None and not joint:
         try:
             width, height = (float(part) for part in chosen.flag_size.lower().split("x"))

@@ -87,28 +87,38 @@ class Setup:
         if self.vertices < 16:
             raise self._wrong(f"the model mesh has {self.vertices} vertices", "ask for at least 16")
 
-    def weighed(self, area_weight: Stated, *, where: str) -> Setup:
-        """Puts the area weight of a cloth that was weighed in place of its material's.
+    def weighed(self, area_weight: Stated | None, density_uncertainty: float | None) -> Setup:
+        """Puts what the user states of the cloth's weight in place of the material's; with neither, nothing changes.
 
         Args:
-            area_weight: value and standard deviation, or a range, uniform [kg/m²].
-            where: it was stated, for the error message.
+            area_weight: value and standard deviation of a weighing, or a range, uniform [kg/m²].
+            density_uncertainty: relative standard uncertainty of the material's own density.
 
         Raises:
-            UsageError: it is stated without an uncertainty or is not above 0, or no material is named.
+            UsageError: both are given; or a weight without an uncertainty, not above 0, or without a material.
         """
+        if area_weight is None and density_uncertainty is None:
+            return self
+        if area_weight is None:
+            return replace(self, mass_known=True, density_uncertainty=density_uncertainty)
+        if density_uncertainty is not None:
+            raise UsageError(
+                "the uncertainty of the weight is given twice",
+                where="--density-uncertainty",
+                fix="leave it out: --area-weight states both",
+            )
         value = (area_weight.low + area_weight.high) / 2
         sigma = area_weight.sigma or (area_weight.high - area_weight.low) / math.sqrt(12)
         if self.material is None:
             raise UsageError(
                 "a weight needs a material, whose stiffness is taken",
-                where=where,
+                where="--area-weight",
                 fix="name the material by --material",
             )
         if not 0 < sigma <= value:
             raise UsageError(
                 f"an area weight of {area_weight.text} kg/m² has no usable uncertainty",
-                where=where,
+                where="--area-weight",
                 fix="give that of the weighing, as in 0.155±0.003",
             )
         material = replace(self.material, density=value)

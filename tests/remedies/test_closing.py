@@ -76,7 +76,7 @@ def test_a_weight_is_stated_once_with_its_uncertainty_beside_a_material(user: Us
     user.again(*MATERIAL, code=3, shows=BEGINS)
     weight = ("--area-weight", "0.155±0.003")
     user.meets(
-        "commands/close_loop.py",
+        "observe/setup.py",
         "leave it out: --area-wei",
         *command,
         *MATERIAL,
