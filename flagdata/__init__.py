@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from flagdata.api.lake_verbs import branch, export, query, tag
     from flagdata.api.lakes import open, pairs  # noqa: A004  read as flagdata.open
     from flagdata.api.learning import build, evaluate, train
-    from flagdata.api.measuring import calibrate, close_loop, measure, observe
+    from flagdata.api.measuring import calibrate, close_loop, measure, observe, propose
     from flagdata.api.physics import render, simulate
     from flagdata.api.recording_verbs import align, ingest, realign
     from flagdata.api.recordings import frames, meshes, motion, wind
@@ -71,6 +71,7 @@ __all__ = [
     "observe",
     "open",
     "pairs",
+    "propose",
     "pull",
     "push",
     "query",

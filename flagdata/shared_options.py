@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import LakePlace
+from flagdata.console import LakePlace, LocalPath
 from flagdata.option_types import DURATION, POSITIVE, SHARE, STATED
 from flagdata.options import option, options
 from flagdata.workload import cores
@@ -23,6 +24,7 @@ FILM = "The film"
 FLAG = "The flag and the camera"
 HOW = "How it is done"
 WRITTEN = "What is written"
+TEST = "The test"
 
 
 @options
@@ -117,6 +119,29 @@ class Shared:
     def processes(self) -> int:
         """How many processes or threads compute."""
         return self.workers or cores()
+
+
+@options
+class ByNulls(Shared):
+    """By which null experiments is tested, and at which level."""
+
+    level: float | None = option(
+        "Significance level of the test; 0.05 by default.", default=None, section=TEST, type=SHARE
+    )
+    nulls: int | None = option(
+        "Number of recordings without any effect to simulate for comparison, 160 or more; on films the number of "
+        "meshes and time-stepping methods, 20 by default.",
+        default=None,
+        section=TEST,
+        type=POSITIVE,
+    )
+    bank: Path | None = option(
+        "Folder of such simulations that were made before, by the study `challenge bank` of a checkout.",
+        default=None,
+        section=TEST,
+        type=LocalPath(exists=True),
+    )
+    seed: int = option("Seed of the simulated nulls.", default=0, section=TEST, type=click.IntRange(min=0))
 
 
 @options

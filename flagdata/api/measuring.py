@@ -16,8 +16,19 @@ from flagdata.console import LocalPath
 from flagdata.errors import UsageError
 from flagdata.option_types import DURATION, POSITIVE, SHARE, STATED
 from flagdata.options import argument, called, option, options
-from flagdata.parts import call
-from flagdata.shared_options import FILM, FLAG, HOW, BesideLake, Drawn, FlagAndCamera, OfCloth, OfFilm
+from flagdata.parts import attribute, call
+from flagdata.shared_options import (
+    FILM,
+    FLAG,
+    HOW,
+    BesideLake,
+    ByNulls,
+    Drawn,
+    FlagAndCamera,
+    NamedLake,
+    OfCloth,
+    OfFilm,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -293,3 +304,44 @@ def close_loop(chosen: Closing) -> Closed:
     if (chosen.rest is None) != (chosen.rate is None):
         raise UsageError("rest= and rate= must be given together", where="recordings", fix="give both")
     return call("measure.closing.arrays:closed", chosen)
+
+
+@options
+class Proposing(ByNulls, NamedLake):
+    """How an effect is sought and tested."""
+
+    recipe: Path | str = argument("The recipe of the experiment.", "RECIPE.toml", type=LocalPath())
+    effect: str | None = option(
+        "Test this effect on the recordings and seek no other.", default=None, metavar="FILE.py:Class"
+    )
+    known: tuple[str, ...] = option(
+        "Effect that the model has already; may be repeated.", default=(), metavar="EFFECT.STRENGTH"
+    )
+    out: Path | str = option(
+        "Folder in which proposal/ is written: the effect file, its tests and proposals.json.",
+        default=Path("out/close-loop"),
+        type=LocalPath(),
+    )
+
+
+@called(Proposing)
+def propose(chosen: Proposing) -> Mapping[str, Any]:
+    """An effect that the library lacks, sought in a part of the recordings and tested on the rest.
+
+    ```python
+    tried = flagdata.propose("flag.toml", known=("lift.coefficient",), workers=2)
+    tried["decision"], tried["reason"], tried["effect"]  # "kept", why, the effect's file and class
+    ```
+
+    It simulates null experiments, which takes minutes, and adds what it tried to `proposals.json` in the folder `out`.
+
+    Returns:
+        What `flagdata propose --json` prints.
+
+    Raises:
+        MissingExtraError: torch is not installed.
+        InputError: a recipe or recordings that cannot be used, with the reason.
+        NotFoundError: no such recipe, lake or recording.
+        UsageError: nulls that cannot test the level.
+    """
+    return attribute("measure.commands.propose:propose").result(chosen)

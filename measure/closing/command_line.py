@@ -3,48 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from flagdata.console import LocalPath, say
+from flagdata.console import say
 from flagdata.errors import UsageError
 from flagdata.findings import Finding
-from flagdata.option_types import POSITIVE, SHARE
-from flagdata.options import option, options
 from flagdata.printable import printable
-from flagdata.shared_options import Shared
+from flagdata.shared_options import ByNulls
 from measure.closing.findings import checked, finding_text
 
 if TYPE_CHECKING:
     from measure.forecasting.setting import Stage
     from measure.observe.recipe import ExperimentRecipe
-
-TEST = "The test"
-
-
-@options
-class ByNulls(Shared):
-    """By which null experiments is tested, and at which level."""
-
-    level: float | None = option(
-        "Significance level of the test; 0.05 by default.", default=None, section=TEST, type=SHARE
-    )
-    nulls: int | None = option(
-        "Number of recordings without any effect to simulate for comparison, 160 or more; on films the number of "
-        "meshes and time-stepping methods, 20 by default.",
-        default=None,
-        section=TEST,
-        type=POSITIVE,
-    )
-    bank: Path | None = option(
-        "Folder of such simulations that were made before, by the study `challenge bank` of a checkout.",
-        default=None,
-        section=TEST,
-        type=LocalPath(exists=True),
-    )
-    seed: int = option("Seed of the simulated nulls.", default=0, section=TEST, type=click.IntRange(min=0))
 
 
 def nulls_given(recipe: ExperimentRecipe | None, chosen: ByNulls, *, level: float | None) -> dict[str, Any]:

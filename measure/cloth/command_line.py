@@ -10,8 +10,7 @@ from flagdata.api.measuring import LENGTHS, OfFlag
 from flagdata.errors import UsageError
 from flagdata.option_types import STATED
 from flagdata.options import described, option, options, typed
-from flagdata.shared_options import FLAG, HOW
-from measure.closing.command_line import TEST, ByNulls
+from flagdata.shared_options import FLAG, HOW, TEST, ByNulls
 
 if TYPE_CHECKING:
     from flagdata.stated import Stated

@@ -14,8 +14,8 @@ from flagdata.console import LocalPath, document, echo, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.option_types import POSITIVE, STATED
 from flagdata.options import AsJson, argument, command, option, options, typed
-from flagdata.shared_options import WRITTEN, NamedLake, OnBranch
-from measure.closing.command_line import TEST, nulls_given, refuse, stage_bars
+from flagdata.shared_options import TEST, WRITTEN, NamedLake, OnBranch
+from measure.closing.command_line import nulls_given, refuse, stage_bars
 from measure.closing.findings import with_warnings
 from measure.cloth.command_line import JudgingFilms, refuse_of_others
 

@@ -2,38 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from flagdata.console import LocalPath, document, echo_lines, say
-from flagdata.options import AsJson, argument, command, option, options
-from flagdata.shared_options import NamedLake
-from measure.closing.command_line import ByNulls, nulls_given, refuse, stage_bars
-
-if TYPE_CHECKING:
-    from measure.propose.outcome import ProposalOutcome
+from flagdata.api.measuring import Proposing
+from flagdata.console import echo_lines, say
+from flagdata.options import Result, verb
+from measure.closing.command_line import nulls_given, refuse, stage_bars
 
 
-@options
-class Proposing(AsJson, ByNulls, NamedLake):
-    """How an effect is sought and tested."""
-
-    recipe: Path = argument("The recipe of the experiment.", "RECIPE.toml", type=LocalPath())
-    effect: str | None = option(
-        "Test this effect on the recordings and seek no other.", default=None, metavar="FILE.py:Class"
-    )
-    known: tuple[str, ...] = option(
-        "Effect that the model has already; may be repeated.", default=(), metavar="EFFECT.STRENGTH"
-    )
-    out: Path = option(
-        "Folder in which proposal/ is written: the effect file, its tests and proposals.json.",
-        default=Path("out/close-loop"),
-        type=LocalPath(),
-    )
-
-
-@command(Proposing)
-def propose(chosen: Proposing) -> None:
+@verb(Proposing, example='flagdata.propose("flag.toml", known=("lift.coefficient",))')
+def propose(chosen: Proposing) -> Iterator[Result]:
     """Propose an effect that the library lacks, test it on recordings it was not made from, keep or reject it.
 
     RECIPE.toml is one of `flagdata close-loop` that names its recordings. Terms are sought in a part of them;
@@ -56,11 +35,11 @@ def propose(chosen: Proposing) -> None:
     from measure.propose.terms import dictionary
     from measure.propose.words import words
 
-    folder = chosen.out / "proposal"
+    folder = Path(chosen.out) / "proposal"
     proposal_log.check(folder / "proposals.json")
     if chosen.effect is None:
         effect_file.check(folder)
-    recipe = recipes.load(chosen.recipe)
+    recipe = recipes.load(Path(chosen.recipe))
     null_options = nulls_given(recipe, chosen, level=chosen.level)
     options = NullOptions(seed=chosen.seed, bank=chosen.bank, workers=chosen.processes, **null_options)
     tried, controls = (
@@ -82,14 +61,8 @@ def propose(chosen: Proposing) -> None:
     if chosen.effect is None and outcome.strengths:
         spec = effect_file.write(outcome, folder).spec
     proposal_log.add(folder / "proposals.json", outcome, effect=spec)
-    _report(outcome, spec, folder, as_json=chosen.as_json, text=words(outcome))
-
-
-def _report(outcome: ProposalOutcome, spec: str, folder: Path, *, as_json: bool, text: str) -> None:
-    if as_json:
-        document("proposal", {"effect": spec, **outcome.as_dict()})
-    else:
-        echo_lines(text)
+    yield Result("proposal", {"effect": spec, **outcome.as_dict()})
+    echo_lines(words(outcome))
     if spec:
         say(f"effect {spec}")
     say(f"wrote {folder / 'proposals.json'}")

@@ -63,8 +63,8 @@ def test_a_call_takes_what_its_command_takes_with_the_same_defaults(name: str) -
     assert wrong == {}
 
 
-OF_THE_TERMINAL = {"blender-setup", "completion", "demo", "help", "propose", "view"}
-"""Commands that no call does: what they are about is a shell, a browser, an installation or a folder of pages."""
+OF_THE_TERMINAL = {"blender-setup", "completion", "demo", "help", "view"}
+"""Commands that no call does: what they are about is a shell, a browser or an installation."""
 
 
 def test_every_other_verb_is_a_call() -> None:
