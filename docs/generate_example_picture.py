@@ -98,7 +98,7 @@ def moving(found: Measured, flag: Example) -> bytes:
 def main() -> None:
     """Write the picture."""
     flag = flagdata.example()
-    PICTURE.write_bytes(moving(flagdata.measure(flag.source, step=_STEP), flag))
+    PICTURE.write_bytes(moving(flagdata.measure(flag.source, windows=_STEP), flag))
 
 
 if __name__ == "__main__":

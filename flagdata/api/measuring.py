@@ -83,12 +83,11 @@ class Measuring(OfFilm, Drawn, BesideLake):
         type=STATED,
         metavar="M/S",
     )
-    step: float | None = option(
+    windows: float | None = option(
         "A wind series, one window every so often [s], as in 1.2s; by default windows follow each other.",
-        "--windows",
-        "--window",
         default=None,
         section=HOW,
+        was=("--window", "--step"),
         type=DURATION,
         metavar="TIME",
     )

@@ -122,7 +122,7 @@ def measure(chosen: MeasureCommand) -> None:
     elif chosen.as_csv:
         csv_rows(done.series.rows())
     else:
-        _report(done, series=chosen.step is not None)
+        _report(done, series=chosen.windows is not None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -96,7 +96,7 @@ class Request:
         size = size_of(chosen.source, chosen.flag_size)
         options = Options(
             size=size,
-            step=chosen.step,
+            step=chosen.windows,
             first=chosen.start,
             last=chosen.end,
             level=chosen.level,

@@ -96,7 +96,7 @@ def test_a_measurement_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pyte
             "flag.mp4",
             flag_size=(1.5, 1.0),
             area_weight="0.19±0.01",
-            step=1.2,
+            windows=1.2,
             seed=3,
             level=0.8,
             end=3.0,
