@@ -117,7 +117,15 @@ def option(
     return field(default=default, kw_only=kw_only, metadata={"option": row})
 
 
-def argument(about: str, metavar: str, *, default: Any = MISSING, kw_only: bool = False, **more: Any) -> Any:
+def argument(
+    about: str,
+    metavar: str,
+    *,
+    default: Any = MISSING,
+    kw_only: bool = False,
+    was: tuple[str, ...] = (),
+    **more: Any,
+) -> Any:
     """States what a command and a call take by position, as the default of a field.
 
     Args:
@@ -125,9 +133,10 @@ def argument(about: str, metavar: str, *, default: Any = MISSING, kw_only: bool 
         metavar: on the command line.
         default: where it is not given; without one it is required.
         kw_only: whether the Python call takes it by keyword alone.
+        was: options of the last version whose value is taken by position now.
         more: of `click.Argument`, as `nargs` and `type`.
     """
-    row = Option(about=about, argument=True, click={"metavar": metavar, **more})
+    row = Option(about=about, argument=True, was=was, click={"metavar": metavar, **more})
     return field(default=default, kw_only=kw_only, metadata={"option": row})
 
 
@@ -177,13 +186,30 @@ class SectionedOption(click.Option):
         self.was = was
 
 
+class PlacedArgument(click.Argument):
+    """An argument whose value an option took.
+
+    Attributes:
+        was: names of the option.
+    """
+
+    def __init__(self, *names: Any, was: tuple[str, ...] = (), **more: Any) -> None:
+        super().__init__(*names, **more)
+        self.was = was
+
+
 class LongCommand(click.Command):
     """A command whose help prints its options in their sections, and that reads their names of the last version."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         options = [param for param in self.params if isinstance(param, SectionedOption)]
         renamed = {old: option.opts[0] for option in options for old in option.was}
-        return super().parse_args(ctx, [_present(word, renamed, args) for word in args])
+        arguments = [param for param in self.params if isinstance(param, PlacedArgument)]
+        by_position = {
+            old: argument.make_metavar(ctx).removesuffix("...") for argument in arguments for old in argument.was
+        }
+        words = [word for name in args for word in _by_position(name, by_position)]
+        return super().parse_args(ctx, [_present(word, renamed, args) for word in words])
 
     def sections(self) -> dict[str, list[click.Option]]:
         """Returns title → options, in the order of `SECTIONS`; those without a section last."""
@@ -252,6 +278,15 @@ def _present(word: str, renamed: Mapping[str, str], words: Collection[str]) -> s
     return f"{present}{equals}{value}"
 
 
+def _by_position(word: str, names: Mapping[str, str]) -> tuple[str, ...]:
+    """Returns a word of a command line without the name of an option whose value is an argument now, and warns."""
+    name, _, value = word.partition("=")
+    if name not in names:
+        return (word,)
+    say(f"give {names[name]} without {name}, which is no longer an option", mark="warning")
+    return (value,) if value else ()
+
+
 def _parameter(key: str, place: Field[Any], row: Option) -> click.Parameter:
     """Returns the parameter of a field; its kind is read from the annotation where the option states no other."""
     kind = str(place.type).removesuffix(" | None")
@@ -260,7 +295,7 @@ def _parameter(key: str, place: Field[Any], row: Option) -> click.Parameter:
     required = place.default is MISSING
     if row.argument:
         several = {"nargs": -1} if several else {}
-        return click.Argument([key], required=required, **{"default": None, **several, **more})
+        return PlacedArgument([key], required=required, was=row.was, **{"default": None, **several, **more})
     if kind == "bool":
         more.update(is_flag=True, type=None)
     elif several:

@@ -38,7 +38,7 @@ _OF_SOURCES = ("winds", "axis", "north", "clock_offset", "sensor", "zone", "acce
 class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
     """How recordings of one cloth are read and judged, and what is written."""
 
-    sources: tuple[str, ...] = argument("Recordings of one cloth.", "SOURCE...", default=())
+    sources: tuple[str, ...] = argument("Recordings of one cloth.", "SOURCE...", default=(), was=("--recipe",))
     verbose: bool = option(
         "Print all that was weighed, the errors before and after, and what was assumed; by default the conclusion "
         "alone.",

@@ -247,6 +247,24 @@ def test_the_name_of_the_last_version_is_read_with_a_warning(capsys: pytest.Capt
     assert "--offset" not in shift.get_help(click.Context(shift)).replace("--clock-offset", "")
 
 
+def test_the_value_of_a_former_option_is_read_where_an_argument_stands_now(capsys: pytest.CaptureFixture[str]) -> None:
+    @options
+    class Sources:
+        sources: tuple[str, ...] = argument("Sources.", "SOURCE...", default=(), was=("--recipe",))
+
+    @command(Sources)
+    def judge(chosen: Sources) -> None:
+        """Judge."""
+        taken.append(chosen.sources)
+
+    taken: list[tuple[str, ...]] = []
+    for words in (["--recipe", "x.toml", "a.csv"], ["--recipe=x.toml", "a.csv"], ["x.toml", "a.csv"]):
+        judge.main(words, standalone_mode=False)
+    assert taken == [("x.toml", "a.csv")] * 3
+    warned = "warning: give SOURCE without --recipe, which is no longer an option"
+    assert capsys.readouterr().err.splitlines() == [warned] * 2
+
+
 @pytest.fixture
 def taken() -> list[Made]:
     return []
