@@ -54,6 +54,12 @@ class CalibrateCommand(AsJson, Shared, Calibrating, Keeping):  # pyright: ignore
         section=HOW,
         metavar="NAME|FOLDER|ID",
     )
+    verbose: bool = option(
+        "Print the camera's place that was fitted to each recording too, and how simulations left out were weighed; by "
+        "default the cloth alone.",
+        default=False,
+        section=WRITTEN,
+    )
     report: Path | None = option(
         "Write a page that needs no other.", default=None, section=WRITTEN, type=LocalPath(), metavar="FILE.html"
     )
@@ -152,7 +158,7 @@ def calibrate(chosen: CalibrateCommand) -> None:
         anemometer_answer = None if anemometer is None else anemometer.as_dict()
         document("calibrate", {**calibration.as_dict(), "artifact": wanted, "anemometer": anemometer_answer})
     else:
-        _print(calibration)
+        _print(calibration, verbose=chosen.verbose)
     if not calibration.weighs:
         raise click.exceptions.Exit(RefusedError.exit_code)
 
@@ -267,7 +273,7 @@ def _provenance(calibration: Calibration, artifact: str | None) -> dict[str, str
     return rows if artifact is None else {**rows, "artifact": artifact}
 
 
-def _print(calibration: Calibration) -> None:
+def _print(calibration: Calibration, *, verbose: bool) -> None:
     from measure.cloth.calibration_page import shown_quantity as shown
 
     echo(calibration.sentence)
@@ -279,6 +285,17 @@ def _print(calibration: Calibration) -> None:
         elif row["bounded"]:
             value = f"{row['interval']} {row['unit']}, {row['level']}"
         echo(f"{row['name']}: {value} (assumed: {row['assumed']})")
+    if verbose:
+        _print_fit(calibration)
+    for finding in calibration.findings:
+        say_finding(finding)
+    if calibration.stated is not None:
+        say(f"for flagdata measure: --area-weight {calibration.stated}")
+
+
+def _print_fit(calibration: Calibration) -> None:
+    from measure.cloth.calibration_page import shown_quantity as shown
+
     for recording, place_quantities in zip(calibration.recordings, calibration.places, strict=True):
         fitted = ", ".join(
             f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place_quantities)
@@ -289,7 +306,3 @@ def _print(calibration: Calibration) -> None:
         f"  intervals of {check.contained} of {check.count} simulations left out contain their weight, median error "
         f"{check.error:.1%}"
     )
-    for finding in calibration.findings:
-        say_finding(finding)
-    if calibration.stated is not None:
-        say(f"for flagdata measure: --area-weight {calibration.stated}")

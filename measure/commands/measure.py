@@ -333,7 +333,8 @@ def _report(done: _Done, *, series: bool) -> None:
     measured = done.measured
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
     echo(mark + measured.sentence)
-    say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.verdict.window_p)} windows in the answer")
+    left_out = "" if measured.combined == len(measured.verdict.window_p) else "; the others look unfamiliar or overlap"
+    say(f"  {measured.verdict.sentence}; the answer combines {measured.combined}{left_out}")
     truths = done.subject.known or {}
     if simulated_with := [
         f"{SHORT[q.name]} {truths[q.name]:.3g} {q.unit}" for q in measured.quantities if q.name in truths

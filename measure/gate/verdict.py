@@ -165,13 +165,12 @@ class Verdict:
 
     @property
     def sentence(self) -> str:
-        """Phrases the verdict, with the level that is applied and the rate that it keeps to."""
+        """Phrases the verdict; of a film that is refused with the level that is applied and the rate it keeps to."""
         strange, count = int(self.strange.sum()), len(self.window_p)
-        rate = f"at most {self.false_alarm:.0%} of familiar films are refused"
         windows = (
-            f"p = {self.p:.2g}, {self.level:.2g} or below would refuse it"
+            f"p = {self.p:.2g} (refused from {self.level:.2g} down)"
             if count == 1
-            else f"{strange} of {count} windows look unfamiliar (p ≤ {self.level:.2g}), {self.refusing} would refuse it"
+            else f"{strange} of {count} windows look unfamiliar (refused from {self.refusing} on)"
         )
         if not self.measurable:
             cause = self.window_reasons[0].what
@@ -181,10 +180,17 @@ class Verdict:
             suffix = "" if not further else f" ({further} more {'reasons' if further > 1 else 'reason'})"
             return f"the film cannot be measured: {self.faults[0].what}{suffix}"
         if self.unlike:
-            return f"this is not like what the network was trained on: {self.reasons[0].what}; {windows} ({rate})"
+            return (
+                f"this is not like the films that the network was trained on: {self.reasons[0].what}; {windows}; "
+                f"a window is unfamiliar at p ≤ {self.level:.2g}, which refuses {self.false_alarm:.0%} of familiar "
+                "films at most"
+            )
         if self.undecided:
-            return f"whether this is like what the network was trained on depends on the size: {self.reasons[0].what}"
-        return f"like what the network was trained on; {windows} ({rate})"
+            return (
+                "whether this is like the films that the network was trained on depends on the size: "
+                f"{self.reasons[0].what}"
+            )
+        return f"like the films that the network was trained on: {windows}"
 
     def as_dict(self) -> Mapping[str, Any]:
         """Returns JSON values."""

@@ -18,7 +18,7 @@ START = 1_777_629_600 * NANOSECONDS
 SECONDS = 120
 SIZED = ("--flag-size", "1.5x1.0")
 CALIBRATE = ("calibrate", "monday", "--only", "anemometer", *SIZED, "--name")
-READ = "windows in the answer"
+READ = "the answer combines"
 
 
 def shown(patch: pytest.MonkeyPatch, *, seed: int, where: Place | None = None) -> None:

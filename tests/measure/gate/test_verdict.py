@@ -75,7 +75,7 @@ def test_of_a_hundred_windows_48_that_are_strange_refuse_and_few_do_not() -> Non
     assert judged(48).refused
     assert judged(26).refused
     assert not judged(25).refused
-    assert "25 of 100 windows look unfamiliar (p ≤ 0.033), 26 would refuse it" in judged(25).sentence
+    assert "25 of 100 windows look unfamiliar (refused from 26 on)" in judged(25).sentence
     assert judged(25).as_dict()["level"] == judged(25).level
     assert (judged(25).as_dict()["strange"], judged(25).as_dict()["refusing"]) == (25, 26)
 
