@@ -23,7 +23,6 @@ from measure.film.windows import Window, WindowLayout, WindowReader, findings_of
 from measure.gate.reasons import REASONS
 from measure.gate.verdict import Verdict, verdict
 from measure.gate.window import WindowGate
-from models.conditioning.repeats import Distinct
 from models.estimator import Estimator
 from models.learner import Loss
 
@@ -34,6 +33,10 @@ and Raftery, Journal of the American Statistical Association 90, 1995, section 3
 EXCLUDED = 0.05
 """Share of the sizes that are possible without the area weight that was given, and not with it, above which a warning
 is due."""
+
+_REPEATING = 0.1
+"""Share of frames that repeat the one before, above which they are the reason where no window is whole. Lower says so
+of films that lack windows for another reason; of films made with half of the frames a second it is a half."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,7 +171,7 @@ def measure(
     of_film = film.findings()
     faults = [finding for finding in of_film if finding.kind in REASONS]
     if clips is None:
-        raise _without_windows(film, layout, distinct, faults)
+        raise _without_windows(film, reader, faults)
     gate_verdict = verdict(
         [look.reasons for look in looks], false_alarm=options.false_alarm, level=gate.level, faults=faults
     )
@@ -238,24 +241,26 @@ def _look(window: Window, gate: WindowGate, joint: FilmAnswer) -> Look:
     )
 
 
-def _without_windows(film: Film, layout: WindowLayout, distinct: Distinct, faults: Sequence[Finding]) -> FlagdataError:
+def _without_windows(film: Film, reader: WindowReader, faults: Sequence[Finding]) -> FlagdataError:
     """Explains why no window of a film is complete."""
+    distinct = reader.distinct
+    start, lack = next(iter(reader.lacks.items()))
+    windows = f"none of {reader.layout.count} windows has all its frames: in the one at {start:.2f} s {lack}"
     still = [fault for fault in faults if fault.kind == "no-motion"]
-    if distinct.repeated and not still:
+    if distinct.share > _REPEATING and not still:
         repeated = REASONS["repeated-frames"]
         return RefusedError(
             f"{repeated.sentence}: {distinct.share:.0%} of {distinct.frames} frames repeat the one before, and "
-            f"{(1 - distinct.share) * film.rate:.3g} different pictures a second are left; none of {layout.count} "
-            "windows has enough",
+            f"{windows}",
             where=film.name,
             fix=repeated.fix,
         )
     if faults:
         return RefusedError(faults[0].what, where=film.name, fix=faults[0].fix or "give another film")
     return UsageError(
-        f"none of {layout.count} windows has all its frames",
+        windows,
         where=film.name,
-        fix="the film's stamps have gaps: choose another part by --start and --end",
+        fix="frames are missing or repeat there: choose another part by --start and --end",
     )
 
 

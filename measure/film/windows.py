@@ -143,6 +143,7 @@ class WindowReader:
     Attributes:
         layout: of the windows.
         distinct: the frames, with how many were read and how many repeat the one before.
+        lacks: start of a window that was left out [s] → what it lacks.
         look: called with each frame and its time before the windows are cut, where someone else looks as well.
     """
 
@@ -172,6 +173,7 @@ class WindowReader:
             first=first,
             last=last,
         )
+        self.lacks: dict[float, str] = {}
         self.look: Callable[[float, UInt8Array], object] | None = None
         margin = 2 * self.layout.period
         self.distinct = Distinct(self._shown(film.frames(self.layout.first - margin, self.layout.last + margin)))
@@ -182,7 +184,7 @@ class WindowReader:
         Args:
             advance: called after each window with how many there are and 1.
         """
-        for window in cut(self.distinct, self.layout):
+        for window in cut(self.distinct, self.layout, lacks=self.lacks):
             yield window
             if advance is not None:
                 advance(self.layout.count, 1)
@@ -194,11 +196,14 @@ class WindowReader:
             yield time, frame
 
 
-def cut(frames: Iterable[TimedFrame], layout: WindowLayout) -> Iterator[Window]:
+def cut(
+    frames: Iterable[TimedFrame], layout: WindowLayout, *, lacks: dict[float, str] | None = None
+) -> Iterator[Window]:
     """Cuts out the windows of a film, in order; one in which frames are missing is left out.
 
     Args:
         frames: (time from the film's first frame [s], picture), in order; at most a window of them is held.
+        lacks: takes start → what it lacks of each window that is left out.
     """
     buffer: deque[TimedFrame] = deque()
     source, interpolator = iter(frames), Interpolator()
@@ -215,28 +220,37 @@ def cut(frames: Iterable[TimedFrame], layout: WindowLayout) -> Iterator[Window]:
             else:
                 buffer.append(following)
         window = _window(buffer, layout, index, interpolator)
-        if window is not None:
+        if isinstance(window, Window):
             yield window
+        elif lacks is not None:
+            lacks[start] = window
 
 
-def _window(buffer: deque[TimedFrame], layout: WindowLayout, index: int, interpolator: Interpolator) -> Window | None:
+def _window(buffer: deque[TimedFrame], layout: WindowLayout, index: int, interpolator: Interpolator) -> Window | str:
+    """Returns a window, or what it lacks."""
     if len(buffer) < 2:
-        return None
+        return "there are no frames"
     times = np.array([time for time, _ in buffer])
     start = float(times[np.abs(times - layout.start(index)).argmin()])
     if abs(start - layout.start(index)) > _LONGEST * layout.period:
-        return None
+        return "there is no frame at its start"
+    allowed = _LONGEST * max(*layout.spacings, layout.period)
     clips, interpolated = [], 0
     for interval in layout.spacings:
         instants = start + interval * np.arange(layout.frames)
         before = np.searchsorted(times, instants, side="right").clip(1, len(times) - 1) - 1
         gaps = times[before + 1] - times[before]
         fractions = (instants - times[before]) / gaps
-        if fractions.max() > 1 + _BEYOND or gaps.max() > _LONGEST * max(*layout.spacings, layout.period):
-            return None
+        if fractions.max() > 1 + _BEYOND:
+            return "the frames end before it does"
+        if gaps.max() > allowed:
+            return (
+                f"{gaps.max() * 1e3:.0f} ms lie between two pictures, and at most {allowed * 1e3:.0f} ms can be "
+                "interpolated"
+            )
         within = np.count_nonzero((times >= start - 1e-6) & (times < instants[-1]))
         if within < _FEWEST * (layout.frames - 1):
-            return None
+            return f"{within} pictures were taken in it, of {layout.frames - 1} at least {_FEWEST:.0%} must be"
         clip, between = at_instants(buffer, instants, period=layout.period, interpolator=interpolator)
         clips.append(grained(clip, seed=index))
         interpolated += between

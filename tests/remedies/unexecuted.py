@@ -17,7 +17,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("measure/anemometer/features.py", "give another film, or --"),
     ),
     "a film whose stamps have gaps in every window, yet at least one window long": (
-        ("measure/estimate/measuring.py", "the film's stamps have g"),
+        ("measure/estimate/measuring.py", "frames are missing or rep"),
     ),
     "a film, real or rendered, whose flag or camera is lost in the whole and found in a part": (
         ("measure/cloth/sources.py", "film from a tripod, or c"),

@@ -432,8 +432,21 @@ def test_a_film_that_is_too_short_or_too_slow_is_refused_with_what_it_takes(mode
 
 def test_a_film_full_of_gaps_is_refused(model: Estimator) -> None:
     times = np.delete(np.arange(60) / RATE, np.arange(5, 60, 8))
-    with pytest.raises(UsageError, match="gaps"):
+    with pytest.raises(UsageError, match=r"in the one at 0\.00 s 80 ms lie between two pictures"):
         measured(Frames(time=times, images=pictures(len(times))), model)
+
+
+@pytest.mark.parametrize(("every", "raised"), [(2, RefusedError), (FRAMES, UsageError)])
+def test_repeated_frames_are_the_reason_where_they_are_many(
+    every: int, raised: type[Exception], model: Estimator
+) -> None:
+    """Of half of the frames the reason is how the film was made, of one in a window that one."""
+    images = pictures(6 * FRAMES)
+    repeats = np.arange(5, len(images), every)
+    images[repeats] = images[repeats - 1]
+    with pytest.raises(raised, match="none of 6 windows has all its frames") as caught:
+        measured(Frames(time=np.arange(len(images)) / RATE, images=images), model)
+    assert ("many frames look alike" in str(caught.value)) == (every == 2)
 
 
 def test_a_model_without_distributions_measures_nothing(model: Estimator) -> None:

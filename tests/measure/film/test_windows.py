@@ -107,8 +107,10 @@ def test_uneven_stamps_are_no_gap_and_a_missing_frame_is() -> None:
     uneven = times + 0.005 * np.sin(np.arange(41))
     layout = lay_out(frames=10, spacings=(0.04,), rate=25.0, duration=1.6, step=None)
     assert len(list(cut(numbered(uneven), layout))) == layout.count == 4
-    windows = list(cut(numbered(np.delete(times, 14)), layout))
+    lacks: dict[float, str] = {}
+    windows = list(cut(numbered(np.delete(times, 14)), layout, lacks=lacks))
     assert [window.index for window in windows] == [0, 2, 3]
+    assert lacks == {0.4: "80 ms lie between two pictures, and at most 70 ms can be interpolated"}
     findings = findings_of(layout, windows_read=3, interpolated=0, frames=40, repeated=0)
     assert {finding.kind: finding.count for finding in findings}["windows-left-out"] == 1
 
