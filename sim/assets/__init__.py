@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
@@ -85,7 +86,7 @@ class Assets:
         return TEXTURES[kind].image(member)
 
     def background(self, name: str) -> UInt8Array:
-        """Renders a background by name: (height, width, 3) sRGB.
+        """Renders a background by name: (height, width, 3) sRGB, read-only; the last few are not drawn anew.
 
         Raises:
             UnknownNameError: there is no such background.
@@ -94,7 +95,7 @@ class Assets:
         kind, member = _split(name, "background", "sky/1")
         if kind == PHOTO:
             return self._photos().image(member)
-        return BACKGROUNDS[kind].image(member)
+        return _drawn_background(kind, member)
 
     def draw_texture(self, kinds: Sequence[str], rng: np.random.Generator) -> str:
         """Draws the name of a texture of one of these kinds, each with equal chance.
@@ -118,6 +119,13 @@ class Assets:
         if self.photos is None:
             raise InputError("no folder of photographs was named", where=PHOTO, fix="name the folder they are in")
         return Photos.of(self.photos)
+
+
+@lru_cache(maxsize=8)  # a film's background is that of the next one where a fit looks for what differs in the cloth
+def _drawn_background(kind: str, member: str) -> UInt8Array:
+    image = BACKGROUNDS[kind].image(member)
+    image.flags.writeable = False
+    return image
 
 
 def _split(name: str, noun: str, example: str) -> tuple[str, str]:
