@@ -58,8 +58,8 @@ def _section(name: str, command: click.Command) -> str:
     if isinstance(command, LongCommand) and len(command.sections()) > 1:
         sections = command.sections()
     for title, part in sections.items():
-        if part:
-            lines += [f"| {title} | meaning |", "|---|---|", *(_row(option, context) for option in part), ""]
+        if shown := [option for option in part if not option.hidden]:
+            lines += [f"| {title} | meaning |", "|---|---|", *(_row(option, context) for option in shown), ""]
     return "\n".join(lines)
 
 

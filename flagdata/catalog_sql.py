@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 from flagdata.errors import LimitError, UnknownNameError, UsageError
+from flagdata.retired_names import present_sql
 from flagdata.schema import CATALOG, Field, Kind, catalog_schema
 
 if TYPE_CHECKING:
@@ -273,6 +274,8 @@ def _view_columns(labels: Sequence[str]) -> str:
     stored = [
         f'CASE WHEN isnan("{name}") THEN NULL ELSE "{name}" END AS "{name}"'
         if pa.types.is_floating(field.type)
+        else present_sql(name)
+        if name == "parameters"
         else f'"{name}"'
         for name, field in CATALOG.items()
     ]

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.errors import CorruptError, InputError
+from flagdata.retired_names import present_names
 
 SIZE_LIMIT = 64 << 20
 """Longest text that is parsed [characters]; a cloth model's mesh is in its recipe. Lists within a list take most memory
@@ -115,13 +116,14 @@ def from_stored_json(text: str) -> Any:
 
 
 def column_json(text: str, column: str, *, artifact: str) -> Any:
-    """Parses the value of a JSON column of a catalog's row.
+    """Parses the value of a JSON column of a catalog's row; parameters have their present names.
 
     Raises:
         CorruptError: as the errors of `from_stored_json`; it names the artifact.
     """
     try:
-        return from_stored_json(text)
+        content = from_stored_json(text)
+        return present_names(content) if column == "parameters" and isinstance(content, dict) else content
     except ValueError as error:
         where = f"artifact {artifact}"
         raise CorruptError(f"its {column} cannot be read: {error}", where=where, fix="run flagdata doctor") from None

@@ -72,7 +72,7 @@ class Answer:
 
     Attributes:
         sentence: in one line, as `flagdata measure` prints it.
-        quantities: name → estimate: "wind_speed", "density" (area weight) and what else the network estimates.
+        quantities: name → estimate: "wind_speed", "area_weight" (area weight) and what else the network estimates.
         draws: name → (n,) draws of the joint posterior, in the same order for all names.
         windows: each by itself.
     """

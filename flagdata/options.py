@@ -36,7 +36,8 @@ import click
 from click.core import ParameterSource
 
 from flagdata.console import document, say
-from flagdata.errors import FlagdataError, UsageError
+from flagdata.errors import FlagdataError
+from flagdata.retired_names import warn_of_old_name
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -78,6 +79,7 @@ class Option:
         section: of a long help.
         argument: whether the command takes it by position.
         was: its names of the last version, which are read with a warning.
+        now: what says it now, of an option of the last version that no help shows; it is read with a warning.
         click: more that `click.Option` or `click.Argument` is given.
     """
 
@@ -86,6 +88,7 @@ class Option:
     section: str = REST
     argument: bool = False
     was: tuple[str, ...] = ()
+    now: str = ""
     click: Mapping[str, Any] = field(default_factory=dict)
 
     def spelled(self, key: str) -> str:
@@ -100,6 +103,7 @@ def option(
     section: str = REST,
     kw_only: bool = True,
     was: tuple[str, ...] = (),
+    now: str = "",
     **more: Any,
 ) -> Any:
     """States an option as the default of a field.
@@ -111,9 +115,12 @@ def option(
         section: of a long help.
         kw_only: whether the Python call takes it by keyword alone.
         was: its names of the last version.
+        now: what says the same now, of an option of the last version.
         more: of `click.Option`, as `type`, `metavar` and `envvar`.
     """
-    row = Option(about=about, names=names, section=section, was=was, click=more)
+    if now:
+        more["hidden"] = True
+    row = Option(about=about, names=names, section=section, was=was, now=now, click=more)
     return field(default=default, kw_only=kw_only, metadata={"option": row})
 
 
@@ -168,6 +175,9 @@ def typed(chosen: object) -> frozenset[str]:
 
 
 def _with_typed(chosen: Any, names: frozenset[str]) -> Any:
+    for key, (_, row) in described(type(chosen)).items():
+        if row.now and key in names:
+            say(f"{row.spelled(key)} is of the last version: give {row.now}", mark="warning")
     vars(chosen)["_typed"] = names
     return chosen
 
@@ -272,9 +282,7 @@ def _present(word: str, renamed: Mapping[str, str], words: Collection[str]) -> s
     if name not in renamed:
         return word
     present = renamed[name]
-    if any(other.partition("=")[0] == present for other in words):
-        raise UsageError(f"{name} is called {present} now, and both are given", where=name, fix="keep one of them")
-    say(f"{name} is called {present} now", mark="warning")
+    warn_of_old_name(name, present, {other.partition("=")[0] for other in words}, where=name)
     return f"{present}{equals}{value}"
 
 
@@ -426,4 +434,5 @@ def _arguments(rows: Mapping[str, tuple[Field[Any], Option]]) -> str:
     return "\n".join(
         textwrap.fill(f"{key}: {row.about}", _WIDTH, initial_indent="    ", subsequent_indent="        ")
         for key, (_, row) in rows.items()
+        if not row.now
     )

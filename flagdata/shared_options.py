@@ -23,6 +23,8 @@ RECORDING = "The recording"
 FILM = "The film"
 FLAG = "The flag and the camera"
 HOW = "How it is done"
+BOTH_STATED = "the weight and its uncertainty as one area weight, 0.155±0.003"
+"""What says now what `density_uncertainty` said."""
 WRITTEN = "What is written"
 TEST = "The test"
 

@@ -21,7 +21,7 @@ class Simulated:
     Attributes:
         name: of the recipe.
         members: each as a mesh sequence, which `flagdata.render` films.
-        parameters: name → (member,) what each drew or was given, SI: "wind_speed", "density", "damping", …
+        parameters: name → (member,) what each drew or was given, SI: "wind_speed", "area_weight", "damping", …
         wind: (member, frame, 3) where the undisturbed air goes to [m/s], at each frame.
         failed: why a member is not there: its number → the reason.
     """

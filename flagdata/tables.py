@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from enum import EnumMeta, StrEnum
 from functools import cache
 from types import NoneType, UnionType
@@ -19,6 +19,7 @@ import msgspec
 from msgspec import Meta
 
 from flagdata.errors import InputError, LimitError, UnknownNameError
+from flagdata.retired_names import warn_of_old_name, with_present_keys
 
 R = TypeVar("R")
 WHOLE_LIMIT = 1_000_000
@@ -80,10 +81,12 @@ class Named:
 
     Attributes:
         noun: what one is called in error messages.
+        was: former name → name.
     """
 
     noun: str
     known: Collection[str]
+    was: Mapping[str, str] = field(default_factory=dict, hash=False)
 
 
 class _Mark(StrEnum):
@@ -133,8 +136,9 @@ def within(kind: Any, least: float = -math.inf, most: float = math.inf) -> Any:
 def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:
     """Reads a dataclass whose fields are the keys of a table in kebab-case.
 
-    The class says what a missing key stands for. A missing table is an empty one; a text without a default is not
-    blank. An error of the class itself that names no place gets that of the table.
+    The class says what a missing key stands for, and in `WAS` which keys it had in the last version. A missing table is
+    an empty one; a text without a default is not blank. An error of the class itself that names no place gets that of
+    the table.
 
     Args:
         computed: values of fields that are not read by their type; their keys may be there.
@@ -144,6 +148,7 @@ def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:
         InputError: a value that does not fit its type, or none for a field without a default.
         LimitError: a whole number above its bound.
     """
+    content = with_present_keys(content, where=where, keys=getattr(kind, "WAS", {}))
     hints = _hints(kind)
     keys = {entry.name.replace("_", "-"): entry for entry in fields(kind)}  # pyright: ignore[reportArgumentType]
     types = {key: Any if entry.name in computed else hints[entry.name] for key, entry in keys.items()}
@@ -281,6 +286,9 @@ def _converted(bare: Any, notes: list[Any], content: Any, *, key: str, where: st
             fix=f"give radians, or degrees as {key}{DEGREES} = {converted:.4g}",
         )
     for note in notes:
+        if isinstance(note, Named) and converted in note.was:
+            warn_of_old_name(converted, note.was[converted], (), where=where)
+            converted = note.was[converted]
         if isinstance(note, Named) and converted not in note.known:
             raise UnknownNameError.of(note.noun, converted, note.known, where=where)
     return converted

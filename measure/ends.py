@@ -36,7 +36,7 @@ WITHIN = 0.03
 choice of this project, from no publication: draws of a uniform prior lie there with a probability of 3 %."""
 PILED = 0.10
 """Share of the draws in an end from which on they bound the quantity on one side only. Fixed with `WITHIN`."""
-LIMITS = {"wind_speed": (0.0, math.inf), "density": (0.0, math.inf)}
+LIMITS = {"wind_speed": (0.0, math.inf), "area_weight": (0.0, math.inf)}
 """Values that quantities can have at all; all others can have any."""
 
 

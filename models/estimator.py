@@ -18,6 +18,7 @@ from torch import Tensor
 
 from flagdata.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.errors import CorruptError, FlagdataError, InputError
+from flagdata.retired_names import present_name
 from flagdata.rng import torch_generator
 from models.crops import Cropping
 from models.frontend import FrontEnd
@@ -255,7 +256,7 @@ def load(folder: Path) -> Estimator:
                 network["name"],
                 network["options"],
                 loss=Loss(loss["name"]),
-                targets=tuple(loss["targets"]),
+                targets=tuple(map(present_name, loss["targets"])),
                 components=loss["components"],
                 margin=loss["margin"],
             )

@@ -46,7 +46,7 @@ class Known:
     """A statement about a quantity, clip by clip, or draw by draw.
 
     Attributes:
-        name: of the quantity, as "density".
+        name: of the quantity, as "area_weight".
         low, high: (n, m) ends of its range in the quantity's unit, equal where a value is stated; m is 1, or the number
             of draws that are asked for, each of which then has its own.
         sigma: (n, m) standard deviations of values; 0 of exact ones and of ranges.

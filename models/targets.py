@@ -4,9 +4,9 @@ Each target lies in a range, for flags that of the search space of Runia et al. 
 of any fabric. What networks learn is the logit of its place in that range, widened by 1 % so that the ends stay finite:
 a distribution over it has no mass outside of what was simulated, and a uniform prior becomes a logistic one.
 
-A quantity has one name in all tables ("density"), whatever cloth it is of; the range is that of one kind of cloth. A
-recipe therefore names targets by the keys of `TARGETS`: "density" is a flag's in the paper's range, "fabric_density" a
-flag's of any fabric, "cloth_density" a hanging cloth's.
+A quantity has one name in all tables ("area_weight"), whatever cloth it is of; the range is that of one kind of cloth.
+A recipe therefore names targets by the keys of `TARGETS`: "area_weight" is a flag's in the paper's range,
+"fabric_area_weight" a flag's of any fabric, "cloth_area_weight" a hanging cloth's.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ _OF_FLAGS = {
     target.name: target
     for target in (
         Target(name="wind_speed", unit="m/s", low=0.0, high=10.0, about="wind speed"),
-        Target(name="density", unit="kg/m²", low=0.10, high=0.17, about="area weight", digits=3),
+        Target(name="area_weight", unit="kg/m²", low=0.10, high=0.17, about="area weight", digits=3),
         Target(
             name="bending_scale",
             unit="log10(N·m)",
@@ -79,12 +79,12 @@ _OF_FLAGS = {
         ),
     )
 }
-"""The ranges of wind and density are the paper's. With each of 15 factors drawn uniformly from 0.1 to 10 about Camel
-Ponte Roma's entries, the bending scale has mean -3.93 and standard deviation 0.10, the anisotropy 0.15 and 0.25; the
-ranges reach at least 6 of them either way."""
+"""The ranges of wind and area weight are the paper's. With each of 15 factors drawn uniformly from 0.1 to 10 about
+Camel Ponte Roma's entries, the bending scale has mean -3.93 and standard deviation 0.10, the anisotropy 0.15 and 0.25;
+the ranges reach at least 6 of them either way."""
 
 _OF_FLAGS_OF_ANY_FABRIC = {
-    "fabric_density": Target(name="density", unit="kg/m²", low=0.05, high=0.40, about="area weight", digits=3),
+    "fabric_area_weight": Target(name="area_weight", unit="kg/m²", low=0.05, high=0.40, about="area weight", digits=3),
     "fabric_bending": Target(
         name="bending_scale",
         unit="log10(N·m)",
@@ -111,13 +111,13 @@ with a margin on either side so that a flag of 1:1 or 2:1 lies well within. Who 
 
 _BENDING = 15
 _ROW = 5
-_STATED = {"wind_speed": ("wind_speed",), "density": ("density",), ASPECT: ("width", "height")}
+_STATED = {"wind_speed": ("wind_speed",), "area_weight": ("area_weight",), ASPECT: ("width", "height")}
 """What quantities are made of that are not made of the bending coefficients."""
 
 _OF_HANGING_CLOTH = {
     "cloth_wind": Target(name="wind_speed", unit="m/s", low=0.0, high=6.0, about="wind speed", cloth=Cloth.HANGING),
-    "cloth_density": Target(
-        name="density", unit="kg/m²", low=0.079, high=0.454, about="area weight", digits=3, cloth=Cloth.HANGING
+    "cloth_area_weight": Target(
+        name="area_weight", unit="kg/m²", low=0.079, high=0.454, about="area weight", digits=3, cloth=Cloth.HANGING
     ),
     "cloth_bending": Target(
         name="bending_scale",
@@ -140,8 +140,8 @@ def truth(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> FloatAr
     """Computes the targets of clips from their parameters: (n, target), NaN where a clip does not know them.
 
     Args:
-        parameters: name → (n,) values, as simulated records state them ("wind_speed", "density", "bending.0" …; "width"
-            and "height" of the cloth [m]).
+        parameters: name → (n,) values, as simulated records state them ("wind_speed", "area_weight", "bending.0" …;
+            "width" and "height" of the cloth [m]).
         names: keys of `TARGETS`.
 
     Raises:

@@ -96,7 +96,7 @@ class Cloth:
         tables: dict[bytes, int] = {}
         table_of = [tables.setdefault(m.stretching.tobytes(), len(tables)) for m in materials]
         samples = [sample_stretching(np.frombuffer(key).reshape(6, 4), evaluation) for key in tables]
-        density = np.array([m.density for m in materials])
+        area_weight = np.array([m.area_weight for m in materials])
         lengths, hinge_areas = mesh.hinge_lengths, mesh.hinge_areas
         return cls(
             mesh=mesh,
@@ -109,7 +109,7 @@ class Cloth:
             hinge_shape=real(lengths**2 / (2 * hinge_areas)),
             hinge_column=real(0.5 * _COLUMN * lengths / hinge_areas),
             hinge_rows=real(direction_rows(mesh.hinge_directions)),
-            mass=real(mesh.vertex_areas[:, None] * density),
+            mass=real(mesh.vertex_areas[:, None] * area_weight),
             samples=real(np.stack(samples)),
             table_of=index(np.array(table_of)),
             grid=GRIDS[evaluation],

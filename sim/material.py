@@ -1,4 +1,4 @@
-"""Cloth materials: area density, measured stretching and bending tables, internal damping.
+"""Cloth materials: area weight, measured stretching and bending tables, internal damping.
 
 The tables are those of Wang, O'Brien and Ramamoorthi (ACM TOG 30(4):71, 2011); how they are evaluated is in
 `sim.tables`. Catalog entries are TOML files of `catalogs/materials`, with their source beside the numbers.
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.recipes import Shelf, parsed
+from flagdata.retired_names import with_present_keys
 
 STRETCHING_SHAPE = (6, 4)
 BENDING_SHAPE = (3, 5)
@@ -33,7 +34,7 @@ class Material:
     Attributes:
         name: what errors and reports call it.
         source: where the numbers are from.
-        density: mass per rest area [kg/m²].
+        area_weight: mass per rest area [kg/m²].
         stretching: (6, 4) [N/m]; columns k0 (uu·uu), k1 (uu·vv), k2 (vv·vv), k3 (uv·uv); row 0 at zero strain, rows 1–5
             at full strain with the larger principal strain at 0, 22.5, 45, 67.5 and 90° from u.
         bending: (3, 5) [N·m]; rows for edges at 0, 45, 90° from u; columns at curvature 0, 5, 10, 15, 20 1/m.
@@ -42,13 +43,13 @@ class Material:
             frames (backward Euler with step h damps slow modes as d = h does).
 
     Raises:
-        InputError: wrong shapes, values that are not finite, a density that is not positive, negative damping, negative
-            bending stiffness, or a direct stiffness (k0, k2 of a row) that is negative.
+        InputError: wrong shapes, values that are not finite, an area weight that is not positive, negative damping,
+            negative bending stiffness, or a direct stiffness (k0, k2 of a row) that is negative.
     """
 
     name: str
     source: str
-    density: float
+    area_weight: float
     stretching: FloatArray
     bending: FloatArray
     damping: float = 0.25e-3
@@ -56,8 +57,8 @@ class Material:
     def __post_init__(self) -> None:
         object.__setattr__(self, "stretching", self._table(self.stretching, STRETCHING_SHAPE, "stretching"))
         object.__setattr__(self, "bending", self._table(self.bending, BENDING_SHAPE, "bending"))
-        if not (math.isfinite(self.density) and self.density > 0):
-            raise self._error(f"density {self.density!r} is not positive", "give the mass per area in kg/m²")
+        if not (math.isfinite(self.area_weight) and self.area_weight > 0):
+            raise self._error(f"area weight {self.area_weight!r} is not positive", "give the mass per area in kg/m²")
         if not (math.isfinite(self.damping) and self.damping >= 0):
             raise self._error(f"damping {self.damping!r} is negative or not finite", "give d in seconds, 0 for none")
         if self.bending.min() < 0:
@@ -89,17 +90,18 @@ class Material:
         Raises:
             InputError: missing, unknown or ill-typed keys.
         """
-        keys = {"title", "source", "density", "stretching", "bending", "damping"}
-        unknown = sorted(set(content) - keys)
-        missing = sorted({"source", "density", "stretching", "bending"} - set(content))
         where = f"material {name!r}"
+        content = with_present_keys(content, where=where)
+        keys = {"title", "source", "area-weight", "stretching", "bending", "damping"}
+        unknown = sorted(set(content) - keys)
+        missing = sorted({"source", "area-weight", "stretching", "bending"} - set(content))
         if unknown:
             raise InputError(
                 f"these keys are unknown: {', '.join(unknown)}", where=where, fix=f"known: {', '.join(sorted(keys))}"
             )
         if missing:
             raise InputError(f"these keys are missing: {', '.join(missing)}", where=where, fix="add them")
-        numbers = {key: content[key] for key in ("density", "damping") if key in content}
+        numbers = {key: content[key] for key in ("area-weight", "damping") if key in content}
         wrong = [key for key, value in numbers.items() if not _is_number(value)]
         if wrong:
             raise InputError(f"{', '.join(wrong)} must be a number", where=where, fix="write it without quotes")
@@ -108,20 +110,20 @@ class Material:
             source=str(content["source"]),
             stretching=content["stretching"],
             bending=content["bending"],
-            **{key: float(value) for key, value in numbers.items()},
+            **{key.replace("-", "_"): float(value) for key, value in numbers.items()},
         )
 
     @functools.cached_property
     def fingerprint(self) -> str:
-        """SHA-256 of density and tables: the same of materials that differ by damping and names alone."""
-        numbers = [np.array([self.density]), self.stretching, self.bending]
+        """SHA-256 of area weight and tables: the same of materials that differ by damping and names alone."""
+        numbers = [np.array([self.area_weight]), self.stretching, self.bending]
         return hashlib.sha256(b"".join(n.astype("<f8").tobytes() for n in numbers)).hexdigest()
 
-    def scaled(self, *, density: float = 1.0, stretching: float = 1.0, bending: float = 1.0) -> Material:
-        """Multiplies this material's density and tables."""
+    def scaled(self, *, area_weight: float = 1.0, stretching: float = 1.0, bending: float = 1.0) -> Material:
+        """Multiplies this material's area weight and tables."""
         return replace(
             self,
-            density=self.density * density,
+            area_weight=self.area_weight * area_weight,
             stretching=self.stretching * stretching,
             bending=self.bending * bending,
         )
@@ -132,12 +134,12 @@ def _is_number(value: Any) -> bool:
 
 
 def isotropic(
-    *, name: str, density: float, stretching: float, shear: float, bending: float, damping: float = 0.0
+    *, name: str, area_weight: float, stretching: float, shear: float, bending: float, damping: float = 0.0
 ) -> Material:
     """Makes a sheet of constant stiffness without Poisson effect, for comparison with closed forms.
 
     Args:
-        density: [kg/m²].
+        area_weight: [kg/m²].
         stretching: membrane stiffness Y h of the force per width [N/m], as it acts (the tables' factor 2 is taken out).
         shear: coefficient k3 of the shear term 2 k3 G01², as it acts [N/m].
         bending: flexural rigidity B of the tables [N·m].
@@ -147,7 +149,7 @@ def isotropic(
     return Material(
         name=name,
         source="constant stiffness",
-        density=density,
+        area_weight=area_weight,
         damping=damping,
         stretching=np.tile(row, (6, 1)),
         bending=np.full(BENDING_SHAPE, bending),

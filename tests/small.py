@@ -9,7 +9,7 @@ columns = 6
 start-noise = 1e-3
 [material]
 name = "camel-ponte-roma"
-density-factor = { low = 0.9, high = 1.1 }
+area-weight-factor = { low = 0.9, high = 1.1 }
 [wind]
 speed = { low = 1.0, high = 4.0 }
 toward = 0.1
@@ -26,7 +26,7 @@ batch = 2
 columns = 6
 [material]
 name = "camel-ponte-roma"
-density = { low = 0.10, high = 0.17 }
+area-weight = { low = 0.10, high = 0.17 }
 bending-factors = { low = 0.1, high = 10.0 }
 [wind]
 speed = { low = 0.0, high = 10.0 }
@@ -99,7 +99,7 @@ title = "Flags"
 width = 1.5
 height = 1.0
 vertices = 200
-[pins]
+[attachment]
 at = "hoist-corners"
 [air]
 density = 1.2

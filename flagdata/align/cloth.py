@@ -23,6 +23,7 @@ from flagdata.provenance import canonical
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import CAMERA, PROVENANCE
 from flagdata.record.parent import open_parent
+from flagdata.retired_names import hashed_names
 from flagdata.schema import TRUTH_WINDOW, Kind
 from flagdata.timebase import NANOSECONDS, iso
 
@@ -37,7 +38,7 @@ class ClothFilm:
     Attributes:
         film: the file.
         fabric: its name; films of one fabric are never on two sides of a split.
-        density: area weight [kg/m²].
+        area_weight: area weight [kg/m²].
         bending_stiffness: flexural rigidity for each metre of width [N·m]; None if unknown.
         wind_level: a fan's setting, as the table has it; "" if none is stated.
         wind: mean speed and its standard uncertainty [m/s]; None if unknown.
@@ -45,7 +46,7 @@ class ClothFilm:
 
     film: Path
     fabric: str
-    density: float
+    area_weight: float
     bending_stiffness: float | None = None
     wind_level: str = ""
     wind: tuple[float, float] | None = None
@@ -53,7 +54,7 @@ class ClothFilm:
     @property
     def parameters(self) -> dict[str, float | str]:
         """What the catalog keeps, by the names that simulated recordings have."""
-        values: dict[str, float | str] = {"fabric": self.fabric, "density": self.density}
+        values: dict[str, float | str] = {"fabric": self.fabric, "area_weight": self.area_weight}
         if self.bending_stiffness is not None:
             values["bending_stiffness"] = self.bending_stiffness
         if self.wind_level:
@@ -83,8 +84,8 @@ def cloth_recording(
         )
     declaration = Finding.of(
         "cloth-declared",
-        f"the cloth is {cloth.fabric}, of {cloth.density:g} kg/m²: measured by itself, as the table says",
-        value=cloth.density,
+        f"the cloth is {cloth.fabric}, of {cloth.area_weight:g} kg/m²: measured by itself, as the table says",
+        value=cloth.area_weight,
     )
     if cloth.wind is None:
         return _without_wind(lake, camera, cloth, declaration, branch=branch, progress=progress)
@@ -105,7 +106,7 @@ def cloth_recording(
 
 
 def _recipe(cloth: ClothFilm) -> dict[str, Any]:
-    return {"cloth": cloth.parameters}
+    return {"cloth": hashed_names(cloth.parameters)}
 
 
 def _without_wind(

@@ -18,6 +18,7 @@ from flagdata.option_types import DURATION, POSITIVE, SHARE, STATED
 from flagdata.options import argument, called, option, options
 from flagdata.parts import attribute, call
 from flagdata.shared_options import (
+    BOTH_STATED,
     FILM,
     FLAG,
     HOW,
@@ -270,11 +271,11 @@ class Closing:
         was=("--size",),
     )
     area_weight: tuple[float, float] | str | Stated | None = option(
-        "Of a cloth that was weighed [kg/m²], as in '0.155±0.005'; by default that of the material.", default=None
+        "Of a cloth that was weighed [kg/m²], as in '0.155±0.005'; by default that of the material, to 30 %.",
+        default=None,
     )
     density_uncertainty: float | None = option(
-        "Relative standard uncertainty of the material's area weight, where no area_weight is given; by default 0.3.",
-        default=None,
+        "Relative standard uncertainty of the material's area weight.", default=None, now=BOTH_STATED
     )
     noise: float | None = option("Standard deviation of a coordinate [m]; by default it is estimated.", default=None)
     level: float | None = option("Significance level of the test of the base model; 0.05 by default.", default=None)

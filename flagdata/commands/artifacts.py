@@ -82,6 +82,7 @@ def show(chosen: Showing) -> Iterator[Result]:
     sentence comes first, of a network its card.
     """
     from flagdata.cells import said
+    from flagdata.documents import column_json
     from flagdata.ingest.before import unconfirmed
     from flagdata.lake.labels import PREFIX
     from flagdata.lake.lineage import labels_of
@@ -91,7 +92,7 @@ def show(chosen: Showing) -> Iterator[Result]:
     found = lake.artifact(chosen.artifact, at=at)
     row = _plain(found.row())
     for column in ("recipe", "parameters", "clock_model", "report"):
-        row[column] = json.loads(row[column]) if row[column] else None
+        row[column] = column_json(row[column], column, artifact=found.id) if row[column] else None
     shown = lake.table(lake.view(at))
     labels = labels_of(shown).get(found.id, {})
     others = shown.select(["artifact", "kind", "name", "parents"]).to_pylist()

@@ -58,4 +58,4 @@ def declare_cloths(chosen: DeclaringCloths) -> Iterator[Result]:
     yield Result("declare-cloths", {"recordings": recordings})
     for cloth, one in made:
         healed = "" if one.healed is None else f"; {one.healed.sentence}"
-        echo(f"{one.recording.id}  {cloth.fabric}, {cloth.density:g} kg/m², {len(one.clips)} clips{healed}")
+        echo(f"{one.recording.id}  {cloth.fabric}, {cloth.area_weight:g} kg/m², {len(one.clips)} clips{healed}")

@@ -34,7 +34,7 @@ class Example:
         flag_size: length and height of the flag [m].
         clock_offset: what must be added to the film's clock to reach the log's [s].
         truth: what was simulated, by name, SI: "wind_speed" is the mean of the wind at the flag over the film [m/s],
-            "density" the cloth's area weight [kg/m²].
+            "area_weight" the cloth's area weight [kg/m²].
     """
 
     name: str
@@ -57,7 +57,7 @@ class Example:
             "log": self.log.name,
             "flag": f"{length:g} m × {height:g} m",
             "true wind": f"{self.truth['wind_speed']:.2f} m/s, the mean over the film",
-            "true area weight": f"{self.truth['density']:.3f} kg/m²",
+            "true area weight": f"{self.truth['area_weight']:.3f} kg/m²",
         }
 
     def __repr__(self) -> str:

@@ -77,8 +77,8 @@ def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
         except FlagdataError as error:
             fix = "give the path of a film from the table's folder on"
             raise type(error)(f"{error.what}: {row['film']}", where=where, fix=fix) from None
-    density = _number(row, "area_weight", where, unit="kg/m²")
-    if density is None or not _WEIGHTS[0] <= density <= _WEIGHTS[1]:
+    area_weight = _number(row, "area_weight", where, unit="kg/m²")
+    if area_weight is None or not _WEIGHTS[0] <= area_weight <= _WEIGHTS[1]:
         raise InputError(
             f"the area weight is {row['area_weight']} kg/m²",
             where=where,
@@ -94,7 +94,7 @@ def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
     return ClothFilm(
         film=film,
         fabric=row["fabric"],
-        density=density,
+        area_weight=area_weight,
         wind_level=row.get("wind_level", ""),
         bending_stiffness=_number(row, "bending_stiffness", where, unit="N·m"),
         wind=None if speed is None or sigma is None else (speed, sigma),
@@ -121,7 +121,7 @@ def _check_alike(films: list[ClothFilm], where: str) -> None:
     for film in films[:-1]:
         if film.film == newest.film:
             raise InputError(f"{newest.film.name} is named twice", where=where, fix="keep one of the rows")
-        same = (film.density, film.bending_stiffness) == (newest.density, newest.bending_stiffness)
+        same = (film.area_weight, film.bending_stiffness) == (newest.area_weight, newest.bending_stiffness)
         if film.fabric == newest.fabric and not same:
             raise InputError(
                 f"{newest.fabric} has another area weight or stiffness than before",

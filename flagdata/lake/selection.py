@@ -23,6 +23,7 @@ from flagdata.lake.labels import PREFIX, columns
 from flagdata.lake.matching import Where, condition, matching
 from flagdata.lake.refs import View
 from flagdata.lake.rowfiles import Scan
+from flagdata.retired_names import present_query
 from flagdata.schema import CATALOG, Field, catalog_schema
 from flagdata.sql_process import MEMORY, sql_process
 
@@ -127,8 +128,8 @@ class Selection:
             Question(
                 rows=stored,
                 labels=tuple(labels),
-                sql=request.sql,
-                where=request.where if isinstance(request.where, str) else None,
+                sql=present_query(request.sql),
+                where=present_query(request.where) if isinstance(request.where, str) else None,
                 order=request.order or DEFAULT_ORDER,
                 columns=request.columns or tuple(CATALOG),
                 limit=request.limit,

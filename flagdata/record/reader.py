@@ -25,6 +25,7 @@ from flagdata.record.key_frames import is_key
 from flagdata.record.metadata import sensor_of
 from flagdata.record.source import Bytes, open_bytes
 from flagdata.record.writer import ATTACHMENT_LIMIT, GZIP_SUFFIX, Coding, encode_jpeg
+from flagdata.retired_names import present_names
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindAverage, WindSeries
 from flagdata.storage import Place
@@ -250,7 +251,7 @@ class Record:
         if not len(table):
             return None
         message = self._decode(TOPIC_TRUTH, messages.TruthParameters, table)[0]
-        return {p.name: p.value for p in message.parameters}
+        return present_names({p.name: p.value for p in message.parameters})
 
     @property
     def attachments(self) -> tuple[str, ...]:

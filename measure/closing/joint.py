@@ -148,10 +148,7 @@ def _cloth(markers: Verdict, films: Verdict, nominal: Mapping[str, float]) -> tu
     combined = []
     for moment in ("before", *(["after"] if same_effect else [])):
         for parameter in films.parameters:
-            name_of_markers = {"area_weight": "density"}.get(parameter.name, parameter.name)
-            of_markers = next(
-                (candidate for candidate in markers.parameters if candidate.name == name_of_markers), None
-            )
+            of_markers = next((candidate for candidate in markers.parameters if candidate.name == parameter.name), None)
             by_markers = None if of_markers is None else getattr(of_markers, moment)
             factor = nominal.get(parameter.name, 1.0)
             of_films: Estimate | None = getattr(parameter, moment)

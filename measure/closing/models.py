@@ -96,7 +96,7 @@ def _model(
     fit = fitted(verdict, effects)
     material = _material(specimen.material)
     material |= {
-        "density": specimen.material.density * fit["density"],
+        "area-weight": specimen.material.area_weight * fit["area_weight"],
         "bending-factor": fit["bending"],
         "damping": fit["damping"],
     }
@@ -170,7 +170,7 @@ def _material(nominal: Material) -> dict[str, Any]:
     table = {
         "title": nominal.name,
         "source": nominal.source,
-        "density": nominal.density,
+        "area-weight": nominal.area_weight,
         "stretching": nominal.stretching.tolist(),
         "bending": nominal.bending.tolist(),
         "damping": nominal.damping,

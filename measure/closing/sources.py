@@ -43,7 +43,7 @@ class SourceOptions:
         up: axis of the recordings that points up; all other options use z up.
         axis: along which the air goes; None for what a log's directions and `north` say.
         north: where north lies, from +x towards +y [rad].
-        offset: from a log's first sample to the first frame [s]; None if not given.
+        offset: added to the recordings' clock to reach the log's [s]; None if not given.
         sensor, zone: how a log's file is read, where it does not say so itself: see `WindOptions`.
         confirm: asks whether a drafted reading of a log is right.
     """
@@ -135,7 +135,7 @@ def drafted(
     def blowing(wind: WindSource) -> dict[str, Any]:
         if wind.velocity is not None:
             return {"velocity": list(wind.velocity)}
-        log = {"log": placed(wind.log), "axis": reading.axis, "north": reading.north, "offset": reading.offset}
+        log = {"log": placed(wind.log), "axis": reading.axis, "north": reading.north, "clock_offset": reading.offset}
         sensor = None if reading.sensor is None else placed(reading.sensor)
         return log | {"sensor": sensor, "zone": reading.zone, "accept": reading.confirm.accept}
 

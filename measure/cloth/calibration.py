@@ -191,7 +191,7 @@ class Calibration:
         weight = self.weight
         if weight.value is None or weight.sigma is None:
             return None
-        return f"{weight.value:.4g}±{weight.sigma:.2g}"
+        return f"{weight.value:g}±{weight.sigma:g}"
 
     @property
     def weighs(self) -> bool:
@@ -239,7 +239,7 @@ class Calibration:
             "withheld": self.withheld,
             "close_loop": None
             if weight.value is None or weight.sigma is None
-            else {"density": weight.value, "density-uncertainty": weight.sigma / weight.value},
+            else {"area-weight": f"{weight.value:g}±{weight.sigma:g}"},
             "check": self.check.as_dict(),
             "options": self.options.recipe(),
             "level": self.options.level,

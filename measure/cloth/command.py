@@ -117,7 +117,7 @@ def _content(verdict: Verdict, outcome: SolvedLoop, title: str, effects: Sequenc
         "time": {"settle": SETTLE, "frames": _FRAMES, "rate": _RATE},
         "material": {
             "name": fabric,
-            "density": cloth["area_weight"],
+            "area-weight": cloth["area_weight"],
             "bending-factor": cloth["bending"] / mean_bending(named(fabric)),
             "damping": max(cloth["damping"] - _STEP, 0.0),
         },

@@ -58,7 +58,7 @@ class OfFilms(OfFlag):
     )
     area_weight: Stated | None = option(
         "Of a cloth that was weighed [kg/m²], as in 0.155±0.005; by default that of any flag, of markers that of the "
-        "material.",
+        "material, to 30 %.",
         default=None,
         section=FLAG,
         type=STATED,

@@ -327,7 +327,7 @@ def cloth(area_weight: float, bending: float, damping: float, *, stretching: flo
     base = named(fabric)
     return replace(
         base,
-        density=area_weight,
+        area_weight=area_weight,
         damping=damping,
         stretching=base.stretching * stretching,
         bending=base.bending * (bending / mean_bending(base)),

@@ -14,7 +14,7 @@ from flagdata.console import LocalPath, document, echo, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.option_types import POSITIVE, STATED
 from flagdata.options import AsJson, argument, command, option, options, typed
-from flagdata.shared_options import TEST, WRITTEN, NamedLake, OnBranch
+from flagdata.shared_options import BOTH_STATED, TEST, WRITTEN, NamedLake, OnBranch
 from measure.closing.command_line import nulls_given, refuse, stage_bars
 from measure.closing.findings import with_warnings
 from measure.cloth.command_line import JudgingFilms, refuse_of_others
@@ -54,10 +54,10 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         metavar="FILE.toml",
     )
     density_uncertainty: float | None = option(
-        "Relative standard uncertainty of the material's area weight, where no --area-weight is given: 0.02 for 2 %; "
-        "by default 0.3.",
+        "Relative standard uncertainty of the material's area weight.",
         default=None,
         section=MARKERS,
+        now=BOTH_STATED,
         type=click.FloatRange(0, 1, min_open=True),
     )
     rate: float | None = option(
@@ -274,7 +274,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         by_markers.verdict,
         by_films.verdict,
         level=level_of_both,
-        nominal={"area_weight": nominal.density, "bending": mean_bending(nominal)},
+        nominal={"area_weight": nominal.area_weight, "bending": mean_bending(nominal)},
     )
     deliver_joint(joint, (by_markers, by_films), delivery)
 
@@ -342,15 +342,12 @@ def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None
     setup = _setup(Setup(), chosen)
     size = () if setup.outline is None else setup.outline.max(axis=0).tolist()
     pins = {} if setup.pins is None else {"points" if isinstance(setup.pins, tuple) else "at": setup.pins}
-    weight: dict[str, float | None] = {"density_uncertainty": chosen.density_uncertainty}
-    if chosen.area_weight is not None and setup.material is not None:
-        weight = {"density": setup.material.density, "density_uncertainty": setup.density_uncertainty}
     content = {
         "title": chosen.name or chosen.draft.stem,
         "test": {"level": chosen.level, "nulls": chosen.nulls},
         "cloth": dict(zip(("width", "height"), size, strict=False)),
-        "material": {"name": chosen.material, **weight},
-        "pins": pins,
+        "material": {"name": chosen.material, "area_weight": _weight(setup, chosen)},
+        "attachment": pins,
         **drafted(sources, chosen.winds, _reading(chosen, None), lake, folder=chosen.draft.resolve().parent),
     }
     write_file(chosen.draft, to_toml(filled(content)))
@@ -358,6 +355,16 @@ def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None
         document("close-loop-draft", {"recipe": str(chosen.draft)})
     else:
         echo(chosen.draft)
+
+
+def _weight(setup: Setup, chosen: CloseLoopCommand) -> str | None:
+    """Returns the cloth's weight as a recipe states it."""
+    if chosen.area_weight is not None:
+        return chosen.area_weight.text
+    if chosen.density_uncertainty is None or setup.material is None:
+        return None
+    value = setup.material.area_weight
+    return f"{value:g}±{value * chosen.density_uncertainty:g}"
 
 
 def _name(recording: str, sources: tuple[str, ...], recipe: ExperimentRecipe | None) -> str:

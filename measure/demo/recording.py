@@ -272,7 +272,7 @@ def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
     attachment = Handles(vertices=handles.corners(flat.rest))
     area_weight, bending, damping = _cloth(recipe)
     base = named(MATERIAL)
-    material = replace(base.scaled(bending=bending), density=area_weight, damping=max(damping - recipe.step, 0.0))
+    material = replace(base.scaled(bending=bending), area_weight=area_weight, damping=max(damping - recipe.step, 0.0))
     start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
     start = roughened(start, attachment, stream(recipe.seed, "demo", "start"), _ROUGH)
     speed = recipe.wind

@@ -40,7 +40,7 @@ vertices = {vertices}
 [material]
 name = "{material}"
 
-[pins]
+[attachment]
 at = "hoist-corners"
 {recordings}"""
 _RECORDING = """
@@ -65,7 +65,7 @@ class TrackedRecipe:
         rate: of the cameras [Hz].
         noise: standard deviation of a marker's coordinate [m].
         width, height: of the flag [m].
-        density, bending: of the cloth, as factors on the catalog's; hidden from the fit.
+        area_weight, bending: of the cloth, as factors on the catalog's; hidden from the fit.
         damping: of the cloth [s].
         vertices: of the mesh that the fit must use.
     """
@@ -81,7 +81,7 @@ class TrackedRecipe:
     noise: float = 5e-4
     width: float = 0.9
     height: float = 0.6
-    density: float = 1.1
+    area_weight: float = 1.1
     bending: float = 0.8
     damping: float = 8e-4
     vertices: int = 90
@@ -163,7 +163,7 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
 def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object]) -> FloatArray:
     """Simulates positions (frame, vertex, 3, recording) [m]."""
     nominal = named(MATERIAL)
-    material = replace(nominal.scaled(density=recipe.density, bending=recipe.bending), damping=recipe.damping)
+    material = replace(nominal.scaled(area_weight=recipe.area_weight, bending=recipe.bending), damping=recipe.damping)
     attachment = Handles(vertices=handles.corners(flat.rest))
     scenes = []
     for index, speed in enumerate(recipe.speeds):

@@ -19,16 +19,16 @@ LEAST_INFORMATION = 0.05
 did not constrain it: a posterior of the same mean then has 78 % of the prior's standard deviation or more."""
 SHORT = {
     "wind_speed": "wind",
-    "density": "area weight",
+    "area_weight": "area weight",
     "bending_scale": "bending",
     "anisotropy": "anisotropy",
     ASPECT: "logarithm of length over height",
 }
 """Names in the one-line answer."""
-HEADLINE = ("wind_speed", "density")
+HEADLINE = ("wind_speed", "area_weight")
 """What the one-line answer is about."""
 _UNITS = {target.name: target.unit for target in TARGETS.values()}
-_DIGITS = {"wind_speed": 1, "density": 2, "bending_scale": 2, "anisotropy": 2, ASPECT: 2}
+_DIGITS = {"wind_speed": 1, "area_weight": 2, "bending_scale": 2, "anisotropy": 2, ASPECT: 2}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +102,7 @@ class Quantity:
 
     @property
     def _digits(self) -> int:
-        light = self.name == "density" and self.assumed[1] < 0.1  # of a small flag
+        light = self.name == "area_weight" and self.assumed[1] < 0.1  # of a small flag
         return _DIGITS[self.name] + light
 
     @property

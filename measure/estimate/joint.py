@@ -28,7 +28,7 @@ from models.restriction import Known, Restricted
 
 DRAWS = 400
 """How many draws there are of each window's posterior, for each size of flag."""
-WIND, WEIGHT = "wind_speed", "density"
+WIND, WEIGHT = "wind_speed", "area_weight"
 _LIGHT_AND_HEAVY = (0.1, 0.9)
 """Quantiles of the answer's area weights at which the wind is given where the weight is open."""
 _MATTERS = 0.25

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from flagdata.documents import from_stored_json
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake import Lake
+from flagdata.retired_names import hashed_name
 from flagdata.schema import Kind
 from flagdata.stated import Stated
 from sim.material import MATERIALS, named
@@ -28,7 +29,7 @@ def weight_of(name: str, *, lake: Lake | None, at: str | None) -> tuple[Stated, 
     """
     if name in MATERIALS.names():
         material = named(name)
-        return Stated.of(material.density), material.source
+        return Stated.of(material.area_weight), material.source
     fabrics = {} if lake is None else _declared(lake, at)
     weights = fabrics.get(name, set())
     if not weights:
@@ -49,5 +50,5 @@ def _declared(lake: Lake, at: str | None) -> Mapping[str, set[float]]:
     for row in rows:
         cloth = from_stored_json(row["recipe"]).get("cloth") if row["recipe"] else None
         if cloth is not None and row["session"] is not None:
-            weights.setdefault(row["session"], set()).add(float(cloth["density"]))
+            weights.setdefault(row["session"], set()).add(float(cloth[hashed_name("area_weight")]))
     return weights

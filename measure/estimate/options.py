@@ -65,7 +65,7 @@ class Options:
     def stated(self, model: Estimator) -> Mapping[str, Stated]:
         """Returns what is stated about quantities, by name: the area weight, and for a model that estimates a flag's
         aspect that of the stated size, where the model knows it."""
-        stated_values = {} if self.area_weight is None else {"density": self.area_weight}
+        stated_values = {} if self.area_weight is None else {"area_weight": self.area_weight}
         if self.size is not None and (aspect := usable_aspect(model.targets, self.size.length, self.size.height)):
             stated_values[ASPECT] = aspect
         return stated_values

@@ -102,7 +102,7 @@ def page(
 
 
 def _row(quantity: Quantity, truths: Mapping[str, float]) -> dict[str, str | bool]:
-    digits = 3 if quantity.name == "density" else 2
+    digits = 3 if quantity.name == "area_weight" else 2
     truth = truths.get(quantity.name)
     bound_level = "" if quantity.span.bound is None else f" ({quantity.span.level * 100:.3g} %)"
     return {
@@ -120,7 +120,7 @@ def _row(quantity: Quantity, truths: Mapping[str, float]) -> dict[str, str | boo
 def _neighbour(neighbour: Neighbour, rate: float) -> dict[str, str]:
     figures = [
         f"{SHORT[name]} {neighbour.known[name]:.{digits}f} {unit}"
-        for name, digits, unit in (("wind_speed", 1, "m/s"), ("density", 3, "kg/m²"))
+        for name, digits, unit in (("wind_speed", 1, "m/s"), ("area_weight", 3, "kg/m²"))
         if name in neighbour.known
     ]
     return {

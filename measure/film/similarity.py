@@ -73,7 +73,7 @@ _SHORTEST, _LONGEST = 0.1, 20.0  # m
 _ASPECT_SLACK = 0.05  # relative; printed sizes are rounded
 _SIZE = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*[x×]\s*(\d+(?:\.\d*)?|\.\d+)\s*(?:m)?\s*")
 
-POWERS: dict[str, float] = {"wind_speed": 0.5, "density": 1.0}
+POWERS: dict[str, float] = {"wind_speed": 0.5, "area_weight": 1.0}
 """Powers of s by which quantities grow."""
 LOGARITHMS: dict[str, float] = {"bending_scale": 4.0, "anisotropy": 0.0, "log_aspect": 0.0}
 """The same of quantities known by their logarithm, base 10 (an aspect, which does not scale, by the natural one)."""

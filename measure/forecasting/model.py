@@ -65,9 +65,9 @@ class Model:
     def halved(self) -> Model:
         """Returns the model halfway from here to the nominal base model."""
         nominal = Calibration()
-        density, bending, damping = (step / 2 for step in self.calibration.steps_from(nominal))
+        area_weight, bending, damping = (step / 2 for step in self.calibration.steps_from(nominal))
         return Model(
-            calibration=nominal.moved((density, bending, damping)),
+            calibration=nominal.moved((area_weight, bending, damping)),
             effects=tuple((column, coefficient / 2) for column, coefficient in self.effects),
         )
 

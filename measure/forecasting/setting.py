@@ -100,7 +100,7 @@ class Setting:
     def prior(self) -> FloatArray:
         """(theta,) standard deviations of the calibrated parameters."""
         specimen = self.experiment.specimen
-        return prior(specimen.density_uncertainty) if specimen.mass_known else PRIOR_WITHOUT_MASS
+        return prior(specimen.area_weight_uncertainty) if specimen.mass_known else PRIOR_WITHOUT_MASS
 
     @property
     def recording(self) -> IntArray:

@@ -67,40 +67,40 @@ from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, 
 
 
 def parameters(
-    base: Refined, larger: Refined | None, reach: FloatArray, *, density_uncertainty: float
+    base: Refined, larger: Refined | None, reach: FloatArray, *, area_weight_uncertainty: float
 ) -> tuple[Parameter, ...]:
-    """Estimates density, bending and damping, by their logarithms, of the base and of a larger model.
+    """Estimates area weight, bending and damping, by their logarithms, of the base and of a larger model.
 
     Args:
         reach: (theta,) standard errors to either side within which this code's nulls lie.
-        density_uncertainty: relative standard uncertainty of the density before anything was fitted.
+        area_weight_uncertainty: relative standard uncertainty of the area weight before anything was fitted.
     """
     estimated: list[Parameter] = []
     for index, (name, _, _) in enumerate(THETA):
         half = float(reach[index]) * base.errors[index]
-        before = _estimate(name, base.model.calibration, half, density_uncertainty)
+        before = _estimate(name, base.model.calibration, half, area_weight_uncertainty)
         within = half / CRITERIA.reach
         if larger is None:
             estimated.append(Parameter(name=name, before=before, after=None, shift=None, within=within))
             continue
         steps = larger.model.calibration.steps_from(base.model.calibration)
         after = _estimate(
-            name, larger.model.calibration, float(reach[index]) * larger.errors[index], density_uncertainty
+            name, larger.model.calibration, float(reach[index]) * larger.errors[index], area_weight_uncertainty
         )
         shift = steps[index] / base.errors[index]
         estimated.append(Parameter(name=name, before=before, after=after, shift=shift, within=within))
     return tuple(estimated)
 
 
-def _estimate(name: str, calibration: Calibration, half: float, density_uncertainty: float) -> Estimate:
+def _estimate(name: str, calibration: Calibration, half: float, area_weight_uncertainty: float) -> Estimate:
     """Estimates a parameter with its interval, of half the width `half` in its logarithm by this code alone.
 
-    What codes differ by does not make that of the density wider than what was known before.
+    What codes differ by does not make that of the area weight wider than what was known before.
     """
     if name == "damping":
         return _damping(calibration.damping, half)
     value, between, prior_uncertainty = {
-        "density": (calibration.density, CRITERIA.density_between, density_uncertainty),
+        "area_weight": (calibration.area_weight, CRITERIA.area_weight_between, area_weight_uncertainty),
         "bending": (calibration.bending, CRITERIA.bending_between, math.inf),
     }[name]
     half_width = min(math.hypot(half, CRITERIA.reach * between), max(half, CRITERIA.reach * prior_uncertainty))
@@ -444,7 +444,7 @@ def _outcome(
         words="",
         test=_test(solved, bank, options),
         parameters=(
-            *parameters(solved.base, larger, solved.reference.reach, density_uncertainty=float(setting.prior[0])),
+            *parameters(solved.base, larger, solved.reference.reach, area_weight_uncertainty=float(setting.prior[0])),
             *_direction(judgement),
         ),
         ranking=_ranking(solved, larger),

@@ -67,7 +67,7 @@ _SEGMENTS = (
 """Arrays with a row for each segment."""
 _SINGLE = ("duration", "anchors_told", "carried")
 """Arrays of one value for the batch."""
-_DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.2, 5.0), (0.25e-3, 40e-3)
+_AREA_WEIGHT, _BENDING, _DAMPING = (0.8, 1.25), (0.2, 5.0), (0.25e-3, 40e-3)
 Progress = Callable[[int], object]
 
 
@@ -97,7 +97,7 @@ def prior_batch(
     `stiffness.drawn` has it.
     """
     rng = stream(seed, "null", "prior")
-    cloth = Calibration(density=_log(rng, _DENSITY), bending=_log(rng, _BENDING), damping=_log(rng, _DAMPING))
+    cloth = Calibration(area_weight=_log(rng, _AREA_WEIGHT), bending=_log(rng, _BENDING), damping=_log(rng, _DAMPING))
     shares = (np.arange(WINDS) + rng.random(WINDS)) / WINDS
     return NullBatch(
         specimen=specimen,

@@ -45,7 +45,7 @@ def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> FloatArra
 def mistaken(batch: NullBatch) -> NullBatch:
     """Moves the batch's calibrations by as much as those of data are off: one draw for its cloth."""
     rng = stream(batch.seed, "null", "mistaken")
-    spread = (CRITERIA.density_between, CRITERIA.bending_between, CRITERIA.damping_factor)
+    spread = (CRITERIA.area_weight_between, CRITERIA.bending_between, CRITERIA.damping_factor)
     steps = tuple(float(step) for step in spread * rng.standard_normal(3))
     moved: dict[Calibration, Calibration] = {
         calibration: calibration.moved(steps) for calibration in batch.calibrations

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from measure.observe.recipe import load, parse, read
     from measure.observe.setup import Hold, Setup, sheet
     from measure.observe.trajectory import (
-        DENSITY_UNCERTAINTY,
+        AREA_WEIGHT_UNCERTAINTY,
         AttachmentTrack,
         Experiment,
         Specimen,

@@ -15,6 +15,7 @@ from flagdata.errors import InputError
 from flagdata.findings import Finding
 from flagdata.ingest.meshes.store import scene_wind
 from flagdata.lake import Artifact
+from flagdata.retired_names import present_names
 from measure.observe.observation import Known
 from measure.observe.trajectory import WindTrack
 from sim import handles
@@ -67,13 +68,13 @@ def of_simulation(artifact: Artifact, rest: FloatArray) -> Known:
     if "simulate" not in recipe or artifact.parameters is None:
         return Known()
     where = f"artifact {artifact.id}"
-    drawn: Mapping[str, Any] = json.loads(artifact.parameters)
+    drawn: Mapping[str, Any] = present_names(json.loads(artifact.parameters))
     try:
         scene = recipe["scene"]
         material = Material(
             name=str(drawn["material"]),
             source=where,
-            density=float(drawn["density"]),
+            area_weight=float(drawn["area_weight"]),
             damping=float(drawn["damping"]),
             stretching=np.reshape(drawn["stretching"], STRETCHING_SHAPE),
             bending=np.reshape(drawn["bending"], BENDING_SHAPE),
@@ -116,7 +117,7 @@ def _arcsim_material(entry: Mapping[str, Any], where: str) -> Material | None:
         return None
     thicken = _number(entry, "thicken", 1.0, where)
     return named(name).scaled(
-        density=thicken * _number(entry, "density_mult", 1.0, where),
+        area_weight=thicken * _number(entry, "density_mult", 1.0, where),
         stretching=thicken * _number(entry, "stretching_mult", 1.0, where),
         bending=thicken * _number(entry, "bending_mult", 1.0, where),
     )

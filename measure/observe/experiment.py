@@ -226,7 +226,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
         mesh=mesh,
         material=_material(descriptions, setup),
         mass_known=setup.mass_known,
-        density_uncertainty=setup.density_uncertainty,
+        area_weight_uncertainty=setup.area_weight_uncertainty,
         held=vertices,
         anchors=anchors_of(recordings, seats),
         anchors_given=False,
@@ -384,6 +384,11 @@ def _trajectory(observation: Observation, low: FloatArray) -> Trajectory:
 
 
 def _material(descriptions: Sequence[Known], setup: Setup) -> Material:
+    material = _nominal(descriptions, setup)
+    return material if setup.area_weight is None else replace(material, area_weight=setup.area_weight)
+
+
+def _nominal(descriptions: Sequence[Known], setup: Setup) -> Material:
     if setup.material is not None:
         return setup.material
     materials = [k.material for k in descriptions if k.material is not None]
@@ -395,7 +400,7 @@ def _material(descriptions: Sequence[Known], setup: Setup) -> Material:
         )
     first = materials[0]
     for material in materials[1:]:
-        same = (first.density, first.damping) == (material.density, material.damping)
+        same = (first.area_weight, first.damping) == (material.area_weight, material.damping)
         tables = ((first.stretching, material.stretching), (first.bending, material.bending))
         if not same or not all(np.array_equal(a, b) for a, b in tables):
             raise InputError(

@@ -3,16 +3,18 @@
     title, up           "z", "-y", …: the axis of the recordings that points up; all other entries use z up
     [test]              level of the global test, nulls: how many null recordings
     [cloth]             width, height, or mesh (an OBJ with texture coordinates in metres); vertices of the model mesh
-    [material]          name (of catalogs/materials) or file (TOML, or ArcSim JSON); thicken, density, damping,
+    [material]          name (of catalogs/materials) or file (TOML, or ArcSim JSON); mass-unknown, or
+                        area-weight: a number, or '0.155±0.003' of a cloth that was weighed; thicken, damping,
                         stretching-factor, bending-factor
-    [pins]              at = "hoist-corners" | "top-corners" | "hoist", or points = [[u, v], …]; stiffness, or
+    [attachment]        at = "hoist-corners" | "top-corners" | "hoist", or points = [[u, v], …]; stiffness, or
                         rigid = true
     [air]               gravity, density, drag (of the quadratic normal force)
     [[recording]]       source: an artifact's id, a folder of meshes, or a marker table; take (a recording of a table
                         that holds several), name, rate, unit, rest-unit, noise
     [recording.wind]    velocity = [x, y, z], where the air goes to; or speed and toward (from +x towards +y); or log
                         (an artifact's id or an anemometer's file) with axis or north (where it lies, from +x towards
-                        +y), and offset or start (ISO 8601);
+                        +y), and clock-offset [s], added to the recording's clock to reach the log's, both counted
+                        from their first samples, or start (ISO 8601);
                         sensor (a recipe of catalogs/sensors or a file) and zone, where the log does not state them;
                         accept (the hash that confirms a drafted reading, as a refusal shows it)
 
@@ -26,12 +28,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, cast
+from typing import Annotated, Any, ClassVar, TypeAlias, cast
 
 from msgspec import Meta
 
 from flagdata import tables, timebase
 from flagdata.addresses import local_path
+from flagdata.console import say
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer import WindOptions
@@ -40,14 +43,17 @@ from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
 from flagdata.recipes import parsed, read_recipe
+from flagdata.retired_names import OF_LOGS, TABLES, with_present_keys
 from flagdata.schema import Kind
+from flagdata.shared_options import BOTH_STATED
+from flagdata.stated import Stated
 from flagdata.tables import WHOLE_LIMIT, Angle, Count, NotNegative, Positive
 from measure.observe import markers, meshes, wind
 from measure.observe.cloth import VERTICES, Points, outline
 from measure.observe.experiment import Observed, observe
 from measure.observe.observation import Observation, Up
 from measure.observe.setup import Hold, Setup, sheet
-from measure.observe.trajectory import DENSITY_UNCERTAINTY, WindTrack
+from measure.observe.trajectory import AREA_WEIGHT_UNCERTAINTY, WindTrack
 from measure.observe.wind import LogPlacement
 from sim.air import QuadraticNormal
 from sim.material import Material, named
@@ -170,12 +176,13 @@ def parse(path: Path) -> ExperimentRecipe:
 class _ExperimentTables:
     """The tables of an experiment; those that depend on others are read after them."""
 
+    WAS: ClassVar = TABLES
     title: str = ""
     up: Up = Up.Z
     test: _Test
     cloth: _Cloth
     material: Mapping[str, Any]
-    pins: _Pins
+    attachment: _Pins
     air: Mapping[str, Any]
     recording: tuple[Mapping[str, Any], ...] = ()
 
@@ -225,10 +232,11 @@ class _Speed(_Wind):
 
 @dataclass(frozen=True, kw_only=True)
 class _Log(_Wind):
+    WAS: ClassVar = OF_LOGS
     log: str
     axis: Triple | None = None
     north: Angle | None = None
-    offset: float | None = None
+    clock_offset: float | None = None
     start: str | None = None
     sensor: str | None = None
     zone: str | None = None
@@ -236,12 +244,19 @@ class _Log(_Wind):
 
 
 _AIR = {"gravity": NotNegative, "density": NotNegative, "drag": NotNegative}
-_MATERIAL = {"name": str, "file": str, "mass-unknown": bool, "density-uncertainty": Positive}
+_UNCERTAINTY = "density-uncertainty"
+"""Key of the last version; `area-weight` states both."""
+_MATERIAL = {
+    "name": str,
+    "file": str,
+    "mass-unknown": bool,
+    "area-weight": float | str,
+    _UNCERTAINTY: Positive,
+}
 _CHANGES = {
     "thicken": Positive,
     "stretching-factor": Positive,
     "bending-factor": NotNegative,
-    "density": Positive,
     "damping": NotNegative,
 }
 """Keys of [material] that need a name or a file."""
@@ -262,29 +277,54 @@ def read(recipe: ExperimentRecipe, lake: Lake | None = None) -> Observed:
 
 
 def _setup(form: _ExperimentTables, folder: Path, *, where: str) -> Setup:
-    cloth, pins, inside = form.cloth, form.pins, f"{where} [material]"
+    cloth, pins, inside = form.cloth, form.attachment, f"{where} [material]"
     from_catalog = "name" in form.material or "file" in form.material
-    material = tables.entries(_MATERIAL | (_CHANGES if from_catalog else {}), form.material, where=inside)
+    table = with_present_keys(form.material, where=inside)
+    material = tables.entries(_MATERIAL | (_CHANGES if from_catalog else {}), table, where=inside)
     air = tables.entries(_AIR, form.air, where=f"{where} [air]")
     gravity = air.pop("gravity", None)
-    if material.get("mass-unknown") and "density-uncertainty" in material:
-        raise UsageError(
-            "both mass-unknown and a density-uncertainty are given",
-            where=inside,
-            fix="keep mass-unknown for a cloth that nobody weighed, density-uncertainty for one whose density is known",
-        )
-    return Setup(
+    weight = _weight(material, where=inside)
+    setup = Setup(
         material=_material(material, folder, where=inside),
         mass_known=not material.get("mass-unknown", False),
-        density_uncertainty=material.get("density-uncertainty", DENSITY_UNCERTAINTY),
+        area_weight=weight.low if weight is not None and weight.exact else None,
+        area_weight_uncertainty=material.get(_UNCERTAINTY, AREA_WEIGHT_UNCERTAINTY),
         outline=_outline(cloth, folder, where=f"{where} [cloth]"),
         pins=pins.at or pins.points or None,
         carried=pins.carried,
-        stiffness=_stiffness(pins, where=f"{where} [pins]"),
+        stiffness=_stiffness(pins, where=f"{where} [attachment]"),
         gravity=gravity,
         air=QuadraticNormal(**air) if air else None,
         vertices=cloth.vertices,
     )
+    return setup if weight is None or weight.exact else setup.weighed(weight)
+
+
+def _weight(material: Mapping[str, Any], *, where: str) -> Stated | None:
+    """Reads what [material] states of the area weight; None where that is its own.
+
+    Raises:
+        UsageError: no weight, one that is not above 0, or an uncertainty of one that is unknown or stated twice.
+    """
+    weight = Stated.of(material["area-weight"]) if "area-weight" in material else None
+    if weight is not None and not weight.low > 0:
+        raise UsageError(
+            f"the area weight {weight.text} kg/m² is not above 0", where=where, fix="give kg/m², as in '0.155±0.003'"
+        )
+    uncertain = weight is not None and not weight.exact
+    if _UNCERTAINTY in material:
+        say(f"{_UNCERTAINTY} is of the last version: give {BOTH_STATED}", mark="warning")
+        if uncertain:
+            raise UsageError(
+                "the uncertainty of the weight is given twice", where=where, fix=f"leave {_UNCERTAINTY} out"
+            )
+    if material.get("mass-unknown") and (uncertain or _UNCERTAINTY in material):
+        raise UsageError(
+            "both mass-unknown and an uncertainty of the area weight are given",
+            where=where,
+            fix="keep mass-unknown for a cloth that nobody weighed, the uncertainty for one whose weight is known",
+        )
+    return weight
 
 
 def _outline(cloth: _Cloth, folder: Path, *, where: str) -> Points | None:
@@ -320,11 +360,11 @@ def _material(form: Mapping[str, Any], folder: Path, *, where: str) -> Material 
     base = named(name, where=where) if name is not None else material_file(folder / local_path(file or ""))
     thicken = form.get("thicken", 1.0)
     material = base.scaled(
-        density=thicken,
+        area_weight=thicken,
         stretching=thicken * form.get("stretching-factor", 1.0),
         bending=thicken * form.get("bending-factor", 1.0),
     )
-    return replace(material, **{key: form[key] for key in ("density", "damping") if key in form})
+    return replace(material, **{key: form[key] for key in ("damping",) if key in form})
 
 
 def _recording(content: Mapping[str, Any], folder: Path, *, where: str) -> RecordingSource:
@@ -346,7 +386,7 @@ def _wind(content: Any, folder: Path, *, where: str) -> WindSource:
         placement = LogPlacement(
             axis=form.axis,
             north=form.north,
-            offset=form.offset,
+            offset=form.clock_offset,
             start=timebase.parse(start, where=f"{where} start") if start is not None else None,
         )
         sensor = form.sensor

@@ -12,7 +12,7 @@ from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from flagdata.stated import Stated
 from measure.observe.cloth import VERTICES
-from measure.observe.trajectory import DENSITY_UNCERTAINTY
+from measure.observe.trajectory import AREA_WEIGHT_UNCERTAINTY
 from sim.air import AirForce
 from sim.material import Material
 
@@ -39,9 +39,10 @@ class Setup:
 
     Attributes:
         material: nominal.
-        mass_known: whether the cloth was weighed, or its material is known; else its density is a guess, and all that
-            is found is a ratio to it.
-        density_uncertainty: relative standard uncertainty of the cloth's density where the mass is known.
+        mass_known: whether the cloth was weighed, or its material is known; else its area weight is a guess, and all
+            that is found is a ratio to it.
+        area_weight: in place of the material's [kg/m²]; None for that.
+        area_weight_uncertainty: relative standard uncertainty of the cloth's area weight where the mass is known.
         outline: (corner, 2) of the flat cloth, in the coordinates of the markers [m].
         pins: where the cloth is held: a name, or rest coordinates ((u, v), …) [m].
         carried: whether the attachments move: the cloth is held by hands or by a robot. They then go where the markers
@@ -57,7 +58,8 @@ class Setup:
 
     material: Material | None = None
     mass_known: bool = True
-    density_uncertainty: float = DENSITY_UNCERTAINTY
+    area_weight: float | None = None
+    area_weight_uncertainty: float = AREA_WEIGHT_UNCERTAINTY
     outline: FloatArray | None = None
     pins: Hold | tuple[tuple[float, float], ...] | None = None
     carried: bool = False
@@ -77,9 +79,9 @@ class Setup:
             raise self._wrong(f"the stiffness is {self.stiffness!r}", "give N/m, or infinity for rigid pins")
         if self.carried and self.stiffness not in (None, math.inf):
             raise self._wrong("a stiffness of pins that are carried", "leave it out: they hold rigidly")
-        if not 0 < self.density_uncertainty <= 1:
+        if not 0 < self.area_weight_uncertainty <= 1:
             raise self._wrong(
-                f"the density uncertainty is {self.density_uncertainty!r}",
+                f"the relative uncertainty of the area weight is {self.area_weight_uncertainty!r}",
                 "give the relative standard uncertainty, such as 0.02 for 2 %",
             )
         if self.gravity is not None and not (math.isfinite(self.gravity) and self.gravity >= 0):
@@ -87,21 +89,21 @@ class Setup:
         if self.vertices < 16:
             raise self._wrong(f"the model mesh has {self.vertices} vertices", "ask for at least 16")
 
-    def weighed(self, area_weight: Stated | None, density_uncertainty: float | None) -> Setup:
+    def weighed(self, area_weight: Stated | None, relative: float | None = None) -> Setup:
         """Puts what the user states of the cloth's weight in place of the material's; with neither, nothing changes.
 
         Args:
             area_weight: value and standard deviation of a weighing, or a range, uniform [kg/m²].
-            density_uncertainty: relative standard uncertainty of the material's own density.
+            relative: standard uncertainty of the material's own area weight, as a share of it.
 
         Raises:
-            UsageError: both are given; or a weight without an uncertainty, not above 0, or without a material.
+            UsageError: both are given; or a weight without an uncertainty, or not above 0.
         """
-        if area_weight is None and density_uncertainty is None:
-            return self
         if area_weight is None:
-            return replace(self, mass_known=True, density_uncertainty=density_uncertainty)
-        if density_uncertainty is not None:
+            if relative is None:
+                return self
+            return replace(self, mass_known=True, area_weight_uncertainty=relative)
+        if relative is not None:
             raise UsageError(
                 "the uncertainty of the weight is given twice",
                 where="--density-uncertainty",
@@ -109,20 +111,13 @@ class Setup:
             )
         value = (area_weight.low + area_weight.high) / 2
         sigma = area_weight.sigma or (area_weight.high - area_weight.low) / math.sqrt(12)
-        if self.material is None:
-            raise UsageError(
-                "a weight needs a material, whose stiffness is taken",
-                where="--area-weight",
-                fix="name the material by --material",
-            )
         if not 0 < sigma <= value:
             raise UsageError(
                 f"an area weight of {area_weight.text} kg/m² has no usable uncertainty",
                 where="--area-weight",
                 fix="give that of the weighing, as in 0.155±0.003",
             )
-        material = replace(self.material, density=value)
-        return replace(self, material=material, mass_known=True, density_uncertainty=sigma / value)
+        return replace(self, area_weight=value, mass_known=True, area_weight_uncertainty=sigma / value)
 
     def _wrong(self, message: str, fix: str) -> InputError:
         return InputError(message, where="setup", fix=fix)

@@ -22,8 +22,8 @@ DIRECTION = math.radians(5.0)
 """rad: how well north, or the axis of a tunnel, is lined up with a camera's axes by eye and compass."""
 CLOCK = 0.3
 """s: a log of 1 Hz whose stamps are rounded, or a cup's lag at a few metres a second."""
-DENSITY_UNCERTAINTY = 0.3
-"""Relative standard uncertainty of a cloth's density [kg/m²] where nobody says how well it is known."""
+AREA_WEIGHT_UNCERTAINTY = 0.3
+"""Relative standard uncertainty of a cloth's area weight [kg/m²] where nobody says how well it is known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -224,8 +224,8 @@ class Specimen:
     Attributes:
         mesh: the model's, in its flat rest state; as wide and high as the cloth.
         material: nominal.
-        mass_known: whether its density is known at least as well as from a material's name.
-        density_uncertainty: relative standard uncertainty of its density, where that is so.
+        mass_known: whether its area weight is known at least as well as from a material's name.
+        area_weight_uncertainty: relative standard uncertainty of its area weight, where that is so.
         held: vertices of `mesh` that are attached.
         anchors: (held, 3) where they are tied [m].
         stiffness: of each attachment, on each axis [N/m].
@@ -244,7 +244,7 @@ class Specimen:
     stiffness: float = ARCSIM_STIFFNESS
     anchors_given: bool = True
     mass_known: bool = True
-    density_uncertainty: float = DENSITY_UNCERTAINTY
+    area_weight_uncertainty: float = AREA_WEIGHT_UNCERTAINTY
     gravity: tuple[float, float, float] = GRAVITY
     air: AirForce = field(default_factory=QuadraticNormal)
 
@@ -321,8 +321,8 @@ def described(specimen: Specimen) -> tuple[dict[str, Any], list[AnyArray]]:
         "anchors-told": specimen.anchors_given,
         "gravity": list(specimen.gravity),
         "air": [type(specimen.air).__name__, *vars(specimen.air).items()],
-        "material": [material.density, material.damping],
-        "density-uncertainty": specimen.density_uncertainty if specimen.mass_known else None,
+        "material": [material.area_weight, material.damping],
+        "density-uncertainty": specimen.area_weight_uncertainty if specimen.mass_known else None,
     }
     return content, [
         specimen.mesh.rest,

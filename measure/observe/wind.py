@@ -37,7 +37,7 @@ class LogPlacement:
         axis: (x, y, z) along which the air goes; speeds are taken along it, directions are not looked at. Of three
             components, None takes the sensor's axes to be the recording's.
         north: where true north lies, from +x towards +y [rad]; used with a direction.
-        offset: from the log's first sample to the recording's first frame [s].
+        offset: added to the recording's clock to reach the log's [s]; each starts at its first sample.
         start: instant of the first frame on the log's clock [UTC ns]; instead of `offset`.
 
     Raises:

@@ -437,7 +437,7 @@ def _strengths(
         scale = max(1.0, abs(first) / math.sqrt(max(statistic, 1e-12)) / claimed)
         error = scale * after.errors[len(THETA) + index]
         strength = estimate(column.described.null + value, error, column.unit)
-        words = _words(setting, column, value, after.model.calibration.density)
+        words = _words(setting, column, value, after.model.calibration.area_weight)
         strengths.append(
             TermStrength(
                 name=column.parameter, words=words, estimate=strength, course=course(setting, after.model, index)
@@ -446,7 +446,7 @@ def _strengths(
     return tuple(strengths)
 
 
-def _words(setting: Setting, column: EffectColumn, value: float, density: float) -> str:
+def _words(setting: Setting, column: EffectColumn, value: float, weight_factor: float) -> str:
     """Describes what a strength of this sign is; of mass, how much."""
     if not isinstance(column, TermColumn):
         return column.name
@@ -455,5 +455,5 @@ def _words(setting: Setting, column: EffectColumn, value: float, density: float)
     specimen = setting.experiment.specimen
     cloth = setting.forecaster.system(setting.segments.select([0]), [setting.calibration])[0].cloth
     share = column.term.at.of(Flat(cloth=cloth))[:, 0, 0].double().numpy()
-    added = value * density * specimen.material.density * float(specimen.mesh.vertex_areas @ share)
+    added = value * weight_factor * specimen.material.area_weight * float(specimen.mesh.vertex_areas @ share)
     return f"{column.term.words}: {1e3 * added:+.3g} g in all"

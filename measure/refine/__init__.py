@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from measure.refine.procedure import Settings, refine, squared
     from measure.refine.refinement import Interval, Refinement, Round
     from measure.refine.simulator import FilmRequest, Simulator
-    from measure.refine.space import DENSITY_COLUMN, QUANTITIES, WIND_COLUMN, Space
+    from measure.refine.space import AREA_WEIGHT_COLUMN, QUANTITIES, WIND_COLUMN, Space
     from measure.refine.target import Target
     from measure.refine.trace import Trace
     from measure.refine.view import DrawnView, FilmCamera, FixedView

@@ -37,12 +37,12 @@ class Learned:
 
 
 LEARNED: Mapping[tuple[str, str], Learned] = {
-    ("wind_speed", "density"): Learned(scenes=("flag-wide",), films={"flag-wide": 3600}),
-    ("wind_speed", "fabric_density"): Learned(
+    ("wind_speed", "area_weight"): Learned(scenes=("flag-wide",), films={"flag-wide": 3600}),
+    ("wind_speed", "fabric_area_weight"): Learned(
         scenes=("flag-fabrics", "flag-fabrics-damped"),
         films={"flag-wide": 3600, "flag-fabrics": 800, "flag-fabrics-damped": 800},
     ),
-    ("outdoor_wind", "fabric_density"): Learned(
+    ("outdoor_wind", "fabric_area_weight"): Learned(
         scenes=("flag-outdoor", "flag-outdoor-damped"), films={"flag-outdoor": 960, "flag-outdoor-damped": 1856}
     ),
 }
@@ -135,8 +135,10 @@ def run(
     """
     recipes, space = scenes_of(estimator, aspect=aspect), space_of(estimator)
     if area_weight is not None:
-        density = Range(low=area_weight[0], high=area_weight[1])
-        recipes = tuple(replace(recipe, material=replace(recipe.material, density=density)) for recipe in recipes)
+        stated_range = Range(low=area_weight[0], high=area_weight[1])
+        recipes = tuple(
+            replace(recipe, material=replace(recipe.material, area_weight=stated_range)) for recipe in recipes
+        )
         space = Space.of(recipes[0])
     otherwise = view or DrawnView(prior=named(RENDERS), assets=Assets())
     targets = [

@@ -36,9 +36,9 @@ def regressors(reported: FloatArray, space: Space) -> FloatArray:
     divided by or multiplied with. All are bounded: with logits, few evaluations near an end of the range would fix the
     slope for all others (decision 025). Anisotropy and nonlinearity of bending are left to the residual.
     """
-    wind, density, scale = reported[:, 0], reported[:, 1], reported[:, 2]
+    wind, area_weight, scale = reported[:, 0], reported[:, 1], reported[:, 2]
     share = np.clip((wind - space.wind.low) / (space.wind.high - space.wind.low), 0.0, 1.0)
-    return np.stack([np.sqrt(share), share, np.log(density), scale], axis=1)
+    return np.stack([np.sqrt(share), share, np.log(area_weight), scale], axis=1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -187,7 +187,7 @@ def refine(
         advance: called with the number of clips that were simulated.
 
     Raises:
-        InputError: a model without a posterior of wind, density, scale and anisotropy, a clip that does not fit it,
+        InputError: a model without a posterior of wind, area weight, scale and anisotropy, a clip that does not fit it,
             a recipe without ranges, a space of another box, or too many simulations that failed.
     """
     chosen, several = settings or Settings(), tuple([targets] if isinstance(targets, Target) else targets)
@@ -343,15 +343,15 @@ class _Run:
         return spans
 
     def _spans(self, draws: FloatArray, prior: FloatArray) -> tuple[Interval, ...]:
-        density, limits = self.space.density, limits_of("density")
-        learned = next(target for target in self.estimator.targets if target.name == "density")
-        if density.low > learned.low or density.high < learned.high:  # narrower: the user states it
-            limits = density.low, density.high
+        area_weight, limits = self.space.area_weight, limits_of("area_weight")
+        learned = next(target for target in self.estimator.targets if target.name == "area_weight")
+        if area_weight.low > learned.low or area_weight.high < learned.high:  # narrower: the user states it
+            limits = area_weight.low, area_weight.high
         return intervals_of(
             draws,
             prior,
             self.settings.level,
-            ranges=(self.space.wind, density),
+            ranges=(self.space.wind, area_weight),
             limits=(limits_of("wind_speed"), limits),
         )
 

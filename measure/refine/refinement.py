@@ -82,7 +82,7 @@ class Round:
         distance: smallest mean squared distance of a θ's replicates to the target, in the replicates' covariance, the
             mean over targets.
         floor: median squared distance of replicates of one θ to each other, likewise.
-        intervals: of wind and density; empty while there are too few evaluations.
+        intervals: of wind and area weight; empty while there are too few evaluations.
         seconds: from the start [s].
     """
 

@@ -24,7 +24,7 @@ from flagdata.errors import InputError
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed, stream
 from flagdata.tables import Range
-from measure.refine.space import DENSITY_COLUMN, WIND_COLUMN, Space
+from measure.refine.space import AREA_WEIGHT_COLUMN, WIND_COLUMN, Space
 from measure.refine.view import View
 from models.conditioning.conditioning import VERSION
 from models.training.conditioned import FitFilm
@@ -210,8 +210,8 @@ class SimulatedScene:
         damping = self.recipe.material.damping
         material = replace(
             scene.material,
-            density=float(values[DENSITY_COLUMN]),
-            bending=values[:DENSITY_COLUMN].reshape(BENDING_SHAPE),
+            area_weight=float(values[AREA_WEIGHT_COLUMN]),
+            bending=values[:AREA_WEIGHT_COLUMN].reshape(BENDING_SHAPE),
             damping=(
                 damping.at(stream(request.seed, "damping").random())
                 if isinstance(damping, Range)

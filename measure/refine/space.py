@@ -21,10 +21,10 @@ from sim.material import BENDING_SHAPE, Material
 from sim.run.recipe import Recipe, Shape
 
 BENDING = BENDING_SHAPE[0] * BENDING_SHAPE[1]
-DENSITY_COLUMN, WIND_COLUMN = BENDING, BENDING + 1
+AREA_WEIGHT_COLUMN, WIND_COLUMN = BENDING, BENDING + 1
 """Columns of θ."""
 DIMENSION = BENDING + 2
-"""Length of θ: bending coefficients 0 to 14 (three directions of five curvatures), density, wind speed."""
+"""Length of θ: bending coefficients 0 to 14 (three directions of five curvatures), area weight, wind speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class ReportedQuantity:
 
 QUANTITIES = (
     ReportedQuantity(name="wind_speed", unit="m/s", about="wind speed", digits=2),
-    ReportedQuantity(name="density", unit="kg/m²", about="area weight", digits=3),
+    ReportedQuantity(name="area_weight", unit="kg/m²", about="area weight", digits=3),
     ReportedQuantity(
         name="bending_scale", unit="log10(N·m)", about="mean logarithm of the bending coefficients", digits=2
     ),
@@ -78,7 +78,7 @@ class Space:
         factor: range of each bending coefficient's factor. Its scale is that of the prior; the search is always
             logarithmic.
         common: of all bending coefficients together, likewise; None where there is none.
-        density: [kg/m²].
+        area_weight: [kg/m²].
         wind: [m/s].
         parts: the prior as a mixture of the priors of smaller boxes, each with its weight; without any it is what the
             ranges say. What is searched is the whole box either way.
@@ -86,7 +86,7 @@ class Space:
 
     material: Material
     factor: Range
-    density: Range
+    area_weight: Range
     wind: Range
     common: Range | None = None
     parts: tuple[tuple[Space, float], ...] = ()
@@ -100,24 +100,24 @@ class Space:
                 effects, or another scene than a flag.
         """
         spec, speed = recipe.material, recipe.wind.speed
-        factor, density, wind = spec.bending_each, spec.density, speed
+        factor, area_weight, wind = spec.bending_each, spec.area_weight, speed
         common = spec.bending if isinstance(spec.bending, Range) else None
         alone = len(spec.bases) == 1 and not recipe.effects and recipe.scene.shape is Shape.FLAG
-        alone &= not any(isinstance(q, Range) for q in (spec.density_factor, spec.stretching, recipe.wind.toward))
+        alone &= not any(isinstance(q, Range) for q in (spec.area_weight_factor, spec.stretching, recipe.wind.toward))
         if not (
             isinstance(factor, Range)
-            and isinstance(density, Range)
+            and isinstance(area_weight, Range)
             and isinstance(wind, Range)
             and alone
             and ((common is not None and common.low > 0) or spec.bending == 1.0)
             and factor.low > 0
         ):
             raise InputError(
-                "the scene is not a flag of one material with ranges of bending factors (above 0), density and wind",
+                "the scene is no flag of one material with ranges of bending factors (above 0), area weight and wind",
                 where=f"recipe {recipe.name!r}",
                 fix='take "flag-wide", or a recipe of the same form',
             )
-        return cls(material=spec.bases[0], factor=factor, density=density, wind=wind, common=common)
+        return cls(material=spec.bases[0], factor=factor, area_weight=area_weight, wind=wind, common=common)
 
     def learned(self, parts: Sequence[tuple[Space, float]]) -> Space:
         """Returns the same box under the prior that a model learned from data sets of several scenes.
@@ -146,7 +146,7 @@ class Space:
         table = self.material.bending.ravel().tolist()
         low, high = self._factors
         bending = [Range(low=k * low, high=k * high, scale=Scale.LOG) for k in table]
-        return (*bending, self.density, self.wind)
+        return (*bending, self.area_weight, self.wind)
 
     @property
     def _factors(self) -> tuple[float, float]:
@@ -156,7 +156,7 @@ class Space:
 
     @property
     def start_ranges(self) -> tuple[Range, Range, Range, Range]:
-        """Returns ranges of wind, density, bending scale and anisotropy: of the latter two the prior's mean and
+        """Returns ranges of wind, area weight, bending scale and anisotropy: of the latter two the prior's mean and
         `_REACH` of its standard deviations either way, within the box."""
         table = np.log10(self.material.bending)
         logs = np.log10(_drawn(self.factor, _SHARES))
@@ -169,7 +169,7 @@ class Space:
         slope = min(slope, high - low)
         return (
             self.wind,
-            self.density,
+            self.area_weight,
             Range(low=max(middle - scale, least), high=min(middle + scale, most)),
             Range(low=tilt - slope, high=tilt + slope),
         )
@@ -224,7 +224,7 @@ class Space:
         return np.stack(
             [
                 values[:, WIND_COLUMN],
-                values[:, DENSITY_COLUMN],
+                values[:, AREA_WEIGHT_COLUMN],
                 logs.mean(axis=(1, 2)),
                 logs[:, 0].mean(axis=1) - logs[:, -1].mean(axis=1),
                 logs[:, :, -2:].mean(axis=(1, 2)) - logs[:, :, :2].mean(axis=(1, 2)),
@@ -235,7 +235,7 @@ class Space:
     @property
     def identity(self) -> str:
         """A hash of the box; the prior within it changes no evaluation."""
-        ranges = [plain(entry) for entry in (self.factor, self.density, self.wind)]
+        ranges = [plain(entry) for entry in (self.factor, self.area_weight, self.wind)]
         ranges += [] if self.common is None else [plain(self.common)]
         return digest(canonical({"material": self.material.fingerprint, "ranges": ranges}))
 

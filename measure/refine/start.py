@@ -1,8 +1,8 @@
 """Where a refinement starts: draws of the amortised posterior, completed to 17 parameters by the prior.
 
-The network estimates wind, density, scale and anisotropy of bending. The 15 coefficients follow from the prior given
-these two: of many prior draws the one whose scale and anisotropy are nearest is taken (sampling-importance-resampling
-with the narrowest kernel), so that the rest is as the prior has it.
+The network estimates wind, area weight, scale and anisotropy of bending. The 15 coefficients follow from the prior
+given these two: of many prior draws the one whose scale and anisotropy are nearest is taken
+(sampling-importance-resampling with the narrowest kernel), so that the rest is as the prior has it.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.stated import Stated
-from measure.refine.space import DENSITY_COLUMN, DIMENSION, WIND_COLUMN, Space
+from measure.refine.space import AREA_WEIGHT_COLUMN, DIMENSION, WIND_COLUMN, Space
 from models.estimator import Estimator
 from models.restriction import Known, usable_aspect
 from models.targets import ASPECT
 
-TARGETS = ("wind_speed", "density", "bending_scale", "anisotropy")
+TARGETS = ("wind_speed", "area_weight", "bending_scale", "anisotropy")
 """Targets that a network must estimate for a refinement to start from it."""
-SUMMARISED = ("wind_speed", "density")
+SUMMARISED = ("wind_speed", "area_weight")
 """Targets whose estimates summarise a clip: clips hardly constrain bending (decision 025)."""
 _POOL = 20_000
 _MARGIN = 1e-3  # of a logit's range: parameters at the very end of theirs have none
@@ -75,10 +75,10 @@ def amortised(
     weights are fewer than the network's, they hold for the clip, as does the aspect (length over height) for a network
     that estimates it.
     """
-    target = next(target for target in estimator.targets if target.name == "density")
-    low, high = max(space.density.low, target.low), min(space.density.high, target.high)
+    target = next(target for target in estimator.targets if target.name == "area_weight")
+    low, high = max(space.area_weight.low, target.low), min(space.area_weight.high, target.high)
     fewer = low > target.low or high < target.high
-    statements = [Known.everywhere("density", Stated(low=low, high=high), count=1)] if fewer else []
+    statements = [Known.everywhere("area_weight", Stated(low=low, high=high), count=1)] if fewer else []
     if (shape := usable_aspect(estimator.targets, aspect, 1.0)) is not None:
         statements.append(Known.everywhere(ASPECT, shape, count=1))
     estimates = estimator.estimate(estimator.inputs(clip[None]), seed=seed, draws=draws, known=statements)
@@ -107,8 +107,8 @@ def widened(values: FloatArray, factor: float, space: Space) -> FloatArray:
 
 
 def completed(space: Space, drawn: FloatArray, *, seed: int) -> FloatArray:
-    """Completes points (n, 17) of [−1, 1]¹⁷ with the wind and density of `drawn` (n, 4), and bending of the prior as
-    near to its scale and anisotropy as 20,000 draws come, no draw twice."""
+    """Completes points (n, 17) of [−1, 1]¹⁷ with the wind and area weight of `drawn` (n, 4), and bending of the prior
+    as near to its scale and anisotropy as 20,000 draws come, no draw twice."""
     pool = space.prior(stream(seed, "refine", "pool"), _POOL)
     offered, wanted = space.reported(pool)[:, 2:4], drawn[:, 2:4]
     spread = offered.std(axis=0)
@@ -121,5 +121,5 @@ def completed(space: Space, drawn: FloatArray, *, seed: int) -> FloatArray:
         taken.add(index)
         out[i] = pool[index]
     values = space.values(out)
-    values[:, DENSITY_COLUMN], values[:, WIND_COLUMN] = drawn[:, 1], drawn[:, 0]
+    values[:, AREA_WEIGHT_COLUMN], values[:, WIND_COLUMN] = drawn[:, 1], drawn[:, 0]
     return space.unit(values)

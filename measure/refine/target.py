@@ -12,6 +12,7 @@ import numpy as np
 from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError
 from flagdata.lake import Artifact
+from flagdata.retired_names import present_names
 from measure.refine.space import BENDING, QUANTITIES, Space
 from measure.refine.view import FixedView, View, of_parameters
 
@@ -49,7 +50,7 @@ def of_recording(recording: Artifact, clip: UInt8Array, *, otherwise: View, spac
         clip: (frame, height, width) of it, conditioned.
         otherwise: the view of a recording that states no ζ.
     """
-    content = json.loads(recording.parameters) if recording.parameters else {}
+    content = present_names(json.loads(recording.parameters)) if recording.parameters else {}
     return as_stated(recording.name, clip, content, otherwise=otherwise, space=space)
 
 
@@ -71,9 +72,9 @@ def knows_view(target: Target) -> bool:
 
 
 def _truth(content: Mapping[str, Any], space: Space) -> dict[str, float]:
-    names = [*(f"bending.{index}" for index in range(BENDING)), "density", "wind_speed"]
+    names = [*(f"bending.{index}" for index in range(BENDING)), "area_weight", "wind_speed"]
     if any(name not in content for name in names):
-        return {name: float(content[name]) for name in ("density", "wind_speed") if name in content}
+        return {name: float(content[name]) for name in ("area_weight", "wind_speed") if name in content}
     point = space.unit(np.array([[float(content[name]) for name in names]]))
     truth = dict(zip((q.name for q in QUANTITIES), space.reported(point)[0].tolist(), strict=True))
-    return {**truth, "density": float(content["density"]), "wind_speed": float(content["wind_speed"])}
+    return {**truth, "area_weight": float(content["area_weight"]), "wind_speed": float(content["wind_speed"])}

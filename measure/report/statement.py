@@ -41,7 +41,7 @@ _SEPARATES: dict[frozenset[str], str] = {
 
 
 _ROUGH = 0.1
-"""Relative uncertainty of the density above which weighing the cloth is better than the material's name."""
+"""Relative uncertainty of the area weight above which weighing the cloth is better than the material's name."""
 _AXES = ("along the wind", "across the wind", "up")
 
 
@@ -90,8 +90,8 @@ def ratios(experiment: Experiment) -> tuple[str, ...]:
     if experiment.specimen.mass_known:
         return ()
     sentence = (
-        "The mass of the cloth is not known: motion shows forces per mass alone, so that density, bending and the "
-        f"strengths of forces are ratios to a density of {number(experiment.specimen.material.density)} kg/m²."
+        "The mass of the cloth is not known: motion shows forces per mass alone, so that area weight, bending and the "
+        f"strengths of forces are ratios to an area weight of {number(experiment.specimen.material.area_weight)} kg/m²."
     )
     return (sentence,)
 
@@ -169,13 +169,13 @@ def _where(mode: FieldColumn) -> str:
 
 def _how_well_weighed(specimen: Specimen) -> tuple[str, ...]:
     """Says how well the cloth's mass is known, and what that leaves open; nothing where it is not known."""
-    uncertainty = specimen.density_uncertainty
+    uncertainty, weight = specimen.area_weight_uncertainty, specimen.material.area_weight
     if not specimen.mass_known:
         return ()
-    known_to = f"its density is known to {100 * uncertainty:.2g} % (one standard deviation)"
+    known_to = f"its area weight is known to {100 * uncertainty:.2g} % (one standard deviation)"
     weighing = (
         ": a pressure of the air that is off by as much differs from another weight only in how the cloth stretches, "
-        "which a cloth that was weighed to 2 % would settle (density-uncertainty = 0.02)"
+        f"which a cloth that was weighed to 2 % would settle (area weight {weight:.3g}±{0.02 * weight:.1g})"
     )
     return (known_to + weighing if uncertainty >= _ROUGH else known_to,)
 
@@ -201,12 +201,13 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         places = "" if specimen.anchors_given else ", tied at their mean observed places"
     between = (
         "intervals of these include the scatter between simulators of other authors, "
-        f"{100 * CRITERIA.density_between:.0f} % in density, a factor of {math.exp(CRITERIA.bending_between):.1f} in "
+        f"{100 * CRITERIA.area_weight_between:.0f} % in area weight, a factor of "
+        f"{math.exp(CRITERIA.bending_between):.1f} in "
         f"bending and {number(1e3 * CRITERIA.damping_between, digits=2)} ms in damping, and for the damping a factor "
         f"of {math.exp(CRITERIA.damping_factor):.0f} by which its fit may end elsewhere, each one standard deviation"
     )
     factor = number(math.exp(CRITERIA.strength_factor), digits=2)
-    cloth = f"{specimen.material.name} (nominally {number(specimen.material.density)} kg/m²)"
+    cloth = f"{specimen.material.name} (nominally {number(specimen.material.area_weight)} kg/m²)"
     return (
         f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
         *_how_well_weighed(specimen),
@@ -214,7 +215,7 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"the base model's air pushes along the cloth's normal with ρ w² per area, ρ = {number(air.density)} kg/m³",
         logged,
         f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {which_frames} of the recordings",
-        "density, bending and internal damping are calibrated, so that what only changes them is not an effect",
+        "area weight, bending and internal damping are calibrated, so that what only changes them is not an effect",
         between,
         f"a strength may be off by a factor of {factor} by the fit's mesh and a mistold cloth: its interval says so",
         "the effect was chosen on all recordings; the errors before and after come from fits without them",

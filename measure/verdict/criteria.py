@@ -13,6 +13,7 @@ from scipy.stats import norm
 
 from flagdata.errors import UsageError
 from flagdata.provenance import recipe_hash
+from flagdata.retired_names import hashed_names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +43,8 @@ class Criteria:
         least_obstructed: one that certainly varies across its mean by less than this share varies along itself alone,
             as a fan makes it: passing obstacles turn it by 0.15 to 0.23 (decision 012).
         most_within: nor is one whose variance within two seconds is more than so many times that between stretches.
-        density_between: standard deviation of the logarithm of the density by which simulators of other authors differ;
-            this and the next two are of twenty nulls of MuJoCo (decision 023).
+        area_weight_between: standard deviation of the logarithm of the area weight by which simulators of other authors
+            differ; this and the next two are of twenty nulls of MuJoCo (decision 023).
         bending_between: the same of the bending stiffness.
         damping_between: standard deviation of the internal damping by which they differ [s].
         damping_factor: standard deviation of the logarithm of the internal damping by which a fit that begins at
@@ -76,7 +77,7 @@ class Criteria:
     least_turned: float = 0.3
     least_obstructed: float = 0.15
     most_within: float = 2.0
-    density_between: float = 0.07
+    area_weight_between: float = 0.07
     bending_between: float = 0.6
     damping_between: float = 2.4e-3
     damping_factor: float = 1.1
@@ -102,7 +103,7 @@ class Criteria:
     @property
     def hash(self) -> str:
         """SHA-256 of all of them, hex."""
-        return recipe_hash(asdict(self))
+        return recipe_hash(hashed_names(asdict(self)))
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values, with their hash."""

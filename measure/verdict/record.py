@@ -223,7 +223,7 @@ class Parameter:
     """A calibrated parameter.
 
     Attributes:
-        name: "density", "bending" or "damping".
+        name: "area_weight", "bending" or "damping".
         before, after: of the base model, and with the effect; their intervals include the scatter between simulators.
         shift: from one to the other, in standard errors.
         within: standard error of its logarithm by noise and by the discretisations of one simulator alone; None where

@@ -106,7 +106,7 @@ class _Desk:
         area_weight: Stated | None,
     ) -> None:
         self._source, self._dataset, self._at = source, dataset, at
-        self._known = {} if area_weight is None else {"density": area_weight}
+        self._known = {} if area_weight is None else {"area_weight": area_weight}
         self._cache, self._workers, self._seed = cache, workers, seed
         self._pairs: dict[str, Pairs] = {}
         self._prepared: dict[tuple[str, str], Prepared] = {}

@@ -76,8 +76,8 @@ def readouts(
     Raises:
         InputError: too few clips, or a quantity that they do not state or that is the same in all of them.
     """
-    density, bending = truth(parameters, ("density", "bending_scale")).T
-    quantities = {"density": density, "stiffness": 10**bending}
+    area_weight, bending = truth(parameters, ("area_weight", "bending_scale")).T
+    quantities = {"area_weight": area_weight, "stiffness": 10**bending}
     reads: dict[str, Read] = {}
     for run in predictions:
         if run.embedding is not None and run.label not in reads:

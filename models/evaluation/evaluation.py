@@ -22,7 +22,7 @@ from models.evaluation.tsne import TsneLayout, layout
 
 SCHEMA = "flagdata.evaluation/1"
 _LEVELS = tuple(sorted({*CURVE, *LEVELS}))
-_COMPARED = ("rmse", "accuracy", "density_error", "triplets")
+_COMPARED = ("rmse", "accuracy", "area_weight_error", "triplets")
 
 
 @dataclass(frozen=True, kw_only=True)

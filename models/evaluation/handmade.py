@@ -23,7 +23,7 @@ from models.handmade import FEATURES, features
 from models.ridge import Ridge, fit_ridge
 from models.training.inputs import Prepared, prepare_clips, prepare_films
 
-TARGETS = ("wind_speed", "density", "bending_scale", "anisotropy")
+TARGETS = ("wind_speed", "area_weight", "bending_scale", "anisotropy")
 _FRONT_END = FrontEnd(maps="handmade")
 _CROPPING = Cropping()
 _VARIANTS = 4

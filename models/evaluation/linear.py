@@ -1,7 +1,7 @@
 """What a linear model reads out of an embedding: PCA, linear regression, one left out at a time, Pearson's r.
 
 Bouman, Xiao, Battaglia and Freeman, Estimating the material properties of fabric from video, ICCV 2013, as in Runia et
-al., Cloth in the Wind, CVPR 2020, section 6: r of log stiffness and log density.
+al., Cloth in the Wind, CVPR 2020, section 6: r of log stiffness and log area weight.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def bouman(
     components: int = COMPONENTS,
 ) -> Readout:
     """Reads quantities out of an embedding by the protocol on logarithms of positive quantities, usually stiffness and
-    density.
+    area weight.
 
     Args:
         embedding: (n, d).

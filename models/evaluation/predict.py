@@ -23,7 +23,7 @@ DRAWS = 200
 _TOGETHER = 64
 _TIMED = 12  # clips
 _RIDGE = 1e-3  # of the mean eigenvalue of the embeddings' covariance
-READ_FROM = ("wind_speed", "density", "bending_scale", "anisotropy")
+READ_FROM = ("wind_speed", "area_weight", "bending_scale", "anisotropy")
 """Targets that a model without a head is read for, by ridge regression of its embeddings of training clips."""
 
 

@@ -12,7 +12,7 @@ from flagdata.arrays import Float32Array, FloatArray, IntArray
 from flagdata.errors import InputError, UnknownNameError
 
 WIND = "wind_speed"
-DENSITY = "density"
+AREA_WEIGHT = "area_weight"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -21,7 +21,7 @@ class Predictions:
 
     Attributes:
         label: the model's name in the table. Several predictions of one label are runs of it with other seeds.
-        targets: names of t quantities: "wind_speed" [m/s], "density" [kg/m²], "log_bending", "anisotropy", ...
+        targets: names of t quantities: "wind_speed" [m/s], "area_weight" [kg/m²], "log_bending", "anisotropy", ...
         truth: (n, t) float64, SI.
         mean: (n, t) float64, point estimates.
         samples: (n, s, t) float32, s ≥ 2 draws of the predictive distribution of each clip; None for a model without.

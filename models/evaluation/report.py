@@ -403,7 +403,7 @@ def _paper(evaluation: Evaluation) -> Grid:
 _METRICS = {
     "rmse": "wind RMSE [m/s]",
     "accuracy": "Acc@0.5",
-    "density_error": "area weight error / spread",
+    "area_weight_error": "area weight error / spread",
     "triplets": "triplet accuracy",
 }
 _SCORES = {

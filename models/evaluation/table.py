@@ -14,7 +14,7 @@ from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from models.evaluation.bootstrap import LEVEL, Resamples, ScoreEstimate, estimate
 from models.evaluation.calibration import LEVELS, coverage_values
-from models.evaluation.predictions import DENSITY, WIND, Predictions
+from models.evaluation.predictions import AREA_WEIGHT, WIND, Predictions
 from models.evaluation.scores import SCORES, rmse_bound
 from models.evaluation.triplets import accuracy_values
 
@@ -150,8 +150,8 @@ def metric_values(predictions: Predictions, resamples: Resamples, triplets: IntA
     values = {}
     if WIND in predictions.targets:
         values = {name: SCORES[name].values(predictions, WIND, resamples) for name in ("rmse", "accuracy", "bias")}
-    if DENSITY in predictions.targets:
-        values["density_error"] = SCORES["relative_error"].values(predictions, DENSITY, resamples)
+    if AREA_WEIGHT in predictions.targets:
+        values["area_weight_error"] = SCORES["relative_error"].values(predictions, AREA_WEIGHT, resamples)
     if predictions.samples is not None and WIND in predictions.targets:
         for level in LEVELS:
             values[_covered(level)] = coverage_values(predictions, WIND, level, resamples)
@@ -334,7 +334,7 @@ COLUMNS = (
     TableColumn(heading="bound", cell=lambda row: (_NONE if row.bound is None else f"≥ {number(row.bound, 3)}",)),
     TableColumn(heading="Acc@0.5", cell=_scored("accuracy", 3)),
     TableColumn(heading="wind bias [m/s]", cell=_scored("bias", 3)),
-    TableColumn(heading="area weight error / spread", cell=_scored("density_error", 3)),
+    TableColumn(heading="area weight error / spread", cell=_scored("area_weight_error", 3)),
     TableColumn(heading="wind covered [%] at 50 / 80 / 90", cell=_coverage),
     TableColumn(heading="triplet accuracy", cell=_scored("triplets", 3)),
     TableColumn(heading="parameters", cell=lambda row: (f"{row.parameters:,}",)),

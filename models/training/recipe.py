@@ -32,6 +32,7 @@ from flagdata.lake import Lake
 from flagdata.lake.matching import Values
 from flagdata.provenance import recipe_hash
 from flagdata.recipes import Shelf, is_name, parsed
+from flagdata.retired_names import NAMES, hashed_name
 from flagdata.schema import Kind
 from flagdata.tables import WHOLE_LIMIT, Count, Named, Whole, read
 from models.conditioning.conditioning import VERSION
@@ -131,7 +132,7 @@ class LossSpec:
     """
 
     name: Loss = Loss.REGRESSION
-    targets: tuple[Annotated[str, Named("target", TARGETS)], ...] = ()
+    targets: tuple[Annotated[str, Named("target", TARGETS, was=NAMES)], ...] = ()
     components: Count = 6
     margin: Annotated[float, Meta(gt=0.0, le=NUMBER_LIMIT)] = 1.0
 
@@ -198,7 +199,7 @@ class TrainingRecipe:
             "variants": self.variants,
             **({"augment": self.augment.identity(), "conditioning": VERSION} if self.cropping.conditioned else {}),
             "network": {"name": self.network.name, "options": dict(self.network.options)},
-            "loss": asdict(self.loss),
+            "loss": {**asdict(self.loss), "targets": tuple(map(hashed_name, self.loss.targets))},
             "optimiser": asdict(self.optimiser),
         }
 

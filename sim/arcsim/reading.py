@@ -136,8 +136,9 @@ def read_material(path: Path) -> Material:
     missing = sorted({"density", "stretching", "bending"} - set(content))
     if missing:
         raise InputError(f"these keys are missing: {', '.join(missing)}", where=f"material {path}", fix="add them")
+    tables = {"area-weight": content["density"], "stretching": content["stretching"], "bending": content["bending"]}
     return Material.from_mapping(
-        {**content, "source": f"ArcSim material file {path.name}", "damping": 0.0}, name=path.stem
+        {**tables, "source": f"ArcSim material file {path.name}", "damping": 0.0}, name=path.stem
     )
 
 
@@ -290,7 +291,7 @@ def _strange(content: Any, schema: Mapping[str, Any], path: str, where: str) -> 
 def _scaled(material: Material, entry: Mapping[str, Any], where: str) -> Material:
     thicken = _number(entry, "thicken", 1.0, where)
     scaled = material.scaled(
-        density=thicken * _number(entry, "density_mult", 1.0, where),
+        area_weight=thicken * _number(entry, "density_mult", 1.0, where),
         stretching=thicken * _number(entry, "stretching_mult", 1.0, where),
         bending=thicken * _number(entry, "bending_mult", 1.0, where),
     )

@@ -106,7 +106,7 @@ def _content(file: ArcsimScene, air: QuadraticNormal, *, mesh: str, material: st
 
 def _material(material: Material) -> dict[str, Any]:
     return {
-        "density": material.density,
+        "density": material.area_weight,
         "stretching": material.stretching.tolist(),
         "bending": material.bending.tolist(),
     }

@@ -45,7 +45,9 @@ def stiffest(system: System) -> Tensor:
         return value
     # The repulsion's stiffness k a v/h at a violation of half the thickness, on a vertex of mass ρ a. Layers at rest on
     # one another stay further apart; the step's safety covers the rest.
-    repulsion = system.contact.stiffness / 2 * torch.tensor([1 / m.density for m in system.cloth.materials]).to(value)
+    repulsion = (
+        system.contact.stiffness / 2 * torch.tensor([1 / m.area_weight for m in system.cloth.materials]).to(value)
+    )
     return torch.maximum(value, _stiffest_stretched(system, 1.0) + repulsion)
 
 
@@ -109,7 +111,7 @@ def stable_step(system: System) -> float:
             raise InputError(
                 f"no step is stable: the largest eigenvalue is {worst:.3g} 1/s², the damping {damping:.3g} s",
                 where="material",
-                fix="give a density, stiffnesses and a damping that a cloth can have",
+                fix="give an area weight, stiffnesses and a damping that a cloth can have",
             )
         _LIMITS[system] = limit
     return _LIMITS[system]

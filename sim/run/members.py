@@ -12,6 +12,7 @@ import numpy as np
 import torch
 
 from flagdata.arrays import FloatArray
+from flagdata.retired_names import hashed_key
 from flagdata.rng import child_seed, stream
 from flagdata.tables import Quantity, Range, ends
 from sim import handles as held
@@ -112,8 +113,8 @@ class Crew:
         factors = _factors(spec, stream(seed, "material", "bending-factors").random(math.prod(BENDING_SHAPE)))
         material = _material(
             base,
-            density=drawn(_of(spec.density, base.density), "material", "density")
-            * drawn(spec.density_factor, "material", "density-factor"),
+            area_weight=drawn(_of(spec.area_weight, base.area_weight), "material", hashed_key("area-weight"))
+            * drawn(spec.area_weight_factor, "material", hashed_key("area-weight-factor")),
             stretching=drawn(spec.stretching, "material", "stretching-factor"),
             bending=drawn(spec.bending, "material", "bending-factor") * factors,
             damping=drawn(_of(spec.damping, base.damping), "material", "damping"),
@@ -140,7 +141,7 @@ class Crew:
             "wind_speed": speed,
             "wind_toward": toward,
             "wind_vertical": wind.vertical,
-            "density": material.density,
+            "area_weight": material.area_weight,
             "damping": material.damping,
             "stretching": tuple(material.stretching.ravel().tolist()),
             "bending": tuple(material.bending.ravel().tolist()),
@@ -169,7 +170,7 @@ class Crew:
         for end in (0, 1):
             material = _material(
                 base,
-                density=ends(_of(spec.density, base.density))[0] * ends(spec.density_factor)[0],
+                area_weight=ends(_of(spec.area_weight, base.area_weight))[0] * ends(spec.area_weight_factor)[0],
                 damping=ends(_of(spec.damping, base.damping))[1],
                 stretching=ends(spec.stretching)[1],
                 bending=stiffest,
@@ -249,10 +250,12 @@ def _factors(spec: MaterialSpec, shares: FloatArray) -> FloatArray:
     return np.array(values).reshape(BENDING_SHAPE)
 
 
-def _material(base: Material, *, density: float, stretching: float, bending: FloatArray, damping: float) -> Material:
+def _material(
+    base: Material, *, area_weight: float, stretching: float, bending: FloatArray, damping: float
+) -> Material:
     return replace(
         base,
-        density=density,
+        area_weight=area_weight,
         damping=damping,
         stretching=base.stretching * stretching,
         bending=base.bending * bending,

@@ -14,6 +14,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.lake.naming import COLUMNS, OF_RESULTS, meant
 from flagdata.printable import SHORT
 from flagdata.record.parent import open_parent
+from flagdata.retired_names import present_recipe
 from flagdata.schema import Kind
 from flagdata.signals import WindSeries
 from sim.run import reading
@@ -64,7 +65,8 @@ def of_artifact(artifact: Artifact) -> Recipe:
     where = f"artifact {artifact.id}"
     if artifact.kind is not Kind.MODEL or artifact.parameters is None:
         raise CorruptError("no model that can be simulated", where=where, fix="close the loop again")
-    recipe = reading.of_content(json.loads(artifact.parameters), name=artifact.name, folder=Path(), where=where)
+    content = present_recipe(json.loads(artifact.parameters))
+    recipe = reading.of_content(content, name=artifact.name, folder=Path(), where=where)
     return replace(recipe, model=artifact.id)
 
 

@@ -9,7 +9,7 @@ which each member draws its own value.
                  [[x, y, z], …] (of a mesh); stiffness (of the handles), or rigid = true; evaluation = "arcsim" |
                  "corrected"; gravity
     [material]   name (of catalogs/materials), names (of which each member draws one), file (TOML, or ArcSim JSON) or
-                 table (what such a TOML file holds); density, density-factor, stretching-factor,
+                 table (what such a TOML file holds); area-weight, area-weight-factor, stretching-factor,
                  bending-factor, damping: quantities; bending-factors: a quantity drawn for each of the 15 coefficients
     [wind]       speed [m/s], toward (where the air goes to, from +x towards +y) [rad], or toward-deg in degrees:
                  quantities; vertical [m/s]. In place of a steady wind: samples = [[time, x, y, z], …], in s since the
@@ -34,7 +34,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta
 
@@ -42,6 +42,7 @@ from flagdata.addresses import local_path
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
 from flagdata.recipes import Shelf, parsed, read_recipe
+from flagdata.retired_names import KEYS
 from flagdata.tables import (
     AngleQuantity,
     Count,
@@ -146,12 +147,13 @@ class _SimulationTables:
 class _Cloth:
     """[material]."""
 
+    WAS: ClassVar = KEYS
     name: str | None = None
     names: tuple[str, ...] = ()
     file: str | None = None
     table: Mapping[str, Any]
-    density: PositiveQuantity | None = None
-    density_factor: PositiveQuantity = 1.0
+    area_weight: PositiveQuantity | None = None
+    area_weight_factor: PositiveQuantity = 1.0
     stretching_factor: PositiveQuantity = 1.0
     bending_factor: NotNegativeQuantity = 1.0
     bending_factors: NotNegativeQuantity = 1.0
@@ -342,8 +344,8 @@ def _arcsim(scene: ArcsimScene, *, noise: float, evaluation: Evaluation) -> Scen
 def _material(cloth: _Cloth, folder: Path, scene: SceneSpec, *, where: str) -> MaterialSpec:
     return MaterialSpec(
         bases=_bases(cloth, folder, scene, where=where),
-        density=cloth.density,
-        density_factor=cloth.density_factor,
+        area_weight=cloth.area_weight,
+        area_weight_factor=cloth.area_weight_factor,
         stretching=cloth.stretching_factor,
         bending=cloth.bending_factor,
         bending_each=cloth.bending_factors,

@@ -15,6 +15,7 @@ import torch
 
 from flagdata.errors import LimitError
 from flagdata.provenance import canonical, digest
+from flagdata.retired_names import hashed_name
 from flagdata.tables import Count, Named, NotNegative, Positive, Quantity, plain
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.arcsim import ArcsimScene
@@ -123,8 +124,8 @@ class MaterialSpec:
 
     Attributes:
         bases: the materials, of which each member draws one.
-        density: [kg/m²]; None for the base's.
-        density_factor: factor on it.
+        area_weight: [kg/m²]; None for the base's.
+        area_weight_factor: factor on it.
         stretching: factor on its table.
         bending: factor on its table.
         bending_each: factor drawn for each of the 15 coefficients on its own.
@@ -132,8 +133,8 @@ class MaterialSpec:
     """
 
     bases: tuple[Material, ...]
-    density: Quantity | None = None
-    density_factor: Quantity = 1.0
+    area_weight: Quantity | None = None
+    area_weight_factor: Quantity = 1.0
     stretching: Quantity = 1.0
     bending: Quantity = 1.0
     bending_each: Quantity = 1.0
@@ -298,12 +299,12 @@ class Recipe:
             },
             "material": {
                 "bases": [_base(base) for base in material.bases],
-                "density": plain(material.density),
+                hashed_name("area_weight"): plain(material.area_weight),
                 "stretching_factor": plain(material.stretching),
                 "bending_factor": plain(material.bending),
                 "bending_factors": plain(material.bending_each),
                 "damping": plain(material.damping),
-                **_density_factor_entry(material),
+                **_area_weight_factor_entry(material),
             },
             "wind": {
                 "speed": plain(wind.speed),
@@ -343,16 +344,17 @@ def _stiffness_entry(scene: SceneSpec) -> dict[str, Any]:
     return {"stiffness": "rigid" if math.isinf(scene.stiffness) else scene.stiffness}
 
 
-def _density_factor_entry(material: MaterialSpec) -> dict[str, Any]:
-    """Describes the factor on the density, where there is one."""
-    return {} if material.density_factor == 1.0 else {"density_factor": plain(material.density_factor)}
+def _area_weight_factor_entry(material: MaterialSpec) -> dict[str, Any]:
+    """Describes the factor on the area weight, where there is one."""
+    factor = material.area_weight_factor
+    return {} if factor == 1.0 else {hashed_name("area_weight_factor"): plain(factor)}
 
 
 def _base(base: Material) -> dict[str, Any]:
     tables = {"stretching": base.stretching.tolist(), "bending": base.bending.tolist()}
     return {
         "name": base.name,
-        "density": base.density,
+        hashed_name("area_weight"): base.area_weight,
         "damping": base.damping,
         "tables": digest(canonical(tables)),
     }

@@ -54,7 +54,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> bytes:
             sensor=Sensor(name="cup"),
         )
         writer.wind(series)
-        writer.truth({"density": 0.2}, log_time=START)
+        writer.truth({"area_weight": 0.2}, log_time=START)
         writer.attach("log.csv", b"time,speed\n" * 9000, media_type="text/csv", log_time=START)
     return path.read_bytes()
 
@@ -76,7 +76,7 @@ def test_a_damaged_record_is_read_as_it_was_or_refused(record: bytes, tmp_path: 
             assert wind is not None
             np.testing.assert_array_equal(wind.channels["wind_speed"], np.linspace(1, 5, 20))
             opened.wind_1hz()
-            assert opened.truth == {"density": 0.2}
+            assert opened.truth == {"area_weight": 0.2}
             assert opened.metadata["camera"] == {"codec": "made"}
             assert opened.attachment("log.csv") == b"time,speed\n" * 9000
 

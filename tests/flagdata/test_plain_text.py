@@ -68,7 +68,7 @@ def test_a_table_of_cloths_is_read_however_it_was_saved(tmp_path: Path, saved: s
     path = tmp_path / "cloths.csv"
     path.write_bytes(TABLES[saved](CLOTHS))
     (one,) = read_cloths(path)
-    assert (one.film.name, one.fabric, one.density, one.bending_stiffness) == ("film.mp4", "felt", 0.24, 3.5e-5)
+    assert (one.film.name, one.fabric, one.area_weight, one.bending_stiffness) == ("film.mp4", "felt", 0.24, 3.5e-5)
     assert one.wind == (2.4, 0.3)
 
 
@@ -77,7 +77,7 @@ def test_blank_cells_and_rows_that_a_spreadsheet_leaves_are_none(tmp_path: Path,
     (tmp_path / "film.mp4").write_bytes(b"a film")
     path = tmp_path / "cloths.csv"
     path.write_text(CLOTHS.replace("\n", ends), encoding="utf-8")
-    assert [one.density for one in read_cloths(path)] == [0.24]
+    assert [one.area_weight for one in read_cloths(path)] == [0.24]
 
 
 def test_a_comma_that_may_be_decimal_or_of_thousands_is_refused(tmp_path: Path) -> None:

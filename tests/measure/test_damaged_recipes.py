@@ -125,10 +125,10 @@ def test_what_no_machine_can_simulate_is_refused_with_the_limit_that_was_passed(
 @pytest.mark.parametrize(
     ("line", "error"),
     [
-        ("density-factor = 1e29", InputError),
+        ("area-weight-factor = 1e29", InputError),
         ("stretching-factor = 1e300", InputError),
         ("damping = 1e300", InputError),
-        ("density-factor = 1e-8", LimitError),
+        ("area-weight-factor = 1e-8", LimitError),
         ("stretching-factor = 1e9", LimitError),
     ],
 )
@@ -137,7 +137,7 @@ def test_a_material_that_no_number_of_steps_can_simulate_is_refused_before_the_f
 ) -> None:
     text, read = FORMS["scene made ready"]
     with pytest.raises(error):
-        read(text.replace("density-factor = { low = 0.9, high = 1.1 }", line), tmp_path)
+        read(text.replace("area-weight-factor = { low = 0.9, high = 1.1 }", line), tmp_path)
 
 
 @pytest.mark.parametrize("name", ["scene.json", "material.json"])

@@ -47,7 +47,7 @@ def write_film(path: Path, wind: float, look: int, *, period: int = PERIOD) -> N
             )
         )
         bending = {f"bending.{index}": 3e-5 * 1.1**look for index in range(15)}
-        truth = {"wind_speed": wind, "density": 0.1 + 0.007 * (look % 10), **bending}
+        truth = {"wind_speed": wind, "area_weight": 0.1 + 0.007 * (look % 10), **bending}
         record.truth(truth, log_time=START)
 
 

@@ -79,7 +79,7 @@ class Passing(nn.Module):
 
 def regression() -> Learner:
     """A learner of two targets whose head passes the embedding on; means 5 and 0.2, deviations 2 and 0.1."""
-    learner = Learner(Passing(), loss=Loss.REGRESSION, targets=("wind_speed", "density"))
+    learner = Learner(Passing(), loss=Loss.REGRESSION, targets=("wind_speed", "area_weight"))
     assert isinstance(learner.head, nn.Linear)
     with torch.no_grad():
         learner.head.weight.copy_(torch.eye(2))

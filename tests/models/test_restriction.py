@@ -15,7 +15,7 @@ from models.restriction import ASPECT_SLACK, Known, restricted
 from models.targets import Scaling
 from tests.refusals import unrefused
 
-SCALING = Scaling(names=("wind_speed", "fabric_density", "anisotropy"))
+SCALING = Scaling(names=("wind_speed", "fabric_area_weight", "anisotropy"))
 DRAWS = 20_000
 
 
@@ -35,7 +35,7 @@ def _given(mixture: Mixture, *known: Known, draws: int = DRAWS):
     return SCALING.values(found.logits).numpy(), found.log_mass.numpy()
 
 
-def _weighed(text: str, *, clips: int = 2, name: str = "density") -> Known:
+def _weighed(text: str, *, clips: int = 2, name: str = "area_weight") -> Known:
     return Known.everywhere(name, parse(text), count=clips)
 
 
@@ -69,7 +69,7 @@ def test_draws_given_a_range_or_a_deviation_are_those_of_many_weighed_by_the_sta
 
 
 def test_one_gaussian_given_an_exact_value_is_the_conditional_gaussian_far_outside_as_well() -> None:
-    """Mean m + c (y − m_y)/v and variance s² − c²/v; the log density of the value is the normal one's."""
+    """Mean m + c (y − m_y)/v and variance s² − c²/v; the log area weight of the value is the normal one's."""
     mixture = _mixture(components=1, clips=1)
     covariance = (mixture.factor @ mixture.factor.mT)[0, 0].numpy()
     location = mixture.location[0, 0].numpy()
@@ -89,8 +89,8 @@ def test_one_gaussian_given_an_exact_value_is_the_conditional_gaussian_far_outsi
         deviation = (y - location[1]) / math.sqrt(covariance[1, 1])
         low, high = (float(bound[1]) for bound in SCALING.bounds)
         slope = (high - low) / ((value - low) * (high - value))  # of the logit
-        density = math.exp(-0.5 * deviation**2) / math.sqrt(2 * math.pi * covariance[1, 1]) * slope
-        assert math.exp(found.log_mass[0, 0]) == pytest.approx(density, rel=1e-9)
+        area_weight = math.exp(-0.5 * deviation**2) / math.sqrt(2 * math.pi * covariance[1, 1]) * slope
+        assert math.exp(found.log_mass[0, 0]) == pytest.approx(area_weight, rel=1e-9)
 
 
 def test_components_are_as_probable_as_the_value_makes_them() -> None:
@@ -153,7 +153,7 @@ def test_two_quantities_that_are_known_are_conditioned_on_together_in_any_order(
 
 def test_of_a_flag_that_was_measured_and_weighed_both_restrict_the_wind() -> None:
     """A Gaussian of wind, weight and aspect, all on logits: the wind's variance falls with each that is known."""
-    scaling = Scaling(names=("outdoor_wind", "fabric_density", "log_aspect"))
+    scaling = Scaling(names=("outdoor_wind", "fabric_area_weight", "log_aspect"))
     covariance = torch.tensor([[1.0, 0.7, 0.6], [0.7, 1.0, 0.1], [0.6, 0.1, 1.0]], dtype=torch.float64)
     mixture = Mixture(
         log_weight=torch.zeros((1, 1), dtype=torch.float64),
@@ -178,13 +178,13 @@ def test_each_draw_has_its_own_statement_and_one_that_is_impossible_has_no_mass(
     scale = np.tile([0.5, 1.0, 2.0, 4.0], (2, 2_500))
     for text, impossible in (("0.2", {0.5: False, 4.0: False, 2.0: False}), ("0.36", {0.5: True})):
         stated = parse(text)
-        values, log_mass = _given(mixture, Known.stated("density", stated, scale=scale), draws=10_000)
+        values, log_mass = _given(mixture, Known.stated("area_weight", stated, scale=scale), draws=10_000)
         for factor in (0.5, 1.0, 2.0, 4.0):
             chosen = scale == factor
             assert np.isneginf(log_mass[chosen]).all() == impossible.get(factor, False)
             if not impossible.get(factor, False):
                 np.testing.assert_allclose(values[..., 1][chosen], stated.low / factor, rtol=1e-9)
-    ranged, mass = _given(mixture, Known.stated("density", parse("0.2:0.3"), scale=scale), draws=10_000)
+    ranged, mass = _given(mixture, Known.stated("area_weight", parse("0.2:0.3"), scale=scale), draws=10_000)
     own = ranged[..., 1] * scale
     assert (own[scale > 0.5].min(), own[scale > 0.5].max()) == pytest.approx((0.2, 0.3), abs=0.002)
     assert np.isneginf(mass[scale == 0.5]).all()  # 0.4 to 0.6 kg/m² of 0.05 to 0.40
@@ -192,8 +192,8 @@ def test_each_draw_has_its_own_statement_and_one_that_is_impossible_has_no_mass(
 
 def test_a_statement_that_the_model_cannot_use_is_refused() -> None:
     cases = [
-        ("density", "0.01:0.10", "0.05 to 0.4"),
-        ("density", "0.5", "area weight is 0.5 kg/m²"),
+        ("area_weight", "0.01:0.10", "0.05 to 0.4"),
+        ("area_weight", "0.5", "area weight is 0.5 kg/m²"),
         ("bending_scale", "-4.0", "does not estimate the bending_scale"),
     ]
     refuse = unrefused(
@@ -208,7 +208,7 @@ def test_a_statement_that_the_model_cannot_use_is_refused() -> None:
 
 def test_ends_that_are_not_in_order_and_mixed_statements_are_refused() -> None:
     def known(low: list[float], high: list[float], sigma: list[float]) -> Known:
-        return Known(name="density", low=np.array([low]), high=np.array([high]), sigma=np.array([sigma]))
+        return Known(name="area_weight", low=np.array([low]), high=np.array([high]), sigma=np.array([sigma]))
 
     assert known([0.1], [0.2], [0.0]).exact is False
     cases = [
@@ -217,4 +217,4 @@ def test_ends_that_are_not_in_order_and_mixed_statements_are_refused() -> None:
         (([0.1], [0.2], [0.1]), "several ways"),
     ]
     assert unrefused(lambda ends: known(*ends), cases, InputError) == []
-    assert Known.everywhere("density", Stated(low=0.1, high=0.1), count=3).low.shape == (3, 1)
+    assert Known.everywhere("area_weight", Stated(low=0.1, high=0.1), count=3).low.shape == (3, 1)

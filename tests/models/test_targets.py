@@ -12,14 +12,14 @@ from flagdata.errors import InputError, UnknownNameError
 from flagdata.tables import ends
 from models.targets import TARGETS, Cloth, Scaling, truth
 
-NAMES = ("wind_speed", "density", "bending_scale", "anisotropy")
+NAMES = ("wind_speed", "area_weight", "bending_scale", "anisotropy")
 
 
 def test_bending_is_summed_up_by_its_mean_logarithm_and_by_warp_over_weft() -> None:
     """Warp (first five) 10⁻³, between 10⁻⁴, weft (last five) 10⁻⁵: mean −4, ratio 2 decades."""
     bending = np.repeat([1e-3, 1e-4, 1e-5], 5)
     parameters = {f"bending.{index}": np.array([value]) for index, value in enumerate(bending)}
-    parameters |= {"wind_speed": np.array([3.0]), "density": np.array([0.12])}
+    parameters |= {"wind_speed": np.array([3.0]), "area_weight": np.array([0.12])}
     assert truth(parameters, NAMES)[0] == pytest.approx([3.0, 0.12, -4.0, 2.0])
 
 
@@ -53,10 +53,10 @@ def test_clips_that_do_not_state_a_parameter_are_an_error_that_names_it() -> Non
 
 def test_the_papers_ranges_are_the_papers() -> None:
     assert (TARGETS["wind_speed"].low, TARGETS["wind_speed"].high) == (0.0, 10.0)
-    assert (TARGETS["density"].low, TARGETS["density"].high) == (0.10, 0.17)
+    assert (TARGETS["area_weight"].low, TARGETS["area_weight"].high) == (0.10, 0.17)
 
 
-CLOTH = ("cloth_wind", "cloth_density", "cloth_bending")
+CLOTH = ("cloth_wind", "cloth_area_weight", "cloth_bending")
 
 
 def test_a_quantity_has_one_name_whatever_cloth_it_is_of() -> None:
@@ -68,17 +68,17 @@ def test_a_quantity_has_one_name_whatever_cloth_it_is_of() -> None:
 
 def test_the_truth_of_hanging_cloth_is_read_from_the_same_parameters() -> None:
     parameters = {f"bending.{index}": np.array([1e-4]) for index in range(15)}
-    parameters |= {"wind_speed": np.array([3.0]), "density": np.array([0.3])}
+    parameters |= {"wind_speed": np.array([3.0]), "area_weight": np.array([0.3])}
     assert truth(parameters, CLOTH)[0] == pytest.approx([3.0, 0.3, -4.0])
 
 
 def test_no_weight_of_hanging_cloth_is_cut_to_the_range_of_flags() -> None:
-    scaling = Scaling(names=("cloth_density",))
+    scaling = Scaling(names=("cloth_area_weight",))
     values = torch.tensor([[0.08], [0.30], [0.45]])
     torch.testing.assert_close(scaling.values(scaling.learned(values)), values, rtol=1e-4, atol=1e-5)
 
 
-@pytest.mark.parametrize("names", [("wind_speed", "cloth_density"), ("density", "density")])
+@pytest.mark.parametrize("names", [("wind_speed", "cloth_area_weight"), ("area_weight", "area_weight")])
 def test_targets_of_two_kinds_of_cloth_or_named_twice_are_refused(names: tuple[str, ...]) -> None:
     with pytest.raises(InputError, match=names[1]):
         Scaling(names=names)
@@ -90,12 +90,12 @@ def test_the_ranges_of_hanging_cloth_hold_all_that_its_scene_can_draw() -> None:
 
     scene = load("hanging-cloth-wide")
     spec = scene.material
-    density = [base.density * factor for base in spec.bases for factor in ends(spec.density_factor)]
+    area_weight = [base.area_weight * factor for base in spec.bases for factor in ends(spec.area_weight_factor)]
     own = [float(np.log10(base.bending).mean()) for base in spec.bases]
     bending = [scale + math.log10(factor) for scale in own for factor in ends(spec.bending)]
     for name, drawn in (
         ("cloth_wind", ends(scene.wind.speed)),
-        ("cloth_density", density),
+        ("cloth_area_weight", area_weight),
         ("cloth_bending", bending),
     ):
         target = TARGETS[name]
@@ -107,19 +107,19 @@ def test_the_ranges_of_hanging_cloth_hold_all_that_its_scene_can_draw() -> None:
 def test_values_beyond_a_range_are_counted_with_how_far_they_reach() -> None:
     """Those within the range, or within the 0.5 % that it is widened by at each end, are learned as they are."""
     values = np.array([[0.0, 0.12], [10.04, 0.17], [10.06, 0.13], [15.9, np.nan]])
-    (said,) = Scaling(names=("wind_speed", "density")).beyond(values)
+    (said,) = Scaling(names=("wind_speed", "area_weight")).beyond(values)
     assert said == "2 of 4 clips lie beyond the range of the target wind_speed, 0 to 10 m/s: they reach from 0 to 15.9"
-    Scaling(names=("wind_speed", "density")).check(values[:2], where="here")
+    Scaling(names=("wind_speed", "area_weight")).check(values[:2], where="here")
 
 
 def test_a_target_of_the_same_cloth_whose_range_is_wide_enough_is_offered() -> None:
     heavy = np.array([[0.2], [0.3]])
     with pytest.raises(InputError, match=r"0\.1 to 0\.17 kg/m²: they reach from 0\.2 to 0\.3") as caught:
-        Scaling(names=("density",)).check(heavy, where="the training side")
+        Scaling(names=("area_weight",)).check(heavy, where="the training side")
     assert caught.value.where == "the training side"
-    assert caught.value.fix.startswith("name the target fabric_density in [loss] targets")
+    assert caught.value.fix.startswith("name the target fabric_area_weight in [loss] targets")
     with pytest.raises(InputError) as caught:
-        Scaling(names=("density",)).check(10 * heavy, where="the training side")
+        Scaling(names=("area_weight",)).check(10 * heavy, where="the training side")
     assert caught.value.fix.startswith("leave that target out, or train on a data set")
 
 
@@ -141,8 +141,8 @@ def test_the_ranges_of_flags_outdoors_hold_all_that_their_data_sets_can_draw() -
         assert recipe.groups is not None
         scene, material = recipe.simulation.scene, recipe.simulation.material
         assert ends(recipe.simulation.wind.speed) == (TARGETS["outdoor_wind"].low, TARGETS["outdoor_wind"].high)
-        assert material.density is not None
-        assert ends(material.density) == (TARGETS["fabric_density"].low, TARGETS["fabric_density"].high)
+        assert material.area_weight is not None
+        assert ends(material.area_weight) == (TARGETS["fabric_area_weight"].low, TARGETS["fabric_area_weight"].high)
         aspects = [math.log(scene.width / height) for height in ends(recipe.groups.height)]
         assert TARGETS["log_aspect"].low < min(aspects)
         assert max(aspects) < TARGETS["log_aspect"].high

@@ -24,7 +24,7 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a model of flags and one of hanging cloth."""
     folder = tmp_path_factory.mktemp("models")
     written(folder / "model", TARGETS)
-    written(folder / "cloth", ("cloth_wind", "cloth_density", "cloth_bending"))
+    written(folder / "cloth", ("cloth_wind", "cloth_area_weight", "cloth_bending"))
     return folder
 
 

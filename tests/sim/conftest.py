@@ -19,7 +19,7 @@ from sim.system import System
 from sim.tables import Evaluation
 from sim.wind import UniformWind
 
-PLAIN = isotropic(name="plain", density=0.2, stretching=50.0, shear=40.0, bending=1e-4)
+PLAIN = isotropic(name="plain", area_weight=0.2, stretching=50.0, shear=40.0, bending=1e-4)
 """Constant stiffness, no damping: its forces derive from an energy."""
 
 

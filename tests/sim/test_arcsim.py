@@ -71,7 +71,7 @@ def test_a_scene_is_what_it_says(write: Write) -> None:
     assert scene.handles.stiffness == 1e3
     assert (scene.wind, scene.gravity) == ((4, 1, 0), (0, 0, -9.8))
     assert scene.air == QuadraticNormal(density=1.0, drag=0.0)
-    assert (scene.material.density, scene.material.damping) == (0.284, 0.0)
+    assert (scene.material.area_weight, scene.material.damping) == (0.284, 0.0)
     np.testing.assert_array_equal(scene.mesh.rest, [[0, 0], [1, 0], [1, 1], [0, 1]])
 
 
@@ -93,7 +93,7 @@ def test_a_mesh_is_scaled_then_turned_then_moved(write: Write) -> None:
 def test_thickening_scales_density_and_both_tables(write: Write) -> None:
     entry = {"data": "m.json", "thicken": 2, "density_mult": 3, "bending_mult": 5, "damping": 1e-3}
     material = read_scene(write(cloth(materials=[entry]))).scene.material
-    assert material.density == pytest.approx(0.284 * 6)
+    assert material.area_weight == pytest.approx(0.284 * 6)
     np.testing.assert_allclose(material.stretching, 2 * np.array(MATERIAL["stretching"]))
     np.testing.assert_allclose(material.bending, 1e-4)
     assert material.damping == 1e-3
@@ -186,7 +186,11 @@ def test_a_scene_that_is_written_comes_back(
     np.testing.assert_allclose(read.scene.mesh.rest, scene.mesh.rest, rtol=1e-8)  # nine digits
     np.testing.assert_allclose(read.scene.position, scene.position, rtol=1e-8)
     material = read.scene.material
-    assert (material.name, material.density, material.damping) == ("gray-interlock", scene.material.density, 1e-3)
+    assert (material.name, material.area_weight, material.damping) == (
+        "gray-interlock",
+        scene.material.area_weight,
+        1e-3,
+    )
     np.testing.assert_array_equal(material.stretching, scene.material.stretching)
     np.testing.assert_array_equal(material.bending, scene.material.bending)
     with pytest.raises(ConflictError, match="exists"):
@@ -242,7 +246,7 @@ def test_impossible_scenes_are_refused(write: Write) -> None:
         ({"duration": None}, InputError, "given 0 times"),
         ({"end_time": 3}, InputError, "given 2 times"),
         ({"duration": 0.01}, InputError, "at least one frame"),
-        (cloth(materials=[{"data": "m.json", "density_mult": -1}]), InputError, "density"),
+        (cloth(materials=[{"data": "m.json", "density_mult": -1}]), InputError, "area weight"),
         (
             {**cloth(materials=[{"data": "m.json", "strain_limits": 1.05}]), "disable": ["remeshing", "collision"]},
             InputError,
@@ -309,7 +313,7 @@ def test_the_papers_own_scene_has_its_contact_and_limits(papers_scene: Scene) ->
     assert scene.contact == Contact(thickness=0.01, stiffness=1e6, friction=0.6)
     assert scene.limits == StrainLimits(low=0.95, high=1.05, sweeps=SWEEPS)
     # thicken = 2
-    np.testing.assert_allclose(scene.material.density, 2 * named("camel-ponte-roma").density, rtol=1e-9)
+    np.testing.assert_allclose(scene.material.area_weight, 2 * named("camel-ponte-roma").area_weight, rtol=1e-9)
 
 
 def centre(positions: NDArray[np.floating], mesh: Mesh | MeshFrame) -> FloatArray:

@@ -122,7 +122,7 @@ def test_a_patch_slides_to_rest_as_coulomb_says() -> None:
         rest=np.concatenate([base.rest, patch.rest + np.array([5.0, 0.0])]),
         faces=np.concatenate([base.faces, patch.faces + base.vertex_count]),
     )
-    material = isotropic(name="stiff", density=0.3, stretching=2000.0, shear=2000.0, bending=1e-3, damping=2e-4)
+    material = isotropic(name="stiff", area_weight=0.3, stretching=2000.0, shear=2000.0, bending=1e-3, damping=2e-4)
     handles = Handles(vertices=tuple(range(base.vertex_count)), stiffness=math.inf)
     friction = 0.5
     system, state = make_system(mesh, [material], handles=handles, gravity=(0.0, 0.0, -G))

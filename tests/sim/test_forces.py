@@ -106,7 +106,7 @@ def test_uniaxial_stretch_pulls_with_stiffness_times_strain(distorted) -> None:
 def test_fold_angle_and_moment_of_two_triangles_by_hand() -> None:
     # A square folded along its diagonal by 60° into a valley: θ = π/3; S = 2/(2 · 1) = 1; α = ½ θ √2 = 0.740 1/m.
     material = Material(
-        name="m", source="test", density=1.0, damping=0.0, stretching=np.ones((6, 4)), bending=np.full((3, 5), 0.3)
+        name="m", source="test", area_weight=1.0, damping=0.0, stretching=np.ones((6, 4)), bending=np.full((3, 5), 0.3)
     )
     mesh = Mesh(rest=[[0, 0], [1, 0], [1, 1], [0, 1]], faces=[[0, 1, 2], [0, 2, 3]])
     system, _ = make_system(mesh, [material])

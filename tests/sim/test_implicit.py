@@ -65,7 +65,7 @@ def test_a_free_mass_point_under_gravity_falls_as_the_method_says(distorted) -> 
 
 
 def test_backward_euler_converges_to_leapfrog_with_first_order() -> None:
-    material = isotropic(name="soft", density=0.3, stretching=20.0, shear=20.0, bending=1e-4, damping=1e-3)
+    material = isotropic(name="soft", area_weight=0.3, stretching=20.0, shear=20.0, bending=1e-4, damping=1e-3)
     mesh = grid(width=0.4, height=0.3, columns=4, rows=3)
     handles = Handles(vertices=(0, 3), stiffness=math.inf)
     system, state = make_system(mesh, [material], handles=handles, gravity=(1.0, 0.0, -9.81), wind=(3.0, 0.0, 0.0))
@@ -82,7 +82,7 @@ def test_backward_euler_converges_to_leapfrog_with_first_order() -> None:
 def test_backward_euler_damps_a_slow_mode_as_declared_damping_of_one_step_does() -> None:
     # A linear mode with ω h ≪ 1: backward Euler multiplies it by 1/√(1 + ω² h²) ≈ exp(−ω² h²/2) a step, Kelvin–Voigt
     # damping d by exp(−d ω² h/2): the same for d = h. Here ω ≈ √(K/ρ)/width · √2 ≈ 14/s, so that ω h = 0.07.
-    spring = isotropic(name="spring", density=1.0, stretching=100.0, shear=0.0, bending=0.0)
+    spring = isotropic(name="spring", area_weight=1.0, stretching=100.0, shear=0.0, bending=0.0)
     mesh = grid(width=1.0, height=0.5, columns=1, rows=1)
     handles = Handles(vertices=(0, 1), stiffness=math.inf)
     h = 5e-3

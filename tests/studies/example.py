@@ -31,7 +31,7 @@ RATE, SECONDS = 25, 12
 GIVEN = {
     "count": 1,
     "batch": 1,
-    "material": {"density": 0.18},
+    "material": {"area-weight": 0.18},
     "wind": {"speed": 5.0},
     "effects": {"gusts": {"intensity": 0.15}},
     "time": {"settle": 3.0, "frames": RATE * SECONDS, "rate": float(RATE)},
@@ -52,7 +52,7 @@ clock-offset = {offset}  # s, added to the film's clock to reach the log's
 
 [truth]  # what was simulated, SI
 wind_speed = {wind:.3f}  # mean over the film
-density = {density}
+area_weight = {area_weight}
 damping = {damping:.5f}
 """
 
@@ -99,7 +99,7 @@ def make(folder: Path, *, seed: int) -> None:
             height=recipe.scene.height,
             offset=OFFSET,
             wind=wind,
-            density=member.parameters["density"],
+            area_weight=member.parameters["area_weight"],
             damping=member.parameters["damping"],
         ),
         encoding="utf-8",

@@ -54,7 +54,7 @@ def energy_drift(*, duration: float, share: float) -> FloatArray:
         duration: [s].
         share: step over the stability limit.
     """
-    plain = isotropic(name="plain", density=0.2, stretching=60.0, shear=60.0, bending=2e-3)
+    plain = isotropic(name="plain", area_weight=0.2, stretching=60.0, shear=60.0, bending=2e-3)
     system, state = build(KICKED_MESH, [plain])
     state = kicked(state)
     total = float(sum(system.energies(state).values()))
@@ -73,16 +73,16 @@ def hung_strip(rows: int) -> tuple[float, float]:
     Without Poisson effect the strip is a bar in tension: K λ (λ² − 1)/2 = ρ g (L − s) at distance s below the support,
     K the membrane stiffness, and the lower end at ∫ λ ds.
     """
-    length, stiffness, density = 1.0, 30.0, 0.3
+    length, stiffness, area_weight = 1.0, 30.0, 0.3
 
     def stretch(s: float) -> float:
-        pull = density * G * (length - s) / stiffness
+        pull = area_weight * G * (length - s) / stiffness
         return brentq(lambda x: x * (x * x - 1) / 2 - pull, 0.5, 3.0, xtol=1e-15)
 
     expected = quad(stretch, 0, length, epsabs=1e-13)[0]
     mesh = grid(width=0.2, height=length, columns=2, rows=rows)
     top = tuple(int(i) for i in np.flatnonzero(mesh.rest[:, 1] > length - 1e-9))
-    material = isotropic(name="bar", density=density, stretching=stiffness, shear=30.0, bending=0.0)
+    material = isotropic(name="bar", area_weight=area_weight, stretching=stiffness, shear=30.0, bending=0.0)
     held = Handles(vertices=top, stiffness=math.inf)
     system, state = build(mesh, [material], handles=held, gravity=(0.0, 0.0, -G))
     final = settle(system, state)
@@ -109,7 +109,9 @@ def elastica_tip(rigidity: float, weight: float, length: float) -> tuple[float, 
     return float(solution.y[2, -1]), float(solution.y[3, -1])
 
 
-def drooped_tips(tables: Sequence[float], *, columns: int, length: float = 0.15, density: float = 0.2) -> FloatArray:
+def drooped_tips(
+    tables: Sequence[float], *, columns: int, length: float = 0.15, area_weight: float = 0.2
+) -> FloatArray:
     """Tips of strips clamped level in gravity, (table, 2): out and down [m].
 
     The flexural rigidity B of the grid with alternating diagonals, by hand: let the lines along the strip turn by a at
@@ -123,12 +125,13 @@ def drooped_tips(tables: Sequence[float], *, columns: int, length: float = 0.15,
         tables: bending stiffness k = 5 B of each strip [N·m].
         columns: cells along the strip.
         length: free length [m].
-        density: [kg/m²].
+        area_weight: [kg/m²].
     """
     cell = length / (columns - 0.5)
     mesh = grid(width=cell * columns, height=cell, columns=columns, rows=1)
     materials = [
-        isotropic(name=f"k{k}", density=density, stretching=400.0, shear=400.0, bending=k, damping=2e-5) for k in tables
+        isotropic(name=f"k{k}", area_weight=area_weight, stretching=400.0, shear=400.0, bending=k, damping=2e-5)
+        for k in tables
     ]
     clamp = tuple(int(i) for i in np.flatnonzero(mesh.rest[:, 0] < 1.5 * cell))
     flat = np.concatenate([mesh.rest, np.zeros((mesh.vertex_count, 1))], axis=1)
@@ -149,7 +152,7 @@ def swing(mode: int, *, rows: int) -> tuple[float, float]:
     length = 1.0
     mesh = grid(width=3 * length / rows, height=length, columns=1, rows=rows)
     top = tuple(int(i) for i in np.flatnonzero(mesh.rest[:, 1] > length - 1e-9))
-    material = isotropic(name="limp", density=0.2, stretching=2000.0, shear=2000.0, bending=0.0)
+    material = isotropic(name="limp", area_weight=0.2, stretching=2000.0, shear=2000.0, bending=0.0)
     held = Handles(vertices=top, stiffness=math.inf)
     system, state = build(mesh, [material], handles=held, gravity=(0.0, 0.0, -G))
     root = float(jn_zeros(0, mode)[-1])
@@ -191,10 +194,10 @@ def fall(duration: float, *, steps: int, looks: int = 1) -> FloatArray:
         steps: in all.
         looks: how often to look; a divisor of `steps`.
     """
-    density, air = 0.15, 1.2
+    area_weight, air = 0.15, 1.2
     mesh = grid(width=0.3, height=0.3, columns=3, rows=3)
     flat = np.concatenate([mesh.rest, np.zeros((mesh.vertex_count, 1))], axis=1)
-    material = isotropic(name="sheet", density=density, stretching=50.0, shear=50.0, bending=1e-4)
+    material = isotropic(name="sheet", area_weight=area_weight, stretching=50.0, shear=50.0, bending=1e-4)
     system, state = build(mesh, [material], position=flat, gravity=(0.0, 0.0, -G), air=QuadraticNormal(density=air))
     terminal, mass = terminal_velocity(), system.cloth.mass[:, 0]
     rows = []
@@ -269,6 +272,6 @@ def edge_statistics(columns: int, *, seed: int, wind: float, members: int, share
 
 def _tip_power(across: NDArray[np.floating]) -> FloatArray:
     """(member, octave) mean square of a displacement (frame, member) in each of `OCTAVES`, from pieces of 4 s."""
-    frequency, density = welch(across.astype(np.float64), fs=1 / FRAME, nperseg=100, detrend="linear", axis=0)
+    frequency, area_weight = welch(across.astype(np.float64), fs=1 / FRAME, nperseg=100, detrend="linear", axis=0)
     inside = [(low <= frequency) & (frequency < high) for low, high in OCTAVES]
-    return np.stack([density[band].sum(0) * frequency[1] for band in inside], axis=1)
+    return np.stack([area_weight[band].sum(0) * frequency[1] for band in inside], axis=1)

@@ -1,4 +1,4 @@
-"""Inertia against wind and gravity: whether frame rate, wind, unit and density are those of one and the same cloth.
+"""Inertia against wind and gravity: whether frame rate, wind, unit and area weight are those of one and the same cloth.
 
 Reactions at pins on a line have no moment about it, nor have internal forces at all, so that the cloth's moment of
 momentum changes by what the air and gravity give. All but the wind's speed is observed or nominal: the speed at which
@@ -61,7 +61,7 @@ class MarkerMotion:
             position=at[1:-1],
             velocity=(at[2:] - at[:-2]) / (2 * step),
             acceleration=(at[2:] - 2 * at[1:-1] + at[:-2]) / step**2,
-            mass=specimen.material.density * specimen.mesh.vertex_areas,
+            mass=specimen.material.area_weight * specimen.mesh.vertex_areas,
         )
 
 
@@ -81,7 +81,7 @@ def check_inertia(recording: Trajectory, specimen: Specimen) -> tuple[Finding, .
             where=f"recording {recording.name!r}",
             value=factor,
             fix=f"check the unit of the wind (km/h are {1 / 3.6:.2g} m/s), the frame rate ({recording.rate:.4g} Hz; "
-            f"{recording.rate / factor:.3g} Hz would fit) and the cloth's density",
+            f"{recording.rate / factor:.3g} Hz would fit) and the cloth's area weight",
         ),
     )
 

@@ -165,7 +165,7 @@ def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
     square = float(np.median((second**2).sum(axis=2).mean(axis=0))) - 18 * recording.noise**2
     typical = math.sqrt(max(square, 0.0)) * rate**2
     weight = float(np.linalg.norm(specimen.gravity))
-    expected = weight + _pressure(specimen, recording.wind) / specimen.material.density
+    expected = weight + _pressure(specimen, recording.wind) / specimen.material.area_weight
     where = f"recording {recording.name!r}"
     if typical > _WILD * expected:
         raise InputError(
@@ -197,7 +197,7 @@ def _pressure(specimen: Specimen, wind: WindTrack) -> float:
 
 def _ratio(specimen: Specimen, wind: WindTrack) -> float:
     """Computes ρU²/(m g); infinite without gravity."""
-    weight = specimen.material.density * float(np.linalg.norm(specimen.gravity))
+    weight = specimen.material.area_weight * float(np.linalg.norm(specimen.gravity))
     return _pressure(specimen, wind) / weight if weight else math.inf
 
 

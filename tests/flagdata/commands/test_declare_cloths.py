@@ -62,11 +62,11 @@ def clips(lake: Lake) -> dict[str, dict[str, Any]]:
 
 
 def test_clips_know_their_cloth_and_the_wind_where_it_is_stated(declared: Declared) -> None:
-    assert [one["parameters"]["density"] for one in declared.said["recordings"]] == [0.24, 0.06]
+    assert [one["parameters"]["area_weight"] for one in declared.said["recordings"]] == [0.24, 0.06]
     felt, silk = clips(declared.lake)["felt"], clips(declared.lake)["silk"]
     assert json.loads(felt["parameters"]) == {
         "fabric": "felt",
-        "density": 0.24,
+        "area_weight": 0.24,
         "bending_stiffness": 3e-5,
         "wind_level": "W2",
     }
@@ -80,7 +80,7 @@ def test_clips_know_their_cloth_and_the_wind_where_it_is_stated(declared: Declar
 
 def test_pairs_have_the_measured_area_weight_as_simulated_ones_have_theirs(declared: Declared) -> None:
     pairs = flagdata.open(declared.lake.path).pairs(where="wind > 0")
-    assert pairs.table.parameters_of(0) == {"density": 0.06}
+    assert pairs.table.parameters_of(0) == {"area_weight": 0.06}
 
 
 def test_the_recording_without_wind_has_the_cameras_frames(declared: Declared) -> None:
@@ -106,7 +106,7 @@ def test_the_same_table_again_adds_nothing_and_another_area_weight_is_another_re
     other.write_text(declared.table.read_text().replace("0.24", "0.25"))
     assert run(other)[0] == 0
     rows = lake.rows("kind = 'recording' and name = 'felt'", columns=["parameters"]).to_pylist()
-    assert sorted(json.loads(row["parameters"])["density"] for row in rows) == [0.24, 0.25]
+    assert sorted(json.loads(row["parameters"])["area_weight"] for row in rows) == [0.24, 0.25]
 
 
 def test_a_wrong_row_leaves_the_lake_as_it_was(run: Run, lake: Lake, declared: Declared) -> None:

@@ -69,7 +69,7 @@ def numbers(table: pa.Table) -> list[int]:
 def test_a_filter_keeps_exactly_the_rows_it_holds_for() -> None:
     assert numbers(select(HandWritten(), "kind = 'clip' and wind between 3 and 6")) == [3, 4]
     assert numbers(select(HandWritten(), "list_contains(quality, 'stale')")) == [3]
-    assert numbers(select(HandWritten(), "(parameters->>'density')::double < 0.3")) == [4]
+    assert numbers(select(HandWritten(), "(parameters->>'area_weight')::double < 0.3")) == [4]
 
 
 @given(

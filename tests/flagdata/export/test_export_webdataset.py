@@ -36,7 +36,7 @@ def test_webdataset_gives_back_ground_truth_identity_and_instants(known: Any, tm
         assert label["artifact"] == known.clips[number]
         assert (label["recording"], label["session"], label["day"]) == (known.recording, "pier", "2026-05-01")
         assert label["frame_times"] == known.times[30 * number : 30 * number + 30].tolist()
-    assert samples[0]["json"]["parameters"] == {"density": 0.2}
+    assert samples[0]["json"]["parameters"] == {"area_weight": 0.2}
     assert samples[1]["json"]["parameters"] is None
     assert samples[2]["json"]["parameters"] == {"damping": None}  # JSON has no NaN
     assert samples[1]["json"]["quality"] == ["wind-stale"]

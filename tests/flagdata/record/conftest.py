@@ -56,7 +56,7 @@ def write(pictures: np.ndarray, series: WindSeries) -> Callable[..., Path]:
                 time = START + k * PERIOD
                 writer.frame(log_time=time, publish_time=time - DEVICE_LAG, timestamp=time + EXPOSURE, image=image)
             writer.wind(series)
-            writer.truth({"bending": 1e-6, "density": 0.284}, log_time=START)
+            writer.truth({"bending": 1e-6, "area_weight": 0.284}, log_time=START)
             writer.attach("log.csv", b"time,speed\n" * 20_000, media_type="text/csv", log_time=START)
             writer.attach("note.txt", b"by hand", media_type="text/plain", log_time=START)
         return path

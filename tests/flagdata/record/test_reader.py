@@ -77,7 +77,7 @@ def test_means_over_a_second_are_those_of_the_usable_samples(sample: Path, serie
 
 def test_truth_metadata_and_attachments_read_back(sample: Path) -> None:
     record = Record.open(sample)
-    assert record.truth == {"bending": 1e-6, "density": 0.284}
+    assert record.truth == {"bending": 1e-6, "area_weight": 0.284}
     assert record.metadata["camera"] == {"codec": "test"}
     assert record.metadata["provenance"] == {"a": "ü"}
     assert set(record.attachments) == {"log.csv", "note.txt"}

@@ -187,10 +187,10 @@ def test_wind_truth_names_and_quality_are_refused_the_second_time_or_out_of_rang
         with pytest.raises(ConflictError):
             record.wind(series)
         with pytest.raises(InputError, match="nan"):
-            record.truth({"density": float("nan")}, log_time=1)
-        record.truth({"density": 1.0}, log_time=1)
+            record.truth({"area_weight": float("nan")}, log_time=1)
+        record.truth({"area_weight": 1.0}, log_time=1)
         with pytest.raises(ConflictError):
-            record.truth({"density": 1.0}, log_time=2)
+            record.truth({"area_weight": 1.0}, log_time=2)
         record.attach("a", b"1", media_type="text/plain", log_time=1)
         with pytest.raises(ConflictError):
             record.attach("a", b"2", media_type="text/plain", log_time=1)

@@ -29,7 +29,7 @@ from sim.run import Crew, of_content
 from tests.measure.report.verdicts import Size, verdict
 from tests.program import invoke
 
-FITTED = {"density": (1.0, 1.1), "bending": (1.6, 0.7), "damping": (0.004, 0.003)}
+FITTED = {"area_weight": (1.0, 1.1), "bending": (1.6, 0.7), "damping": (0.004, 0.003)}
 """Before and after the effect was added; damping in seconds, the others of nominal."""
 
 
@@ -162,14 +162,14 @@ def test_newer_code_leaves_its_verdict_and_models_under_the_same_names(
 
 def test_the_identity_is_that_of_all_that_was_known(specimen: Specimen) -> None:
     base = fingerprint(experiment(specimen))
-    heavier = replace(specimen, material=specimen.material.scaled(density=1.01))
+    heavier = replace(specimen, material=specimen.material.scaled(area_weight=1.01))
     moved = replace(specimen, anchors=specimen.anchors + 1e-3)
     others = [
         experiment(specimen, speed=4.1),
         experiment(heavier),
         experiment(moved),
         experiment(replace(specimen, stiffness=math.inf)),
-        experiment(replace(specimen, density_uncertainty=0.02)),
+        experiment(replace(specimen, area_weight_uncertainty=0.02)),
         experiment(replace(specimen, mass_known=False)),
     ]
     (seen,) = experiment(specimen).recordings
@@ -206,14 +206,14 @@ def test_a_model_has_the_parameters_of_the_verdict(specimen: Specimen, place: in
     text = to_toml(model.content)
     crew = Crew(of_content(tomllib.loads(text), name="x", folder=Path(), where="x"))
     member, nominal = crew.member(0), named("camel-ponte-roma")
-    density, bending, damping = (values[stage] for values in FITTED.values())
-    assert member.scene.material.density == pytest.approx(nominal.density * density)
+    area_weight, bending, damping = (values[stage] for values in FITTED.values())
+    assert member.scene.material.area_weight == pytest.approx(nominal.area_weight * area_weight)
     np.testing.assert_allclose(member.scene.material.bending, nominal.bending * bending)
     np.testing.assert_allclose(member.scene.material.stretching, nominal.stretching)
     assert member.scene.material.damping == pytest.approx(damping)
     assert member.wind_speed == 5.0
     assert {name: dict(values) for name, values in member.effects.items()} == (
-        {} if place == 0 else {"lift": {"coefficient": 0.62, "density": pytest.approx(1.225, abs=0.1)}}
+        {} if place == 0 else {"lift": {"coefficient": 0.62, "area_weight": pytest.approx(1.225, abs=0.1)}}
     )
     np.testing.assert_allclose(crew.mesh.rest, specimen.mesh.rest)
     np.testing.assert_array_equal(crew.mesh.faces, specimen.mesh.faces)

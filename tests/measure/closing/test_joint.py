@@ -114,7 +114,7 @@ def test_an_upper_limit_is_not_combined_and_opposite_signs_are_apart() -> None:
 def test_the_cloth_of_markers_is_brought_to_the_films_units_and_the_page_has_both_kinds() -> None:
     markers = replace(
         judged(Conclusion.EFFECT, 0.02),
-        parameters=(Parameter(name="density", before=interval(1.1, 0.1), after=interval(1.0, 0.1), shift=None),),
+        parameters=(Parameter(name="area_weight", before=interval(1.1, 0.1), after=interval(1.0, 0.1), shift=None),),
     )
     films = replace(
         judged(Conclusion.EFFECT, 0.01),

@@ -33,7 +33,7 @@ def test_the_files_are_an_experiment_without_findings_that_matter(made: Tracks) 
 def test_neither_file_states_what_acted(made: Tracks) -> None:
     recipe = made.recipe.read_text(encoding="utf-8")
     assert not [effect for effect in EFFECTS if effect in recipe]
-    assert set(tomllib.loads(recipe)) == {"title", "cloth", "material", "pins", "recording"}
+    assert set(tomllib.loads(recipe)) == {"title", "cloth", "material", "attachment", "recording"}
     assert made.table.read_text(encoding="utf-8").startswith("recording,frame,marker,u,v,x,y,z\n")
 
 

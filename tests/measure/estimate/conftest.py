@@ -24,7 +24,7 @@ from models.storage import WEIGHTS, renew, tensor_bytes, write_card, write_tenso
 from models.wave import WaveNetwork
 
 FRAMES, SIZE, RATE = 12, 24, 25.0
-TARGETS = ("wind_speed", "density", "bending_scale", "anisotropy")
+TARGETS = ("wind_speed", "area_weight", "bending_scale", "anisotropy")
 
 
 def pictures(count: int, *, seed: int = 3, height: int = 32, width: int = 40) -> UInt8Array:
@@ -89,7 +89,9 @@ def model(model_folder: Path) -> Estimator:
 @pytest.fixture(scope="session")
 def cloth_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model of hanging cloth as a folder."""
-    return written(tmp_path_factory.mktemp("cloth") / "small-cloth", ("cloth_wind", "cloth_density", "cloth_bending"))
+    return written(
+        tmp_path_factory.mktemp("cloth") / "small-cloth", ("cloth_wind", "cloth_area_weight", "cloth_bending")
+    )
 
 
 @pytest.fixture(scope="session")

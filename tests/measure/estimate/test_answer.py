@@ -25,10 +25,22 @@ WIND = Quantity(
     name="wind_speed", unit="m/s", value=4.3, sigma=0.27, span=whole(3.9, 4.8), assumed=(0.0, 10.0), information=1.9
 )
 WEIGHT = Quantity(
-    name="density", unit="kg/m²", value=0.13, sigma=0.014, span=whole(0.11, 0.16), assumed=(0.1, 0.17), information=0.3
+    name="area_weight",
+    unit="kg/m²",
+    value=0.13,
+    sigma=0.014,
+    span=whole(0.11, 0.16),
+    assumed=(0.1, 0.17),
+    information=0.3,
 )
 UNCONSTRAINED = Quantity(
-    name="density", unit="kg/m²", value=0.135, sigma=0.02, span=whole(0.1, 0.17), assumed=(0.1, 0.17), information=0.001
+    name="area_weight",
+    unit="kg/m²",
+    value=0.135,
+    sigma=0.02,
+    span=whole(0.1, 0.17),
+    assumed=(0.1, 0.17),
+    information=0.001,
 )
 STRONG = Quantity(
     name="wind_speed",
@@ -87,7 +99,7 @@ def test_draws_at_both_ends_of_the_range_give_no_value() -> None:
 
 def test_the_weight_of_a_small_flag_is_given_to_a_gram() -> None:
     small = Quantity(
-        name="density",
+        name="area_weight",
         unit="kg/m²",
         value=0.0325,
         sigma=0.003,
@@ -126,8 +138,8 @@ def found(
 def test_a_posterior_equal_to_the_prior_gives_no_value_and_a_narrow_one_does() -> None:
     rng = stream(2, "told")
     prior = rng.uniform(0.1, 0.17, size=(5000, 1))
-    assert not found(rng.uniform(0.1, 0.17, size=(400, 1)), prior, "density", assumed=(0.1, 0.17)).constrained
-    assert found(rng.normal(0.13, 0.01, size=(400, 1)), prior, "density", assumed=(0.1, 0.17)).constrained
+    assert not found(rng.uniform(0.1, 0.17, size=(400, 1)), prior, "area_weight", assumed=(0.1, 0.17)).constrained
+    assert found(rng.normal(0.13, 0.01, size=(400, 1)), prior, "area_weight", assumed=(0.1, 0.17)).constrained
 
 
 def test_the_interval_contains_its_share_of_the_draws() -> None:

@@ -14,8 +14,8 @@ from measure.estimate import CARD_KEY, UNKNOWN, Dependence, combined, of_model
 from measure.estimate.combine import effective
 from models.estimator import Estimator
 
-CLOTH = ("density",)
-BOTH = ("wind_speed", "density")
+CLOTH = ("area_weight",)
+BOTH = ("wind_speed", "area_weight")
 
 
 def posterior(observed: float, noise: float, n: int, rng: np.random.Generator) -> FloatArray:

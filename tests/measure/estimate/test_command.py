@@ -74,7 +74,7 @@ def record(path: Path, *, seed: int) -> None:
                 sensor=Sensor(name="cup"),
             )
         )
-        writer.truth({"wind_speed": 4.0, "density": 0.12}, log_time=START)
+        writer.truth({"wind_speed": 4.0, "area_weight": 0.12}, log_time=START)
 
 
 @pytest.fixture
@@ -129,7 +129,7 @@ def test_python_gives_the_answer_of_the_command_as_arrays(film: Path, model_fold
     assert found.draws["wind_speed"].mean() == pytest.approx(found.wind.value)
     windows = said["windows"]
     np.testing.assert_array_equal(found.windows.start, [window["start"] for window in windows])  # type: ignore[attr-defined]
-    assert found.windows.low["density"].min() >= 0.12
+    assert found.windows.low["area_weight"].min() >= 0.12
     assert {values.shape for values in found.windows.value.values()} == {(4,)}
 
 
@@ -160,12 +160,12 @@ def test_a_material_states_its_area_weight_from_the_catalog_or_the_lakes_films(f
     assert "Wang" in done.err
     found = json.loads(done.out)
     assert found["options"]["area_weight"] == 0.113  # Wang et al. 2011, table of densities
-    assert found["quantities"]["density"]["given"] is True
+    assert found["quantities"]["area_weight"]["given"] is True
     assert found["sentence"].endswith("area weight 0.113 kg/m², as given")
     made = Lake.open(lake)
     with made.transaction("declared") as transaction:
-        for name, session, density in (("one", "felt", 0.24), ("two", "linen", 0.2), ("three", "linen", 0.21)):
-            cloth = {"cloth": {"fabric": session, "density": density}}
+        for name, session, area_weight in (("one", "felt", 0.24), ("two", "linen", 0.2), ("three", "linen", 0.21)):
+            cloth = {"cloth": {"fabric": session, "area_weight": area_weight}}
             transaction.add(Artifact(kind=Kind.RECORDING, name=name, session=session, recipe=cloth, frame_count=1))
     assert weight_of("felt", lake=made, at=None)[0] == Stated.of(0.24)
     with pytest.raises(UsageError, match=r"2 area weights, 0\.2 to 0\.21"):
@@ -179,7 +179,7 @@ def test_a_material_states_its_area_weight_from_the_catalog_or_the_lakes_films(f
 
 def test_the_shipped_model_of_hanging_cloth_gives_weights_of_its_range(film: Path) -> None:
     found = answer(film, "--flag-size", "1x1", "--model", "wave-cloth", "--anyway")
-    low, high = found["quantities"]["density"]["interval"]  # type: ignore[index]
+    low, high = found["quantities"]["area_weight"]["interval"]  # type: ignore[index]
     assert 0.079 <= low < high <= 0.454
 
 
@@ -307,7 +307,7 @@ def test_the_nearest_simulated_clips_are_those_of_other_recordings(lake: Path, m
     assert (compared, fewer) == (6, 3)
     clips = opened.rows(f"kind = 'clip' and recording = '{other['artifact']}'")["artifact"].to_pylist()
     assert {one.artifact for one in rest} == set(clips)
-    assert rest[0].known["density"] == 0.12
+    assert rest[0].known["area_weight"] == 0.12
 
 
 def test_reading_only_adds_nothing_to_the_lake(lake: Path, model_folder: Path) -> None:
@@ -403,7 +403,7 @@ def test_a_text_file_is_no_film(tmp_path: Path) -> None:
 
 def test_a_hanging_cloth_is_measured_by_a_model_of_it(film: Path, cloth_folder: Path) -> None:
     found = answer(film, "--model", cloth_folder, "--flag-size", "1.0x1.0", "--anyway")
-    assert set(found["quantities"]) == {"wind_speed", "density", "bending_scale"}  # type: ignore[call-overload]
+    assert set(found["quantities"]) == {"wind_speed", "area_weight", "bending_scale"}  # type: ignore[call-overload]
     assert found["model"] == "small-cloth"
 
 

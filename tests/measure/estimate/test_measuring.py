@@ -85,8 +85,8 @@ def test_the_same_pictures_of_a_smaller_flag_played_faster_are_a_similar_flag(mo
     fast = Frames(time=np.arange(len(images)) / (2 * RATE), images=images)
     whole = measured(slow, model)
     quarter = measured(fast, model, size=FlagSize(length=0.375, height=0.25))
-    wind, density, bending, anisotropy = whole.draws.T
-    expected = np.stack([wind / 2, density / 4, bending - np.log10(256.0), anisotropy], axis=1)
+    wind, area_weight, bending, anisotropy = whole.draws.T
+    expected = np.stack([wind / 2, area_weight / 4, bending - np.log10(256.0), anisotropy], axis=1)
     np.testing.assert_allclose(quarter.draws, expected, rtol=1e-9)
     assert quarter.quantities[1].assumed == pytest.approx((0.025, 0.0425))
 
@@ -110,13 +110,13 @@ def test_an_unknown_size_widens_the_interval_of_the_wind(model: Estimator) -> No
 def test_an_area_weight_that_is_known_restricts_the_answer_to_it(model: Estimator) -> None:
     film = even(4 * FRAMES)
     free, known = measured(film, model), measured(film, model, area_weight=parse("0.12:0.13"))
-    density = known.quantities[1]
-    assert density.assumed == (0.12, 0.13)
-    assert 0.12 <= density.span.low < density.span.high <= 0.13
-    assert sigma(known, "density") < sigma(free, "density") / 2
+    area_weight = known.quantities[1]
+    assert area_weight.assumed == (0.12, 0.13)
+    assert 0.12 <= area_weight.span.low < area_weight.span.high <= 0.13
+    assert sigma(known, "area_weight") < sigma(free, "area_weight") / 2
     assert known.options.recipe()["area_weight"] == [0.12, 0.13]
     for window in known.windows:
-        own = window.quantity("density").span
+        own = window.quantity("area_weight").span
         assert 0.12 - 1e-6 <= own.low < own.high <= 0.13 + 1e-6
 
 
@@ -128,14 +128,14 @@ def test_an_area_weight_is_a_value_or_has_a_deviation_and_the_wind_is_that_of_a_
     found = {text: measured(film, model, area_weight=parse(text)) for text in ("0.16", "0.16±0.0001", "0.1599:0.1601")}
     narrow = found["0.1599:0.1601"].quantities
     for text, one in found.items():
-        wind, density, bending, _ = one.quantities
+        wind, area_weight, bending, _ = one.quantities
         for own, other in ((wind, narrow[0]), (bending, narrow[2])):  # of 400 draws each: four standard errors
             assert own.value is not None
             assert other.value is not None
             assert other.sigma is not None
             assert own.value == pytest.approx(other.value, abs=4 * 1.5 * other.sigma / 20), text
             assert own.sigma == pytest.approx(other.sigma, rel=0.2), text
-        assert density.value == pytest.approx(0.16, abs=1e-4)
+        assert area_weight.value == pytest.approx(0.16, abs=1e-4)
     exact = found["0.16"].quantities[1]
     assert (exact.given, exact.sigma, exact.span.ends()) == (True, 0.0, [0.16, 0.16])
     assert found["0.16"].sentence.endswith("area weight 0.16 kg/m², as given")
@@ -237,7 +237,7 @@ def test_a_weight_that_is_open_is_answered_with_the_winds_of_a_light_and_a_heavy
 
 
 def test_a_flags_aspect_is_known_from_its_size_by_a_model_that_estimates_it(tmp_path: Path) -> None:
-    aspects = estimator.load(written(tmp_path / "aspects", ("wind_speed", "density", "log_aspect")))
+    aspects = estimator.load(written(tmp_path / "aspects", ("wind_speed", "area_weight", "log_aspect")))
     for size, given in ((FlagSize(length=1.5, height=1.0), True), (FlagSize(length=1.5, height=0.5), False)):
         found = measured(even(2 * FRAMES), aspects, size=size)
         aspect = found.quantities[2]
@@ -265,9 +265,9 @@ def test_a_weight_that_makes_the_film_improbable_is_called_a_contradiction(model
 
 
 def test_a_weighing_near_the_end_of_the_models_range_is_assumed_up_to_that_end(model: Estimator) -> None:
-    density = measured(even(FRAMES), model, area_weight=parse("0.165±0.01")).quantities[1]
-    assert density.assumed == pytest.approx((0.165 - 0.01645, 0.17))
-    assert density.span.high <= 0.17 or density.span.bound is Bound.LEAST
+    area_weight = measured(even(FRAMES), model, area_weight=parse("0.165±0.01")).quantities[1]
+    assert area_weight.assumed == pytest.approx((0.165 - 0.01645, 0.17))
+    assert area_weight.span.high <= 0.17 or area_weight.span.bound is Bound.LEAST
 
 
 def test_an_area_weight_is_that_of_the_flag_itself_whatever_its_size(model: Estimator) -> None:
@@ -459,12 +459,12 @@ def test_a_model_without_distributions_measures_nothing(model: Estimator) -> Non
 def test_a_hanging_cloth_is_measured_in_its_own_ranges_and_size(cloth_model: Estimator) -> None:
     """1 m × 1 m is the size of its training: what the model says needs no scaling, and what is assumed is its range."""
     found = measured(even(3 * FRAMES), cloth_model, size=FlagSize(length=1.0, height=1.0))
-    assert found.names == ("wind_speed", "density", "bending_scale")
+    assert found.names == ("wind_speed", "area_weight", "bending_scale")
     assert found.sizes.scale == pytest.approx([1.0])
     assert "aspect-ratio" not in {finding.kind for finding in found.findings}
-    wind, density = found.quantities[:2]
+    wind, area_weight = found.quantities[:2]
     assert wind.assumed == pytest.approx((0.0, 6.0))
-    assert density.assumed == pytest.approx((0.079, 0.454))
+    assert area_weight.assumed == pytest.approx((0.079, 0.454))
     assert found.sentence.startswith(("wind", "area weight"))
 
 

@@ -88,7 +88,7 @@ def test_simulated_neighbours_are_shown_in_motion_with_what_they_were_made_with(
         name="clip",
         frames=pictures(FRAMES, seed=9),
         distance=2.5,
-        known={"wind_speed": 3.25, "density": 0.12},
+        known={"wind_speed": 3.25, "area_weight": 0.12},
     )
     context = replace(PLAIN, neighbours=(neighbour,), compared=7, known={"wind_speed": 6.0})
     text = drawn(found, context)

@@ -29,7 +29,7 @@ def interval(name: str, median: float, half: float) -> Interval:
 def found() -> Refinement:
     intervals = (
         interval("wind_speed", 4.0, 0.5),
-        interval("density", 0.12, 0.01),
+        interval("area_weight", 0.12, 0.01),
         interval("bending_scale", -4.0, 0.2),
         interval("anisotropy", 0.3, 0.1),
         interval("nonlinearity", -0.2, 0.1),
@@ -63,7 +63,7 @@ def test_a_flag_four_times_as_long_has_twice_the_wind_four_times_the_weight_and_
     by_name = {entry.name: entry for entry in larger.intervals}
     assert (by_name["wind_speed"].median, by_name["wind_speed"].span.high) == (8.0, 9.0)
     assert by_name["wind_speed.1"].span.low == 10.0
-    assert by_name["density"].median == pytest.approx(0.48)
+    assert by_name["area_weight"].median == pytest.approx(0.48)
     assert by_name["bending_scale"].median == pytest.approx(-4.0 + math.log10(256))
     assert by_name["bending_scale"].span.high - by_name["bending_scale"].span.low == pytest.approx(0.4)
     np.testing.assert_allclose(larger.bending, 256e-4)

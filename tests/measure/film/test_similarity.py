@@ -33,11 +33,11 @@ def flight(scale: float, *, wind: float, material: Material, frames: int = 12) -
     return np.stack(shown)
 
 
-def cloth(*, density: float, bending: float, scale: float = 1.0) -> Material:
+def cloth(*, area_weight: float, bending: float, scale: float = 1.0) -> Material:
     """Of constant bending stiffness; stretching and damping follow the scale."""
     return replace(
         CAMEL,
-        density=density,
+        area_weight=area_weight,
         bending=np.full((3, 5), bending),
         stretching=CAMEL.stretching * scale**2,
         damping=CAMEL.damping * np.sqrt(scale),
@@ -47,28 +47,28 @@ def cloth(*, density: float, bending: float, scale: float = 1.0) -> Material:
 def test_values_scaled_back_make_half_a_flag_move_like_the_whole() -> None:
     # The simulator knows nothing of similarity: air and gravity are the same for both.
     values = np.array([4.0, 0.12, np.log10(3e-5)])
-    names = ("wind_speed", "density", "bending_scale")
-    wind, density, bending = scaled_back(values, names, 0.5)
-    whole = flight(1.0, wind=4.0, material=cloth(density=0.12, bending=3e-5))
-    half = flight(0.5, wind=wind, material=cloth(density=density, bending=10**bending, scale=0.5))
+    names = ("wind_speed", "area_weight", "bending_scale")
+    wind, area_weight, bending = scaled_back(values, names, 0.5)
+    whole = flight(1.0, wind=4.0, material=cloth(area_weight=0.12, bending=3e-5))
+    half = flight(0.5, wind=wind, material=cloth(area_weight=area_weight, bending=10**bending, scale=0.5))
     moved = np.abs(whole - whole[0]).max()
     assert moved > 0.1  # of a length; it is not a flag at rest that is compared
     # The step follows from the mesh, so it scales by √s too: equal to rounding, which motion amplifies (10⁻¹⁵ seen).
     np.testing.assert_allclose(half, whole, atol=1e-9)
-    unscaled = flight(0.5, wind=4.0, material=cloth(density=density, bending=10**bending, scale=0.5))
+    unscaled = flight(0.5, wind=4.0, material=cloth(area_weight=area_weight, bending=10**bending, scale=0.5))
     assert np.abs(unscaled - whole).max() > 0.01
 
 
 def test_scaling_back_at_the_trained_size_changes_nothing() -> None:
     values = np.array([[4.0, 0.12, -4.5, 0.3]])
     np.testing.assert_array_equal(
-        scaled_back(values, ("wind_speed", "density", "bending_scale", "anisotropy"), 1.0), values
+        scaled_back(values, ("wind_speed", "area_weight", "bending_scale", "anisotropy"), 1.0), values
     )
 
 
 def test_a_flag_four_times_as_long_is_in_twice_the_wind_and_four_times_the_weight() -> None:
     values = np.array([3.0, 0.1, -4.0, 0.2])
-    found = scaled_back(values, ("wind_speed", "density", "bending_scale", "anisotropy"), 4.0)
+    found = scaled_back(values, ("wind_speed", "area_weight", "bending_scale", "anisotropy"), 4.0)
     np.testing.assert_allclose(found, [6.0, 0.4, -4.0 + np.log10(256.0), 0.2])
     assert spacing(4.0, rate=25.0) == pytest.approx(0.08)
 

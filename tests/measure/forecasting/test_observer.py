@@ -157,7 +157,7 @@ def test_calibration_sensitivities_are_those_of_their_parameters(
     base = forecaster.errors(*forecaster.system(segments, [NOMINAL] * len(segments)), segments)
     changes = forecaster.sensitivities((), segments, [NOMINAL] * len(segments), base)
     assert len(changes) == len(THETA)
-    heavier = Calibration(density=1.05)
+    heavier = Calibration(area_weight=1.05)
     errors = forecaster.errors(*forecaster.system(segments, [heavier] * len(segments)), segments)
     expected = -np.log(1.05) * changes[0]
     assert float((errors - expected).norm() / errors.norm()) < 0.2
@@ -167,7 +167,7 @@ def test_steps_in_a_joint_batch_are_those_taken_alone(
     monkeypatch: pytest.MonkeyPatch, forecaster: Forecaster, own_recording: Trajectory
 ) -> None:
     segments = Segments.of([own_recording])
-    nominal = [Calibration(density=1.1)] * len(segments)
+    nominal = [Calibration(area_weight=1.1)] * len(segments)
     columns = (
         FieldColumn(axis=2, mode=(1, 0)),
         MotionColumn(derivative=1, mode=(0, 0)),
@@ -204,8 +204,8 @@ def test_models_in_one_batch_leave_what_they_leave_alone(
     segments = Segments.of([own_recording])
     lift = EffectColumn(effect="lift", parameter="coefficient", step=0.3)
     models = [
-        Model(calibration=Calibration(density=density), effects=((lift, strength),))
-        for density, strength in ((1.0, 0.0), (1.2, 0.5), (0.9, 0.8))
+        Model(calibration=Calibration(area_weight=area_weight), effects=((lift, strength),))
+        for area_weight, strength in ((1.0, 0.0), (1.2, 0.5), (0.9, 0.8))
     ]
     monkeypatch.setattr(model_module, "WIDEST", 2 * len(segments))
     together = errors_of(models, forecaster, segments)
@@ -235,7 +235,7 @@ def test_members_of_a_batch_do_not_touch_one_another(forecaster: Forecaster, own
     twice = Segments.of([own_recording, replace(own_recording, name="again")])
     alone = Segments.of([own_recording])
     errors = forecaster.errors(
-        *forecaster.system(twice, [NOMINAL] * len(alone) + [Calibration(density=1.2)] * len(alone)), twice
+        *forecaster.system(twice, [NOMINAL] * len(alone) + [Calibration(area_weight=1.2)] * len(alone)), twice
     )
     single = forecaster.errors(*forecaster.system(alone, [NOMINAL] * len(alone)), alone)
     torch.testing.assert_close(errors[..., : len(alone)], single, rtol=0, atol=1e-9)

@@ -41,20 +41,20 @@ def test_a_turned_wind_has_turned_before_a_segment_begins() -> None:
         assert blown == pytest.approx([5 * math.cos(math.radians(10)), 5 * math.sin(math.radians(10)), 0.0])
 
 
-@given(density=st.floats(-0.5, 0.5), bending=st.floats(-1.5, 1.5), damping=st.floats(-2.0, 4.0))
-def test_steps_between_calibrations_undo_one_another(density: float, bending: float, damping: float) -> None:
+@given(area_weight=st.floats(-0.5, 0.5), bending=st.floats(-1.5, 1.5), damping=st.floats(-2.0, 4.0))
+def test_steps_between_calibrations_undo_one_another(area_weight: float, bending: float, damping: float) -> None:
     start = Calibration()
-    moved = start.moved((density, bending, damping))
+    moved = start.moved((area_weight, bending, damping))
     back = moved.moved(tuple(-step for step in moved.steps_from(start)))
-    assert back.density == pytest.approx(start.density)
+    assert back.area_weight == pytest.approx(start.area_weight)
     assert back.bending == pytest.approx(start.bending)
     assert back.damping == pytest.approx(start.damping)
 
 
 def test_a_calibration_scales_density_and_bending_and_sets_damping() -> None:
     nominal = named("camel-ponte-roma")
-    material = Calibration(density=1.1, bending=2.0, damping=1e-3).material(nominal)
-    assert material.density == pytest.approx(1.1 * nominal.density)
+    material = Calibration(area_weight=1.1, bending=2.0, damping=1e-3).material(nominal)
+    assert material.area_weight == pytest.approx(1.1 * nominal.area_weight)
     np.testing.assert_allclose(material.bending, 2 * nominal.bending)
     np.testing.assert_allclose(material.stretching, nominal.stretching)
     assert material.damping == 1e-3
@@ -62,7 +62,7 @@ def test_a_calibration_scales_density_and_bending_and_sets_damping() -> None:
 
 def test_steps_are_natural_logarithms() -> None:
     moved = Calibration(damping=1e-3).moved((math.log(1.1), math.log(2.0), math.log(30.0)))
-    assert moved.density == pytest.approx(1.1)
+    assert moved.area_weight == pytest.approx(1.1)
     assert moved.bending == pytest.approx(2.0)
     assert moved.damping == pytest.approx(30e-3)
     assert len(THETA) == 3
@@ -72,7 +72,7 @@ def test_a_calibration_at_its_bounds_says_so() -> None:
     """Damping up to what cloth has, 30 ms and more, is none."""
     assert Calibration(damping=60e-3).at_bounds == ()
     far = Calibration().moved((20.0, 0.0, -20.0))
-    assert far.at_bounds == ("density", "damping")
+    assert far.at_bounds == ("area_weight", "damping")
 
 
 def test_a_field_mode_is_a_force_per_mass_along_its_axis() -> None:

@@ -39,7 +39,7 @@ SIZE, RATE, DURATION, NOISE, FAR, VERTICES = 0.4, 25.0, 4.6, 5e-4, 0.12, 36
 KINDS = 12
 LEVEL = 0.1
 """Twelve kinds can test at 1/13."""
-CLOTH = Calibration(density=1.05, bending=0.8, damping=3e-3)
+CLOTH = Calibration(area_weight=1.05, bending=0.8, damping=3e-3)
 SETUP = Setup(
     outline=sheet(SIZE, SIZE),
     material=named("camel-ponte-roma"),
@@ -168,7 +168,7 @@ def test_close_loop_judges_a_table_of_a_carried_cloth(bank: Path, tmp_path: Path
     takes = "\n".join(f'[[recording]]\ntake = "way {k}"\n{source}' for k in range(2))
     recipe.write_text(
         f'[cloth]\nwidth = {SIZE}\nheight = {SIZE}\nvertices = {VERTICES}\n[material]\nname = "camel-ponte-roma"\n'
-        f'[pins]\nat = "top-corners"\ncarried = true\n{takes}\n',
+        f'[attachment]\nat = "top-corners"\ncarried = true\n{takes}\n',
         encoding="utf-8",
     )
     options = ("--bank", bank, "--level", LEVEL, "--json", "--out", tmp_path / "loop")

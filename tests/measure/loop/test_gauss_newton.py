@@ -14,14 +14,14 @@ from measure.loop import gauss_newton
 from measure.probes import Statistics
 
 LIFT = EffectColumn(effect="lift", parameter="coefficient", step=0.3)
-FAR = Model(calibration=Calibration(density=0.5, bending=4.0, damping=10e-3), effects=((LIFT, 2.0),))
+FAR = Model(calibration=Calibration(area_weight=0.5, bending=4.0, damping=10e-3), effects=((LIFT, 2.0),))
 NOTHING = cast(Forecaster, None), cast(Segments, None)
 
 
 def linearised(_: Forecaster, __: Segments, model: Model) -> Statistics:
-    """Of models that run from 70 % of the nominal density on; the data are the model."""
+    """Of models that run from 70 % of the nominal area weight on; the data are the model."""
     count, size = len(THETA) + len(model.effects), 4
-    r = np.full((size, count), np.nan if model.calibration.density < 0.7 else 0.0)
+    r = np.full((size, count), np.nan if model.calibration.area_weight < 0.7 else 0.0)
     return Statistics(
         recording=np.zeros(size, dtype=np.int64),
         r=r,
@@ -52,7 +52,7 @@ def test_a_model_that_diverges_is_drawn_back(
     found = gauss_newton._round(  # pyright: ignore[reportPrivateUsage]
         *NOTHING, model, null(len(THETA) + len(effects)), np.full(4, 5.0), (5,) * len(effects), anchor=Calibration()
     )
-    assert found.origin.calibration.density == pytest.approx(0.5**0.5)
+    assert found.origin.calibration.area_weight == pytest.approx(0.5**0.5)
     assert [strength for _, strength in found.origin.effects] == [strength / 2 for _, strength in effects]
 
 

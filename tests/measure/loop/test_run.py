@@ -76,7 +76,7 @@ def recorded(specimen: Specimen, *effects: Effect, seed: int) -> Experiment:
         duration=DURATION,
         noise=NOISE,
         speeds=SPEEDS,
-        calibrations=(Calibration(density=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS),
+        calibrations=(Calibration(area_weight=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS),
         seed=seed,
         effects=effects,
     )
@@ -241,7 +241,7 @@ def test_a_level_that_the_bank_cannot_test_is_reported(pulled: Experiment, bank:
     assert "at least 19 are needed" in verdict.words  # K + 1 ≥ 1/0.05
     assert not verdict.test.open
     assert "borderline" not in verdict.words
-    assert [p.name.split()[0] for p in verdict.parameters] == ["density", "bending", "damping", "direction"]
+    assert [p.name.split()[0] for p in verdict.parameters] == ["area_weight", "bending", "damping", "direction"]
 
 
 def test_a_bank_of_other_segments_is_refused(specimen: Specimen, plain: Experiment, bank: Path) -> None:

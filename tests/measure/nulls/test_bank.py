@@ -14,7 +14,7 @@ from measure.probes.statistics import statistics
 from sim.integrate import SplitEuler
 
 LEAN = EffectColumn(effect="tilted-pole", parameter="lean", step=0.02)
-CLOTHS = (Calibration(density=1.2, damping=2e-3), Calibration(density=0.8, bending=2.0, damping=2e-3))
+CLOTHS = (Calibration(area_weight=1.2, damping=2e-3), Calibration(area_weight=0.8, bending=2.0, damping=2e-3))
 
 
 @pytest.fixture(scope="module")

@@ -44,7 +44,7 @@ def test_nulls_are_kept_by_their_design(monkeypatch: pytest.MonkeyPatch, tmp_pat
     assert (count, read) == (40, 40)
     # More of the same design are added to them; what the weight is known to does not shape them.
     assert asked(monkeypatch, tmp_path, setting, nulls=320) == (folder, 80, 80)
-    weighed = replace(setting.experiment, specimen=replace(setting.experiment.specimen, density_uncertainty=0.02))
+    weighed = replace(setting.experiment, specimen=replace(setting.experiment.specimen, area_weight_uncertainty=0.02))
     assert asked(monkeypatch, tmp_path, replace(setting, experiment=weighed))[0] == folder
     noisy = tuple(replace(r, noise=2e-3) for r in setting.experiment.recordings)
     other = Setting.of(replace(setting.experiment, recordings=noisy))

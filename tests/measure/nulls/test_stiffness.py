@@ -17,7 +17,7 @@ def test_without_factors_it_is_the_nominal_material() -> None:
     made = StiffnessFactors().of(nominal)
     np.testing.assert_array_equal(made.stretching, nominal.stretching)
     np.testing.assert_array_equal(made.bending, nominal.bending)
-    assert made.density == nominal.density
+    assert made.area_weight == nominal.area_weight
 
 
 def test_factors_are_on_their_own_directions_and_the_coupling_between_them() -> None:

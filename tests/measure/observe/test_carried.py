@@ -108,8 +108,8 @@ def test_recordings_agree_on_whether_the_cloth_is_carried(swung: Observation) ->
 
 def test_a_recipe_says_that_pins_are_carried(tmp_path: Path) -> None:
     path = tmp_path / "cloth.toml"
-    path.write_text('[pins]\nat = "top-corners"\ncarried = true\n', encoding="utf-8")
+    path.write_text('[attachment]\nat = "top-corners"\ncarried = true\n', encoding="utf-8")
     assert parse(path).setup.carried
-    path.write_text("[pins]\ncarried = true\nstiffness = 100\n", encoding="utf-8")
+    path.write_text("[attachment]\ncarried = true\nstiffness = 100\n", encoding="utf-8")
     with pytest.raises(UsageError, match="hold rigidly"):
         parse(path)

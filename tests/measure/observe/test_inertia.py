@@ -53,7 +53,7 @@ def vane() -> tuple[Trajectory, Specimen]:
 
     def acceleration(angle: float, rate: float) -> float:
         across = -SPEED * np.sin(angle) - u * rate
-        return float(DENSITY * (np.abs(across) * across * u).mean() / (CLOTH.density * WIDTH**2 / 3))
+        return float(DENSITY * (np.abs(across) * across * u).mean() / (CLOTH.area_weight * WIDTH**2 / 3))
 
     turned = angles(acceleration, 1.2)
     shape = (len(TIMES), len(REST))

@@ -23,8 +23,8 @@ width = {WIDTH}
 height = {HEIGHT}
 [material]
 name = "camel-ponte-roma"
-density = 0.2
-[pins]
+area-weight = 0.2
+[attachment]
 at = "hoist"
 """
 
@@ -64,22 +64,29 @@ def test_a_table_of_two_recordings_with_another_axis_up_and_in_millimetres(table
     np.testing.assert_allclose(calm.positions, truth.positions[:, names], atol=1e-8)
     np.testing.assert_allclose(brisk.wind.velocity, [[6 * math.cos(0.1), 6 * math.sin(0.1), 0]])
     specimen = observed.experiment.specimen
-    assert specimen.material.density == 0.2
+    assert specimen.material.area_weight == 0.2
     np.testing.assert_array_equal(specimen.material.bending, named("camel-ponte-roma").bending)
     np.testing.assert_allclose(specimen.anchors[:, :2], 0.0, atol=1e-3)
     assert observed.findings == ()
 
 
 @pytest.mark.parametrize(
-    ("line", "uncertainty"), [("", 0.3), ("density-uncertainty = 0.02", 0.02), ("mass-unknown = true", 1.0)]
+    ("lines", "uncertainty"),
+    [
+        ("area-weight = 0.2", 0.3),
+        ('area-weight = "0.2±0.004"', 0.02),
+        ("area-weight = 0.2\nmass-unknown = true", 1.0),
+        ("density = 0.2\ndensity-uncertainty = 0.02", 0.02),  # as in the last version
+    ],
 )
-def test_how_well_the_cloth_was_weighed_is_the_prior_of_its_density(
-    table: Path, tmp_path: Path, line: str, uncertainty: float
+def test_how_well_the_cloth_was_weighed_is_the_prior_of_its_area_weight(
+    table: Path, tmp_path: Path, lines: str, uncertainty: float
 ):
     entry = f'[[recording]]\nsource = "{table}"\nrate = {RATE}\nunit = "mm"\ntake = "calm"\nwind = {{ speed = 4.0 }}\n'
-    common = COMMON.replace("density = 0.2", f"density = 0.2\n{line}")
+    common = COMMON.replace("area-weight = 0.2", lines)
     observed = read(load(_recipe(tmp_path, f'up = "y"\n{common}{entry}')))
-    assert Setting.of(observed.experiment).prior.tolist() == [uncertainty, 1.0, 1.5]
+    assert observed.experiment.specimen.material.area_weight == 0.2
+    assert Setting.of(observed.experiment).prior.tolist() == [pytest.approx(uncertainty), 1.0, 1.5]
 
 
 def _meshes(seconds: float = 2.2) -> MeshSequence:
@@ -116,7 +123,7 @@ def test_an_arcsim_folder_needs_nothing_else(folder: Path, tmp_path: Path):
     observed = read(load(_recipe(tmp_path, f'[[recording]]\nsource = "{folder}"\n')))
     specimen, (recording,) = observed.experiment.specimen, observed.experiment.recordings
     base = named("camel-ponte-roma")
-    assert specimen.material.density == pytest.approx(2 * base.density)
+    assert specimen.material.area_weight == pytest.approx(2 * base.area_weight)
     np.testing.assert_allclose(specimen.material.bending, 2 * base.bending)
     assert (specimen.stiffness, specimen.air.plain.density) == (2e3, 1.2)
     np.testing.assert_allclose(specimen.mesh.rest[list(specimen.held), 0], 0.0, atol=1e-6)
@@ -178,15 +185,30 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
             "direction-sigma is -0.1",
         ),
         ("[cloth]\nwidth = 1\n[[recording]]\nsource = 'a'", UsageError, "half a size"),
-        ("[pins]\nat = 'hoist'\npoints = [[0, 0]]\n[[recording]]\nsource = 'a'", UsageError, "both at and points"),
-        ("[pins]\nat = 'hoists'\n[[recording]]\nsource = 'a'", UnknownNameError, "did you mean 'hoist'"),
+        (
+            "[attachment]\nat = 'hoist'\npoints = [[0, 0]]\n[[recording]]\nsource = 'a'",
+            UsageError,
+            "both at and points",
+        ),
+        ("[attachment]\nat = 'hoists'\n[[recording]]\nsource = 'a'", UnknownNameError, "did you mean 'hoist'"),
         (
             "[material]\nmass-unknown = true\ndensity-uncertainty = 0.1\n[[recording]]\nsource = 'a'",
             UsageError,
-            "both mass-unknown and a density-uncertainty",
+            "both mass-unknown and an uncertainty",
         ),
-        ("[material]\ndensity-uncertainty = 2\n[[recording]]\nsource = 'a'", InputError, "density uncertainty is 2.0"),
+        (
+            "[material]\ndensity-uncertainty = 2\n[[recording]]\nsource = 'a'",
+            InputError,
+            "uncertainty of the area weight is 2.0",
+        ),
         ("[material]\ndensity-uncertainty = 0\n[[recording]]\nsource = 'a'", InputError, "density-uncertainty"),
+        (
+            "[material]\narea-weight = '0.2±0.01'\ndensity-uncertainty = 0.1\n[[recording]]\nsource = 'a'",
+            UsageError,
+            "given twice",
+        ),
+        ("[material]\narea-weight = '-0.2±0.01'\n[[recording]]\nsource = 'a'", UsageError, "not above 0"),
+        ("[material]\narea-weight = 0.2\ndensity = 0.2\n[[recording]]\nsource = 'a'", UsageError, "both are given"),
         ("[material]\nname = 'camel'\n[[recording]]\nsource = 'a'", UnknownNameError, "camel"),
         ("up = 'w'\n[[recording]]\nsource = 'a'", UnknownNameError, "unknown up 'w'"),
     ],

@@ -65,7 +65,7 @@ def test_an_output_folder_is_an_experiment(reference_data: Path):
 def test_half_a_second_of_a_remeshed_run_is_followed_but_too_short(reference_data: Path):
     seen = from_folder(reference_data / "arcsim" / "raw_remeshed")
     assert seen.known.material is not None
-    assert seen.known.material.density == pytest.approx(2 * 0.284)
+    assert seen.known.material.area_weight == pytest.approx(2 * 0.284)
     assert seen.known.pins is not None
     np.testing.assert_allclose(seen.known.pins, [[0, 0], [0, 2]], atol=1e-12)
     with pytest.raises(InputError, match=r"13 frames over 0\.48 s"):

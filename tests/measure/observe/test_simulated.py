@@ -20,7 +20,7 @@ columns = 12
 start-noise = 0.01
 [material]
 name = "camel-ponte-roma"
-density = 0.2
+area-weight = 0.2
 [wind]
 speed = 5.0
 toward = 0.3
@@ -40,7 +40,7 @@ def test_a_simulated_flag_is_observed_with_its_own_scene(tmp_path: Path):
     observed = observe([from_artifact(lake, lake.artifact(added))])
     specimen, (recording,) = observed.experiment.specimen, observed.experiment.recordings
     assert recording.source == added
-    assert (specimen.material.density, specimen.air.plain.density) == (0.2, 1.2)
+    assert (specimen.material.area_weight, specimen.air.plain.density) == (0.2, 1.2)
     np.testing.assert_allclose(specimen.mesh.rest[list(specimen.held)], [[0, 0], [0, 1]], atol=1e-6)
     np.testing.assert_allclose(recording.wind.velocity, [[5 * np.cos(0.3), 5 * np.sin(0.3), 0]])
     assert recording.rate == pytest.approx(25.0)

@@ -159,7 +159,7 @@ def test_kept_directions_say_of_the_base_model_what_the_statistics_say(
     forecaster: Forecaster, own_recording: Trajectory
 ) -> None:
     segments = Segments.of([own_recording])
-    nominal = [Calibration(density=1.1)] * len(segments)
+    nominal = [Calibration(area_weight=1.1)] * len(segments)
     found, projection = projected(forecaster, segments, nominal, COLUMNS)
     errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
     kept, own = projection.course(errors), found.course

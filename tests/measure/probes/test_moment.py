@@ -63,7 +63,7 @@ def test_forces_between_two_points_have_none(forecaster: Forecaster, segments: S
 def test_kept_directions_say_of_the_base_models_moment_what_the_statistics_say(
     forecaster: Forecaster, segments: Segments
 ) -> None:
-    nominal = [Calibration(density=1.1)] * len(segments)
+    nominal = [Calibration(area_weight=1.1)] * len(segments)
     found, projection = projected(forecaster, segments, nominal, COLUMNS)
     errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
     turned, kept = found.turning, projection.turned(errors)

@@ -26,7 +26,7 @@ def segments(own_recording: Trajectory) -> Segments:
 
 
 def test_the_projection_of_the_base_models_errors_is_r(forecaster: Forecaster, segments: Segments) -> None:
-    nominal = [Calibration(density=1.1)] * len(segments)
+    nominal = [Calibration(area_weight=1.1)] * len(segments)
     found, projection = projected(forecaster, segments, nominal, COLUMNS)
     errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
     np.testing.assert_allclose(projection.of(errors), found.r, rtol=1e-9, atol=1e-12)
@@ -67,7 +67,7 @@ def test_mirrored_across_the_wind_only_what_pushes_across_the_motion_changes_its
     columns = (*COLUMNS, AcrossColumn(mode=(0, 0)))
     mirrored = replace(own_recording, positions=own_recording.positions * [1.0, -1.0, 1.0])
     found, image = (
-        statistics(forecaster, own, [Calibration(density=1.1)] * len(own), columns)
+        statistics(forecaster, own, [Calibration(area_weight=1.1)] * len(own), columns)
         for own in (Segments.of([own_recording]), Segments.of([mirrored]))
     )
     alike, signs = [0, 2, 3, 4, 5], np.array([1.0, 1.0, 1.0, 1.0, -1.0])

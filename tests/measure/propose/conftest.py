@@ -95,7 +95,7 @@ def nulls(specimen: Specimen, columns: tuple[EffectColumn, ...], directions: tup
         # Damping beyond 1 ms: the implicit method, which is the cheaper one here.
         cloths = [
             Calibration(
-                density=float(rng.uniform(0.8, 1.25)),
+                area_weight=float(rng.uniform(0.8, 1.25)),
                 bending=float(rng.uniform(0.4, 2.5)),
                 damping=float(rng.uniform(1.1e-3, 4e-3)),
             )
@@ -124,6 +124,6 @@ def bank(nulls: tuple[Nulls, float], directions: tuple[Column, ...]) -> NullBank
 @pytest.fixture(scope="session")
 def pushed(specimen: Specimen) -> Experiment:
     """Four winds with a push of 8 m/s²; fitted to nulls of this size, one across the wind scatters by 0.2 m/s²."""
-    calibrations = (Calibration(density=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS)
+    calibrations = (Calibration(area_weight=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS)
     batch = simulated(specimen, calibrations, SPEEDS, (SidePush(acceleration=PUSH),), 91)
     return Experiment(specimen=specimen, recordings=tuple(batch.simulate()))

@@ -25,7 +25,7 @@ seed = 1
 columns = 3
 [material]
 name = "camel-ponte-roma"
-density = { low = 0.10, high = 0.17 }
+area-weight = { low = 0.10, high = 0.17 }
 bending-factors = { low = 0.1, high = 10.0 }
 [wind]
 speed = { low = 0.0, high = 10.0 }
@@ -54,7 +54,7 @@ def estimator() -> Estimator:
             WaveNetwork(dimension=6, widths=(4, 6, 8)),
             loss=Loss.POSTERIOR,
             components=2,
-            targets=("wind_speed", "density", "bending_scale", "anisotropy"),
+            targets=("wind_speed", "area_weight", "bending_scale", "anisotropy"),
         )
     return Estimator(
         name="random",

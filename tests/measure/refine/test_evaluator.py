@@ -88,8 +88,8 @@ def test_an_unknown_view_is_drawn_anew_for_each_clip(simulator: Simulator, tmp_p
 def test_a_recordings_own_view_is_read_from_its_parameters(view: FixedView) -> None:
     stated = {f"render.{name}": value for name, value in view.zeta.as_dict().items()}
     camera = {"camera.rate_factor": 19.0, "camera.read_noise": 1.0, "camera.shot_noise": 2.0}
-    found = of_parameters({**stated, **camera, "density": 0.1}, where="test")
+    found = of_parameters({**stated, **camera, "area_weight": 0.1}, where="test")
     assert found is not None
     assert found.zeta == view.zeta
     assert found.camera == FilmCamera(rate_factor=19.0, read_noise=1.0, shot_noise=2.0)
-    assert of_parameters({"density": 0.1}, where="test") is None
+    assert of_parameters({"area_weight": 0.1}, where="test") is None

@@ -35,7 +35,7 @@ def target(recipe: Recipe, view: FixedView) -> Target:
     simulator = Simulator.of(recipe, view, frames=8, rate=25.0, batch=1)
     clip = simulator.films([FilmRequest(point=(0.0,) * 16 + (0.2,), seed=child_seed(9, "target"))])[0].clip
     assert clip is not None
-    return Target(name="known", clip=clip, view=view, truth={"wind_speed": 6.0, "density": 0.135})
+    return Target(name="known", clip=clip, view=view, truth={"wind_speed": 6.0, "area_weight": 0.135})
 
 
 @pytest.fixture(scope="module")

@@ -60,12 +60,12 @@ def test_replicates_take_turns_at_the_scenes(recipe: Recipe, view: FixedView) ->
 
 
 def test_scenes_of_different_spaces_are_refused(recipe: Recipe, view: FixedView) -> None:
-    heavier = replace(recipe, material=replace(recipe.material, density=Range(low=0.2, high=0.4)))
+    heavier = replace(recipe, material=replace(recipe.material, area_weight=Range(low=0.2, high=0.4)))
     with pytest.raises(InputError, match="2 different search spaces"):
         of([recipe, heavier], view)
 
 
-@pytest.mark.parametrize("name", ["stretching", "density_factor"])
+@pytest.mark.parametrize("name", ["stretching", "area_weight_factor"])
 def test_a_range_that_nothing_would_draw_is_refused(recipe: Recipe, view: FixedView, name: str) -> None:
     ranged = replace(recipe, material=replace(recipe.material, **{name: Range(low=0.5, high=2.0)}))
     with pytest.raises(InputError, match="ranges of bending factors"):

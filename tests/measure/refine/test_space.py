@@ -51,7 +51,7 @@ def test_combinations_of_bending_follow_their_definitions(recipe: Recipe) -> Non
     assert reported["anisotropy"] == pytest.approx(np.log10(4))
     assert reported["nonlinearity"] == pytest.approx(np.log10(3))
     assert reported["bending_scale"] == pytest.approx(-5 + np.log10(4) / 3 + np.log10(3) * 2 / 5)
-    assert (reported["wind_speed"], reported["density"]) == (pytest.approx(3.0), pytest.approx(0.12))
+    assert (reported["wind_speed"], reported["area_weight"]) == (pytest.approx(3.0), pytest.approx(0.12))
 
 
 def test_a_common_factor_widens_the_box_and_moves_all_coefficients_together() -> None:
@@ -87,11 +87,11 @@ def test_a_prior_of_several_scenes_is_their_mixture_within_the_box() -> None:
     box, usual = Space.of(load("flag-fabrics")), Space.of(load("flag-wide"))
     mixed = box.learned([(usual, 3.0), (box, 1.0)])
     drawn = mixed.values(mixed.prior(np.random.default_rng(4), 40_000))
-    density = drawn[:, 15]
+    area_weight = drawn[:, 15]
     inside = np.log(0.17 / 0.10) / np.log(0.40 / 0.05)  # of a log-uniform area weight
-    assert ((density >= 0.10) & (density <= 0.17)).mean() == pytest.approx(0.75 + 0.25 * inside, abs=0.01)
+    assert ((area_weight >= 0.10) & (area_weight <= 0.17)).mean() == pytest.approx(0.75 + 0.25 * inside, abs=0.01)
     means = 0.135, (0.40 - 0.05) / np.log(0.40 / 0.05)
-    assert density.mean() == pytest.approx(0.75 * means[0] + 0.25 * means[1], abs=0.001)
+    assert area_weight.mean() == pytest.approx(0.75 * means[0] + 0.25 * means[1], abs=0.001)
     assert drawn[:, 16].mean() == pytest.approx(5.0, abs=0.06)
     factor = drawn[:, :15] / named("camel-ponte-roma").bending.ravel()
     beyond = (factor.max(axis=1) > 10.001) | (factor.min(axis=1) < 0.0999)

@@ -10,7 +10,7 @@ import torch
 
 from flagdata.rng import stream
 from flagdata.tables import Range
-from measure.refine import DENSITY_COLUMN, WIND_COLUMN, Space, start
+from measure.refine import AREA_WEIGHT_COLUMN, WIND_COLUMN, Space, start
 from models.estimator import Estimator
 from sim.run import Recipe
 
@@ -20,11 +20,11 @@ def test_completed_points_have_the_given_wind_and_area_weight(recipe: Recipe) ->
     given = np.array([[3.0, 0.12, -4.0, 0.1], [7.5, 0.165, -3.9, -0.2]])
     values = space.values(start.completed(space, given, seed=0))
     np.testing.assert_allclose(values[:, WIND_COLUMN], given[:, 0])
-    np.testing.assert_allclose(values[:, DENSITY_COLUMN], given[:, 1])
+    np.testing.assert_allclose(values[:, AREA_WEIGHT_COLUMN], given[:, 1])
 
 
 def test_an_area_weight_that_is_known_is_what_the_refinement_starts_from(estimator: Estimator, recipe: Recipe) -> None:
-    known = replace(recipe, material=replace(recipe.material, density=Range(low=0.12, high=0.125)))
+    known = replace(recipe, material=replace(recipe.material, area_weight=Range(low=0.12, high=0.125)))
     clip = stream(0, "clip").integers(0, 255, (8, 48, 48), dtype=np.uint8)
     draws = start.amortised(estimator, clip, Space.of(known), aspect=1.5, seed=1, draws=200)
     assert 0.12 <= draws[:, 1].min() <= draws[:, 1].max() <= 0.125 + 1e-6

@@ -135,14 +135,14 @@ def test_an_outcome_with_an_answer_proposes_nothing(outcome: LoopOutcome) -> Non
 def test_how_well_the_cloth_was_weighed_is_an_assumption(
     outcome: LoopOutcome, known: float, expected: str, weigh: bool
 ) -> None:
-    specimen = replace(outcome.experiment.specimen, density_uncertainty=known)
+    specimen = replace(outcome.experiment.specimen, area_weight_uncertainty=known)
     (said,) = (
-        text for text in assumptions(replace(outcome.experiment, specimen=specimen)) if "density is known" in text
+        text for text in assumptions(replace(outcome.experiment, specimen=specimen)) if "area weight is known" in text
     )
     assert expected in said
-    assert ("density-uncertainty" in said) == weigh
+    assert ("0.284±0.006" in said) == weigh
 
 
 def test_an_unweighed_cloths_density_is_not_listed_as_known(outcome: LoopOutcome) -> None:
     specimen = replace(outcome.experiment.specimen, mass_known=False)
-    assert not any("density is known" in t for t in assumptions(replace(outcome.experiment, specimen=specimen)))
+    assert not any("area weight is known" in t for t in assumptions(replace(outcome.experiment, specimen=specimen)))

@@ -50,7 +50,7 @@ def posterior(
     samples = mean[:, None, :] + wide * np.sqrt(0.5) * random.normal(size=(clips, draws, targets))
     return Predictions(
         label="posterior",
-        targets=("wind_speed", "density", "anisotropy")[:targets],
+        targets=("wind_speed", "area_weight", "anisotropy")[:targets],
         truth=truth,
         mean=mean,
         samples=samples.astype(np.float32),

@@ -52,12 +52,12 @@ def test_a_linear_embedding_of_the_logarithms_is_read_out_with_r_of_one() -> Non
     logs = random.normal(size=(90, 2))
     found = bouman(
         logs @ random.normal(size=(2, 60)) + 7,
-        {"stiffness": np.exp(logs[:, 0]), "density": np.exp(logs[:, 1])},
+        {"stiffness": np.exp(logs[:, 0]), "area_weight": np.exp(logs[:, 1])},
         group=np.arange(90) // 3,
         generator=generator(5),
         components=2,
     )
-    assert found.targets == ("log stiffness", "log density")
+    assert found.targets == ("log stiffness", "log area_weight")
     assert [r.value for r in found.pearson] == pytest.approx([1, 1], abs=1e-9)
     np.testing.assert_allclose(found.predicted, logs, atol=1e-8)
     assert found.findings == ()
@@ -80,7 +80,7 @@ def test_fewer_components_are_kept_where_the_clips_or_dimensions_do_not_suffice_
     random = generator(7)
     found = bouman(
         random.normal(size=(clips, dimension)),
-        {"density": random.uniform(1, 2, clips)},
+        {"area_weight": random.uniform(1, 2, clips)},
         group=np.arange(clips),
         generator=generator(1),
     )
@@ -92,8 +92,10 @@ def test_fewer_components_are_kept_where_the_clips_or_dimensions_do_not_suffice_
 
 def test_ninety_clips_keep_the_papers_fifty_components() -> None:
     random = generator(8)
-    density = random.uniform(1, 2, 90)
-    found = bouman(random.normal(size=(90, 512)), {"density": density}, group=np.arange(90), generator=generator(1))
+    area_weight = random.uniform(1, 2, 90)
+    found = bouman(
+        random.normal(size=(90, 512)), {"area_weight": area_weight}, group=np.arange(90), generator=generator(1)
+    )
     assert found.components == 50
     assert found.findings == ()
 
@@ -107,7 +109,9 @@ def test_quantities_without_a_logarithm_or_a_spread_are_refused() -> None:
     ]
     assert (
         unrefused(
-            lambda density: bouman(np.eye(5), {"density": density}, group=np.arange(5), generator=generator(1)),
+            lambda area_weight: bouman(
+                np.eye(5), {"area_weight": area_weight}, group=np.arange(5), generator=generator(1)
+            ),
             cases,
             InputError,
         )
@@ -117,4 +121,4 @@ def test_quantities_without_a_logarithm_or_a_spread_are_refused() -> None:
 
 def test_too_few_groups_are_refused() -> None:
     with pytest.raises(InputError, match="2 groups"):
-        bouman(np.eye(5), {"density": np.arange(1.0, 6)}, group=np.array([1, 1, 1, 2, 2]), generator=generator(1))
+        bouman(np.eye(5), {"area_weight": np.arange(1.0, 6)}, group=np.array([1, 1, 1, 2, 2]), generator=generator(1))

@@ -42,7 +42,7 @@ def ours(seed: int) -> Predictions:
 
 @pytest.fixture(scope="module")
 def found() -> Evaluation:
-    readout = bouman(WIND[:, None] + 1, {"density": WIND + 1}, group=GROUP, generator=generator(1), components=1)
+    readout = bouman(WIND[:, None] + 1, {"area_weight": WIND + 1}, group=GROUP, generator=generator(1), components=1)
     return evaluate(
         [run("SDN", 0.3, 1), ours(3), run("SDN", 0.5, 2), run("ResNet-18", 1.5, 4)],
         data="made@v1",
@@ -97,7 +97,7 @@ def test_a_model_has_no_score_of_what_it_does_not_give(found: Evaluation) -> Non
         "rmse",
         "accuracy",
         "bias",
-        "density_error",
+        "area_weight_error",
         "covered_50",
         "covered_80",
         "covered_90",
@@ -175,7 +175,7 @@ def test_names_of_models_and_data_are_text_in_markdown_and_on_the_page() -> None
         dataclasses.replace(run("B", 0.3, 1), label=BAD, note=BAD),
         dataclasses.replace(run("A", 0.4, 2), note=BAD),
     ]
-    readout = bouman(WIND[:, None] + 1, {"density": WIND + 1}, group=GROUP, generator=generator(1))
+    readout = bouman(WIND[:, None] + 1, {"area_weight": WIND + 1}, group=GROUP, generator=generator(1))
     shown = evaluate(
         made, data=BAD, seed=0, draws=10, reference=BAD, reads=[Read(label=BAD, data=BAD, readout=readout)]
     )
@@ -220,6 +220,6 @@ def test_small_errors_are_shown_to_three_significant_digits() -> None:
 
 def test_a_warning_of_a_readout_says_of_which_model_and_data_it_is() -> None:
     made = run("SDN", 1, 1)
-    readout = bouman(WIND[:, None] + 1, {"density": WIND + 1}, group=GROUP, generator=generator(1))
+    readout = bouman(WIND[:, None] + 1, {"area_weight": WIND + 1}, group=GROUP, generator=generator(1))
     shown = evaluate([made], data="made", seed=0, draws=10, reads=[Read(label="SDN", data="cloth", readout=readout)])
     assert "**Warning:** SDN on cloth: 1 principal components are kept, not 50" in markdown(shown)

@@ -155,7 +155,7 @@ def test_triplets_are_scored_on_clips_of_other_lengths_and_cloth_is_read_from_em
     assert [(point["label"], point["frames"]) for point in found["frames"]] == [("small", 8), ("small", 12)]
     assert all(0 <= point["accuracy"] <= 1 for point in found["frames"])
     assert found["frames"][0]["accuracy"] != found["frames"][1]["accuracy"]
-    assert set(found["linear"][0]["pearson"]) == {"log density", "log stiffness"}
+    assert set(found["linear"][0]["pearson"]) == {"log area_weight", "log stiffness"}
     text = (tmp_path / "evaluation.md").read_text()
     assert "## Triplet accuracy against frames" in text
     assert "## Linear readout of the embedding" in text
@@ -227,7 +227,7 @@ def test_a_model_of_hanging_cloth_estimates_the_same_quantities_in_its_own_range
     Lake.open(lake).tag("v1")
     path = tmp_path / "small-cloth.toml"
     part = TRAINING.replace("[data]\n", "[data]\nsequences = 8\n")
-    path.write_text(part.replace('["wind_speed"]', '["cloth_wind", "cloth_density"]'))
+    path.write_text(part.replace('["wind_speed"]', '["cloth_wind", "cloth_area_weight"]'))
     trained = run("train", str(path), "--at", "v1", "--lake", str(lake), "--workers", "1", "--branch", "main")
     options = ["--lake", str(lake), "--at", "v1", "--out", str(tmp_path / "shipped")]
     done = CliRunner().invoke(shipping.main, [str(path), *options], catch_exceptions=False)
@@ -237,11 +237,11 @@ def test_a_model_of_hanging_cloth_estimates_the_same_quantities_in_its_own_range
     assert trained["name"] == model.name == "small-cloth"
     assert model.cloth is Cloth.HANGING
     assert model.card["trained"]["sequences"] == 8
-    assert [(target.name, target.high) for target in model.targets] == [("wind_speed", 6.0), ("density", 0.454)]
+    assert [(target.name, target.high) for target in model.targets] == [("wind_speed", 6.0), ("area_weight", 0.454)]
     found = run(
         "evaluate", "shipped/small-cloth", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path / "page")
     )
-    assert {row["target"] for row in found["targets"]} == {"wind_speed", "density"}
+    assert {row["target"] for row in found["targets"]} == {"wind_speed", "area_weight"}
 
 
 def test_a_model_that_was_cut_off_is_an_error_with_its_place(lake: Path, tmp_path: Path) -> None:

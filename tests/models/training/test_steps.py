@@ -36,7 +36,7 @@ def prepared(count: int, *, seed: int) -> Prepared:
     wind = np.repeat(rng.uniform(0, 10, count // 2), 2)
     maps = rng.normal(size=(count, 2, *FRONT_END.shape)) * 0.1
     maps[:, :, 0] += wind[:, None, None, None] / 10
-    parameters = {"wind_speed": wind, "density": rng.uniform(0.1, 0.17, count)}
+    parameters = {"wind_speed": wind, "area_weight": rng.uniform(0.1, 0.17, count)}
     return Prepared(
         maps=maps.astype(np.float16),
         parameters=parameters,

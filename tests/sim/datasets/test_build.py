@@ -52,7 +52,7 @@ def test_clips_load_as_real_ones_do_with_the_simulated_wind_as_their_truth(built
             assert sample.clip.shape == (1, 30, 32, 32)
             assert sample.wind == winds[sample.seed]
             assert (sample.wind_sigma, sample.clock_sigma, sample.coverage) == (0.0, 0.0, 1.0)
-            assert 0.10 <= sample.parameters["density"] <= 0.17
+            assert 0.10 <= sample.parameters["area_weight"] <= 0.17
             assert {f"bending.{i}" for i in range(15)} < set(sample.parameters)
             assert sample.parameters["render.width"] == 32
     assert not seen["train"] & seen["test"]
@@ -150,7 +150,7 @@ def test_the_card_says_what_was_built(built: Path, make: Callable[..., DatasetRe
     assert make().hash in text
     assert "CC0-1.0" in text
     assert "data:image/jpeg;base64," in text
-    for name in ("wind_speed", "density", "camera_radius", "anemometer-lag.distance", "flag/"):
+    for name in ("wind_speed", "area_weight", "camera_radius", "anemometer-lag.distance", "flag/"):
         assert name in text
     assert "<td>train</td><td>3</td><td>–</td><td>7</td><td>7</td>" in text
     assert text.index("<td>bending.2<") < text.index("<td>bending.10<")

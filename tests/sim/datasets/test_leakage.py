@@ -18,7 +18,7 @@ from tests.sim.datasets.leakage import FEATURES, Surroundings, accuracies, dealt
 SEQUENCES, FILMS = 40, 80
 TARGETS = (
     "wind_speed",
-    "density",
+    "area_weight",
     "bending.0",
     "bending.7",
     "render.camera_radius",

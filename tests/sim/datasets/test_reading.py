@@ -30,7 +30,7 @@ def test_flagsim_has_the_papers_counts_size_and_search_space() -> None:
     time, wind, material = recipe.simulation.time, recipe.simulation.wind, recipe.simulation.material
     assert (time.frames, time.rate) == (60, 25.0)
     assert ends(wind.speed) == (0.0, 10.0)
-    assert material.density == Range(low=0.10, high=0.17)
+    assert material.area_weight == Range(low=0.10, high=0.17)
     assert ends(material.bending_each) == (0.1, 10.0)
     assert ends(recipe.prior.quantities["width"]) == ends(recipe.prior.quantities["height"]) == (300, 300)
 
@@ -61,7 +61,7 @@ def test_a_field_campaign_has_one_flag_a_session_and_believes_its_anemometer() -
         assert not isinstance(simulation.material.bending, Range)
         low, high = ends(simulation.wind.speed)
         assert high / low == pytest.approx(1.25 / 0.75)
-    assert len({simulation.material.bases[0].density for simulation in drawn}) == 14
+    assert len({simulation.material.bases[0].area_weight for simulation in drawn}) == 14
 
 
 def test_what_does_not_shape_the_data_leaves_the_hash_alone_and_what_does_changes_it(make: Make) -> None:

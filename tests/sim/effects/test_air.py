@@ -107,7 +107,7 @@ def test_a_falling_sheet_reaches_the_terminal_velocity_of_its_power_law(exponent
 def test_added_mass_slows_a_swing_by_the_root_of_the_mass_ratio() -> None:
     """A plate that hangs by its upper edge and swings through a small angle: gravity restores the cloth's mass, the
     inertia is that and the air's: periods are as √(1 + m_a/σ) = 2 for m_a = 3 σ."""
-    sheet = isotropic(name="sheet", density=0.2, stretching=40.0, shear=30.0, bending=0.05)
+    sheet = isotropic(name="sheet", area_weight=0.2, stretching=40.0, shear=30.0, bending=0.05)
     mesh = grid(width=0.3, height=0.4, columns=1, rows=2)
     system, state = make_system(
         mesh,
@@ -162,8 +162,8 @@ def test_pressure_and_weight_are_confounded_where_stiffness_is_free() -> None:
     ends = []
     for material, change in (
         (cloth, 0.6),
-        (cloth.scaled(density=1 / 1.6, stretching=1 / 1.6, bending=1 / 1.6), 0.0),
-        (cloth.scaled(density=1 / 1.6, bending=1 / 1.6), 0.0),
+        (cloth.scaled(area_weight=1 / 1.6, stretching=1 / 1.6, bending=1 / 1.6), 0.0),
+        (cloth.scaled(area_weight=1 / 1.6, bending=1 / 1.6), 0.0),
     ):
         start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
         held = tuple(int(v) for v in np.flatnonzero(flat.rest[:, 0] == 0))

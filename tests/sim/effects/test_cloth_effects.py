@@ -86,7 +86,7 @@ def test_cloth_rolled_at_its_rest_curvature_does_not_bend() -> None:
 def test_damping_lets_a_vibration_decay_as_stated() -> None:
     """Stiffness-proportional damping d: ẍ + d ω² ẋ + ω² x = 0, so that the amplitude falls by e^(−d ω² t/2); ω is
     that of the undamped member of the same batch, a patch held at one edge and stretched along itself."""
-    sheet = isotropic(name="sheet", density=0.2, stretching=50.0, shear=40.0, bending=1e-4)
+    sheet = isotropic(name="sheet", area_weight=0.2, stretching=50.0, shear=40.0, bending=1e-4)
     mesh = grid(width=0.2, height=0.2, columns=1, rows=1)
     system, state = make_system(
         mesh, [sheet, sheet], air=QuadraticNormal(density=0.0), handles=Handles(vertices=(0, 1), stiffness=float("inf"))

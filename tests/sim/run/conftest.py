@@ -17,7 +17,7 @@ start-noise = 1e-3
 {scene}
 [material]
 name = "camel-ponte-roma"
-density = {{ low = 0.10, high = 0.17 }}
+area-weight = {{ low = 0.10, high = 0.17 }}
 bending-factors = {{ low = 0.1, high = 10.0 }}
 {material}
 [wind]

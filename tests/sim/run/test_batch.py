@@ -171,7 +171,7 @@ def test_energies_are_those_of_the_motion() -> None:
     assert {"kinetic", "stretching", "bending", "gravity", "handles"} <= set(energies)
     assert all(len(values) == recipe.time.frames for values in energies.values())
     assert outcome.sequence is not None
-    mass = crew.mesh.vertex_areas * float(outcome.member.parameters["density"])
+    mass = crew.mesh.vertex_areas * float(outcome.member.parameters["area_weight"])
     height = outcome.sequence.positions[..., 2].astype(np.float64)
     # float32 sums of 35 vertices.
     np.testing.assert_allclose(energies["gravity"], 9.81 * (height * mass).sum(axis=1), rtol=1e-5)

@@ -19,7 +19,7 @@ from sim.scene import assemble, flag
 PONTE_ROMA = replace(named("camel-ponte-roma"), damping=0.0)
 CONSTANT = isotropic(
     name="constant",
-    density=PONTE_ROMA.density,
+    area_weight=PONTE_ROMA.area_weight,
     stretching=float(PONTE_ROMA.stretching.max()),
     shear=float(PONTE_ROMA.stretching.max()),
     bending=float(PONTE_ROMA.bending.mean()),
@@ -45,7 +45,7 @@ def falling(material: Material, *, finer: int) -> tuple[float, float]:
 @pytest.mark.parametrize("finer", [2, 4])
 def test_without_damping_the_tables_make_energy_whatever_the_step_and_constant_stiffness_does_not(finer: int) -> None:
     # At the start the flag is at rest 0.5 m, on the average, above its lowest handle: at most 2.1 J to be had.
-    weight = 1.5 * PONTE_ROMA.density * 9.81
+    weight = 1.5 * PONTE_ROMA.area_weight * 9.81
     compression, energy = falling(PONTE_ROMA, finer=finer)
     assert compression > CRUMPLED
     assert energy > 20 * weight * 0.5

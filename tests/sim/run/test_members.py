@@ -21,10 +21,10 @@ def test_draws_cover_the_search_space_uniformly() -> None:
     crew = Crew(make_recipe())
     members = [crew.member(index) for index in range(400)]
     speed = np.array([m.parameters["wind_speed"] for m in members])
-    density = np.array([m.parameters["density"] for m in members])
+    area_weight = np.array([m.parameters["area_weight"] for m in members])
     factors = np.array([m.scene.material.bending / CAMEL.bending for m in members])
     # A uniform distribution's mean over n draws has a standard deviation of width/√(12 n): four of them.
-    for values, low, high in ((speed, 0, 10), (density, 0.10, 0.17), (factors, 0.1, 10)):
+    for values, low, high in ((speed, 0, 10), (area_weight, 0.10, 0.17), (factors, 0.1, 10)):
         assert low <= values.min()
         assert values.max() <= high
         assert abs(values.mean() - (low + high) / 2) < 4 * (high - low) / np.sqrt(12 * values.size)
@@ -46,39 +46,39 @@ def test_materials_are_drawn_alike_often() -> None:
     crew.assemble(drawn[:9])
 
 
-def test_a_density_factor_multiplies_each_materials_own_density() -> None:
+def test_an_area_weight_factor_multiplies_each_materials_own_area_weight() -> None:
     """Log-uniform from 0.7 to 1.4: the mean logarithm of n draws has a standard deviation of ln 2/√(12 n)."""
-    text = small(material="density-factor = { low = 0.7, high = 1.4, scale = 'log' }")
+    text = small(material="area-weight-factor = { low = 0.7, high = 1.4, scale = 'log' }")
     text = text.replace('name = "camel-ponte-roma"', 'names = ["paper", "gray-interlock"]')
-    text = text.replace("density = { low = 0.10, high = 0.17 }\n", "")
+    text = text.replace("area-weight = { low = 0.10, high = 0.17 }\n", "")
     crew = Crew(parse(text, name="r", folder=Path(), where="r"))
     members = [crew.member(index) for index in range(200)]
     own = {"paper": 0.1, "gray-interlock": 0.187}  # kg/m², of the catalog's files
-    density = np.array([m.parameters["density"] for m in members], dtype=np.float64)
-    factors = density / [own[str(m.parameters["material"])] for m in members]
+    area_weight = np.array([m.parameters["area_weight"] for m in members], dtype=np.float64)
+    factors = area_weight / [own[str(m.parameters["material"])] for m in members]
     assert factors.min() >= 0.7
     assert factors.max() <= 1.4
     assert abs(np.log(factors).mean() - np.log(0.7 * 1.4) / 2) < 4 * np.log(2) / np.sqrt(12 * 200)
-    np.testing.assert_allclose([m.scene.material.density for m in members], density)
+    np.testing.assert_allclose([m.scene.material.area_weight for m in members], area_weight)
 
 
 def test_the_stable_step_is_looked_for_at_the_lightest_cloth() -> None:
     light, plain = (
         Crew(parse(small(material=extra), name="r", folder=Path(), where="r"))
-        for extra in ("density-factor = { low = 0.5, high = 2.0 }", "")
+        for extra in ("area-weight-factor = { low = 0.5, high = 2.0 }", "")
     )
     mass = [float(crew.corners(0)[0].cloth.mass.sum(dim=0)[0]) for crew in (light, plain)]
     assert mass[0] / mass[1] == pytest.approx(0.5, rel=1e-5)
 
 
-def test_a_recipe_without_a_density_factor_is_the_recipe_it_was() -> None:
+def test_a_recipe_without_an_area_weight_factor_is_the_recipe_it_was() -> None:
     """Its hash is in lakes: artifacts made before there were such factors are found again."""
     plain, one = (
         parse(small(material=extra), name="r", folder=Path(), where="r").identity()
-        for extra in ("", "density-factor = 1.0")
+        for extra in ("", "area-weight-factor = 1.0")
     )
     assert plain == one
-    assert "density_factor" not in plain["material"]
+    assert "area_weight_factor" not in plain["material"]
 
 
 def test_a_new_draw_does_not_move_the_others() -> None:
@@ -87,7 +87,7 @@ def test_a_new_draw_does_not_move_the_others() -> None:
         Crew(make_recipe(material="damping = { low = 0.0, high = 1e-3 }")).member(2),
     )
     assert more.parameters["damping"] != plain.parameters["damping"]
-    for name in ("wind_speed", "density", "bending"):
+    for name in ("wind_speed", "area_weight", "bending"):
         assert more.parameters[name] == plain.parameters[name]
     np.testing.assert_array_equal(more.scene.position, plain.scene.position)
 

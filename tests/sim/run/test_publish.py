@@ -43,7 +43,7 @@ def test_members_are_published_with_what_they_were_made_of(lake: Lake) -> None:
         assert (row["kind"], row["frame_count"], row["rate"]) == ("meshes", 4, 25.0)
         assert row["wind"] == pytest.approx(member.parameters["wind_speed"])
         parameters = json.loads(row["parameters"])
-        assert parameters["density"] == member.parameters["density"]
+        assert parameters["area_weight"] == member.parameters["area_weight"]
         assert len(parameters["bending"]) == 15
         assert set(report_of["mean_energies"]) >= {"kinetic", "stretching", "bending", "gravity"}
         sequence = read_meshes(lake.object_path(row["object"]))

@@ -38,7 +38,7 @@ def test_the_search_space_is_the_papers() -> None:
     recipe = load("flag-search-space")
     assert [base.name for base in recipe.material.bases] == ["camel-ponte-roma"]
     assert recipe.material.bending_each == Range(low=0.1, high=10.0)
-    assert recipe.material.density == Range(low=0.10, high=0.17)
+    assert recipe.material.area_weight == Range(low=0.10, high=0.17)
     assert recipe.wind.speed == Range(low=0.0, high=10.0)
     assert (recipe.time.frames, recipe.time.rate) == (60, 25.0)
     assert recipe.scene.width / recipe.scene.height == 1.5
@@ -112,7 +112,7 @@ def test_what_is_wrong_is_refused_with_its_place() -> None:
         (MINIMAL.replace("speed = 4.0", ""), InputError, "no wind speed"),
         (MINIMAL.replace("speed", "sped"), UnknownNameError, "did you mean 'speed'"),
         ("[wind]\nspeed = 4.0\n", InputError, "no material"),
-        (MINIMAL.replace("[wind]", "density = 0.0\n[wind]"), InputError, "above 0"),
+        (MINIMAL.replace("[wind]", "area-weight = 0.0\n[wind]"), InputError, "above 0"),
         (MINIMAL.replace("[wind]", "file = 'x.toml'\n[wind]"), UsageError, "more than one of name"),
         (MINIMAL.replace("[wind]", "names = ['paper']\n[wind]"), UsageError, "more than one of name"),
         ("[scene]\nshape = 'arcsim'\n" + MINIMAL, InputError, "the key file is missing"),
@@ -147,13 +147,14 @@ def test_winds_force_is_named() -> None:
 
 
 def test_materials_of_a_users_own_files_are_read(tmp_path: Path) -> None:
-    tables = {"density": 0.2, "stretching": [[50.0, 0, 50, 40]] * 6, "bending": [[1e-5] * 5] * 3}
-    (tmp_path / "mine.json").write_text(json.dumps(tables))
+    tables = {"area-weight": 0.2, "stretching": [[50.0, 0, 50, 40]] * 6, "bending": [[1e-5] * 5] * 3}
+    of_arcsim = {"density" if key == "area-weight" else key: value for key, value in tables.items()}
+    (tmp_path / "mine.json").write_text(json.dumps(of_arcsim))
     lines = [f"{key} = {json.dumps(value)}" for key, value in tables.items()]
     (tmp_path / "mine.toml").write_text("\n".join([*lines, 'source = "measured"', "damping = 1e-3"]))
     for name, damping in (("mine.json", 0.0), ("mine.toml", 1e-3)):
         (base,) = read(f'[material]\nfile = "{name}"\n[wind]\nspeed = 1\n', tmp_path).material.bases
-        assert (base.density, base.damping) == (0.2, damping)
+        assert (base.area_weight, base.damping) == (0.2, damping)
         np.testing.assert_array_equal(base.bending, tables["bending"])
     with pytest.raises(NotFoundError):
         read('[material]\nfile = "yours.toml"\n[wind]\nspeed = 1\n', tmp_path)
@@ -198,7 +199,7 @@ def test_an_arcsim_scene_may_be_the_start_of_a_recipe(scene_folder: Path) -> Non
     member = Crew(recipe).member(0)
     np.testing.assert_allclose(member.scene.wind, [0, 3, 1], atol=1e-12)
     assert member.scene.gravity == (0, 0, -9.8)
-    assert member.scene.material.density == 0.2
+    assert member.scene.material.area_weight == 0.2
     assert recipe.wind.force == QuadraticNormal(density=1.2)
     assert recipe.identity()["scene"]["left_out"] == ["strainlimiting", "proximity"]
     changed = read(ARCSIM + '[material]\nname = "paper"\n[wind]\nspeed = 2.0\n', scene_folder)

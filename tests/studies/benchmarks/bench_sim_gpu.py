@@ -202,7 +202,12 @@ def _agreement(device: str, columns: int) -> dict[str, Any]:
 
 def _training(batch: int, device: str) -> dict[str, Any]:
     """Forward, backward and a step of Adam."""
-    targets = ("wind_speed", "fabric_density", "fabric_bending", "anisotropy")  # as catalogs/training/flow.toml has it
+    targets = (
+        "wind_speed",
+        "fabric_area_weight",
+        "fabric_bending",
+        "anisotropy",
+    )  # as catalogs/training/flow.toml has it
     learner = build("flow", {"dimension": 32}, loss=Loss.POSTERIOR, targets=targets, components=6, margin=1.0).to(
         device
     )

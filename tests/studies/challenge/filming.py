@@ -93,7 +93,10 @@ def films_of(
         },
         "area_weight": None
         if not filming.weight_sigma
-        else [material_of(key).density * math.exp(filming.weight_sigma * rng.standard_normal()), filming.weight_sigma],
+        else [
+            material_of(key).area_weight * math.exp(filming.weight_sigma * rng.standard_normal()),
+            filming.weight_sigma,
+        ],
         "anemometer": {"distance_constant": _CUP, "averaging": 1.0},
         "recordings": recordings,
     }

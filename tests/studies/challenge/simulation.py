@@ -125,7 +125,7 @@ def _simulated(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) ->
 
 def material_of(key: AnswerKey) -> Material:
     """The set's true cloth."""
-    return replace(named(key.material).scaled(density=key.density, bending=key.bending), damping=key.damping)
+    return replace(named(key.material).scaled(area_weight=key.density, bending=key.bending), damping=key.damping)
 
 
 def _frames(recipe: ChallengeRecipe, key: AnswerKey) -> int:

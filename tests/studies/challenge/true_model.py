@@ -35,7 +35,7 @@ def true_model_errors(folder: ChallengeFolder, key: AnswerKey) -> Mapping[str, f
     if any(issubclass(kind, Gusts) for kind, _ in kinds):
         return {}
     effects = [kind(**{acting.parameter: acting.value}) for kind, acting in kinds]
-    calibration = Calibration(density=key.density, bending=key.bending, damping=key.damping)
+    calibration = Calibration(area_weight=key.density, bending=key.bending, damping=key.damping)
     return prediction_errors(folder.experiment(key.name), calibration, effects)
 
 

@@ -50,7 +50,7 @@ width = {width}
 height = {height}
 [material]
 name = "camel-ponte-roma"
-[pins]
+[attachment]
 at = "hoist-corners"
 """
 RECORDING = """

@@ -28,7 +28,16 @@ from measure.forecasting import Setting
 from measure.loop import LoopOptions
 from measure.nulls import bank as banks
 from measure.nulls import batches
-from measure.observe import DENSITY_UNCERTAINTY, Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe
+from measure.observe import (
+    AREA_WEIGHT_UNCERTAINTY,
+    Experiment,
+    Hold,
+    Observation,
+    Setup,
+    WindTrack,
+    from_arrays,
+    observe,
+)
 from measure.verdict import CRITERIA, Conclusion, Estimate, Verdict
 from tests.evidence import ABSENT
 from tests.studies.validation.arcsim import RATE, folder
@@ -37,8 +46,10 @@ from tests.studies.validation.flags_runs import CAMEL
 WINDS = (3, 5, 7)
 DRAWS = tuple(range(1, 1 + int(os.environ.get("FLAGDATA_DRAWS", "3"))))
 """Of the nulls, some 13 minutes of a core each; FLAGDATA_DRAWS says how many."""
-KNOWN = tuple(float(known) for known in os.environ.get("FLAGDATA_KNOWN", f"{DENSITY_UNCERTAINTY:g},0.02").split(","))
-"""Relative standard uncertainties of the density that is declared: where it is not given, and of a cloth that was
+KNOWN = tuple(
+    float(known) for known in os.environ.get("FLAGDATA_KNOWN", f"{AREA_WEIGHT_UNCERTAINTY:g},0.02").split(",")
+)
+"""Relative standard uncertainties of the area weight that is declared: where it is not given, and of a cloth that was
 weighed; FLAGDATA_KNOWN says which are tried."""
 WORKERS = int(os.environ.get("FLAGDATA_WORKERS", "0")) or len(os.sched_getaffinity(0))
 """Processes that simulate the nulls; FLAGDATA_WORKERS says how many."""
@@ -97,20 +108,20 @@ def _report(what: str) -> None:
 
 
 def _heading(draw: int, known: float) -> str:
-    return f"draw {draw}, density known to {100 * known:.0f} %"
+    return f"draw {draw}, area weight known to {100 * known:.0f} %"
 
 
 def _once(place: Path, name: str, experiment: Experiment, seed: int) -> dict[str, Any]:
     """A verdict as the page reports it, from its file where it was made before."""
-    kept = place / f"{name}-{experiment.specimen.density_uncertainty:g}.json"
+    kept = place / f"{name}-{experiment.specimen.area_weight_uncertainty:g}.json"
     if not kept.exists():
         record = _record(close_loop(experiment, LoopOptions(bank=place / "nulls", seed=seed)), CASES[name])
         kept.write_text(json.dumps(record, allow_nan=False), encoding="utf-8")
     return json.loads(kept.read_text(encoding="utf-8"))
 
 
-def _experiment(runs: Path, name: str, known: float = DENSITY_UNCERTAINTY) -> Experiment:
-    setup = Setup(material=CAMEL, density_uncertainty=known, pins=Hold.HOIST_CORNERS)
+def _experiment(runs: Path, name: str, known: float = AREA_WEIGHT_UNCERTAINTY) -> Experiment:
+    setup = Setup(material=CAMEL, area_weight_uncertainty=known, pins=Hold.HOIST_CORNERS)
     return observe([_recording(runs / f"{name}_w{wind}.npz", wind) for wind in WINDS], setup).experiment
 
 
@@ -128,7 +139,7 @@ def _recording(path: Path, wind: int) -> Observation:
 
 
 def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
-    wanted = {"density": 1.0, "bending": 1.0} | dict(truth.parameters)
+    wanted = {"area_weight": 1.0, "bending": 1.0} | dict(truth.parameters)
     shown = {p.name: p.before if p.after is None else p.after for p in verdict.parameters}
     return {
         "said": verdict.conclusion.value,
@@ -191,14 +202,14 @@ def _table(heading: str, verdicts: Mapping[str, Any]) -> list[str]:
     lines = [
         f"## {heading}",
         "",
-        "| what acted | verdict | p | density, of nominal | bending, of nominal | damping [ms] | right | s |",
+        "| what acted | verdict | p | area weight, of nominal | bending, of nominal | damping [ms] | right | s |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for name, own in verdicts.items():
         found = own["parameters"]
         lines.append(
             f"| {name} | {own['said']}{': ' * bool(own['named'])}{', '.join(own['named'])} | {own['p']:.3f} "
-            f"[{own['p low']:.3f}, {own['p high']:.3f}] | {_span(found['density'])} | {_span(found['bending'])} | "
+            f"[{own['p low']:.3f}, {own['p high']:.3f}] | {_span(found['area_weight'])} | {_span(found['bending'])} | "
             f"{_span(found['damping'], 1e3)} | {'yes' if own['right'] else 'no'} | {own['seconds']} |"
         )
     unseen = [

@@ -6,7 +6,7 @@ tables that a user would bring, against one bank of nulls by flagdata's own simu
 
 Environment variables: FLAGDATA_FOREIGN_NULLS (how many nulls), FLAGDATA_FOREIGN_EFFECTS (how many of each effect),
 FLAGDATA_FOREIGN_ACTED (which effects, separated by commas), FLAGDATA_FOREIGN_KINDS (kinds of numerics in the bank),
-FLAGDATA_FOREIGN_WEIGHED (the relative uncertainty that each cloth is weighed with; its own density is then what is
+FLAGDATA_FOREIGN_WEIGHED (the relative uncertainty that each cloth is weighed with; its own area weight is then what is
 declared), FLAGDATA_FOREIGN_FOLDER (where bank, recordings and verdicts are kept; a run that was stopped goes on there).
 """
 
@@ -36,7 +36,7 @@ from tests.studies.validation.environments import MUJOCO
 from tests.studies.validation.mujoco.experiments import NOISE, NOMINAL, NOTHING, SPEEDS, UNDECLARED, Truth, draw, write
 
 _NULLS, _EFFECTS, _KINDS = 20, 1, 40
-_COVERED = ("density", "bending", "damping")
+_COVERED = ("area_weight", "bending", "damping")
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -79,10 +79,12 @@ def _row(truth: Truth, folder: Path, python: Path, seed: int) -> dict[str, Any]:
 
 
 def _weighed(observed: Observed, truth: Truth, uncertainty: float) -> Observed:
-    """With the cloth's own density declared, known to a relative uncertainty, in place of the nominal one."""
+    """With the cloth's own area weight declared, known to a relative uncertainty, in place of the nominal one."""
     specimen = observed.experiment.specimen
     known = replace(
-        specimen, material=specimen.material.scaled(density=truth.factors["density"]), density_uncertainty=uncertainty
+        specimen,
+        material=specimen.material.scaled(area_weight=truth.factors["area_weight"]),
+        area_weight_uncertainty=uncertainty,
     )
     return replace(observed, experiment=replace(observed.experiment, specimen=known))
 
@@ -126,9 +128,9 @@ def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str
     except InputError as error:
         return {**row, "refused": str(error), "grade": "refused"}
     of = {parameter.name: parameter.after or parameter.before for parameter in verdict.parameters}
-    declared = observed.experiment.specimen.material.density / NOMINAL.density
+    declared = observed.experiment.specimen.material.area_weight / NOMINAL.area_weight
     true = {
-        "density": truth.factors["density"] / declared,
+        "area_weight": truth.factors["area_weight"] / declared,
         "bending": truth.factors["bending"],
         "damping": truth.damping,
     }
@@ -226,7 +228,7 @@ def page(found: Mapping[str, Any]) -> str:
         "",
         f"{found['refused']} were refused. The bank holds {found['kinds']} kinds of numerics.",
         "",
-        "| experiment | acted | cloth: density, stretching, bending; damping | method | said | p | grade |",
+        "| experiment | acted | cloth: area weight, stretching, bending; damping | method | said | p | grade |",
         "|---|---|---|---|---|---|---|",
         *(_line(row) for row in found["experiments"]),
     ]

@@ -51,7 +51,7 @@ def test_the_declared_material_has_the_membrane_of_saint_venant_and_kirchhoff(tm
     (tmp_path / "recipe.toml").write_text('[material]\nfile = "cloth.toml"\n', encoding="utf-8")
     material = parse(tmp_path / "recipe.toml").setup.material
     assert material is not None
-    assert material.density == NOMINAL.density
+    assert material.area_weight == NOMINAL.area_weight
     mesh = grid(width=1.0, height=1.0, columns=2, rows=2)
     cloth = Cloth.build(mesh, [material], dtype=torch.float64)
     y, nu = NOMINAL.stretching, NOMINAL.poisson
@@ -69,7 +69,7 @@ def test_a_hem_weighs_its_line_density_times_the_circumference() -> None:
     assert truth.sheet.added is not None
     assert truth.sheet.added.sum() == pytest.approx(0.02 * 2 * (1.5 + 1.0))
     mass = HemMass(line_density=0.02).cloth(Cloth.build(truth.sheet.mesh, [MATERIAL], dtype=torch.float64)).mass[:, 0]
-    plain = MATERIAL.density * truth.sheet.mesh.vertex_areas
+    plain = MATERIAL.area_weight * truth.sheet.mesh.vertex_areas
     np.testing.assert_allclose(truth.sheet.added, mass.numpy() - plain, atol=1e-12)
 
 
@@ -114,7 +114,7 @@ def test_the_summary_counts_nulls_and_effects_apart() -> None:
 
 
 def _row(truth: Truth, p: float, *, grade: str) -> dict[str, object]:
-    covered = MappingProxyType({name: {"covers": True} for name in ("density", "bending", "damping")})
+    covered = MappingProxyType({name: {"covers": True} for name in ("area_weight", "bending", "damping")})
     return {
         "name": truth.name,
         "acted": truth.undeclared.title,

@@ -56,7 +56,7 @@ def assembled(
     for index, strip in enumerate(members):
         material = isotropic(
             name=f"strip {index}",
-            density=strip.mass,
+            area_weight=strip.mass,
             stretching=stretching,
             shear=stretching,
             bending=5 * strip.rigidity,

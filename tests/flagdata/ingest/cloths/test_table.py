@@ -29,16 +29,16 @@ def written(folder: Path, *lines: str) -> Path:
 
 def test_each_row_is_a_film_with_its_cloths_properties(folder: Path) -> None:
     first, second, third = read_cloths(written(folder, HEADING, *ROWS))
-    assert (first.film, first.fabric, first.density) == (folder / "a.mp4", "Faux Fur", 0.39)
+    assert (first.film, first.fabric, first.area_weight) == (folder / "a.mp4", "Faux Fur", 0.39)
     assert first.parameters == {
         "fabric": "Faux Fur",
-        "density": 0.39,
+        "area_weight": 0.39,
         "bending_stiffness": 2.1e-5,
         "wind_level": "W1",
     }
     assert second.wind_level == "W2"
     assert second.wind is None
-    assert third.parameters == {"fabric": "silk", "density": 0.05}
+    assert third.parameters == {"fabric": "silk", "area_weight": 0.05}
     assert third.wind == (2.4, 0.3)
 
 

@@ -53,7 +53,7 @@ def test_a_heavier_flag_droops_more_and_repeats() -> None:
 def test_a_cloth_has_the_bending_it_is_given() -> None:
     made = cloth(0.2, 7e-5, 0.01, stretching=2.0, fabric="gray-interlock")
     assert mean_bending(made) == pytest.approx(7e-5)
-    assert made.density == 0.2
+    assert made.area_weight == 0.2
     assert np.allclose(made.stretching, 2 * named("gray-interlock").stretching)
 
 

@@ -150,7 +150,9 @@ def test_films_and_markers_of_a_cloth_are_judged_together(
     def closed(experiment: Experiment, options: LoopOptions, *, stage: object) -> Verdict:
         levels.append(options.level)
         one = Estimate(value=1.0, low=0.8, high=1.2, unit="of nominal")
-        fitted = [Parameter(name=name, before=one, after=one, shift=0.0) for name in ("density", "bending", "damping")]
+        fitted = [
+            Parameter(name=name, before=one, after=one, shift=0.0) for name in ("area_weight", "bending", "damping")
+        ]
         return replace(verdict(Conclusion.EFFECT), parameters=tuple(fitted))
 
     monkeypatch.setattr("measure.closing.close.close_loop", closed)
@@ -160,7 +162,7 @@ def test_films_and_markers_of_a_cloth_are_judged_together(
     lake, out = tmp_path / "lake", tmp_path / "out"
     Lake.create(lake)
     cloth = tmp_path / "cloth.toml"
-    cloth.write_text(f'[cloth]\nwidth = {WIDTH}\nheight = {HEIGHT}\n[pins]\nat = "hoist"\n')
+    cloth.write_text(f'[cloth]\nwidth = {WIDTH}\nheight = {HEIGHT}\n[attachment]\nat = "hoist"\n')
     done = run(
         *tables,
         tracks,

@@ -1,7 +1,7 @@
 """Experiments of a flag by MuJoCo: drawn from a seed, simulated, and written as a user would bring them.
 
 What is declared is one nominal cloth, level winds along +x and nothing else. What is simulated is another cloth by
-another method: density, stretching, bending and damping differ from the nominal ones, and an undeclared effect
+another method: area weight, stretching, bending and damping differ from the nominal ones, and an undeclared effect
 may act.
 """
 
@@ -36,14 +36,18 @@ _HEADING = 0.5  # rad: how far from downwind a flag starts
 NOMINAL = Sheet(
     mesh=grid(width=WIDTH, height=HEIGHT, columns=COLUMNS, rows=ROWS),
     held=(),
-    density=0.284,
+    area_weight=0.284,
     stretching=120.0,
     poisson=0.2,
     bending=9e-6,
     damping=0.25e-3,
 )
-"""About Camel Ponte Roma, isotropic: its area density, tension at small strain, and k/4 of its bending table."""
-SPREAD: Mapping[str, tuple[float, float]] = {"density": (0.85, 1.18), "stretching": (0.7, 1.5), "bending": (0.4, 2.5)}
+"""About Camel Ponte Roma, isotropic: its area area weight, tension at small strain, and k/4 of its bending table."""
+SPREAD: Mapping[str, tuple[float, float]] = {
+    "area_weight": (0.85, 1.18),
+    "stretching": (0.7, 1.5),
+    "bending": (0.4, 2.5),
+}
 """Log-uniform factors on the nominal cloth."""
 DAMPINGS = (0.25e-3, 5e-3)  # s, log-uniform
 GENTLE = 1e-3
@@ -200,14 +204,14 @@ def write(truth: Truth, folder: Path, *, python: Path, seed: int) -> Path:
 def material_text() -> str:
     """The nominal cloth as a material file: entries that act as this membrane and these hinges do.
 
-    The tables' entries count twice in the membrane, whose energy density is (k0 G00² + 2 k1 G00 G11 + k2 G11² +
+    The tables' entries count twice in the membrane, whose energy area weight is (k0 G00² + 2 k1 G00 G11 + k2 G11² +
     2 k3 G01²)/2, and hinges of an entry k store k/4 κ²/2 in a cylinder.
     """
     plain = NOMINAL.stretching / (1 - NOMINAL.poisson**2)
     row = [plain / 2, NOMINAL.poisson * plain / 2, plain / 2, NOMINAL.stretching / (1 + NOMINAL.poisson) / 2]
     bending = [4 * NOMINAL.bending] * 5
     return (
-        f'source = "constant stiffness"\ndensity = {NOMINAL.density}\ndamping = {NOMINAL.damping}\n'
+        f'source = "constant stiffness"\ndensity = {NOMINAL.area_weight}\ndamping = {NOMINAL.damping}\n'
         f"stretching = {[row] * 6}\nbending = {[bending] * 3}\n"
     )
 
@@ -215,7 +219,7 @@ def material_text() -> str:
 def _recipe(speeds: Sequence[float]) -> str:
     head = (
         f'[cloth]\nwidth = {WIDTH}\nheight = {HEIGHT}\n\n[material]\nfile = "cloth.toml"\n\n'
-        '[pins]\nat = "hoist-corners"\nrigid = true\n'
+        '[attachment]\nat = "hoist-corners"\nrigid = true\n'
     )
     parts = [
         f'\n[[recording]]\nsource = "{_file(speed)}"\nname = "{speed:.3g} m/s"\nrate = {RATE}\nnoise = {NOISE}\n'
@@ -237,9 +241,9 @@ def _markers(rest: FloatArray) -> IntArray:
     return np.flatnonzero((column % SEEN == 0) & (row % SEEN == 0))
 
 
-def _hem(rest: FloatArray, density: float) -> FloatArray | None:
+def _hem(rest: FloatArray, area_weight: float) -> FloatArray | None:
     """(vertex,) mass of a hem around the cloth, of so much for each metre, half of each edge at its ends [kg]."""
-    if not density:
+    if not area_weight:
         return None
     length = np.zeros(len(rest))
     for across, along, cells in ((0, 1, ROWS), (1, 0, COLUMNS)):
@@ -247,7 +251,7 @@ def _hem(rest: FloatArray, density: float) -> FloatArray | None:
         beside = np.minimum(rest[:, across], size - rest[:, across]) < 1e-9
         at_end = np.minimum(rest[:, along], extent - rest[:, along]) < 1e-9
         length += np.where(beside, extent / cells * np.where(at_end, 0.5, 1.0), 0.0)
-    return density * length
+    return area_weight * length
 
 
 def _table(path: Path, rest: FloatArray, positions: FloatArray) -> None:

@@ -32,11 +32,11 @@ class Flag:
     """A flag in a wind: 1.5 × 1.0 m of Camel Ponte Roma, two hoist corners held, of some area weight.
 
     Attributes:
-        density: [kg/m²].
+        area_weight: [kg/m²].
         speed: of the wind [m/s].
     """
 
-    density: float
+    area_weight: float
     speed: float
 
 
@@ -69,19 +69,19 @@ READINGS = ("drag", "droop", "frequency", "wavelength", "speed", "amplitude")
 c / U; r.m.s. of that middle across the wind over L. NaN where a run diverged or shows no travelling wave."""
 
 
-def material(density: float) -> Material:
+def material(area_weight: float) -> Material:
     """Camel Ponte Roma with its declared damping, of another area weight [kg/m²]."""
-    return replace(named("camel-ponte-roma"), density=density)
+    return replace(named("camel-ponte-roma"), area_weight=area_weight)
 
 
 def scenes_of(one: Flag, numerics: Numerics) -> list[Scene]:
     """Its starts."""
     scene = flag(
-        material=material(one.density), wind_speed=one.speed, width=LENGTH, height=HEIGHT, columns=numerics.columns
+        material=material(one.area_weight), wind_speed=one.speed, width=LENGTH, height=HEIGHT, columns=numerics.columns
     )
     if numerics.contact:
         scene = replace(scene, contact=Contact())
-    generator = stream(numerics.seed, "real-flags", f"{one.density:g}-{one.speed:g}")
+    generator = stream(numerics.seed, "real-flags", f"{one.area_weight:g}-{one.speed:g}")
     noise = generator.normal(0.0, _NOISE, (numerics.starts, *scene.position.shape))
     noise[:, list(scene.handles.vertices)] = 0.0
     return [replace(scene, position=scene.position + part) for part in noise]
