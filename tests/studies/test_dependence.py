@@ -23,7 +23,7 @@ def simulated(correlation: float, *, noise: float, films: int = 4000) -> Errors:
     variance = 1 / (1 + 1 / noise)
     # Two draws with the mean and the variance of the posterior.
     draws = (observed / noise * variance)[:, :, None] + np.sqrt(variance) * np.array([-1.0, 1.0])[:, None]
-    names = ("wind_speed", "density")
+    names = ("wind_speed", "area_weight")
     found = errors_of(draws, truth, names)
     return Errors(names=names, values=found)
 
@@ -33,7 +33,7 @@ def simulated(correlation: float, *, noise: float, films: int = 4000) -> Errors:
 def test_the_correlation_of_likelihoods_is_found_whether_they_are_narrow_or_wide(
     correlation: float, noise: float
 ) -> None:
-    value, upper = simulated(correlation, noise=noise).correlation("density")
+    value, upper = simulated(correlation, noise=noise).correlation("area_weight")
     assert value == pytest.approx(correlation, abs=0.04)
     assert value <= upper <= value + 0.05
 
@@ -46,7 +46,7 @@ def test_the_winds_errors_count_with_what_the_prior_has_in_common() -> None:
 
 def test_a_window_as_wide_as_the_prior_has_no_score() -> None:
     draws = np.array([-1.5, 1.5])[None, None, :, None]
-    assert errors_of(draws, np.array([[0.4]]), ("density",))[0, 0, 0] == 0
+    assert errors_of(draws, np.array([[0.4]]), ("area_weight",))[0, 0, 0] == 0
 
 
 def test_the_cards_entry_is_what_was_measured() -> None:
@@ -54,4 +54,4 @@ def test_the_cards_entry_is_what_was_measured() -> None:
     entry = card_entry(found)
     stored = of_model(replace(model, card={**model.card, CARD_KEY: entry}))
     assert stored == found.dependence()
-    assert stored.cloth >= entry["targets"]["density"]["correlation"]
+    assert stored.cloth >= entry["targets"]["area_weight"]["correlation"]

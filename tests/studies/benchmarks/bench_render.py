@@ -63,7 +63,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def _flag() -> Meshes:
-    scene = flag(material=material("camel-ponte-roma").scaled(density=0.5), wind_speed=5.0, columns=60)
+    scene = flag(material=material("camel-ponte-roma").scaled(area_weight=0.5), wind_speed=5.0, columns=60)
     kept = []
     with torch.no_grad():
         system, state = assemble([scene])

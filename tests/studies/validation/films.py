@@ -105,7 +105,7 @@ def _reasons(measured: Measurement) -> dict[str, Any]:
 def _quantities(measured: Measurement) -> dict[str, Any]:
     """The estimate of a refused film too: what the refusal spares the user."""
     found = {}
-    for short, name in (("wind", "wind_speed"), ("weight", "density")):
+    for short, name in (("wind", "wind_speed"), ("weight", "area_weight")):
         column = measured.draws[:, measured.names.index(name)]
         own = next(one for one in measured.quantities if one.name == name)
         low, high = own.span.ends()

@@ -68,8 +68,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         result["of"][target.name] = _scores(
             truth, found.mean[:, column], low[:, column], high[:, column], known, unit=target.unit, seed=seed
         )
-    weight = [target.name for target in found.targets].index("density")
-    truth = _of(test, "density")
+    weight = [target.name for target in found.targets].index("area_weight")
+    truth = _of(test, "area_weight")
     mean = found.mean[:, weight]
     result["known_material_rmse"] = _rmse(truth - _mean_of_each(truth, of))
     chosen = _one_of_each(of, seed)
@@ -85,7 +85,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         for k in chosen
     ]
     result["targets_median_error"] = float(np.median(errors))
-    trivial = np.abs(_of(train, "density").mean() - truth)[chosen]
+    trivial = np.abs(_of(train, "area_weight").mean() - truth)[chosen]
     result["targets_always_the_mean_median_error"] = float(np.median(trivial))
     result["paper_median_error"] = float(np.median([abs(a - b) for a, b in PAPER]))
     _draw(out / "validate-hanging-cloth.png", truth, mean, low[:, weight], high[:, weight], chosen)

@@ -283,7 +283,7 @@ def simulated(case: str, number: int, seed: int, *, across: int = ACROSS_MARKERS
     material, parameters = CAMEL, {}
     if case == _OTHER:
         other = named(str(rng.choice([name for name in MATERIALS.names() if name != CAMEL.name])))
-        material = replace(other.scaled(density=CAMEL.density / other.density), damping=CAMEL.damping)
+        material = replace(other.scaled(area_weight=CAMEL.area_weight / other.area_weight), damping=CAMEL.damping)
     flat = grid(width=WIDTH, height=HEIGHT, columns=11, rows=7)
     ends = [int(np.argmin(np.linalg.norm(flat.rest - corner, axis=1))) for corner in ((0.0, 0.0), (0.0, HEIGHT))]
     specimen = Specimen(
@@ -308,7 +308,7 @@ def simulated(case: str, number: int, seed: int, *, across: int = ACROSS_MARKERS
         winds=tuple(WindTrack(times=times, velocity=wind) for wind in winds),
     )
     own = batch.calibrations[0]
-    parameters = {"density": own.density, "damping": own.damping}
+    parameters = {"area_weight": own.area_weight, "damping": own.damping}
     if case != _OTHER:
         parameters["bending"] = own.bending
     positions = np.stack([recording.positions for recording in batch.simulate()])

@@ -95,7 +95,7 @@ def simulate(
     across = run.push * length * share**2 * (6 - 4 * share + share**2) / 3
     material = isotropic(
         name="paper",
-        density=mass,
+        area_weight=mass,
         stretching=run.stretching,
         shear=run.stretching,
         bending=_GRID_RIGIDITY * rigidity,

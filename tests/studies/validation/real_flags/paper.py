@@ -86,7 +86,7 @@ def frequencies(case: Case, shares: Sequence[float], speeds: Sequence[float], ho
     across = case.run.push * length * along**2 * (6 - 4 * along + along**2) / 3
     paper = isotropic(
         name="paper",
-        density=case.sheet.mass,
+        area_weight=case.sheet.mass,
         stretching=how.stretching,
         shear=how.stretching,
         bending=_GRID_RIGIDITY * case.sheet.rigidity,

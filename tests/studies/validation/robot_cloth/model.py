@@ -150,7 +150,7 @@ def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parame
             mesh=mesh,
             position=own,
             handles=Handles(vertices=held, stiffness=math.inf),
-            material=replace(cloth.material.scaled(density=p.density, bending=p.bending), damping=p.damping),
+            material=replace(cloth.material.scaled(area_weight=p.density, bending=p.bending), damping=p.damping),
         )
         for own, p in zip(start, parameters, strict=True)
     ]
