@@ -213,7 +213,7 @@ def test_a_model_has_the_parameters_of_the_verdict(specimen: Specimen, place: in
     assert member.scene.material.damping == pytest.approx(damping)
     assert member.wind_speed == 5.0
     assert {name: dict(values) for name, values in member.effects.items()} == (
-        {} if place == 0 else {"lift": {"coefficient": 0.62, "area_weight": pytest.approx(1.225, abs=0.1)}}
+        {} if place == 0 else {"lift": {"coefficient": 0.62, "density": pytest.approx(1.225, abs=0.1)}}
     )
     np.testing.assert_allclose(crew.mesh.rest, specimen.mesh.rest)
     np.testing.assert_array_equal(crew.mesh.faces, specimen.mesh.faces)
