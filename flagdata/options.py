@@ -429,10 +429,14 @@ def _keyword(name: str) -> str:
     return name.removeprefix("--").replace("-", "_")
 
 
+def _told(row: Option) -> str:
+    """Returns what the documentation of a call says of an option."""
+    return f"{row.about} Of the last version: give {row.now}." if row.now else row.about
+
+
 def _arguments(rows: Mapping[str, tuple[Field[Any], Option]]) -> str:
     """Returns what a docstring says of each option."""
     return "\n".join(
-        textwrap.fill(f"{key}: {row.about}", _WIDTH, initial_indent="    ", subsequent_indent="        ")
+        textwrap.fill(f"{key}: {_told(row)}", _WIDTH, initial_indent="    ", subsequent_indent="        ")
         for key, (_, row) in rows.items()
-        if not row.now
     )

@@ -22,9 +22,8 @@ from flagdata.retired_names import hashed_names, present_names, present_query, p
 from flagdata.schema import CATALOG, catalog_schema
 from measure.verdict import CRITERIA
 from models.targets import Scaling
-from models.training.recipe import load as load_training
-from sim.run.members import Crew
-from sim.run.reading import load, parse
+from models.training import load as load_training
+from sim.run import Crew, load, parse
 from tests.small import SIMULATION
 
 SCENES = {
