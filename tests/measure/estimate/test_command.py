@@ -165,7 +165,7 @@ def test_a_material_states_its_area_weight_from_the_catalog_or_the_lakes_films(f
     made = Lake.open(lake)
     with made.transaction("declared") as transaction:
         for name, session, area_weight in (("one", "felt", 0.24), ("two", "linen", 0.2), ("three", "linen", 0.21)):
-            cloth = {"cloth": {"fabric": session, "area_weight": area_weight}}
+            cloth = {"cloth": {"fabric": session, "density": area_weight}}  # as recipes are hashed
             transaction.add(Artifact(kind=Kind.RECORDING, name=name, session=session, recipe=cloth, frame_count=1))
     assert weight_of("felt", lake=made, at=None)[0] == Stated.of(0.24)
     with pytest.raises(UsageError, match=r"2 area weights, 0\.2 to 0\.21"):
