@@ -37,7 +37,7 @@ def test_the_verdicts_on_another_simulator_are_those_of_their_sheets() -> None:
     rejected = nulls["false_rejections"]
     assert f"[{rejected['count']} null experiments]" in page
     assert (
-        f"| {rejected['hits']} rejected; the intervals contain the density in {density['hits']}, the bending in "
+        f"| {rejected['hits']} rejected; the intervals contain the area weight in {density['hits']}, the bending in "
         f"{bending['hits']}, the damping in all |"
     ) in page
     right, missed, wrong = (effects[name] for name in ("right", "missed", "wrong"))
