@@ -13,8 +13,6 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
-from distributed import Client
-
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import ConflictError
 from flagdata.lake import Artifact, Lake
@@ -24,11 +22,11 @@ from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 from sim.datasets import jobs
 from sim.datasets.cast import Cast, Roll, casts
-from sim.datasets.cluster import Job, results
 from sim.datasets.films import PlannedFilm, Sequences
 from sim.datasets.jobs import Filmed, Simulated
 from sim.datasets.recipe import DatasetRecipe
 from sim.run.publish import publish, whole
+from sim.workers import Job, Workers
 
 COMMIT_FILMS = 32
 """Films of one commit."""
@@ -68,15 +66,13 @@ class Build:
     """One build of a recipe into a lake.
 
     Args:
-        say: called with a line of progress for the user.
         device: where workers compute.
     """
 
     lake: Lake
     recipe: DatasetRecipe
-    client: Client
+    workers: Workers
     bars: Bars
-    say: Callable[[str], None]
     branch: str = "main"
     device: str = "cpu"
     _new_sequences: int = field(default=0, init=False)
@@ -127,7 +123,7 @@ class Build:
         """Simulates all pending members of the rolls once; those that fail are noted on their roll."""
         by_name = {roll.cast.simulation.name: roll for roll, _ in todo}
         done: Simulated
-        for done in results(self.client, self._batches(todo), say=self.say):
+        for done in self.workers.results(self._batches(todo)):
             roll = by_name[done.name]
             good = [outcome for outcome in done.outcomes if outcome.sequence is not None]
             for outcome in done.outcomes:
@@ -176,7 +172,7 @@ class Build:
             waiting: list[Filmed] = []
             last = time.monotonic()
             try:
-                for done in results(self.client, self._shots(missing), say=self.say):
+                for done in self.workers.results(self._shots(missing)):
                     waiting.append(done)
                     if len(waiting) >= COMMIT_FILMS or time.monotonic() - last > COMMIT_SECONDS:
                         ready, waiting = waiting, []

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import sim.datasets.build
-import sim.datasets.cluster
+import sim.workers.scheduled
 from flagdata.cli import main
 from flagdata.lake import Transaction
 from tests.pausing import pause
@@ -30,6 +30,6 @@ def pause_at(artifacts: int) -> None:
 
 if __name__ == "__main__":
     sim.datasets.build.COMMIT_FILMS = 2
-    sim.datasets.cluster.PATIENCE = 2.0
+    sim.workers.scheduled.PATIENCE = 2.0
     pause_at(int(sys.argv.pop(1)))
     main()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import json
-from contextlib import nullcontext
 from pathlib import Path
 from typing import NoReturn
 
@@ -39,6 +38,14 @@ def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(recipe_file: Pat
     assert 30 * 2048 <= rates["film_bytes"] < 30 * 2048 + 60_000
 
 
+def test_a_plan_of_other_counts_is_of_a_data_set_that_says_them(recipe_file: Path, tmp_path: Path) -> None:
+    counts = "--sequences", 10, "--films", 12
+    planned = said(recipe_file, *counts, "--lake", tmp_path / "lake", "--plan", "--workers", 1, "--json").document
+    assert planned["recipe"] == "tiny-10x12"
+    assert planned["sequences"] == {"train": 6, "test": 4}
+    assert planned["films"] == {"train": 8, "test": 4}
+
+
 def test_the_planned_size_of_a_sequence_is_near_the_real_one(recipe_file: Path, tmp_path: Path) -> None:
     from flagdata.lake import write_meshes
 
@@ -69,6 +76,7 @@ def test_a_plan_for_people_has_a_line_a_side(recipe_file: Path, tmp_path: Path) 
     [
         (["flagsin"], 2, "did you mean 'flagsim'"),
         (["flagsim", "--renderer", "rastre"], 2, "did you mean 'raster'"),
+        (["flagsim", "--sequences", "2"], 2, "2 sequences cannot be on 3 sides"),
         (["flagsim", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"], 2, "--workers with --scheduler"),
     ],
 )
@@ -97,7 +105,6 @@ def test_a_data_set_that_is_built_is_reported_although_its_card_cannot_be_writte
     def refused(*_: object, **__: object) -> NoReturn:
         raise OSError(errno.EIO, "Input/output error")
 
-    monkeypatch.setattr("sim.datasets.cluster.connected", lambda *_, **__: nullcontext())
     monkeypatch.setattr("sim.datasets.build.Build.run", lambda _: report)
     monkeypatch.setattr("sim.datasets.card.write_card", refused)
     code, out, err = said(recipe_file, "--lake", tmp_path / "lake", "--json")

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import nullcontext
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -31,10 +30,10 @@ from measure.observe import recipe as recipes
 from measure.propose import dictionary
 from measure.propose.propose import propose
 from sim import handles
-from sim.datasets.cluster import Job
 from sim.effects import EFFECTS
 from sim.material import named
 from sim.mesh import grid
+from sim.workers import Job
 from tests.small import DATA_SET, SIMULATION, TRAINING
 from tests.studies.failing.commands import Scene, artifacts, files, rows
 from tests.studies.failing.trial import Command
@@ -195,18 +194,16 @@ def kept_outcome(kept: str) -> None:
 
 def kept_jobs(kept: str) -> None:
     """Jobs of a build are done here, and their results kept by the jobs' arguments."""
-    import sim.datasets.build
-    import sim.datasets.cluster
+    import sim.workers.here
 
-    def done(client: object, jobs: Iterable[Job], *, say: Callable[[str], None]) -> Iterator[Any]:
+    def done(workers: object, jobs: Iterable[Job]) -> Iterator[Any]:
         for function, arguments in jobs:
             path = Path(kept) / f"{function.__name__}-{_name(arguments)}"
             if not path.exists():
                 path.write_bytes(pickle.dumps(function(*arguments)))
             yield pickle.loads(path.read_bytes())
 
-    sim.datasets.build.results = done  # pyright: ignore[reportPrivateImportUsage]
-    sim.datasets.cluster.connected = lambda *_, **__: nullcontext()  # pyright: ignore[reportAttributeAccessIssue]
+    sim.workers.here.Here.results = done
 
 
 def kept_windows(kept: str) -> None:
