@@ -42,6 +42,9 @@ class Building(Computed, OnBranch, OnLake):
         type=POSITIVE,
         metavar="N",
     )
+    shard: str | None = option(
+        "Make one part of N, for builds on several machines, each on a branch of its own.", default=None, metavar="I/N"
+    )
     scheduler: str | None = option(
         "A Dask scheduler, tcp://HOST:PORT; without it, this machine.", default=None, metavar="ADDRESS"
     )

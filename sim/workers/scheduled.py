@@ -10,7 +10,6 @@ from importlib.metadata import version
 from itertools import islice
 from typing import Any, cast
 
-import dask.config
 import torch
 from distributed import CancelledError, Client, Future, as_completed
 from distributed.scheduler import KilledWorker
@@ -25,9 +24,6 @@ _POLL = 0.05  # s
 _LOOK = 1.0  # s, from one look at who works to the next
 PATIENCE = 120.0
 """How long jobs wait where nobody works, before that is an error [s]."""
-_LARGEST = {"distributed.admin.large-graph-warning-threshold": "1 TiB"}
-"""A job carries the mesh sequence that it films, 70 MiB for ten minutes: it is sent once, to the one worker that films
-it, so that Dask's advice to share it among jobs is of no use to anybody."""
 
 
 @contextmanager
@@ -126,8 +122,7 @@ class Scheduled:
         def fill() -> None:
             """Submits jobs for the workers there are now."""
             for function, arguments in islice(waiting, max(0, max(1, self.count) * _AHEAD - running.count())):
-                with dask.config.set(_LARGEST):
-                    running.add(self._client.submit(_alone, function, *arguments, pure=False))
+                running.add(self._client.submit(_alone, function, *arguments, pure=False))
 
         try:
             fill()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,6 @@ from sim import handles
 from sim.effects import EFFECTS
 from sim.material import named
 from sim.mesh import grid
-from sim.workers import Job
 from tests.small import DATA_SET, SIMULATION, TRAINING
 from tests.studies.failing.commands import Scene, artifacts, files, rows
 from tests.studies.failing.trial import Command
@@ -193,17 +192,19 @@ def kept_outcome(kept: str) -> None:
 
 
 def kept_jobs(kept: str) -> None:
-    """Jobs of a build are done here, and their results kept by the jobs' arguments."""
-    import sim.workers.here
+    """What jobs of a build compute is kept by the jobs' arguments; they put it into the lake as they do."""
+    from sim.datasets import jobs
 
-    def done(workers: object, jobs: Iterable[Job]) -> Iterator[Any]:
-        for function, arguments in jobs:
+    def keeping(function: Callable[..., Any]) -> Callable[..., Any]:
+        def done(*arguments: Any) -> Any:
             path = Path(kept) / f"{function.__name__}-{_name(arguments)}"
             if not path.exists():
                 path.write_bytes(pickle.dumps(function(*arguments)))
-            yield pickle.loads(path.read_bytes())
+            return pickle.loads(path.read_bytes())
 
-    sim.workers.here.Here.results = done
+        return done
+
+    jobs.simulate, jobs.film = keeping(jobs.simulate), keeping(jobs.film)
 
 
 def kept_windows(kept: str) -> None:
