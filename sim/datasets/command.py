@@ -49,9 +49,7 @@ def build(chosen: Building) -> Iterator[Result]:
     shard = None if chosen.shard is None else Shard.parse(chosen.shard)
     loaded = with_counts(loaded, sequences=chosen.sequences, films=chosen.films)
     if shard is not None and chosen.card is not None:
-        raise UsageError(
-            "a shard has no card", where="--card", fix="leave --card out, and build without --shard at last"
-        )
+        raise UsageError("a shard has no card", where="--card", fix="leave --card out")
     if scheduler is not None and chosen.workers is not None:
         raise UsageError("--workers with --scheduler", fix="start more workers at the scheduler")
     lake = _lake(chosen)

@@ -64,6 +64,14 @@ CASES = [
         code=2,
     ),
     Case(
+        "datasets/command.py",
+        "leave --card out",
+        f"{BUILD} --shard 1/2 --card card.html",
+        (f"{BUILD} --shard 1/2",),
+        shows=NO_WORKERS,
+        code=2,
+    ),
+    Case(
         "evaluation/report.py",
         "give a name, and the fol",
         "evaluate shipped --name out/table",

@@ -12,7 +12,9 @@ import pytest
 from flagdata.lake import Lake
 from sim.datasets import casts, jobs, load, plan
 from sim.datasets.build import BuildReport
+from sim.datasets.counts import with_counts
 from sim.datasets.plan import Rates
+from sim.datasets.shard import Shard
 from tests.program import Ended, invoke
 
 
@@ -44,6 +46,12 @@ def test_a_plan_of_other_counts_is_of_a_data_set_that_says_them(recipe_file: Pat
     assert planned["recipe"] == "tiny-10x12"
     assert planned["sequences"] == {"train": 6, "test": 4}
     assert planned["films"] == {"train": 8, "test": 4}
+    rates = Rates(sequence_seconds=1.0, film_seconds=1.0, sequence_bytes=1.0, film_bytes=1.0)
+    recipe = with_counts(load(str(recipe_file)), sequences=10, films=12)
+    shards = [plan.plan(recipe, None, workers=1, rates=rates, shard=Shard(number=number, of=3)) for number in (1, 2, 3)]
+    assert sum(shard.missing_sequences for shard in shards) == 10
+    assert sum(shard.missing_films for shard in shards) == 12
+    assert all(shard.missing_sequences for shard in shards)
 
 
 def test_the_planned_size_of_a_sequence_is_near_the_real_one(recipe_file: Path, tmp_path: Path) -> None:
@@ -76,6 +84,7 @@ def test_a_plan_for_people_has_a_line_a_side(recipe_file: Path, tmp_path: Path) 
     [
         (["flagsin"], 2, "did you mean 'flagsim'"),
         (["flagsim", "--renderer", "rastre"], 2, "did you mean 'raster'"),
+        (["flagsim", "--shard", "5/4"], 2, "'5/4' is no shard"),
         (["flagsim", "--sequences", "2"], 2, "2 sequences cannot be on 3 sides"),
         (["flagsim", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"], 2, "--workers with --scheduler"),
     ],
