@@ -137,7 +137,8 @@ class Here:
             raise WorkerError(
                 f"processes died {TRIES} times over the same jobs",
                 where="this machine",
-                fix=f"see whether it lacks memory, or give fewer --workers; {RESUMED}",
+                fix="see whether it lacks memory, or give fewer --workers; a script calls it below "
+                f'if __name__ == "__main__"; {RESUMED}',
             )
         self._say("a process has died; its jobs are done again")
 
