@@ -169,7 +169,10 @@ def put_film(lake: str, recipe: DatasetRecipe, job: PlannedFilm, meshes: str, de
         FlagdataError: a renderer that is not installed or fails, no space, no permission.
     """
     opened = _lake(lake)
-    done = film(recipe, job, read_meshes(opened.whole_object(meshes)), device)
+    sequence = read_meshes(opened.whole_object(meshes))
+    if not isinstance(sequence, MeshSequence):
+        raise TypeError("a simulated sequence has one mesh")
+    done = film(recipe, job, sequence, device)
     put = deposit(opened, ".mcap", lambda path: path.write_bytes(done.data))
     record = Record.open(opened.record_place(put.name))
     times = record.frame_times
