@@ -137,6 +137,7 @@ NAMES: dict[str, tuple[str, str]] = {
     "sensors": ("flagdata.ingest.anemometer.recipe:SENSORS", "ingest --sensor, close-loop --sensor"),
     "log-formats": ("flagdata.ingest.anemometer.formats.registry:FORMATS", "ingest --as"),
     "datasets": ("sim.datasets.reading:DATASETS", "build RECIPE"),
+    "renders": ("sim.render.prior:PRIORS", "[render] prior of a data set's recipe"),
     "training": ("models.training.recipe:TRAININGS", "train RECIPE"),
     "models": ("models.estimator:SHIPPED", "measure --model, calibrate --model"),
     "exports": ("flagdata.export.plan:FORMATS", "export FORMAT"),

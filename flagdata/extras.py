@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 
 from flagdata.errors import MissingExtraError
 
@@ -11,7 +12,7 @@ EXTRAS = {
     "torch": "physics",
     "cv2": "physics",
     "safetensors": "physics",
-    "matplotlib": "physics",
+    "matplotlib": "plots",
     "sklearn": "learn",
     "psutil": "learn",
     "dask": "cluster",
@@ -20,6 +21,18 @@ EXTRAS = {
     "warp": "gpu",
 }
 """Module → extra of pyproject.toml. Excel sheets and object storage name theirs where they are opened."""
+PURPOSES = {
+    "physics": "measuring, simulating and training pairs need",
+    "learn": "training and evaluating networks need",
+    "cluster": "the workers of a scheduler need",
+    "plots": "figures need",
+    "xarray": "Zarr and NetCDF files need",
+    "gpu": "simulations on a graphics processor need",
+}
+"""What each extra is for, as the begin of a sentence."""
+_TORCH = "torch"
+_OF_TORCH = frozenset({"physics", "learn", "cluster"})
+"""Extras that bring torch."""
 _CPU = "without an NVIDIA card first: pip install torch --index-url https://download.pytorch.org/whl/cpu; then: "
 
 
@@ -29,10 +42,17 @@ def missing(error: ImportError) -> MissingExtraError | None:
     if not isinstance(error, ModuleNotFoundError) or module not in EXTRAS:
         return None
     extra = EXTRAS[module]
-    first = "" if extra in ("xarray", "gpu") else _CPU
+    first = _CPU if extra in _OF_TORCH and not _is_installed(_TORCH) else ""
     return MissingExtraError(
-        f"this needs {module}, which the plain installation leaves out", fix=f"{first}pip install 'flagdata[{extra}]'"
+        f"{PURPOSES[extra]} {module}, which is not installed", fix=f"{first}pip install 'flagdata[{extra}]'"
     )
+
+
+def _is_installed(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except (ImportError, ValueError):
+        return False
 
 
 @contextmanager

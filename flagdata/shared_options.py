@@ -143,6 +143,12 @@ class ByNulls(Shared):
         section=TEST,
         type=LocalPath(exists=True),
     )
+    scheduler: str | None = option(
+        "Dask scheduler whose workers simulate, tcp://HOST:PORT; without it, this machine.",
+        default=None,
+        section=HOW,
+        metavar="ADDRESS",
+    )
     seed: int = option("Seed of the simulated nulls.", default=0, section=TEST, type=click.IntRange(min=0))
 
 

@@ -16,10 +16,10 @@ from av.video.frame import VideoFrame
 from flagdata.arrays import UInt8Array
 from flagdata.lake.meshes import MeshSequence
 from flagdata.rng import stream
-from measure.workers import single_threaded
 from sim.datasets.picture import noisy
 from sim.render import Meshes, RenderParameters
 from sim.render.raster import Raster
+from sim.workers import single_threaded
 
 NOISE = {"camera.read_noise": 0.8, "camera.shot_noise": 1.5}
 """Of the camera, in 8-bit steps: in the middle of the data set `outdoor`."""

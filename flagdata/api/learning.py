@@ -15,7 +15,7 @@ import click
 from flagdata.addresses import lake_place
 from flagdata.caches import beside
 from flagdata.console import LocalPath
-from flagdata.option_types import STATED
+from flagdata.option_types import POSITIVE, STATED
 from flagdata.options import argument, called, option, options
 from flagdata.parts import attribute
 from flagdata.shared_options import AtVersion, Computed, OnBranch, OnLake, Shared
@@ -33,6 +33,18 @@ class Building(Computed, OnBranch, OnLake):
 
     recipe: Path | str = argument("A TOML file, or the name of a recipe of the catalog.", "RECIPE")
     plan: bool = option("Print counts, bytes and hours, and make nothing.", default=False)
+    sequences: int | None = option(
+        "Simulated sequences of all sides together, instead of the recipe's.", default=None, type=POSITIVE, metavar="N"
+    )
+    films: int | None = option(
+        "Films of all sides together; by default as many a sequence as the recipe has.",
+        default=None,
+        type=POSITIVE,
+        metavar="N",
+    )
+    shard: str | None = option(
+        "Make one part of N, for builds on several machines, each on a branch of its own.", default=None, metavar="I/N"
+    )
     scheduler: str | None = option(
         "A Dask scheduler, tcp://HOST:PORT; without it, this machine.", default=None, metavar="ADDRESS"
     )
@@ -49,13 +61,14 @@ def build(chosen: Building) -> Mapping[str, Any]:
     ```python
     planned = flagdata.build("flagsim-small", lake="lake", plan=True)
     built = flagdata.build("flagsim-small", lake="lake", workers=2)
+    small = flagdata.build("flagsim-small", lake="lake", sequences=100, films=500)
     ```
 
     Returns:
         What `flagdata build --json` prints.
 
     Raises:
-        MissingExtraError: torch or Dask is not installed.
+        MissingExtraError: torch is not installed, or Dask for a scheduler.
         UnknownNameError: no such recipe or renderer.
         UsageError: options that contradict each other.
     """

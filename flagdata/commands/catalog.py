@@ -11,9 +11,10 @@ from importlib import import_module
 from pathlib import Path
 
 from flagdata.console import echo, echo_lines, say, table
-from flagdata.errors import MissingExtraError, UnknownNameError
+from flagdata.errors import MissingExtraError, UnknownNameError, UsageError
 from flagdata.extras import explained
 from flagdata.options import Result, argument, options, verb
+from flagdata.parts import attribute
 from flagdata.recipes import Shelf
 from flagdata.registry import PlugInError, Registry
 
@@ -23,19 +24,29 @@ class Named:
     """Names of which kind are listed."""
 
     kind: str | None = argument("Of the names; all kinds by default.", "[KIND]", default=None)
+    name: str | None = argument("The one whose recipe is printed.", "[NAME]", default=None)
 
 
 @verb(Named, example='flagdata.catalog("effects")["kinds"]')
 def catalog(chosen: Named) -> Iterator[Result]:
     """List the names that come with flagdata: scenes, materials, effects, sensors, data sets, models and more.
 
-    With KIND that kind alone, a line on each name. What a lake holds is listed by `flagdata ls`.
+    With KIND that kind alone, a line on each name. With NAME its recipe, as TOML to copy and change: of scenes, data
+    sets, trainings, materials and sensors. What a lake holds is listed by `flagdata ls`.
+
+    \b
+      flagdata catalog datasets flagsim-small > mine.toml
     """
     from flagdata.cli import NAMES
 
     kind = chosen.kind
     if kind is not None and kind not in NAMES:
         raise UnknownNameError.of("kind of name", kind, NAMES)
+    if kind is not None and chosen.name is not None:
+        found_recipe = recipe_of(kind, chosen.name)
+        yield Result("catalog-recipe", {"kind": kind, "name": chosen.name, "recipe": found_recipe})
+        echo_lines(found_recipe)
+        return
     kinds = NAMES if kind is None else {kind: NAMES[kind]}
     found: dict[str, Mapping[str, str]] = {}
     for name, (target, _) in kinds.items():
@@ -58,6 +69,26 @@ def catalog(chosen: Named) -> Iterator[Result]:
                     ", ".join(names), initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False, width=80
                 )
             )
+
+
+def recipe_of(kind: str, name: str) -> str:
+    """Returns the text of a recipe.
+
+    Raises:
+        MissingExtraError: its kind needs a package that is not installed.
+        UnknownNameError: no such name.
+        UsageError: names of this kind have no recipes.
+    """
+    from flagdata.cli import NAMES
+
+    shelf = attribute(NAMES[kind][0])
+    if not isinstance(shelf, Shelf):
+        raise UsageError(
+            f"{kind} have no recipes: each is code",
+            where=f"{kind}: {name}",
+            fix=f"flagdata catalog {kind} says what each is",
+        )
+    return shelf.named(name).text.rstrip("\n")
 
 
 def titles(target: str) -> Mapping[str, str]:

@@ -17,6 +17,7 @@ from flagdata.errors import UsageError
 from flagdata.options import AsJson, command, option, options
 from flagdata.printable import SHORT
 from flagdata.sql_process import sql_process
+from flagdata.timebase import iso
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from flagdata.lake.selection import Request, Selection
 
 PEOPLE_LIMIT = 20
+_INSTANTS = ("start", "end")
 _TIME_LIMIT = 60.0  # s; that of `flagdata.lake.selection`, which is not imported for --help
 
 # What people see without --columns, by the one kind that was selected.
@@ -44,7 +46,7 @@ VIEWS: dict[str | None, tuple[str, ...]] = {
     ),
     "clip": (
         "artifact",
-        "recording",
+        "name",
         "start_time",
         "frame_first",
         "frame_count",
@@ -215,8 +217,11 @@ def _print_table(catalog: pa.Table | Scan, request: Request) -> None:
     if not total:
         say(f"no rows of {Selection(catalog, Request()).total():,} match")
         return
-    header = [f"{f.name} [{unit}]" if (unit := _unit(f)) else f.name for f in result.schema]
-    columns = [[_cell(value, short=short) for value in column.to_pylist()] for column in result.columns]
+    header = [f"{f.name} [{unit}]" if (unit := _unit(f)) and not _is_instant(f) else f.name for f in result.schema]
+    columns = [
+        [iso(value) if _is_instant(f) and value is not None else _cell(value, short=short) for value in column]
+        for f, column in zip(result.schema, (column.to_pylist() for column in result.columns), strict=True)
+    ]
     table(header, zip(*columns, strict=True))
     if result.num_rows < total:
         say(f"{result.num_rows:,} of {total:,} rows; more by --limit")
@@ -225,6 +230,11 @@ def _print_table(catalog: pa.Table | Scan, request: Request) -> None:
 def _unit(field: pa.Field) -> str:
     unit = (field.metadata or {}).get(b"unit", b"").decode()
     return "" if unit == "1" else unit
+
+
+def _is_instant(field: pa.Field) -> bool:
+    """Returns whether a column holds instants [UTC ns], which people read as times."""
+    return field.name in _INSTANTS and _unit(field) == "ns"
 
 
 def _cell(value: Any, *, short: bool) -> str | None:

@@ -37,8 +37,8 @@ class Pairs(Batchable):
     """Pairs of a query, a map-style dataset. Made by `Source.pairs`.
 
     Workers, forked or spawned, get flat arrays and paths; they never touch the catalog. Each opens a record when it
-    first needs it; of a lake in a bucket it fetches what is needed then, which forked workers cannot. With a
-    `torch.utils.data.DataLoader` of your own, pass `collate_fn=flagdata.dataset.collate`.
+    first needs it; of a lake in a bucket it fetches what is needed then, which forked workers cannot. A
+    `torch.utils.data.DataLoader` of your own gives batches as `loader` does, in an order of its own.
 
     Attributes:
         table: the pairs' numbers, as arrays.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +14,7 @@ import pyarrow.compute as pc
 from flagdata.arrays import FloatArray
 from flagdata.dataset.clips import TRUTH_SPEED, clip_truth, truth_series
 from flagdata.dataset.lineage import origins_of, superseded
-from flagdata.dataset.splits import ExplicitSplit, HashedSplit, check_side, groups, refuse_leaks
+from flagdata.dataset.splits import ExplicitSplit, HashedSplit, Origin, check_side, groups, refuse_leaks
 from flagdata.dataset.table import COLUMNS, PairTable
 from flagdata.dataset.tolerance import Refusal, Tolerance, judge
 from flagdata.documents import column_json
@@ -25,6 +27,7 @@ from flagdata.lake.selection import Request, Selection
 from flagdata.record import Record
 from flagdata.schema import TRUTH_WINDOW, Kind
 
+_LOG = logging.getLogger("flagdata")
 _ORIGIN = ("artifact", "recording", "session", "seed", "day")
 _LINEAGE = ("artifact", "kind", "parents", "created", "source_hash", "object", "session")
 
@@ -91,13 +94,8 @@ def resolve(
     if split is not None:
         wanted = clips_on_side(catalog, split, split_by)
         table = table.take(np.isin(table.artifact, np.array(sorted(wanted), dtype=np.str_)))
-        if not len(table):
-            count = len(set(groups(origins_of(_lineage(catalog), _clips(catalog, None, _ORIGIN))).tolist()))
-            raise RefusedError(
-                f"split {split!r} holds none of the clips; the catalog has {count} independent groups",
-                where=where,
-                fix="record more days and sessions, or give an ExplicitSplit",
-            )
+        if len(table) in (0, clips.num_rows):
+            check_divided(catalog, split, split_by, empty=not len(table), where=where)
     windows = _windows(clips, table)
     table = _with_window(lake, table, windows, _common(windows) if window is None else window)
     refused = judge(table, tolerance, superseded=superseded(_lineage(catalog), set(table.recording.tolist())))
@@ -134,6 +132,43 @@ def clips_on_side(catalog: pa.Table | Scan, split: str, split_by: HashedSplit | 
     if isinstance(split_by, ExplicitSplit):
         return set(explicit_sides(catalog, split_by)[split]["artifact"].to_pylist())
     return _hashed_side(catalog, split_by, split)
+
+
+def check_divided(
+    catalog: pa.Table | Scan, split: str, split_by: HashedSplit | ExplicitSplit, *, empty: bool, where: str | None
+) -> None:
+    """Warns where all clips of a catalog belong together, so that one side of a hashed split has all of them.
+
+    Args:
+        empty: whether the side that is wanted has none of the clips that are wanted.
+
+    Raises:
+        RefusedError: it has none.
+    """
+    clips = _clips(catalog, None, _ORIGIN)
+    origins = origins_of(_lineage(catalog), clips)
+    count = len(set(groups(origins).tolist()))
+    if count == 1 and isinstance(split_by, HashedSplit):
+        side = split_by.assign(origins)[0]
+        whole = f"all {len(clips)} clips belong together ({_shared(origins)}), and are on the side {side!r}"
+        if not empty:
+            _LOG.warning("warning: %s: the others are empty", whole)
+    else:
+        whole = f"the catalog has {count} independent groups"
+    if empty:
+        raise RefusedError(
+            f"split {split!r} holds none of the clips; {whole}",
+            where=where,
+            fix="record more days and sessions, or give an ExplicitSplit",
+        )
+
+
+def _shared(origins: Sequence[Origin]) -> str:
+    """Says what connects recordings, in words."""
+    common = set.intersection(*(set(origin.ties) for origin in origins))
+    words = ("session", "day", "seed")
+    named = sorted((tie for tie in common if tie.startswith(words)), key=lambda tie: words.index(tie.partition(" ")[0]))
+    return named[0] if named else "by session, day or source"
 
 
 def _hashed_side(catalog: pa.Table | Scan, split_by: HashedSplit, split: str) -> set[str]:

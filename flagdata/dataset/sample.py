@@ -9,6 +9,7 @@ from typing import Self, TypeAlias
 
 import torch
 from torch.utils.data import default_collate
+from torch.utils.data._utils.collate import default_collate_fn_map
 
 from flagdata.errors import InputError
 
@@ -156,6 +157,14 @@ def collate(samples: Sequence[Sample]) -> Batch:
         day=tuple(sample.day for sample in samples),
         seed=tuple(sample.seed for sample in samples),
     )
+
+
+def _collate_by_default(samples: Sequence[Sample], *, collate_fn_map: object = None) -> Batch:
+    return collate(samples)
+
+
+default_collate_fn_map[Sample] = _collate_by_default
+"""A `torch.utils.data.DataLoader` of pairs batches as `collate` does: torch's table of types."""
 
 
 def _column(values: list[float]) -> torch.Tensor:

@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from flagdata.dataset.lineage import superseded
-from flagdata.dataset.resolve import clips_on_side
+from flagdata.dataset.resolve import check_divided, clips_on_side
 from flagdata.dataset.splits import HashedSplit
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.export.croissant import write_croissant
@@ -226,6 +226,8 @@ def prepare(lake: Lake, request: Export) -> Prepared:
     if request.split is not None and rows.num_rows:
         matching = rows.num_rows
         rows = on_side(catalog, rows, request.split, salt=request.salt)
+        if rows.num_rows in (0, matching):
+            check_divided(catalog, request.split, HashedSplit(salt=request.salt), empty=False, where=request.where)
         if not rows.num_rows:
             raise NotFoundError(
                 f"none of the {matching} rows that match is on the side {request.split}, by its clips",

@@ -23,6 +23,7 @@ from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
+from flagdata.lake.deposit import Deposit
 from flagdata.lake.healing import Healing, healing
 from flagdata.lake.leases import Lease, collecting
 from flagdata.lake.removal import remove
@@ -172,6 +173,18 @@ class Transaction:
             NotFoundError: it is not there.
         """
         return self._sizes[name] if name in self._sizes else self._hold(name)
+
+    def rely(self, deposit: Deposit) -> str:
+        """Takes over an object that another process has put into the store, as if it had been put here, and returns its
+        name.
+
+        Raises:
+            NotFoundError: it is not there.
+        """
+        self.hold(deposit.name)
+        if deposit.fresh:
+            self._fresh.add(deposit.name)
+        return deposit.name
 
     @contextmanager
     def keeping_collectors_out(self) -> Iterator[None]:

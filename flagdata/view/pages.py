@@ -53,6 +53,7 @@ ICON = (
 )
 _ID = 32  # characters of an artifact's id
 _FILMED = frozenset({Kind.CAMERA, Kind.RECORDING, Kind.CLIP, *DRAWN})
+_REPORTED = frozenset({Kind.WIND, Kind.MEASUREMENT, Kind.MODEL})
 _ASIDE = frozenset({"artifact", "name", "kind", "parents", "report", "recipe", "parameters", "clock_model", "quality"})
 _CLOCK = (("clock_offset", "offset", "s"), ("clock_sigma", "σ of the offset", "s"), ("clock_drift", "drift", "s/s"))
 _EVIDENCE = (
@@ -198,7 +199,7 @@ def artifact(site: Site, identity: str) -> str:
         facts=facts,
         lost=lost,
         findings=_findings(report),
-        words=report.get("words"),
+        words=_sentence(report),
         evidence=_evidence(row, report),
         stated={name: json.dumps(value, indent=2, ensure_ascii=False) for name, value in documents.items() if value},
         films=row["kind"] in _FILMED and row["object"] is not None,
@@ -258,8 +259,9 @@ def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
     length = None if seconds is None else f"{seconds:.3g} s" if seconds < 120 else f"{seconds / 60:.3g} min"
     size = None if row["kind"] == Kind.CLIP else size_text(row["object_bytes"])
     wind = row["wind"]
+    report = _from_column(row, "report") or {} if row["kind"] in _REPORTED else {}
     if row["kind"] == Kind.WIND:
-        wind = (_from_column(row, "report") or {}).get("mean_speed")
+        wind = report.get("mean_speed")
     sigma = "" if row["wind_sigma"] is None else f" ± {row['wind_sigma']:.2f}"
     return {
         "artifact": row["artifact"],
@@ -273,7 +275,14 @@ def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
         "wind": None if wind is None else f"{wind:.2f}{sigma} m/s",
         "lost": site.media.is_lost(row),
         "pictured": row["kind"] in _FILMED and row["object"] is not None,
+        "says": _sentence(report),
     }
+
+
+def _sentence(report: Mapping[str, Any]) -> str | None:
+    """Returns what a result says in a sentence, as `flagdata show` prints it."""
+    said_in_words = report.get("sentence") or report.get("words")
+    return None if said_in_words is None else printable(str(said_in_words))
 
 
 def _together(text: str | None) -> str | None:

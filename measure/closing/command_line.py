@@ -25,6 +25,10 @@ def nulls_given(recipe: ExperimentRecipe | None, chosen: ByNulls, *, level: floa
     """
     if chosen.bank is not None and chosen.nulls is not None:
         raise UsageError("both --nulls and --bank are given", where="--nulls", fix="keep one of them")
+    if chosen.bank is not None and chosen.scheduler is not None:
+        raise UsageError(
+            "--scheduler and --bank are given: nothing is simulated", where="--scheduler", fix="keep one of them"
+        )
     values = {"level": level, "nulls": chosen.nulls}
     if recipe is not None:
         values = {name: getattr(recipe, name) if value is None else value for name, value in values.items()}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flagdata.arrays import FloatArray
-from flagdata.pages.pictures import figure_url
+from flagdata.pages.pictures import figure_url, still
 from flagdata.pages.render import render
 from flagdata.provenance import code_version
 from flagdata.tables import Range, Scale
@@ -66,6 +66,8 @@ def against_wind(observed: Observed, names: Sequence[str], bands: Sequence[Band]
 
 
 _BLUE, _RUST = "#2b6f8f", "#c4622d"
+_SIDE = 280
+"""Of a film's frame [px]."""
 _DEGREES = ("azimuth", "elevation")
 
 
@@ -87,6 +89,11 @@ def calibration_page(
         "level": f"{calibration.options.level * 100:.3g} %",
         "cloth": [shown_quantity(q) for q in calibration.cloth],
         "stated": calibration.stated,
+        "films": [
+            {"name": one.name, "picture": still(one.excerpt.window.frames[0], side=_SIDE)}
+            for one in (recording.observed for recording in calibration.recordings)
+            if one.excerpt is not None
+        ],
         "posterior": None if calibration.withheld else _posterior(calibration),
         "recordings": [
             {
@@ -134,6 +141,10 @@ def _posterior(calibration: Calibration) -> str:
         logarithmic = isinstance(about.prior, Range) and about.prior.scale is Scale.LOG
         edges = np.geomspace(low, high, 41) if logarithmic else np.linspace(low, high, 41)
         axes.hist(calibration.draws.cloth[about.name], bins=edges, color=_BLUE)
+        quantity = next(one for one in calibration.cloth if one.name == about.name)
+        if quantity.value is not None or quantity.bounded:
+            ends = max(low, quantity.span.low), min(high, quantity.span.high)
+            axes.axvspan(*ends, color=_RUST, alpha=0.15, linewidth=0)
         axes.axhline(
             len(calibration.draws.cloth[about.name]) / 40, color=_RUST
         )  # the prior: the bins have equal shares of it
@@ -142,7 +153,9 @@ def _posterior(calibration: Calibration) -> str:
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30 * low else (1.0,)))
             axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
             axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.set_title(about.name.replace("_", " "), fontsize=11)
         axes.set_xlabel(f"{about.name.replace('_', ' ')} [{about.unit}]")
+        axes.set_ylabel("share of draws")
         axes.set_yticks([])
     return figure_url(figure)
 

@@ -30,6 +30,7 @@ OF_MARKERS = (
     "up",
     "noise",
     "bank",
+    "scheduler",
     "most_nulls",
 )
 

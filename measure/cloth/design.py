@@ -48,7 +48,7 @@ from measure.cloth.simulation import BATCH, LITTLE, Discretisation, Flag, FlagBa
 from measure.cloth.wind import Log
 from measure.forecasting.strengths import Strengths, all_strengths
 from measure.observables.observable import WINDOW
-from measure.workers import single_threaded
+from sim.workers import single_threaded
 
 _HOIST = "full-hoist.stiffness"
 

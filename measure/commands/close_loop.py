@@ -229,6 +229,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
             bank=chosen.bank,
             most_nulls=chosen.most_nulls,
             workers=chosen.processes,
+            scheduler=chosen.scheduler,
             suspected=None if chosen.suspect is None else Suspicion.parse(chosen.suspect, on_markers()),
             **null_options,
         )

@@ -41,7 +41,13 @@ def propose(chosen: Proposing) -> Iterator[Result]:
         effect_file.check(folder)
     recipe = recipes.load(Path(chosen.recipe))
     null_options = nulls_given(recipe, chosen, level=chosen.level)
-    options = NullOptions(seed=chosen.seed, bank=chosen.bank, workers=chosen.processes, **null_options)
+    options = NullOptions(
+        seed=chosen.seed,
+        bank=chosen.bank,
+        workers=chosen.processes,
+        scheduler=chosen.scheduler,
+        **null_options,
+    )
     tried, controls = (
         (dictionary(), ()) if chosen.effect is None else (candidates.from_file(chosen.effect), dictionary())
     )

@@ -67,6 +67,7 @@ def page(
         sections: what comes between the answer and its provenance, each under its own heading.
     """
     shown, noticed = measured.shown(anyway=anyway), measured.noticed(anyway=anyway)
+    rows = [_row(quantity, context.known) for quantity in measured.quantities]
     spacing = measured.windows[0].end - measured.windows[0].start
     clip_rate = (len(measured.clip) - 1) / spacing if spacing > 0 else context.rate
     values = {
@@ -76,7 +77,9 @@ def page(
         "gate": measured.verdict.sentence,
         "reasons": [reason.what for reason in measured.verdict.reasons],
         "answer": measured.sentence,
-        "rows": [_row(quantity, context.known) for quantity in measured.quantities],
+        "rows": rows,
+        "unconstrained": [row for row in rows if not row["constrained"]],
+        "wind": next((row for row in rows if row["name"] == SHORT["wind_speed"] and row["constrained"]), None),
         "simulated": bool(context.known),
         "level": f"{measured.options.level * 100:.3g} %",
         "clip": moving(measured.clip, rate=clip_rate, side=_SIDE),
@@ -113,6 +116,8 @@ def _row(quantity: Quantity, truths: Mapping[str, float]) -> dict[str, str | boo
         "interval": quantity.span.phrase(digits) + bound_level,
         "assumed": f"{quantity.assumed[0]:.{digits}f} to {quantity.assumed[1]:.{digits}f}",
         "information": f"{quantity.information:.2f}",
+        "range": quantity.span.phrase(digits),
+        "level": f"{quantity.span.level * 100:.3g} %",
         "known": "" if truth is None else f"{truth:.{digits}f}",
     }
 

@@ -86,10 +86,10 @@ def corner(measured: Measurement) -> str:
             else:
                 axes.hist2d(draws[:, column], draws[:, row], bins=30, cmap="Blues")
             if row == count - 1:
-                axes.set_xlabel(_label(measured, column), fontsize=8)
+                axes.set_xlabel(_label(measured, column), fontsize=10)
             if column == 0 and row:
-                axes.set_ylabel(_label(measured, row), fontsize=8)
-            axes.tick_params(labelsize=7)
+                axes.set_ylabel(_label(measured, row), fontsize=10)
+            axes.tick_params(labelsize=8)
     return figure_url(figure)
 
 
@@ -141,8 +141,9 @@ def series(wind_series: Beside, *, level: float) -> str:
                 mfc=face,
                 label=label,
             )
+    axes.set_title("Wind read from each window of the film", fontsize=11)
     axes.set(xlabel="time since the first frame [s]", ylabel="wind speed [m/s]", ylim=(0, None))
-    axes.legend(loc="best", fontsize=8, ncols=2)
+    axes.legend(loc="best", fontsize=9, ncols=2)
     return figure_url(figure)
 
 
@@ -155,9 +156,11 @@ def spectra(spectrum: Spectrum) -> str:
     power.loglog(spectrum.frequency, spectrum.logged, color=_BLUE, label="anemometer")
     power.loglog(spectrum.frequency, spectrum.estimated, color=_RUST, label="film")
     power.set(xlabel="frequency [Hz]", ylabel="power density [(m/s)²/Hz]")
-    power.legend(fontsize=8)
+    power.set_title("Power of the wind's changes", fontsize=11)
+    power.legend(fontsize=9)
     coherent.semilogx(spectrum.frequency, spectrum.coherence, color=_RUST)
     coherent.axhline(spectrum.chance, color=_GRAY, linestyle=":", label="of unrelated series, 1 in 20")
     coherent.set(xlabel="frequency [Hz]", ylabel="coherence", ylim=(0, 1))
-    coherent.legend(fontsize=8)
+    coherent.set_title("Coherence of film and anemometer", fontsize=11)
+    coherent.legend(fontsize=9)
     return figure_url(figure)

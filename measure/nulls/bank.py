@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from io import BytesIO
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from flagdata.arrays import FloatArray, read_arrays
+from flagdata.console import say_beside_bars
 from flagdata.durable import put_if_absent
 from flagdata.errors import CorruptError, NotFoundError, UsageError
 from flagdata.provenance import code_version
@@ -37,6 +35,7 @@ from measure.observe.trajectory import Specimen, Trajectory
 from measure.probes.course import Course
 from measure.probes.statistics import Statistics, statistics
 from sim.integrate.split import SplitEuler
+from sim.workers import connected
 
 WINDS = 4
 """Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What experiments leave
@@ -148,30 +147,42 @@ def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[FloatAr
     return [anchors[cloth] for cloth in batch.calibrations]
 
 
-def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progress: Progress | None = None) -> None:
+def build(
+    folder: Path,
+    batches: Sequence[NullBatch],
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> None:
     """Evaluates the batches that the folder lacks, each into a file of its own; long ones first, so that no worker is
     left alone with one.
 
     Args:
+        workers: processes on this machine.
+        scheduler: address of a Dask scheduler, whose workers are taken instead.
         progress: called with the number of batches done.
+
+    Raises:
+        NotFoundError: no scheduler answers there, or it has no workers.
+        WorkerError: workers kept dying, or are gone.
     """
     folder.mkdir(parents=True, exist_ok=True)
     missing = [index for index in range(len(batches)) if not _file(folder, index).exists()]
     missing.sort(key=lambda index: -batches[index].effort)
     if progress is not None:
         progress(len(batches) - len(missing))
-    context = get_context("spawn")
-    with ProcessPoolExecutor(
-        max_workers=workers, mp_context=context, initializer=torch.set_num_threads, initargs=(1,)
-    ) as pool:
-        running = [pool.submit(_cache, folder, batches[index], index) for index in missing]
-        for done in as_completed(running):
-            done.result()
+    if not missing:
+        return
+    with connected(scheduler, workers=min(workers, len(missing)), say=say_beside_bars) as pool:
+        for index, content in pool.results((_content_of, (batches[index], index)) for index in missing):
+            put_if_absent(_file(folder, index), content)
             if progress is not None:
                 progress(1)
 
 
-def _cache(folder: Path, batch: NullBatch, index: int) -> None:
+def _content_of(batch: NullBatch, index: int) -> tuple[int, bytes]:
+    """Evaluates a batch; returns its number and the bytes of its file."""
     nulls, duration = evaluate(batch, index, columns())
     measured = nulls.statistics
     if measured.lines is None or measured.turning is None or measured.course is None or measured.settled is None:
@@ -206,7 +217,7 @@ def _cache(folder: Path, batch: NullBatch, index: int) -> None:
         course_curvature=measured.course.curvature,
         settled=measured.settled,
     )
-    put_if_absent(_file(folder, index), buffer.getvalue())
+    return index, buffer.getvalue()
 
 
 def _file(folder: Path, index: int) -> Path:

@@ -36,6 +36,7 @@ class NullOptions:
         bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
             and winds, over the same priors.
         workers: processes for the nulls, then threads for what is fitted.
+        scheduler: address of a Dask scheduler whose workers simulate the nulls; None for processes of this machine.
 
     Raises:
         UsageError: a level or counts that make no sense.
@@ -46,6 +47,7 @@ class NullOptions:
     nulls: int = FEWEST_NULLS
     bank: Path | None = None
     workers: int = 1
+    scheduler: str | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.level < 1:
@@ -74,6 +76,7 @@ def bank_for(setting: Setting, options: NullOptions, *, nulls: int | None = None
         nulls=options.nulls if nulls is None else nulls,
         seed=options.seed,
         workers=options.workers,
+        scheduler=options.scheduler,
         stage=stage,
     )
 
@@ -174,7 +177,9 @@ def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
     ]
 
 
-def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
+def simulated(
+    setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage, scheduler: str | None = None
+) -> NullBank:
     """Simulates a bank of `batches`, kept in the user's cache folder by the hash of its design: what is there already
     is not simulated anew, and a build that was stopped goes on."""
     wanted = batches(setting, kinds=math.ceil(nulls / banks.WINDS), seed=seed)
@@ -186,7 +191,7 @@ def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: S
         stage(f"nulls of {len(wanted)} kinds", done, len(wanted))
 
     folder = kept_in(setting, seed=seed)
-    banks.build(folder, wanted, workers=workers, progress=count)
+    banks.build(folder, wanted, workers=workers, scheduler=scheduler, progress=count)
     total = banks.WINDS * len(wanted)
     words = f"{total} recordings of {len(wanted)} meshes and methods, over the priors of the cloth"
     words += _CARRIED if setting.experiment.carried else ""

@@ -31,12 +31,13 @@ _MOST = 8
 
 
 def overview(comparisons: Sequence[Comparison], *, after: str) -> Markup:
-    """Draws bars of each comparison in per cent of the base model's error, the floor shaded; empty where there is none.
+    """Draws bars of each comparison of two models in per cent of the base model's error, the floor shaded; empty where
+    the base model is alone, since all its bars would be 100 % long.
 
     Args:
         after: what the model after is called, "with lift".
     """
-    drawn = [c for c in comparisons if known(c.before) and c.before.value > 0][:_MOST]
+    drawn = [c for c in comparisons if known(c.before) and c.before.value > 0 and known(c.after)][:_MOST]
     if not drawn:
         return Markup("")
     ends = [100 * v / c.before.value for c in drawn for e in (c.before, c.after, c.floor) for v in (e.value, e.high)]
@@ -46,11 +47,7 @@ def overview(comparisons: Sequence[Comparison], *, after: str) -> Markup:
     captions = []
     for row, comparison in enumerate(drawn):
         parts += _row(comparison, scale, 6 + _ROW * row)
-        share = (
-            f"{100 * comparison.after.value / comparison.before.value:.0f} % {after}"
-            if known(comparison.after)
-            else "base model alone"
-        )
+        share = f"{100 * comparison.after.value / comparison.before.value:.0f} % {after}"
         captions.append(f"{comparison.what}: {share}")
     title = "Errors on unseen data in per cent of the base model's"
     return drawing(_WIDTH, height, title, "; ".join(captions), "".join(parts))
@@ -65,8 +62,7 @@ def _row(comparison: Comparison, scale: Linear, top: float) -> list[str]:
         width = scale(min(100 * comparison.floor.value / comparison.before.value, scale.high)) - _LEFT
         parts.append(f'<rect class="floor" x="{_LEFT:g}" y="{top - 3:g}" width="{width:.1f}" height="36"/>')
     parts.append(_bar(comparison.before, comparison.before.value, scale, top, "before"))
-    if known(comparison.after):
-        parts.append(_bar(comparison.after, comparison.before.value, scale, top + 15, "after"))
+    parts.append(_bar(comparison.after, comparison.before.value, scale, top + 15, "after"))
     return parts
 
 

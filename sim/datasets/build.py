@@ -1,34 +1,30 @@
 """Building a data set: sequences first, then their films, each commit a batch of them.
 
-Workers turn jobs into bytes (`sim.datasets.jobs`); this process alone writes to the lake. What is in the lake is known
-by its identity, so that a build that was killed goes on where its last commit was, and ends with the same artifacts and
-objects as an unbroken one.
+Workers put what they make into the lake's store (`sim.datasets.jobs`); this process alone commits. What is in the lake
+is known by its identity, so that a build that was killed goes on where its last commit was, and ends with the same
+artifacts and objects as an unbroken one.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TypeAlias
 
-from distributed import Client
-
-from flagdata.dataset.clips import clip_rows
-from flagdata.errors import ConflictError
-from flagdata.lake import Artifact, Lake
-from flagdata.lake.meshes import read_meshes
-from flagdata.record import Record
+from flagdata.errors import ConflictError, RefusedError
+from flagdata.lake import Lake
 from flagdata.schema import Kind
-from flagdata.timebase import NANOSECONDS
 from sim.datasets import jobs
 from sim.datasets.cast import Cast, Roll, casts
-from sim.datasets.cluster import Job, results
 from sim.datasets.films import PlannedFilm, Sequences
-from sim.datasets.jobs import Filmed, Simulated
+from sim.datasets.jobs import PutFilm, PutSequences
 from sim.datasets.recipe import DatasetRecipe
-from sim.run.publish import publish, whole
+from sim.datasets.shard import Shard
+from sim.run.publish import commit, whole
+from sim.workers import Job, Workers
 
 COMMIT_FILMS = 32
 """Films of one commit."""
@@ -68,17 +64,17 @@ class Build:
     """One build of a recipe into a lake.
 
     Args:
-        say: called with a line of progress for the user.
         device: where workers compute.
+        shard: the part that is made; None for all.
     """
 
     lake: Lake
     recipe: DatasetRecipe
-    client: Client
+    workers: Workers
     bars: Bars
-    say: Callable[[str], None]
     branch: str = "main"
     device: str = "cpu"
+    shard: Shard | None = None
     _new_sequences: int = field(default=0, init=False)
     _new_films: int = field(default=0, init=False)
     _healed: int = field(default=0, init=False)
@@ -89,17 +85,19 @@ class Build:
 
         Raises:
             ConflictError: the branch has films of this name by another recipe, or these films under another name.
-            RefusedError: too many sequences fail.
+            RefusedError: too many sequences fail, or one of a shard.
             WorkerError: workers kept dying, or all of them are gone.
             FlagdataError: a renderer, an asset or the disk failed.
         """
         begun = time.perf_counter()
         self._refuse_other_names(self.films(Roll(cast=cast) for cast in casts(self.recipe)))
-        rolls = self._simulate()
-        films = self._film(rolls)
+        rolls = [Roll(cast=cast) for cast in casts(self.recipe)]
+        made = None if self.shard is None else self.shard.sequences(rolls)
+        sequences = self._simulate(rolls, made)
+        films = self._film(rolls, made)
         failed = [f"{roll.cast.simulation.name} {index}: {why}" for roll in rolls for index, why in roll.failed.items()]
         return BuildReport(
-            sequences=sum(roll.cast.simulation.count for roll in rolls),
+            sequences=sequences,
             films=len(films),
             new_sequences=self._new_sequences,
             new_films=self._new_films,
@@ -111,34 +109,43 @@ class Build:
 
     # Sequences
 
-    def _simulate(self) -> list[Roll]:
-        rolls = [Roll(cast=cast) for cast in casts(self.recipe)]
+    def _simulate(self, rolls: Sequence[Roll], made: Collection[str] | None) -> int:
+        """Simulates what is missing of the sequences that are made here, and returns how many those are."""
         in_lake = whole(self.lake, [roll.id(i) for roll in rolls for i in roll.candidates], branch=self.branch)
-        total = sum(roll.cast.simulation.count for roll in rolls)
+        total = sum(len(roll.pending((), made)) for roll in rolls)
         with self.bars(total, f"{self.recipe.name}: simulate", "flag") as advance:
-            todo = [(roll, roll.pending(in_lake)) for roll in rolls]
+            todo = [(roll, roll.pending(in_lake, made)) for roll in rolls]
             advance(total - sum(len(pending) for _, pending in todo))
             while any(pending for _, pending in todo):
                 self._simulate_once([entry for entry in todo if entry[1]], advance)
-                todo = [(roll, roll.pending(in_lake)) for roll, _ in todo]
-        return rolls
+                self._refuse_replacing(rolls)
+                todo = [(roll, roll.pending(in_lake, made)) for roll, _ in todo]
+        return total
+
+    def _refuse_replacing(self, rolls: Sequence[Roll]) -> None:
+        """Refuses a shard in which a sequence failed: the one that takes its place would move films to other shards."""
+        failed = [(roll, index) for roll in rolls for index in roll.failed]
+        if self.shard is not None and failed:
+            (roll, index), *_ = failed
+            raise RefusedError(
+                f"sequence {index} failed, and a shard cannot choose another: {roll.failed[index]}",
+                where=roll.cast.simulation.name,
+                fix="build the data set without --shard, on a branch that has none of its films",
+            )
 
     def _simulate_once(self, todo: Sequence[tuple[Roll, list[int]]], advance: Advance) -> None:
         """Simulates all pending members of the rolls once; those that fail are noted on their roll."""
         by_name = {roll.cast.simulation.name: roll for roll, _ in todo}
-        done: Simulated
-        for done in results(self.client, self._batches(todo), say=self.say):
+        done: PutSequences
+        for done in self.workers.results(self._batches(todo)):
             roll = by_name[done.name]
-            good = [outcome for outcome in done.outcomes if outcome.sequence is not None]
-            for outcome in done.outcomes:
-                if outcome.failure is not None:
-                    roll.failed[outcome.member.index] = outcome.failure[1]
-            if good:
-                committed = publish(self.lake, roll.cast.simulation, good, step=done.step, branch=self.branch)
-                roll.done |= {outcome.member.index for outcome in good}
+            roll.failed |= done.failed
+            if done.stored:
+                committed = commit(self.lake, roll.cast.simulation, done.stored, branch=self.branch)
+                roll.done |= set(done.stored)
                 self._new_sequences += len(committed.added)
                 self._healed += len(committed.healed)
-                advance(len(good))
+                advance(len(done.stored))
 
     def _batches(self, todo: Sequence[tuple[Roll, list[int]]]) -> Iterator[Job]:
         for roll, pending in todo:
@@ -146,7 +153,8 @@ class Build:
             for base in range(len(simulation.material.bases)):
                 indices = [index for index in pending if roll.crew.base(index) == base]
                 for first in range(0, len(indices), simulation.batch):
-                    yield jobs.simulate, (simulation, base, indices[first : first + simulation.batch], self.device)
+                    members = indices[first : first + simulation.batch]
+                    yield jobs.put_sequences, (self._address, simulation, base, members, self.device)
 
     # Films
 
@@ -162,21 +170,22 @@ class Build:
             for film in Sequences(recipe=self.recipe, side=side, members=tuple(side_members)).films()
         ]
 
-    def _film(self, rolls: Iterable[Roll]) -> list[PlannedFilm]:
+    def _film(self, rolls: Iterable[Roll], made: Collection[str] | None) -> list[PlannedFilm]:
         films = self.films(rolls)
         self._refuse_other_names(films)
+        self._refuse_mixture({film.artifact().id for film in films})
+        films = [film for film in films if made is None or film.sequence in made]
         film_ids = {film.artifact().id for film in films}
-        self._refuse_mixture(film_ids)
         in_lake = whole(self.lake, film_ids, branch=self.branch)
         missing = [film for film in films if film.artifact().id not in in_lake]
         clips = self.lake.rows({"kind": Kind.CLIP}, at=self.branch, columns=["recording"])["recording"].to_pylist()
         self._clips = sum(recording in film_ids for recording in clips)
         with self.bars(len(films), f"{self.recipe.name}: render", "film") as advance:
             advance(len(films) - len(missing))
-            waiting: list[Filmed] = []
+            waiting: list[PutFilm] = []
             last = time.monotonic()
             try:
-                for done in results(self.client, self._shots(missing), say=self.say):
+                for done in self.workers.results(self._shots(missing)):
                     waiting.append(done)
                     if len(waiting) >= COMMIT_FILMS or time.monotonic() - last > COMMIT_SECONDS:
                         ready, waiting = waiting, []
@@ -214,38 +223,26 @@ class Build:
         rows = self.lake.rows("kind = 'meshes'", at=self.branch, columns=["artifact", "object"]).to_pylist()
         objects = {row["artifact"]: row["object"] for row in rows}
         for film in films:
-            sequence = read_meshes(self.lake.whole_object(objects[film.sequence]))  # damage must not be filmed
-            yield jobs.film, (self.recipe, film, sequence, self.device)
+            yield jobs.put_film, (self._address, self.recipe, film, objects[film.sequence], self.device)
 
-    def _commit(self, filmed: Sequence[Filmed]) -> int:
-        """Commits films to the lake and returns how many."""
+    @property
+    def _address(self) -> str:
+        """Where workers find the lake."""
+        path = self.lake.path
+        return str(path.absolute() if isinstance(path, Path) else path)
+
+    def _commit(self, filmed: Sequence[PutFilm]) -> int:
+        """Commits films that are in the store and returns how many."""
         if not filmed:
             return 0
         message = f"build {self.recipe.name}: {len(filmed)} films"
         with self.lake.transaction(message, branch=self.branch) as transaction:
             for done in filmed:
-                staged = transaction.staging(".mcap")
-                staged.write_bytes(done.data)
-                stored = transaction.put(staged)
-                record = Record.open(self.lake.record_place(stored))
-                recording = _recording(done, record, stored=stored)
-                transaction.add(replace(recording, branch=self.branch))
-                for clip in clip_rows(record, recording):
+                transaction.rely(done.put)
+                transaction.add(done.recording)
+                for clip in done.clips:
                     self._clips += transaction.add(clip)
-        films = {done.film.artifact().id for done in filmed}
+        films = {done.recording.id for done in filmed}
         self._new_films += len(films.intersection(transaction.result.added))
         self._healed += len(films.intersection(transaction.result.healed))
         return len(filmed)
-
-
-def _recording(done: Filmed, record: Record, *, stored: str) -> Artifact:
-    times = record.frame_times
-    rate = (len(times) - 1) * NANOSECONDS / (done.end - done.start) if len(times) > 1 else None
-    return replace(
-        done.film.artifact(),
-        object=stored,
-        start=done.start,
-        end=done.end,
-        rate=rate,
-        parameters=done.parameters,
-    )

@@ -21,8 +21,12 @@ if TYPE_CHECKING:
 def build(chosen: Building) -> Iterator[Result]:
     """Build a data set: simulate its sequences, film them, and lay both into the lake with their ground truth.
 
-    RECIPE is a TOML file, or a recipe of the catalog: flagsim, flagsim-small, clothsim, field, outdoor. The lake is
-    made if there is none.
+    RECIPE is a TOML file, or a recipe of the catalog: flagsim, flagsim-small, clothsim, field, outdoor (`flagdata
+    catalog datasets NAME` prints one to copy). --sequences and --films change how many are made: the data set is then
+    called after the counts. The lake is made if there is none.
+
+    Builds of several machines each make a part, --shard 1/4 to 4/4, on branches that flagdata merge brings together;
+    the same command without --shard then writes the card.
 
     A build that was stopped or killed goes on where its last commit was when the command is given again, and ends with
     the same objects. At the end the data set's card, an HTML page, is written into the lake's folder cards.
@@ -30,22 +34,29 @@ def build(chosen: Building) -> Iterator[Result]:
     \b
       flagdata build flagsim-small --lake lake --plan
       flagdata build flagsim-small --lake lake
+      flagdata build flagsim-small --sequences 100 --films 500 --lake lake
       flagdata build flagsim --lake /shared/lake --scheduler tcp://10.0.0.1:8786
     """
     from flagdata.errors import UsageError
+    from sim.datasets.counts import with_counts
     from sim.datasets.reading import load, with_renderer
+    from sim.datasets.shard import Shard
 
     branch, device, scheduler = chosen.branch, chosen.device, chosen.scheduler
     loaded = load(str(chosen.recipe))
     if chosen.renderer is not None:
         loaded = with_renderer(loaded, chosen.renderer)
+    shard = None if chosen.shard is None else Shard.parse(chosen.shard)
+    loaded = with_counts(loaded, sequences=chosen.sequences, films=chosen.films)
+    if shard is not None and chosen.card is not None:
+        raise UsageError("a shard has no card", where="--card", fix="leave --card out")
     if scheduler is not None and chosen.workers is not None:
         raise UsageError("--workers with --scheduler", fix="start more workers at the scheduler")
     lake = _lake(chosen)
     if chosen.plan:
         from sim.datasets.plan import plan
 
-        planned = plan(loaded, lake, workers=_workers(chosen), branch=branch, device=device)
+        planned = plan(loaded, lake, workers=_workers(chosen), branch=branch, device=device, shard=shard)
         yield Result("build-plan", planned.as_dict())
         _print_plan(planned)
         return
@@ -53,22 +64,26 @@ def build(chosen: Building) -> Iterator[Result]:
     from flagdata.lake.merging import added_since
     from sim.datasets import card as cards
     from sim.datasets.build import Build
-    from sim.datasets.cluster import connected
     from sim.datasets.plan import length
+    from sim.workers import connected
 
     cards.check(chosen.card)
     lake = lake or _made(str(chosen.lake))
     lake.check_writable()
-    lasting = length(loaded, lake, workers=_workers(chosen), branch=branch, device=device)
+    lasting = length(loaded, lake, workers=_workers(chosen), branch=branch, device=device, shard=shard)
     if lasting is not None:
         say(lasting)
-    with in_steps(added_since(lake, branch)), connected(scheduler, workers=chosen.processes) as client:
+    with (
+        in_steps(added_since(lake, branch)),
+        connected(scheduler, workers=chosen.processes, say=say_beside_bars) as workers,
+    ):
         report = Build(
-            lake=lake, recipe=loaded, client=client, bars=progress, say=say_beside_bars, branch=branch, device=device
+            lake=lake, recipe=loaded, workers=workers, bars=progress, branch=branch, device=device, shard=shard
         ).run()
     written = None
-    with following(f"the data set {loaded.name}", "writing its card"):
-        written = str(cards.write_card(lake, loaded, branch=branch, path=chosen.card))
+    if shard is None:
+        with following(f"the data set {loaded.name}", "writing its card"):
+            written = str(cards.write_card(lake, loaded, branch=branch, path=chosen.card))
     yield Result("build", {"lake": str(lake.path), "recipe": loaded.name, "card": written, **vars(report)})
     for failure in report.failed:
         say(f"replaced: {failure}")
@@ -100,10 +115,10 @@ def _made(path: str) -> Lake:
 def _workers(chosen: Building) -> int:
     if chosen.scheduler is None:
         return chosen.processes
-    from sim.datasets.cluster import connected, threads
+    from sim.workers import connected
 
-    with connected(chosen.scheduler, workers=0) as client:
-        return max(1, threads(client))
+    with connected(chosen.scheduler, workers=0) as workers:
+        return max(1, workers.count)
 
 
 def _print_plan(planned: Plan) -> None:

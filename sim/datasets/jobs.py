@@ -1,4 +1,5 @@
-"""What workers do: pure functions from a recipe and a number to bytes. Workers know no lake and keep no state.
+"""What workers do: pure functions from a recipe and a number to meshes and bytes (`simulate`, `film`), and the same put
+into a lake's store (`put_sequences`, `put_film`), so that only rows go back to the process that commits them.
 
 Renderers and crews are kept from one job to the next, since they take time to make; they change no result. Torch is
 left on one thread for good, since the last bits of its sums depend on how many it has.
@@ -7,14 +8,21 @@ left on one thread for good, since the last bits of its sums depend on how many 
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from socket import gethostname
 from typing import Any
 
 import torch
 
-from flagdata.lake.meshes import MeshSequence
+from flagdata.dataset.clips import clip_rows
+from flagdata.errors import NotFoundError
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.deposit import Deposit, deposit
+from flagdata.lake.meshes import MeshSequence, read_meshes
 from flagdata.provenance import canonical
+from flagdata.record import Record
+from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
 from sim.datasets import anemometer, picture
 from sim.datasets.films import PlannedFilm
@@ -23,6 +31,7 @@ from sim.datasets.record import Content, parameters_of, record_bytes, texts_of
 from sim.render import RENDERERS, Meshes, RenderParameters
 from sim.run.batch import BatchOutcome, Stepper, run
 from sim.run.members import Crew
+from sim.run.publish import Deposited, deposited
 from sim.run.recipe import Recipe as Simulation
 from sim.run.recipe import Shape
 
@@ -61,6 +70,30 @@ class Filmed:
     start: int
     end: int
     parameters: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class PutSequences:
+    """Members whose meshes are in a lake's store, without a row yet.
+
+    Attributes:
+        name: of their recipe.
+        stored: index → row and object.
+        failed: index → why it has no meshes.
+    """
+
+    name: str
+    stored: Mapping[int, Deposited]
+    failed: Mapping[int, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PutFilm:
+    """A recording that is in a lake's store, and the rows that are to refer to it."""
+
+    recording: Artifact
+    clips: tuple[Artifact, ...]
+    put: Deposit
 
 
 def simulate(simulation: Simulation, base: int, indices: Sequence[int], device: str) -> Simulated:
@@ -109,6 +142,64 @@ def film(recipe: DatasetRecipe, job: PlannedFilm, sequence: MeshSequence, device
         end=int(times[-1]),
         parameters=canonical({**parameters, **texts_of(member, zeta)}),
     )
+
+
+def put_sequences(lake: str, simulation: Simulation, base: int, indices: Sequence[int], device: str) -> PutSequences:
+    """Simulates members as `simulate`, and puts their meshes into the lake's store.
+
+    Raises:
+        NotFoundError: this process does not see the lake.
+        FlagdataError: no space, no permission.
+    """
+    done = simulate(simulation, base, indices, device)
+    failed = {o.member.index: o.failure[1] for o in done.outcomes if o.failure is not None}
+    stored = deposited(_lake(lake), simulation, done.outcomes, step=done.step)
+    return PutSequences(name=simulation.name, stored=stored, failed=failed)
+
+
+def put_film(lake: str, recipe: DatasetRecipe, job: PlannedFilm, meshes: str, device: str) -> PutFilm:
+    """Films a sequence of the lake as `film`, and puts the record into its store.
+
+    Args:
+        meshes: the sequence's object.
+
+    Raises:
+        CorruptError: the object was damaged, and must not be filmed.
+        NotFoundError: this process does not see the lake.
+        FlagdataError: a renderer that is not installed or fails, no space, no permission.
+    """
+    opened = _lake(lake)
+    sequence = read_meshes(opened.whole_object(meshes))
+    if not isinstance(sequence, MeshSequence):
+        raise TypeError("a simulated sequence has one mesh")
+    done = film(recipe, job, sequence, device)
+    put = deposit(opened, ".mcap", lambda path: path.write_bytes(done.data))
+    record = Record.open(opened.record_place(put.name))
+    times = record.frame_times
+    rate = (len(times) - 1) * NANOSECONDS / (done.end - done.start) if len(times) > 1 else None
+    recording = replace(
+        job.artifact(), object=put.name, start=done.start, end=done.end, rate=rate, parameters=done.parameters
+    )
+    return PutFilm(recording=recording, clips=tuple(clip_rows(record, recording)), put=put)
+
+
+def _lake(address: str) -> Lake:
+    """Opens the lake of this thread's last job again, or another.
+
+    Raises:
+        NotFoundError: there is none here.
+    """
+    lakes: dict[str, Lake] = _own.__dict__.setdefault("lakes", {})
+    if address not in lakes:
+        try:
+            lakes[address] = Lake.open(address)
+        except NotFoundError:
+            raise NotFoundError(
+                "a worker does not see the lake",
+                where=f"{address} on {gethostname()}",
+                fix="keep the lake in a bucket (s3://bucket/prefix), or in a folder that all workers share",
+            ) from None
+    return lakes[address]
 
 
 def shot(

@@ -22,6 +22,7 @@ from sim.datasets import jobs
 from sim.datasets.cast import Cast, Roll, casts
 from sim.datasets.films import Sequences
 from sim.datasets.recipe import DatasetRecipe
+from sim.datasets.shard import Shard
 from sim.run.publish import one_thread
 
 T = TypeVar("T")
@@ -101,6 +102,7 @@ def plan(
     branch: str = "main",
     device: str = "cpu",
     rates: Rates | None = None,
+    shard: Shard | None = None,
 ) -> Plan:
     """Counts what a build makes, and measures what it takes.
 
@@ -108,6 +110,7 @@ def plan(
         lake: what is in it is not made again; None where there is none yet.
         workers: that will share the work.
         rates: as they are known; None to measure them.
+        shard: the part that is made; None for all.
 
     Raises:
         FlagdataError: the measurement failed, as the build would.
@@ -116,6 +119,7 @@ def plan(
     if lake is not None:
         in_lake = set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
     rolls = [Roll(cast=cast) for cast in casts(recipe)]
+    made = None if shard is None else shard.sequences(rolls)
     films = 0
     frames: dict[str, list[int]] = {side.name: [] for side in recipe.sides}
     for side in recipe.sides:
@@ -123,21 +127,29 @@ def plan(
         members = tuple((roll.cast, index, roll.id(index)) for roll in side_rolls for index in roll.chosen)
         side_films = Sequences(recipe=recipe, side=side.name, members=members).films()
         for film in side_films:
-            films += film.artifact().id not in in_lake
+            films += film.artifact().id not in in_lake and (made is None or film.sequence in made)
             frames[side.name].append(film.cast.simulation.time.frames)
     return Plan(
         recipe=recipe,
         sequences={side.name: side.sequences for side in recipe.sides},
         films={side.name: side.renders for side in recipe.sides},
         clips={side: sum(count // CLIP_FRAMES for count in counts) for side, counts in frames.items()},
-        missing_sequences=sum(len(roll.pending(in_lake)) for roll in rolls),
+        missing_sequences=sum(len(roll.pending(in_lake, made)) for roll in rolls),
         missing_films=films,
         rates=rates or measure(recipe, _typical([roll.cast for roll in rolls]), device=device),
         workers=workers,
     )
 
 
-def length(recipe: DatasetRecipe, lake: Lake, *, workers: int, branch: str = "main", device: str = "cpu") -> str | None:
+def length(
+    recipe: DatasetRecipe,
+    lake: Lake,
+    *,
+    workers: int,
+    branch: str = "main",
+    device: str = "cpu",
+    shard: Shard | None = None,
+) -> str | None:
     """Describes what a build makes and for about how long; None where nothing is missing. Rates are measured where the
     typical ones predict more than a few minutes.
 
@@ -145,7 +157,7 @@ def length(recipe: DatasetRecipe, lake: Lake, *, workers: int, branch: str = "ma
         FlagdataError: the measurement failed, as the build would.
     """
     typical = _typical(list(casts(recipe)))
-    usual = plan(recipe, lake, workers=workers, branch=branch, rates=_usual(typical))
+    usual = plan(recipe, lake, workers=workers, branch=branch, rates=_usual(typical), shard=shard)
     if not usual.missing_sequences and not usual.missing_films:
         return None
     estimate = usual if usual.seconds < _BRIEF else replace(usual, rates=measure(recipe, typical, device=device))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from itertools import islice
 from typing import Any, TypeAlias
 
@@ -16,6 +17,7 @@ import torch
 
 from flagdata.errors import UsageError
 from flagdata.lake import Artifact, CommitResult, Lake
+from flagdata.lake.deposit import Deposit, deposit
 from flagdata.lake.healing import Healing, unsound
 from flagdata.lake.meshes import write_meshes
 from flagdata.provenance import canonical
@@ -25,6 +27,8 @@ from sim.run.batch import BatchOutcome, Stepper, run
 from sim.run.members import Crew
 from sim.run.recipe import Recipe
 
+Deposited: TypeAlias = tuple[Artifact, Deposit]
+"""A row that is not committed yet, and its object in the store."""
 Progress: TypeAlias = Callable[[int], object]
 """Called with the number of members done since the last call; a batch under way counts by its share of frames."""
 
@@ -194,8 +198,7 @@ def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, ste
         step: of the integrator [s].
     """
     identity = recipe.identity()
-    indices = ", ".join(str(o.member.index) for o in outcomes)
-    with lake.transaction(f"simulate {recipe.name}: members {indices}", branch=branch) as transaction:
+    with lake.transaction(_message(recipe, [o.member.index for o in outcomes]), branch=branch) as transaction:
         for outcome in outcomes:
             if outcome.sequence is None:
                 continue
@@ -203,6 +206,34 @@ def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, ste
             write_meshes(staged, outcome.sequence)
             transaction.add(_published(recipe, identity, outcome, step, stored=transaction.put(staged)))
     return transaction.result
+
+
+def deposited(lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, step: float) -> dict[int, Deposited]:
+    """Puts the meshes of outcomes that have some into the store; returns index → row and object.
+
+    Args:
+        step: of the integrator [s].
+    """
+    identity = recipe.identity()
+    stored: dict[int, Deposited] = {}
+    for outcome in outcomes:
+        if outcome.sequence is not None:
+            put = deposit(lake, ".zarr", partial(write_meshes, sequence=outcome.sequence))
+            stored[outcome.member.index] = _published(recipe, identity, outcome, step, stored=put.name), put
+    return stored
+
+
+def commit(lake: Lake, recipe: Recipe, stored: Mapping[int, Deposited], *, branch: str) -> CommitResult:
+    """Commits the rows of members whose meshes are in the store."""
+    with lake.transaction(_message(recipe, stored), branch=branch) as transaction:
+        for row, put in stored.values():
+            transaction.rely(put)
+            transaction.add(row)
+    return transaction.result
+
+
+def _message(recipe: Recipe, indices: Iterable[int]) -> str:
+    return f"simulate {recipe.name}: members {', '.join(map(str, indices))}"
 
 
 def member_artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, seed: int) -> Artifact:

@@ -7,8 +7,11 @@ from typing import Any
 
 import pytest
 
+from flagdata.cli import NAMES
 from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError
+from flagdata.parts import attribute
 from flagdata.recipes import Shelf, parsed
+from tests.program import invoke
 
 ROOT = Path(__file__).resolve().parents[2]
 SENSORS = Shelf(folder="sensors", noun="sensor recipe")
@@ -18,6 +21,16 @@ def test_a_name_is_the_file_of_that_name_in_the_catalog() -> None:
     found = SENSORS.find("generic-csv")
     assert found.data == (ROOT / "catalogs" / "sensors" / "generic-csv.toml").read_bytes()
     assert (found.name, found.folder, found.where) == ("generic-csv", Path(), "sensor recipe 'generic-csv'")
+
+
+@pytest.mark.parametrize("kind", ["datasets", "sensors"])
+def test_the_catalog_prints_a_recipe_that_can_be_copied(kind: str, tmp_path: Path) -> None:
+    shelf = attribute(NAMES[kind][0])
+    for name in shelf.names():
+        copy = tmp_path / f"{name}.toml"
+        copy.write_text(invoke("catalog", kind, name).out)
+        assert parsed(shelf.find(str(copy)).text, where="") == parsed(shelf.named(name).text, where="")
+    assert invoke("catalog", kind, "generic-csw").code == 2
 
 
 def test_every_file_of_a_folder_has_a_name_and_can_be_found_by_it() -> None:

@@ -16,6 +16,13 @@ AWAY = "".join(
 """A log whose zone is not in it."""
 CASES = [
     Case(
+        "commands/catalog.py",
+        "says what each is",
+        "catalog exports csv",
+        ("catalog exports",),
+        shows="webdataset",
+    ),
+    Case(
         "align/constant.py",
         "see flagdata ls",
         "declare mast --speed 3 --sigma 0.2",

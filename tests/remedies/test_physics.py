@@ -10,6 +10,9 @@ from tests.remedies.user import User
 SHORT = "measure second.mp4"
 """A film of less than a second: refused for its length, once the options fit."""
 TOO_SHORT = "s of film, a measurement takes"
+BUILD = "build flagsim-small --scheduler tcp://127.0.0.1:1 --workers 1"
+NO_WORKERS = "--workers with --scheduler"
+"""What is refused next, once the counts fit."""
 STAMPS = "align first mast --by stamps --offset-sigma 0.1"
 CASES = [
     Case(
@@ -43,6 +46,30 @@ CASES = [
         "measure --query \"name = 'mist'\"",
         ("query --where \"name = 'first'\"",),
         shows="first",
+    ),
+    Case(
+        "datasets/counts.py",
+        "or more: ",
+        f"{BUILD} --sequences 2",
+        (f"{BUILD} --sequences 3",),
+        shows=NO_WORKERS,
+        code=2,
+    ),
+    Case(
+        "datasets/counts.py",
+        "or more, or --sequences",
+        f"{BUILD} --films 300",
+        (f"{BUILD} --films 400", OR, f"{BUILD} --films 300 --sequences 300"),
+        shows=NO_WORKERS,
+        code=2,
+    ),
+    Case(
+        "datasets/command.py",
+        "leave --card out",
+        f"{BUILD} --shard 1/2 --card card.html",
+        (f"{BUILD} --shard 1/2",),
+        shows=NO_WORKERS,
+        code=2,
     ),
     Case(
         "evaluation/report.py",

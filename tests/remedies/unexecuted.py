@@ -30,6 +30,12 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("models/training/inputs.py", "free some space or name"),
     ),
     "a heading, no remedy": (("sim/run/batch.py", "flagdata simulate"),),
+    "a flag that cannot be simulated among those of a shard": (
+        ("sim/datasets/build.py", "build the data set without --shard"),
+    ),
+    "a machine that kills the processes of a build, three times": (
+        ("sim/workers/here.py", "see whether it lacks mem"),
+    ),
     "a lake that fails while a command says what it published before another failure": (
         ("flagdata/console.py", "what was finished before"),
     ),

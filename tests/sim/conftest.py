@@ -1,8 +1,9 @@
-"""Small systems for the simulator's tests."""
+"""Small systems for the simulator's tests, and workers of a scheduler."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from sim.state import State
 from sim.system import System
 from sim.tables import Evaluation
 from sim.wind import UniformWind
+from tests.clusters import Cluster
 
 PLAIN = isotropic(name="plain", area_weight=0.2, stretching=50.0, shear=40.0, bending=1e-4)
 """Constant stiffness, no damping: its forces derive from an energy."""
@@ -60,3 +62,14 @@ def make_system(
         anchors=position[vertices].clone(),
     )
     return system, State(position=position, velocity=torch.zeros_like(position))
+
+
+@pytest.fixture
+def doomed(tmp_path: Path) -> Iterator[Cluster]:
+    """A cluster of one worker, to be killed."""
+    (tmp_path / "dask").mkdir()
+    running = Cluster(tmp_path / "dask", workers=1)
+    try:
+        yield running
+    finally:
+        running.close()

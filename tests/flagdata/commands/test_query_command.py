@@ -181,3 +181,17 @@ def test_every_stored_column_is_described_with_its_unit(run: Run) -> None:
     columns = {column["name"]: column for column in json.loads(out)["columns"]}
     assert set(CATALOG) <= set(columns)
     assert columns["clock_drift"]["unit"] == "s/s"
+
+
+def test_people_read_clips_by_their_names_and_instants_as_times(run: Run) -> None:
+    _, out, _ = run("--where", "kind = 'clip'")
+    header, first, *_ = out.splitlines()
+    assert header.split()[:3] == ["artifact", "name", "start_time"]
+    assert "pier 0" in first
+    _, out, _ = run("--where", "name = 'pier'", "--columns", "name,start,end,frame_count")
+    assert [line.split() for line in out.splitlines()] == [
+        ["name", "start", "end", "frame_count"],
+        ["pier", "2026-05-01T12:00:00Z", "2026-05-01T12:01:00Z", "1500"],
+    ]
+    _, out, _ = run("--where", "name = 'pier'", "--columns", "start", "--csv")
+    assert out.splitlines() == ["start", str(NOON)]  # for programs

@@ -327,8 +327,11 @@ def test_a_record_that_is_open_may_be_read_after_a_fork(pairs):
 
 @pytest.mark.parametrize("workers", [0, 2])
 def test_torchs_own_loader_works_too(pairs, workers):
-    loader = torch.utils.data.DataLoader(pairs, batch_size=16, num_workers=workers, collate_fn=collate)
+    loader = torch.utils.data.DataLoader(pairs, batch_size=16, num_workers=workers)
     assert [a for batch in loader for a in batch.artifact] == pairs.table.artifact.tolist()
+    first, direct = next(iter(loader)), collate([pairs[index] for index in range(16)])
+    assert torch.equal(first.clip, direct.clip)
+    assert torch.equal(first.wind, direct.wind)
 
 
 FLIPS = 20

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -185,6 +186,19 @@ def test_a_recording_that_was_aligned_anew_gives_its_clips_once(lake, made):
     ] * 3
     assert set(flagdata.open(lake.path).pairs(at="before").table.recording.tolist()) == {old}
     assert set(flagdata.open(lake.path).pairs(f"recording = '{old}'").table.recording.tolist()) == {old}
+
+
+def test_a_single_session_says_that_it_is_on_one_side(lake, made, caplog):
+    for number in range(2):
+        add_recording(lake, made(number=number, session="pier"))
+    source = flagdata.open(lake.path)
+    full = max(source.sides().items(), key=lambda entry: entry[1].clips)[0]
+    said = f"all 6 clips belong together (session pier), and are on the side '{full}'"
+    assert len(source.pairs(split=full)) == 6
+    assert [record.getMessage() for record in caplog.records] == [f"warning: {said}: the others are empty"]
+    empty = next(side for side, size in source.sides().items() if not size.clips)
+    with pytest.raises(RefusedError, match=re.escape(f"split '{empty}' holds none of the clips; {said}")):
+        source.pairs(split=empty)
 
 
 def test_what_is_missing_is_an_error(source):

@@ -55,6 +55,11 @@ def test_the_page_of_a_result_lists_its_versions_with_the_code_of_each(shown: Sh
         keep(lake, one, lambda staged: (staged.mkdir(), (staged / "x").write_text("y")), "measure").artifact.id
         for one in (result, replace(result, code_version="0.1.0+<b>"))
     ]
+    says = "wind 4.2 m/s [2.9, 5.8] 90 % <b>"
+    told = replace(result, code_version="0.1.0+c", report=json.dumps({"sentence": says, "findings": []}))
+    weighed = keep(lake, told, lambda staged: (staged.mkdir(), (staged / "x").write_text("y")), "measure").artifact.id
+    for address in ("?kind=measurement", f"artifact/{weighed}"):
+        assert html.escape(says) in text(shown, address)
     page = text(shown, f"artifact/{ids[1]}")
     assert f"{ids[0][:12]} by code 0.1.0+aaaaaaa" in page
     assert f"{ids[1][:12]} by code 0.1.0+&lt;b&gt;, this one" in page

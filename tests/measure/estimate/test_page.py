@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from flagdata.film_array import Frames
 from measure.estimate import Context, Measurement, Section, beside
+from measure.estimate.answer import SHORT
 from measure.estimate.nearest import Neighbour
 from measure.estimate.page import page
 from models.estimator import Estimator
@@ -38,6 +39,9 @@ def test_the_answer_stands_first_and_every_quantity_has_a_row(found: Measurement
     text = drawn(found)
     assert found.sentence in text
     assert text.index(found.sentence) < text.index("What the film says")
+    folded = text.partition("What this film does not tell")[2].partition("</details>")[0]
+    for quantity in found.quantities:
+        assert (f"<td>{SHORT[quantity.name]}</td>" in folded) is not quantity.constrained
     assert [text.count(f"<td>{name}</td>") for name in ("wind", "area weight", "bending", "anisotropy")] == [1] * 4
 
 
@@ -46,6 +50,9 @@ def test_a_bound_is_shown_as_one_without_a_value(model: Estimator) -> None:
     strong = replace(strong, verdict=replace(strong.verdict, p=0.5))
     text = unescape(" ".join(drawn(strong).split()))
     assert f"<b>{strong.sentence}</b>" in text
+    (headline,) = re.findall(r'<p class="headline">(.*?)</p>', text)
+    assert re.fullmatch(r"wind <b>at least \d\.\d\d m/s</b> 95 %", headline)
+    assert text.index(headline) < text.index(f"<b>{strong.sentence}</b>") < text.index("<h2>The film")
     assert re.search(r"<td>wind</td> <td></td><td>at least \d\.\d\d \(95 %\)</td>", text)
     assert "range ends at 10.0 m/s" in text
     assert "inf" not in re.sub(r"data:[^\"]*|inference|information|inform", "", text)

@@ -32,7 +32,6 @@ from measure.observe import (
 from measure.verdict import NOT_REJECTED
 from sim.effects import EFFECTS, Effect
 from sim.material import named
-from tests.pools import Here
 from tests.program import invoke
 
 SIZE, RATE, DURATION, NOISE, FAR, VERTICES = 0.4, 25.0, 4.6, 5e-4, 0.12, 36
@@ -106,9 +105,7 @@ def experiment(*effects: Effect, seed: int) -> Experiment:
 def bank(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Nulls of the ways that a recording without effects shows."""
     folder = tmp_path_factory.mktemp("carried")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(banks, "ProcessPoolExecutor", Here)
-        banks.build(folder, plan.batches(Setting.of(experiment(seed=1)), kinds=KINDS, seed=3))
+    banks.build(folder, plan.batches(Setting.of(experiment(seed=1)), kinds=KINDS, seed=3))
     return folder
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -29,7 +31,7 @@ from measure.report.words import words
 from measure.verdict import NOT_REJECTED, Conclusion, Verdict, number
 from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect, ForceEffect, Value, strength
-from tests.pools import Here
+from sim.workers import Job
 
 DURATION, NOISE, SPEEDS, KINDS = 4.6, 5e-4, (3.5, 6.0), 9
 
@@ -53,11 +55,8 @@ def bank(specimen: Specimen, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Nulls of nine kinds of numerics, the fewest that can test a level of 0.1."""
     folder = tmp_path_factory.mktemp("bank")
     done: list[int] = []
-    for index, batch in enumerate(batches(specimen)[:-1]):
-        banks._cache(folder, batch, index)  # pyright: ignore[reportPrivateUsage]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(banks, "ProcessPoolExecutor", Here)
-        banks.build(folder, batches(specimen), progress=done.append)
+    banks.build(folder, batches(specimen)[:-1])
+    banks.build(folder, batches(specimen), progress=done.append)
     assert done == [KINDS - 1, 1]  # a build goes on where it was
     return folder
 
@@ -292,3 +291,23 @@ def test_the_base_model_is_led_on_only_to_where_less_is_left(
     ended, fits = run._calibrated(*cast(Any, (At(), At(), None)))  # pyright: ignore[reportPrivateUsage]
     assert ended.calibration.bending == pytest.approx(2.0 ** (looks - 1))
     assert fits is ended or looks == 1
+
+
+def test_nulls_are_simulated_by_the_workers_of_a_scheduler(
+    specimen: Specimen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str | None] = []
+
+    class Workers:
+        def results(self, jobs: Iterable[Job]) -> Iterator[object]:
+            yield from ((index, b"nulls of a worker") for _, (_, index) in jobs)
+
+    def connected(scheduler: str | None, **options: object) -> AbstractContextManager[Workers]:
+        asked.append(scheduler)
+        return nullcontext(Workers())
+
+    monkeypatch.setattr(banks, "connected", connected)
+    banks.build(tmp_path, batches(specimen)[:2], scheduler="tcp://host:8786")
+    banks.build(tmp_path, batches(specimen)[:2], scheduler="tcp://host:8786")  # all there: nobody is asked
+    assert asked == ["tcp://host:8786"]
+    assert [path.read_bytes() for path in banks.files(tmp_path)] == [b"nulls of a worker"] * 2

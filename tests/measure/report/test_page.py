@@ -145,6 +145,10 @@ def test_a_sufficient_base_model_has_no_columns_for_an_effect() -> None:
     heads = [e.text for e in parsed(html).all("th")]
     assert not any("reduction" in h or "control" in h or "shift" in h for h in heads)
     assert "nan" not in html.replace("nance", "").lower().split("motion-data")[0]
+    # Bars of one model would all be 100 % long; its errors and their floors are in the table.
+    assert "How much it matters" not in html
+    assert "How much it matters" in page(verdict(Conclusion.EFFECT))
+    assert "Error on unseen data" in html
 
 
 def test_whether_a_strength_is_one_in_all_recordings_is_shown_beside_them() -> None:

@@ -6,30 +6,30 @@ Once the lake has that many artifacts it pauses with another object that it has 
 """
 
 import sys
-from pathlib import Path
 
 import sim.datasets.build
-import sim.datasets.cluster
+import sim.workers.scheduled
 from flagdata.cli import main
 from flagdata.lake import Transaction
+from flagdata.lake.deposit import Deposit
 from tests.pausing import pause
 
 
 def pause_at(artifacts: int) -> None:
-    put, paused = Transaction.put, []
+    rely, paused = Transaction.rely, []
 
-    def pausing_put(transaction: Transaction, path: Path) -> str:
-        name = put(transaction, path)
+    def pausing_rely(transaction: Transaction, deposit: Deposit) -> str:
+        name = rely(transaction, deposit)
         if not paused and transaction._lake.rows(columns=["artifact"]).num_rows >= artifacts:
             paused.append(name)
             pause()
         return name
 
-    Transaction.put = pausing_put
+    Transaction.rely = pausing_rely
 
 
 if __name__ == "__main__":
     sim.datasets.build.COMMIT_FILMS = 2
-    sim.datasets.cluster.PATIENCE = 2.0
+    sim.workers.scheduled.PATIENCE = 2.0
     pause_at(int(sys.argv.pop(1)))
     main()

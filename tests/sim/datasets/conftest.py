@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import subprocess
-import sys
-import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -18,6 +14,7 @@ from flagdata.cli import root
 from flagdata.lake import Lake
 from sim.datasets import DatasetRecipe, parse
 from tests import pausing
+from tests.clusters import Cluster
 from tests.small import DATA_SET, SIMULATION
 
 WORKER = Path(__file__).with_name("build_worker.py")
@@ -54,47 +51,6 @@ def _replaced(text: str, changes: dict[str, str]) -> str:
         assert old in text
         text = text.replace(old, new)
     return text
-
-
-class Cluster:
-    """A scheduler and workers in processes of their own, on loopback."""
-
-    def __init__(self, folder: Path, *, workers: int) -> None:
-        self._folder = folder
-        self._file = folder / "scheduler.json"
-        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--idle-timeout", "3600")
-        self.workers: list[subprocess.Popen[bytes]] = []
-        for _ in range(workers):
-            self.add_worker()
-
-    def add_worker(self) -> None:
-        place = str(self._folder / f"worker-{len(self.workers)}")
-        # The last: nothing stays behind a test run that is killed.
-        options = ("--nthreads", "1", "--no-nanny", "--local-directory", place, "--death-timeout", "60")
-        self.workers.append(self._start("worker", *options))
-
-    def _start(self, role: str, *options: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "dask", role, "--scheduler-file", str(self._file), "--no-dashboard", *options]
-        return subprocess.Popen(
-            command,
-            env={**pausing.finding_tests(), "OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore"},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-
-    @property
-    def address(self) -> str:
-        for _ in range(600):
-            with suppress(OSError, ValueError, KeyError):
-                return json.loads(self._file.read_text())["address"]
-            time.sleep(0.1)
-        raise TimeoutError("the scheduler did not start")
-
-    def close(self) -> None:
-        for process in (*self.workers, self.scheduler):
-            process.kill()
-            process.wait()
 
 
 @pytest.fixture(scope="session")
@@ -151,17 +107,6 @@ class Builds:
         rows = Lake.open(lake).rows(columns=columns).to_pylist()
         assert len({row["artifact"] for row in rows}) == len(rows)
         return {row["artifact"]: tuple(str(row[column]) for column in columns) for row in rows}
-
-
-@pytest.fixture
-def doomed(tmp_path: Path) -> Iterator[Cluster]:
-    """A cluster of one worker, to be killed."""
-    (tmp_path / "dask").mkdir()
-    running = Cluster(tmp_path / "dask", workers=1)
-    try:
-        yield running
-    finally:
-        running.close()
 
 
 @pytest.fixture(scope="session")

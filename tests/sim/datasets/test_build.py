@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import pickle
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from flagdata.errors import FlagdataError
 from flagdata.lake import Lake, doctor, object_names, verify
 from flagdata.record import Record
 from sim.datasets import DatasetRecipe
+from sim.workers import Job, Scheduled
+from tests.clusters import Cluster
 from tests.program import invoke
 
 SIDES = {side: {"dataset": "tiny", "side": side} for side in ("train", "test")}
@@ -78,14 +81,52 @@ def test_a_films_anemometer_is_a_log_of_its_wind_at_1_hz(built: Path) -> None:
         assert parameters["material"] == "camel-ponte-roma"
 
 
-def test_a_build_into_a_bucket_makes_the_rows_and_objects_of_one_in_a_folder(
-    recipe_file: Path, builds: Any, built: Path, bucket_folder: str
+@pytest.fixture
+def beside_bucket(bucket_folder: str, tmp_path: Path) -> Iterator[Cluster]:
+    """Two workers that have the bucket's address and keys."""
+    (tmp_path / "dask").mkdir()
+    running = Cluster(tmp_path / "dask", workers=2)
+    try:
+        yield running
+    finally:
+        running.close()
+
+
+def test_a_build_into_a_bucket_of_which_a_worker_is_preempted_makes_the_rows_of_one_in_a_folder(
+    recipe_file: Path,
+    builds: Any,
+    built: Path,
+    bucket_folder: str,
+    beside_bucket: Cluster,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    done = builds.build(recipe_file, bucket_folder)
+    """What the workers make goes from them into the bucket; the client sends jobs and gets rows."""
+    plain, passed = Scheduled.results, []
+
+    def counted(workers: Scheduled, jobs: Iterable[Job]) -> Iterator[Any]:
+        def sent() -> Iterator[Job]:
+            for job in jobs:
+                passed.append(len(pickle.dumps(job)))
+                yield job
+
+        for number, result in enumerate(plain(workers, sent())):
+            passed.append(len(pickle.dumps(result)))
+            if number == FILMS // 2:
+                beside_bucket.workers[0].terminate()
+            yield result
+
+    monkeypatch.setattr(Scheduled, "results", counted)
+    done = type(builds)(beside_bucket, tmp_path / "said").build(recipe_file, bucket_folder)
     assert done.exit_code == 0, done
+    assert beside_bucket.workers[0].wait(timeout=60) is not None
     assert builds.rows(bucket_folder) == builds.rows(built)
     lake = Lake.open(bucket_folder)
     assert verify(lake, object_names(lake)) == ()
+    stored = sum(one.size for one in lake.objects)
+    assert len(passed) >= 2 * (FILMS + 3)
+    # Jobs and rows have the recipe's length: 20 kB a film, of which one of flagsim-small has 2.8 MB and these 0.1.
+    assert sum(passed) < min(stored / 2, 20_000 * len(passed))
 
 
 def test_a_build_that_is_killed_twice_ends_as_an_unbroken_one(
@@ -120,7 +161,7 @@ def test_a_build_ends_without_workers_and_without_its_scheduler_and_goes_on_when
     said = own.refused(process)
     assert "all workers are gone; waiting 2 s for new ones" in said
     assert "no workers for 2 s" in said
-    assert "it goes on from the last commit" in said
+    assert "it goes on from what is kept" in said
     kept = own.rows(lake)
     assert len(kept) > SEQUENCES
     doomed.add_worker()
@@ -128,7 +169,7 @@ def test_a_build_ends_without_workers_and_without_its_scheduler_and_goes_on_when
     doomed.scheduler.kill()
     said = own.refused(process)
     assert "the scheduler is gone" in said
-    assert "it goes on from the last commit" in said
+    assert "it goes on from what is kept" in said
     assert kept.items() < own.rows(lake).items()
     assert builds.build(recipe_file, lake).exit_code == 0
     assert own.rows(lake) == builds.rows(built)
@@ -142,6 +183,28 @@ def test_without_a_scheduler_it_is_built_by_processes_of_this_machine(
     assert (said["new_sequences"], said["new_films"], said["clips"]) == (SEQUENCES, FILMS, FILMS)
     assert Path(said["card"]).parent == tmp_path / "lake" / "cards"
     assert builds.rows(tmp_path / "lake") == builds.rows(built)
+
+
+def test_shards_on_branches_merged_are_the_whole_build(
+    recipe_file: Path, built: Path, builds: Any, tmp_path: Path
+) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    made: list[dict[str, Any]] = []
+    for number in (1, 2):
+        lake.branch(f"part-{number}")
+        where = ("--lake", lake.path, "--branch", f"part-{number}", "--workers", 1, "--json")
+        made.append(invoke("build", recipe_file, "--shard", f"{number}/2", *where).document)
+    assert [part["card"] for part in made] == [None, None]
+    assert sum(part["new_sequences"] for part in made) == SEQUENCES
+    assert sum(part["new_films"] for part in made) == FILMS
+    assert all(part["new_films"] == part["films"] for part in made)
+    assert all(part["films"] for part in made)
+    for number in (1, 2):
+        assert invoke("merge", f"part-{number}", "--lake", lake.path).code == 0
+    whole = invoke("build", recipe_file, "--lake", lake.path, "--workers", 1, "--json").document
+    assert (whole["new_sequences"], whole["new_films"]) == (0, 0)
+    assert whole["card"]
+    assert builds.rows(lake.path) == builds.rows(built)
 
 
 def test_the_card_says_what_was_built(built: Path, make: Callable[..., DatasetRecipe]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import json
-from contextlib import nullcontext
 from pathlib import Path
 from typing import NoReturn
 
@@ -13,7 +12,9 @@ import pytest
 from flagdata.lake import Lake
 from sim.datasets import casts, jobs, load, plan
 from sim.datasets.build import BuildReport
+from sim.datasets.counts import with_counts
 from sim.datasets.plan import Rates
+from sim.datasets.shard import Shard
 from tests.program import Ended, invoke
 
 
@@ -37,6 +38,20 @@ def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(recipe_file: Pat
     assert plan["bytes"] == pytest.approx(5 * rates["sequence_bytes"] + 10 * rates["film_bytes"], abs=1)
     # 30 frames of one slot each; the log, the schemas and the parameters take some 45 kB beside them.
     assert 30 * 2048 <= rates["film_bytes"] < 30 * 2048 + 60_000
+
+
+def test_a_plan_of_other_counts_is_of_a_data_set_that_says_them(recipe_file: Path, tmp_path: Path) -> None:
+    counts = "--sequences", 10, "--films", 12
+    planned = said(recipe_file, *counts, "--lake", tmp_path / "lake", "--plan", "--workers", 1, "--json").document
+    assert planned["recipe"] == "tiny-10x12"
+    assert planned["sequences"] == {"train": 6, "test": 4}
+    assert planned["films"] == {"train": 8, "test": 4}
+    rates = Rates(sequence_seconds=1.0, film_seconds=1.0, sequence_bytes=1.0, film_bytes=1.0)
+    recipe = with_counts(load(str(recipe_file)), sequences=10, films=12)
+    shards = [plan.plan(recipe, None, workers=1, rates=rates, shard=Shard(number=number, of=3)) for number in (1, 2, 3)]
+    assert sum(shard.missing_sequences for shard in shards) == 10
+    assert sum(shard.missing_films for shard in shards) == 12
+    assert all(shard.missing_sequences for shard in shards)
 
 
 def test_the_planned_size_of_a_sequence_is_near_the_real_one(recipe_file: Path, tmp_path: Path) -> None:
@@ -69,6 +84,8 @@ def test_a_plan_for_people_has_a_line_a_side(recipe_file: Path, tmp_path: Path) 
     [
         (["flagsin"], 2, "did you mean 'flagsim'"),
         (["flagsim", "--renderer", "rastre"], 2, "did you mean 'raster'"),
+        (["flagsim", "--shard", "5/4"], 2, "'5/4' is no shard"),
+        (["flagsim", "--sequences", "2"], 2, "2 sequences cannot be on 3 sides"),
         (["flagsim", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"], 2, "--workers with --scheduler"),
     ],
 )
@@ -97,7 +114,6 @@ def test_a_data_set_that_is_built_is_reported_although_its_card_cannot_be_writte
     def refused(*_: object, **__: object) -> NoReturn:
         raise OSError(errno.EIO, "Input/output error")
 
-    monkeypatch.setattr("sim.datasets.cluster.connected", lambda *_, **__: nullcontext())
     monkeypatch.setattr("sim.datasets.build.Build.run", lambda _: report)
     monkeypatch.setattr("sim.datasets.card.write_card", refused)
     code, out, err = said(recipe_file, "--lake", tmp_path / "lake", "--json")

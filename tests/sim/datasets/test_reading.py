@@ -11,6 +11,7 @@ import torch
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.tables import Range, ends
 from sim.datasets import DATASETS, DatasetRecipe, Truth, casts, load, parse
+from sim.datasets.counts import with_counts
 from sim.datasets.reading import with_renderer
 from sim.effects import FiniteSpanLoading
 from sim.run import Crew
@@ -127,3 +128,34 @@ def test_an_unknown_recipe_is_answered_with_the_nearest(tmp_path) -> None:
         load(str(tmp_path / "none.toml"))
     with pytest.raises(InputError, match="not TOML"):
         parse("title = ", name="x", folder=tmp_path, where="x.toml")
+
+
+@pytest.mark.parametrize("name", DATASETS.names())
+def test_counts_are_dealt_to_the_sides_in_the_recipes_shares(name: str) -> None:
+    recipe = load(name)
+    wanted = 101, 505
+    other = with_counts(recipe, sequences=wanted[0], films=wanted[1])
+    assert (sum(side.sequences for side in other.sides), sum(side.renders for side in other.sides)) == wanted
+    totals = [sum(getattr(side, what) for side in recipe.sides) for what in ("sequences", "renders")]
+    for side, before in zip(other.sides, recipe.sides, strict=True):
+        assert abs(side.sequences - wanted[0] * before.sequences / totals[0]) < 1
+        assert abs(side.renders - wanted[1] * before.renders / totals[1]) < 1
+        assert side.renders >= side.sequences >= side.sessions
+        assert bool(side.sessions) == bool(before.sessions)
+    assert sum(cast.simulation.count for cast in casts(other)) == wanted[0]
+    assert (other.name, other.licence) == (f"{name}-101x505", recipe.licence)
+    assert other.hash != recipe.hash
+    assert other.seed != recipe.seed  # none of its films is one of the recipe's own
+
+
+def test_films_follow_the_sequences_and_counts_that_cannot_be_are_refused() -> None:
+    recipe = load("flagsim-small")  # 400 sequences, 5 films of each
+    assert with_counts(recipe, sequences=None, films=None) is recipe
+    assert with_counts(recipe, sequences=400, films=2000) is recipe
+    assert sum(side.renders for side in with_counts(recipe, sequences=40, films=None).sides) == 200
+    assert sum(side.sequences for side in with_counts(recipe, sequences=None, films=800).sides) == 400
+    assert [side.sequences for side in with_counts(recipe, sequences=3, films=3).sides] == [1, 1, 1]
+    with pytest.raises(UsageError, match="2 sequences cannot be on 3 sides"):
+        with_counts(recipe, sequences=2, films=None)
+    with pytest.raises(UsageError, match="300 films are fewer than the 400 sequences"):
+        with_counts(recipe, sequences=None, films=300)

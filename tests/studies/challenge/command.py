@@ -95,9 +95,17 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
 @click.option(
     "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Number of processes that simulate."
 )
+@click.option("--scheduler", help="Dask scheduler whose workers simulate, tcp://HOST:PORT; without it, this machine.")
 @json_option
 def bank(
-    folder: Path, recipe: str, seed: int, lake_path: Place | None, kinds: int, workers: int, as_json: bool
+    folder: Path,
+    recipe: str,
+    seed: int,
+    lake_path: Place | None,
+    kinds: int,
+    workers: int,
+    scheduler: str | None,
+    as_json: bool,
 ) -> None:
     """Simulate nulls that all sets of a recipe share, by what participants know; a build that was stopped goes on."""
     from flagdata.lake import Lake
@@ -110,7 +118,7 @@ def bank(
     claim(folder, origin, seed=seed)
     say(of_batches(batches, workers=workers))
     with progress(kinds, label="null recordings", unit="kind") as advance:
-        banks.build(folder, batches, workers=workers, progress=advance)
+        banks.build(folder, batches, workers=workers, scheduler=scheduler, progress=advance)
     if as_json:
         document("challenge-bank", {"folder": str(folder), "kinds": kinds, "recordings": kinds * banks.WINDS})
     else:

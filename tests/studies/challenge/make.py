@@ -19,9 +19,9 @@ from flagdata.errors import FlagdataError
 from flagdata.outputs import check_folder, fresh_folder
 from flagdata.provenance import code_version, recipe_hash
 from flagdata.rng import stream
-from measure.workers import single_threaded
 from sim.handles import ARCSIM_STIFFNESS
 from sim.scene import GRAVITY
+from sim.workers import single_threaded
 from tests.studies.challenge import folder as files
 from tests.studies.challenge.answer_key import AnswerKey, seal
 from tests.studies.challenge.design import draw

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from flagdata.errors import FlagdataError
 from flagdata.rng import child_seed
 from measure.verdict import Verdict
-from measure.workers import single_threaded
+from sim.workers import single_threaded
 from tests.studies.challenge.filing import Filing, file, filed, verdict_json
 from tests.studies.challenge.folder import ChallengeFolder
 

@@ -77,17 +77,21 @@ def test_a_folder_goes_on_with_its_own_nulls_alone(recipe: ChallengeRecipe, tmp_
 
 
 def test_the_verb_builds_them(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    asked: list[tuple[Path, int, int]] = []
+    asked: list[tuple[Path, int, int, str | None]] = []
 
-    def build(folder: Path, batches: Sequence[NullBatch], *, workers: int, progress: object) -> None:
-        asked.append((folder, len(batches), workers))
+    def build(
+        folder: Path, batches: Sequence[NullBatch], *, workers: int, scheduler: str | None, progress: object
+    ) -> None:
+        asked.append((folder, len(batches), workers, scheduler))
 
     monkeypatch.setattr(banks, "build", build)
     (tmp_path / "tiny.toml").write_text(TEN_SECONDS)
     arguments = ["bank", str(tmp_path / "made"), "--recipe", str(tmp_path / "tiny.toml"), "--seed", "5", "--kinds", "6"]
-    result = CliRunner().invoke(challenge, [*arguments, "--workers", "2", "--json"], catch_exceptions=False)
+    result = CliRunner().invoke(
+        challenge, [*arguments, "--workers", "2", "--scheduler", "tcp://a:1", "--json"], catch_exceptions=False
+    )
     assert json.loads(result.stdout)["recordings"] == 6 * banks.WINDS
-    assert asked == [(tmp_path / "made", 6, 2)]
+    assert asked == [(tmp_path / "made", 6, 2, "tcp://a:1")]
 
 
 def test_the_verb_takes_a_recipe_of_close_loop(

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,6 @@ from measure.observe import recipe as recipes
 from measure.propose import dictionary
 from measure.propose.propose import propose
 from sim import handles
-from sim.datasets.cluster import Job
 from sim.effects import EFFECTS
 from sim.material import named
 from sim.mesh import grid
@@ -194,19 +192,19 @@ def kept_outcome(kept: str) -> None:
 
 
 def kept_jobs(kept: str) -> None:
-    """Jobs of a build are done here, and their results kept by the jobs' arguments."""
-    import sim.datasets.build
-    import sim.datasets.cluster
+    """What jobs of a build compute is kept by the jobs' arguments; they put it into the lake as they do."""
+    from sim.datasets import jobs
 
-    def done(client: object, jobs: Iterable[Job], *, say: Callable[[str], None]) -> Iterator[Any]:
-        for function, arguments in jobs:
+    def keeping(function: Callable[..., Any]) -> Callable[..., Any]:
+        def done(*arguments: Any) -> Any:
             path = Path(kept) / f"{function.__name__}-{_name(arguments)}"
             if not path.exists():
                 path.write_bytes(pickle.dumps(function(*arguments)))
-            yield pickle.loads(path.read_bytes())
+            return pickle.loads(path.read_bytes())
 
-    sim.datasets.build.results = done  # pyright: ignore[reportPrivateImportUsage]
-    sim.datasets.cluster.connected = lambda *_, **__: nullcontext()  # pyright: ignore[reportAttributeAccessIssue]
+        return done
+
+    jobs.simulate, jobs.film = keeping(jobs.simulate), keeping(jobs.film)
 
 
 def kept_windows(kept: str) -> None:

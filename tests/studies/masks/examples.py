@@ -17,9 +17,9 @@ from flagdata.lake import Lake, MeshSequence, read_meshes
 from flagdata.outputs import rewrite
 from flagdata.rng import child_seed, stream
 from flagdata.schema import Kind
-from measure.workers import single_threaded
 from models.conditioning import Stills
 from sim.assets import Assets
+from sim.workers import single_threaded
 from tests.studies.masks.films import Example, example
 
 _MOST_RUNS = 4
