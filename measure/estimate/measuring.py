@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,13 +18,14 @@ from measure.estimate.answer import Quantity, sentence
 from measure.estimate.combine import OWN, Dependence
 from measure.estimate.joint import DRAWS, FilmAnswer, Look, WindowAnswer
 from measure.estimate.options import Options
-from measure.film.similarity import Sizes, sizes, trained_on
+from measure.film.similarity import RATE_SLACK, Sizes, Trained, length_first, sizes, trained_on
 from measure.film.windows import Window, WindowLayout, WindowReader, findings_of
 from measure.gate.reasons import REASONS
-from measure.gate.verdict import Verdict, verdict
+from measure.gate.verdict import Reason, Verdict, verdict
 from measure.gate.window import WindowGate
 from models.estimator import Estimator
 from models.learner import Loss
+from models.targets import Cloth
 
 CONTRADICTION = 1 / 150
 """Bayes factor of the area weight that was stated, below which a warning is due: very strong evidence against it (Kass
@@ -37,6 +38,10 @@ is due."""
 _REPEATING = 0.1
 """Share of frames that repeat the one before, above which they are the reason where no window is whole. Lower says so
 of films that lack windows for another reason; of films made with half of the frames a second it is a half."""
+
+_PART = 1 / 3
+"""Share of the film's windows on which an answer rests at least. Lower answers films of which most shows no whole flag,
+or lacks frames; higher refuses films that a flag leaves for a while."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,13 +173,15 @@ def measure(
         looks.append(look)
         interpolated += window.interpolated
     # The gate judges the film; sizes at which it is unlike the training are dropped.
-    of_film = film.findings()
+    of_film = tuple(finding for finding in film.findings() if model.cloth is Cloth.FLAG or not _of_flags(finding))
     faults = [finding for finding in of_film if finding.kind in REASONS]
     if clips is None:
-        raise _without_windows(film, reader, faults)
+        raise _without_windows(film, reader, faults, considered, trained_on(model.targets))
     gate_verdict = verdict(
         [look.reasons for look in looks], false_alarm=options.false_alarm, level=gate.level, faults=faults
     )
+    if (few := _few_windows(gate_verdict, layout)) is not None:
+        gate_verdict = replace(gate_verdict, faults=(*gate_verdict.faults, few))
     sizes_kept = considered.only(gate_verdict.sizes)
     answer = FilmAnswer(model=model, sizes=sizes_kept, options=options)
     kept_looks = [look.only(gate_verdict.sizes) for look in looks]
@@ -241,17 +248,50 @@ def _look(window: Window, gate: WindowGate, joint: FilmAnswer) -> Look:
     )
 
 
-def _without_windows(film: Film, reader: WindowReader, faults: Sequence[Finding]) -> FlagdataError:
+def _of_flags(finding: Finding) -> bool:
+    """Returns whether it is a fault of flags only."""
+    return finding.kind in REASONS and REASONS[finding.kind].of_flags
+
+
+def _few_windows(gate_verdict: Verdict, layout: WindowLayout) -> Reason | None:
+    """Refuses an answer that would rest on too few of the film's windows, whatever the reason is that others do not
+    count."""
+    counting = int(np.count_nonzero(~(np.array(gate_verdict.blank) | gate_verdict.strange)))
+    if gate_verdict.unlike or not gate_verdict.measurable or counting >= _PART * layout.count:
+        return None
+    fault = REASONS["few-windows"]
+    return Reason(
+        kind="few-windows",
+        what=f"{fault.sentence}: on {counting} of {layout.count} windows, a third at least is needed",
+        p=None,
+        fix=fault.fix,
+        value=counting / layout.count,
+    )
+
+
+def _without_windows(
+    film: Film, reader: WindowReader, faults: Sequence[Finding], considered: Sizes, trained: Trained
+) -> FlagdataError:
     """Explains why no window of a film is complete."""
     distinct = reader.distinct
     start, lack = next(iter(reader.lacks.items()))
     windows = f"none of {reader.layout.count} windows has all its frames: in the one at {start:.2f} s {lack}"
     still = [fault for fault in faults if fault.kind == "no-motion"]
     if distinct.share > _REPEATING and not still:
+        repeating = f"{distinct.share:.0%} of {distinct.frames} frames repeat the one before"
+        left, needed = (1 - distinct.share) * film.rate, RATE_SLACK / max(reader.layout.spacings)
+        if left < needed:
+            length = trained.length * float(considered.scale.max())
+            return RefusedError(
+                f"{REASONS['low-frame-rate'].sentence}: {repeating}, {left:.3g} different ones a second are left, a "
+                f"{trained.noun} of {length:.3g} m needs {needed:.3g}, and {windows}",
+                where=film.name,
+                fix=f"film at {needed:.3g} frames a second or more that are all different"
+                + length_first(considered.given),
+            )
         repeated = REASONS["repeated-frames"]
         return RefusedError(
-            f"{repeated.sentence}: {distinct.share:.0%} of {distinct.frames} frames repeat the one before, and "
-            f"{windows}",
+            f"{repeated.sentence}: {repeating}, and {windows}",
             where=film.name,
             fix=repeated.fix,
         )

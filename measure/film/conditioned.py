@@ -20,6 +20,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CropBox
 from flagdata.schema import FRAME_SIZE
 from measure.gate.counted import reasons
+from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower, conditioning_of
 from models.conditioning.conditioning import LEAST, SAMPLE
@@ -215,14 +216,15 @@ class ConditionedFilm:
         conditioning, follower, watch, cut = self.found, self._follower, self._watch, self._cut
         if conditioning is None or follower is None or watch is None or cut is None:
             return self._film.findings()
-        faults = reasons(watch, conditioning, follower)
+        faults = reasons(watch, conditioning, follower, aspect=self._aspect)
         if cut.partly:  # what is left shows the whole flag
             faults = tuple(fault for fault in faults if fault.kind != "cut-off")
         of_conditioning = [
             *_of_camera(conditioning, follower),
             *_of_flag(conditioning, self.reference, number_given=self._flag is not None),
-            *_of_aspect(conditioning, self._aspect),
         ]
+        if all(fault.kind != "another-shape" for fault in faults):
+            of_conditioning += _of_aspect(conditioning, self._aspect)
         if all(fault.kind != "cut-off" for fault in faults):
             of_conditioning += cut.findings()
         return (*self._film.findings(), *of_conditioning, *faults)
@@ -366,6 +368,6 @@ def _of_aspect(conditioning: Conditioning, stated_aspect: float | None) -> list[
             f"the flag's outline is {region.aspect:.2f} times as long as high at the hoist; a flag of the size "
             f"given would be at most {stated_aspect:.2f} times",
             value=region.aspect,
-            fix="check --flag-size: length along the wind times height along the pole",
+            fix=REASONS["another-shape"].fix,
         )
     ]

@@ -250,7 +250,7 @@ def sizes(
                 "needs "
                 f"{needed:.4g}",
                 where="frame rate",
-                fix=f"film at {math.ceil(10 * needed) / 10:g} frames a second or more",
+                fix=f"film at {math.ceil(10 * needed) / 10:g} frames a second or more" + length_first(stated_size),
             )
         return Sizes(
             given=stated_size,
@@ -297,6 +297,17 @@ def sizes(
         scale=prior.quantile(middles) / trained.length,
         draws=prior.quantile(within) / trained.length,
         findings=tuple(findings),
+    )
+
+
+def length_first(stated_size: FlagSize | None) -> str:
+    """Returns what a remedy adds where a flag is stated higher than long, as one whose height was typed first: the
+    size in the other order."""
+    if stated_size is None or stated_size.length >= stated_size.height:
+        return ""
+    return (
+        f"; the length comes first: of a flag {stated_size.length:g} m high and {stated_size.height:g} m long give "
+        f"--flag-size {stated_size.height:g}x{stated_size.length:g}"
     )
 
 

@@ -11,11 +11,13 @@ class Fault:
     sentence: what was found and what it may mean, without a final stop; the figure follows it.
     fix: what the user can do.
     of_motion: whether it concerns the moving region, and so needs one.
+    of_flags: whether it is a fault of flags only, and none of cloth that hangs.
     """
 
     sentence: str
     fix: str
     of_motion: bool = False
+    of_flags: bool = False
 
 
 REASONS: dict[str, Fault] = {
@@ -42,19 +44,46 @@ REASONS: dict[str, Fault] = {
         fix="make sure that the crop shows a flag on a pole and little else that moves",
         of_motion=True,
     ),
+    "no-pole": Fault(
+        sentence="what moves may be no flag on a pole: no upright edge that stands still was found beside it",
+        fix="film so that the whole flag and its pole are in the picture, or choose the flag by --flag or --crop",
+        of_motion=True,
+        of_flags=True,
+    ),
+    "hangs-from-above": Fault(
+        sentence="the cloth may hang from a bar or a line rather than fly from a pole: a level edge stands still along "
+        "its top",
+        fix="film a flag whose one side is at a pole",
+        of_motion=True,
+        of_flags=True,
+    ),
     "moving-camera": Fault(
         sentence="the camera may move: its motion could not be followed",
         fix="film from a tripod, with something that stands still in the picture",
     ),
     "cut-off": Fault(
-        sentence="part of the cloth may lie outside the picture: motion reaches the picture's edge",
+        sentence="motion reaches the picture's edge, so that a part of the flag may lie outside",
         of_motion=True,
         fix="film so that the whole flag is in the picture, or choose another by --flag",
+    ),
+    "no-background": Fault(
+        sentence="the picture may show too little but what moves",
+        of_motion=True,
+        fix="film from farther away, so that the whole flag and its surroundings are in the picture",
+    ),
+    "another-shape": Fault(
+        sentence="what moves is longer than the flag that was given, and may be another thing",
+        of_motion=True,
+        fix="check --flag-size: length along the wind times height along the pole",
     ),
     "scale": Fault(
         sentence="the flag fills less or more of the picture than in the training clips",
         fix="film from nearer, so that the flag spans 100 pixels or more",
         of_motion=True,
+    ),
+    "few-windows": Fault(
+        sentence="an answer would rest on a small part of the film",
+        fix="give the part in which the whole flag flies and no frame is missing, by --start and --end",
     ),
     "several-flags": Fault(
         sentence="more than one region moves", fix="choose one by --flag, or crop to it", of_motion=True

@@ -15,6 +15,7 @@ from models.conditioning import framing, noise
 from models.conditioning.camera import STILL, WORK, Camera, Transform, by_edges, camera_of, path
 from models.conditioning.framing import Square
 from models.conditioning.regions import Region, regions_of
+from models.conditioning.standing import Box, Standing
 from models.conditioning.whole import CUT, SIDES, at_edges
 
 VERSION = 2
@@ -42,6 +43,8 @@ _DRIFT = 10
 """Frames over which the camera's place is smoothed for its drift."""
 _NEARBY = 6
 """Frames of the sample about the middle one over which a camera without known motion counts as still."""
+_BORDER = 2
+"""Pixels at the picture's edge in which no edge is looked for: what is padded beyond begins there."""
 _AHEAD = 0.1
 """Width of the band about cloth in which no feature of the background is sought, in sizes of the region."""
 
@@ -63,6 +66,7 @@ class Conditioning:
         kept: (size, size) float32 share of each pixel's changes that is noise, 0 to 1.
         path: (n, 2) of the square's centre over the sample [px of the film].
         cut: (n, 4) length at which the cloth moves along each of `whole.SIDES` of the picture, in sizes of the cloth.
+        standing: edges that stand still in the square.
     """
 
     size: int
@@ -77,11 +81,20 @@ class Conditioning:
     kept: Float32Array
     path: FloatArray
     cut: FloatArray
+    standing: Standing
 
     @property
     def region(self) -> Region | None:
         """The flag's; None where nothing moves."""
         return self.regions[self.chosen] if self.regions else None
+
+    def framed_box(self, region: Region) -> Box:
+        """Returns left, top, right and bottom of a region's places in the pictures that come out [px]."""
+        begins, step = (self.square.x, self.square.y) * 2, self.square.side / self.size
+        left, top, right, bottom = (
+            (edge / self.scale - begin) / step for edge, begin in zip(region.box, begins, strict=True)
+        )
+        return left, top, right, bottom
 
     @property
     def cut_share(self) -> dict[str, float]:
@@ -260,6 +273,7 @@ def conditioning_of(
         kept=np.minimum(_USUAL * level / spread, 1.0).astype(np.float32),
         path=np.stack([_centre(square, transform, scale) for transform in transforms]),
         cut=cut,
+        standing=Standing.of(stack, _shown(square, size, width=width, height=height)),
     )
 
 
@@ -369,6 +383,15 @@ def _noise(stack: UInt8Array, weight: Float32Array) -> float:
     change = np.diff(stack.astype(np.float32), axis=0)
     rough = np.stack([noise.rough(picture)[frozen] for picture in change])
     return max(noise.deviation(rough) / np.sqrt(2), _ROUNDING)
+
+
+def _shown(square: Square, size: int, *, width: int, height: int) -> BoolArray:
+    """Masks the pixels (size, size) of the square that lie in a picture of this size, without its outermost ones."""
+    step = square.side / size
+    columns, rows = (begin + step * (np.arange(size) + 0.5) for begin in (square.x, square.y))
+    edge = _BORDER * step
+    across, down = ((at > edge) & (at < length - edge) for at, length in ((columns, width), (rows, height)))
+    return np.asarray(down[:, None] & across[None], dtype=np.bool_)
 
 
 def _inside(within: tuple[int, int, int, int], shape: tuple[int, ...], scale: float) -> BoolArray:

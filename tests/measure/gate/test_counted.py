@@ -24,11 +24,14 @@ def drawn(
     scenery: bool = True,
     shift: FloatArray | None = None,
     noise: float = 1.0,
+    pole: bool = True,
+    bar: bool = False,
 ) -> UInt8Array:
-    """(COUNT, HEIGHT, WIDTH): striped cloth whose waves grow towards its free end and never come again.
+    """(COUNT, HEIGHT, WIDTH): striped cloth on a pole, whose waves grow towards its free end and never come again.
 
     Args:
         scenery: whether the background has features.
+        pole, bar: whether there is a pole at the cloth's side, a bar along its top.
         shift: (COUNT, 2) of all that is shown, to the right and down [px].
     """
     rng = stream(5, "drawn")
@@ -38,6 +41,10 @@ def drawn(
     behind = cv2.resize(rough, (wide, high), interpolation=cv2.INTER_CUBIC) if scenery else np.full((high, wide), 150.0)
     rows, columns = np.mgrid[:high, :wide].astype(np.float64)
     x, y, width, height = box[0] + pad, box[1] + pad, box[2], box[3]
+    if pole:
+        behind[y - 6 :, x - 3 : x] = 20.0
+    if bar:
+        behind[y - 12 : y - 8, x - 10 : x + width + 10] = 20.0
     along = (columns - x) / width
     out = []
     for k in range(COUNT):

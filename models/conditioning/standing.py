@@ -1,0 +1,121 @@
+"""Edges that stand still about the cloth: of the pole beside a flag, or of a bar that cloth hangs from.
+
+An edge stands still where the slope of the picture keeps its direction and strength for most of the film. A straight
+line of such edges is looked for in each direction near the upright, and near the level: pixels count whose slope is
+across the line, so that foliage and other textures, whose slopes point everywhere, make none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from flagdata.arrays import BoolArray, Float32Array, UInt8Array
+
+_PICTURES = 24
+"""Pictures at most that are looked at."""
+_BLUR = 1.2
+"""Width of the Gaussian by which they are smoothed [px]."""
+_ABSENT, _LEFT = 0.5, 0.5
+"""Share of the time in which the slope of an edge at rest may be below this share of its mean: cloth flies before it,
+and frames of a camera that moves are registered to a pixel. Higher takes what comes again for what stands."""
+_FAINT, _CLEAR = 1.5, 4.0
+"""Slopes [gray levels/px] of the mean picture at which an edge ends, and from which on there is one (Canny)."""
+_ACROSS = 25.0
+"""Degrees by which the slope at an edge may differ from that across a line."""
+_TILT = 20
+"""Degrees by which a line may differ from the upright, or the level, in steps of one."""
+_GAP = 0.06
+"""Gaps in a line, in lengths of what it is compared with: where cloth or a rope is before it."""
+_UNITS = 64
+"""Steps of a slope of one gray level a pixel, as whole numbers."""
+
+Box = tuple[float, float, float, float]
+"""Left, top, right and bottom [px]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Standing:
+    """Edges that stand still in a film.
+
+    Attributes:
+        upright: (height, width) those of lines near the upright.
+        level: (height, width) those of lines near the level.
+    """
+
+    upright: BoolArray
+    level: BoolArray
+
+    @classmethod
+    def of(cls, pictures: UInt8Array, inside: BoolArray) -> Standing:
+        """Finds them.
+
+        Args:
+            pictures: (n, height, width) gray, registered, of the whole film.
+            inside: (height, width) what the film shows: beyond its edge the picture is padded by stripes.
+        """
+        slopes = np.stack([_slopes(picture) for picture in pictures[:: -(-len(pictures) // _PICTURES)]])
+        mean = slopes.mean(axis=0)  # (2, height, width): along x and y
+        steep = np.hypot(*mean)
+        along = (slopes * (mean / np.maximum(steep, 1e-6))).sum(axis=1)
+        rests = np.sort(along, axis=0)[int(_ABSENT * len(along))] > _LEFT * steep
+        across, down = np.rint(mean * (rests & inside) * _UNITS).astype(np.int16)
+        edges = cv2.Canny(across, down, _FAINT * _UNITS, _CLEAR * _UNITS, L2gradient=True) > 0
+        angle = np.degrees(np.arctan2(np.abs(mean[1]), np.abs(mean[0])))
+        return cls(upright=edges & (angle < _ACROSS), level=edges & (angle > 90 - _ACROSS))
+
+    def beside(self, box: Box, reach: float) -> float:
+        """Measures the longest upright line beside or before a box that reaches its rows, in heights of the box.
+
+        Args:
+            reach: how far the line may lie from the box's left or right side, in sizes of the box.
+        """
+        left, top, right, bottom = box
+        near = reach * max(right - left, bottom - top)
+        return _longest(self.upright, (top, bottom), ((left - near, left + near), (right - near, right + near)))
+
+    def above(self, box: Box, reach: float) -> float:
+        """Measures the longest level line along the box's top, in widths of the box; see `beside`."""
+        left, top, right, bottom = box
+        near = reach * max(right - left, bottom - top)
+        return _longest(self.level.T, (left, right), ((top - near, top + near),))
+
+
+def _slopes(picture: UInt8Array) -> Float32Array:
+    """Computes the slopes (2, height, width) of a smoothed picture along x and y [gray levels/px]."""
+    smooth = cv2.GaussianBlur(picture.astype(np.float32), (0, 0), _BLUR)
+    return np.stack([cv2.Sobel(smooth, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)]).astype(np.float32)
+
+
+def _longest(edges: BoolArray, ends: tuple[float, float], places: tuple[tuple[float, float], ...]) -> float:
+    """Measures the longest line down the rows of edges (height, width), over the distance of `ends`.
+
+    Args:
+        ends: rows between which a part of the line is.
+        places: ranges of columns in one of which it lies at the middle of `ends`.
+    """
+    height, width = edges.shape
+    extent, middle = ends[1] - ends[0], (ends[0] + ends[1]) / 2
+    tilts = np.tan(np.radians(np.arange(-_TILT, _TILT + 1)))
+    columns = np.arange(width)
+    wanted = np.any([(columns >= low) & (columns <= high) for low, high in places], axis=0)
+    if not wanted.any():
+        return 0.0
+    rows = np.arange(height)
+    wide = np.asarray(cv2.dilate(edges.astype(np.uint8), np.ones((1, 3), np.uint8)), np.uint8)
+    moved = np.rint(tilts[:, None] * (rows - middle)).astype(int)[..., None] + columns[wanted]
+    lines = np.where((moved >= 0) & (moved < width), wide[rows[:, None], moved.clip(0, width - 1)], 0)
+    gap = 2 * round(_GAP * extent / 2) + 1
+    longest = 0
+    run, reaches = np.zeros(lines.shape[::2], int), np.zeros(lines.shape[::2], bool)
+    absent = np.full(lines.shape[::2], gap + 1)
+    for row in range(height):
+        present = lines[:, row] > 0
+        absent = np.where(present, 0, absent + 1)
+        ended = absent > gap
+        run = np.where(ended, 0, run + 1)
+        reaches = ~ended & (reaches | (present & (ends[0] <= row <= ends[1])))
+        longest = max(longest, int(np.where(present & reaches, run, 0).max()))
+    return longest / extent
