@@ -94,8 +94,8 @@ def campaign(counts: Mapping[str, int], *, start: int) -> dict[str, dict[str, An
         start: seed that all of them are drawn from.
 
     Returns:
-        By class: `examples`, by subject; how many were `refused`; `slowest`, the most processor time of one [s]; `peak`,
-        the most memory of one [B]; and the `failures`, each with its subject, its example and what came of it.
+        By class: `examples`, by subject; how many were `refused`; `slowest`, the most processor time of one [s];
+        `peak`, the most memory of one [B]; and the `failures`, each with its subject, its example and what came of it.
     """
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "outcome.json"
