@@ -113,10 +113,10 @@ def bank(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_carried_cloths_without_effects_are_accepted_by_the_count_of_kinds(bank: Path) -> None:
-    """Twelve kinds of numerics reject at 1/13: two or more of three by chance in 2 of 100 such draws."""
-    verdicts = [close_loop(experiment(seed=seed), LoopOptions(bank=bank, level=LEVEL)) for seed in (5, 9, 11)]
+    """Twelve kinds of numerics reject at 1/13: two or more of four by chance in 3 of 100 such draws."""
+    verdicts = [close_loop(experiment(seed=seed), LoopOptions(bank=bank, level=LEVEL)) for seed in (5, 9, 11, 20)]
     accepted = [verdict for verdict in verdicts if verdict.conclusion in NOT_REJECTED]
-    assert len(accepted) >= 2
+    assert len(accepted) >= 3
     for verdict in verdicts:
         test = verdict.test
         assert test.kinds == KINDS
