@@ -23,18 +23,22 @@ hypothesis.settings.load_profile("whatever-the-load")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 LONGEST = (
-    "test_hostile.py",
-    "measure/loop/test_run.py",
     "docs/test_pages.py",
     "test_readme.py",
     "sim/datasets/test_build.py",
-    "measure/refine/test_procedure.py",
-    "docs/test_notebooks.py",
-    "measure/loop/test_carried.py",
-    "flagdata/lake/test_object_storage.py",
-    "flagdata/test_failing_calls.py",
+    "measure/loop/test_run.py",
     "measure/propose/test_propose.py",
-    "flagdata/dataset/test_loader.py",
+    "flagdata/lake/test_object_storage.py",
+    "test_hostile.py",
+    "flagdata/test_failing_calls.py",
+    "docs/test_notebooks.py",
+    "models/training/test_command.py",
+    "flagdata/lake/test_unfinished.py",
+    "measure/loop/test_carried.py",
+    "flagdata/lake/test_integrity.py",
+    "flagdata/lake/test_healing.py",
+    "flagdata/lake/test_killed_on_a_bucket.py",
+    "contract/test_effects.py",
 )
 """Files that take longest, begun first, so that the two workers of `make test` end together."""
 

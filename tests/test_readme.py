@@ -43,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The shortest demonstration, on a coarse mesh, in small pictures."""
     out = tmp_path_factory.mktemp("readme") / "out" / "demo"
     with pytest.MonkeyPatch.context() as patch:
-        small = partial(RecordingRecipe, rate=25, columns=10, step=4e-3, width=240, rows=180, samples=1)
+        small = partial(RecordingRecipe, rate=25, columns=8, step=8e-3, width=240, rows=180, samples=1)
         patch.setattr("measure.demo.story.RecordingRecipe", small)
         patch.setattr("measure.camera.ProcessPoolExecutor", Here)
         Shell(patch=patch).run(f"flagdata demo --out {out}")

@@ -269,10 +269,10 @@ _DAMAGED = "the mesh store is damaged"
 
 
 def _open(path: Path) -> zarr.Group:
-    import zarr
+    from flagdata.lake.sized_chunks import open_group
 
     with store_errors(path, "this is not a Zarr store"):
-        return zarr.open_group(path, mode="r", zarr_format=3)
+        return open_group(path)
 
 
 def check_format(head: Any, newest_format: int, path: Path, *, noun: str) -> dict[str, Any]:
@@ -519,11 +519,11 @@ def read_markers(path: Path) -> MarkerSequence:
         CorruptError: not such a store, damaged, or of a newer format.
         LimitError: arrays or chunks larger than the limits of `flagdata.lake.meshes`.
     """
-    import zarr
+    from flagdata.lake.sized_chunks import open_group
 
     restore = "run flagdata verify; ingest the table again or restore it from a copy"
     with store_errors(path, "the marker store is damaged"):
-        group = zarr.open_group(path, mode="r", zarr_format=3)
+        group = open_group(path)
         head = check_format(group.attrs.get(_MARKERS_HEAD), MARKERS_FORMAT, path, noun="markers")
         attributes: Any = group.attrs["attributes"]
         names: Any = group.attrs["names"]

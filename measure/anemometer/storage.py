@@ -74,10 +74,10 @@ def read(path: Path) -> ReadingModel:
         CorruptError: not such a folder, damaged, or of a newer format.
         LimitError: arrays larger than the limits of `flagdata.lake.meshes`.
     """
-    import zarr
+    from flagdata.lake.sized_chunks import open_group
 
     with store_errors(path, "the reading model is damaged", fix="run flagdata verify; calibrate again"):
-        group = zarr.open_group(path, mode="r", zarr_format=3)
+        group = open_group(path)
         check_format(group.attrs.get(HEAD), FORMAT, path, noun="reading models")
         about: dict[str, Any] = json.loads(json.dumps(dict(group.attrs)))
 

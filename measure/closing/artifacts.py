@@ -172,10 +172,10 @@ def read(path: Path) -> tuple[Verdict, str]:
         CorruptError: not such a folder, damaged, or of a newer format.
         LimitError: arrays larger than the limits of `flagdata.lake.meshes`.
     """
-    import zarr
+    from flagdata.lake.sized_chunks import open_group
 
     with store_errors(path, "the measurement is damaged", fix="run flagdata verify; close the loop again"):
-        group = zarr.open_group(path, mode="r", zarr_format=3)
+        group = open_group(path)
         check_format(group.attrs.get(_HEAD), _FORMAT, path, noun="verdicts")
         verdict, report = (
             read_part(group, name, None, None, where=str(path)).tobytes().decode() for name in ("verdict", "report")

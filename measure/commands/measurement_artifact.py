@@ -137,10 +137,10 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         CorruptError: not such a folder, damaged, or of a newer format.
         LimitError: arrays larger than the limits of `flagdata.lake.meshes`.
     """
-    import zarr
+    from flagdata.lake.sized_chunks import open_group
 
     with store_errors(path, "the measurement is damaged", fix="run flagdata verify; measure again"):
-        group = zarr.open_group(path, mode="r", zarr_format=3)
+        group = open_group(path)
         check_format(group.attrs.get(_HEAD), _FORMAT, path, noun="measurements")
         answer: Any = json.loads(json.dumps(group.attrs["answer"]))
         names = sorted(group.array_keys())

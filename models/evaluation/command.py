@@ -132,6 +132,8 @@ class _Desk:
         catalog = self._source.lake.table(self._source.lake.view(self._at))
         trained_on = [DataSpec.of_identity(_card(estimator)["recipe"]["data"]) for _, estimator in chosen]
         refuse_learned(catalog, trained_on, dataset=self._dataset, side=side)
+        # First: lengths that no film has and networks that are none on maps are refused before the rest is computed.
+        triplets = self._triplets([estimator for _, estimator in chosen], frames, side)
         for row, estimator in chosen:
             predictions = self._predictions(estimator, side)
             data = DataSpec.of_identity(_card(estimator)["recipe"]["data"])
@@ -151,7 +153,7 @@ class _Desk:
             seed=self._seed,
             reference=reference,
             tsne_of=tsne,
-            frames=self._triplets([estimator for _, estimator in chosen], frames, side),
+            frames=triplets,
             reads=self._reads(evaluated, side, data) if linear else (),
             learning=_points([point for point in learned if point[1].label in curves]),
         )

@@ -148,6 +148,21 @@ def test_a_zarr_store_with_changed_bytes_is_read_or_refused(kind: str, tmp_path:
     law()
 
 
+@pytest.mark.parametrize("kind", ["meshes", "markers", "xarray"])
+def test_a_chunk_that_states_another_length_than_it_has_is_refused_before_memory_beyond_it_is_read(
+    kind: str, tmp_path: Path
+) -> None:
+    write, read = STORES[kind]
+    write(tmp_path / "made.zarr")
+    (chunk,) = (path for path in (tmp_path / "made.zarr" / "positions" / "c").rglob("*") if path.is_file())
+    data = bytearray(chunk.read_bytes())
+    length = int.from_bytes(data[12:16], "little")  # of the first of the shard
+    data[12:16] = (length + 1).to_bytes(4, "little")
+    chunk.write_bytes(data)
+    with pytest.raises((CorruptError, ValueError), match=f"a chunk has {length} bytes and states {length + 1}"):
+        read(tmp_path / "made.zarr")
+
+
 @pytest.mark.parametrize("kind", ["meshes", "markers"])
 def test_a_zarr_store_made_by_hand_is_read_or_refused(kind: str, tmp_path: Path) -> None:
     write, read = STORES[kind]

@@ -15,7 +15,7 @@ from tests.studies.failing.groups import grouped
 from tests.studies.failing.injector import Fault, Injector, injecting
 from tests.studies.failing.trial import Trials
 
-BEFORE, AFTER = 2, 3
+BEFORE, AFTER = 2, 2
 """How many of a command's calls fail in turn before and after it has published, spread evenly; all of them with
 FLAGDATA_EVERY_CALL set. `python -m tests.studies failing` has the slow commands as well, and kills."""
 EVERY = bool(os.environ.get("FLAGDATA_EVERY_CALL"))

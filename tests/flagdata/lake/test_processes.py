@@ -20,17 +20,17 @@ NOW = timedelta(0)
 
 
 def test_four_processes_ingesting_at_once_lose_no_row(lake: Lake, start_worker: Callable[..., Any]) -> None:
-    workers = [start_worker(f"w{i}", count=16, shared=5) for i in range(4)]
+    workers = [start_worker(f"w{i}", count=8, shared=5) for i in range(4)]
     for worker in workers:
         worker.await_line("done")
-    assert [len(worker.acknowledged()) for worker in workers] == [21] * 4
+    assert [len(worker.acknowledged()) for worker in workers] == [13] * 4
     expected = {identity for worker in workers for identity in worker.acknowledged()}
-    assert len(expected) == 4 * 16 + 5
+    assert len(expected) == 4 * 8 + 5
     rows = lake.rows()["artifact"].to_pylist()
     assert len(rows) == len(expected)  # the five shared sources raced, and are there once
     assert set(rows) == expected
     merges = [entry for entry in lake.catalog.history() if entry.get("message", "").startswith("merge ")]
-    assert len(merges) == 2  # of the catalog's files, after each 32 of some 72 versions, overtaken by no commit
+    assert len(merges) == 1  # of the catalog's files, after 32 of some 40 versions, overtaken by no commit
     assert doctor(lake, grace=NOW) == ()
     assert verify(lake, object_names(lake)) == ()
 
@@ -95,14 +95,14 @@ def test_collection_beside_ingests_deletes_nothing_that_they_publish(
     lake: Lake, start_worker: Callable[..., Any]
 ) -> None:
     workers = [start_worker(f"w{i}", count=1000, shared=3) for i in range(2)]
-    for _ in range(10):
+    for _ in range(6):
         collect(lake, grace=NOW)
         for worker in workers:
             worker.await_acknowledged(1)
     for worker in workers:
         worker.stop()
     acknowledged = {identity for worker in workers for identity in worker.acknowledged()}
-    assert len(acknowledged) >= 2 * 10 - 3  # one at least of each worker and round, three of which they may share
+    assert len(acknowledged) >= 2 * 6 - 3  # one at least of each worker and round, three of which they may share
     assert acknowledged == set(lake.rows()["artifact"].to_pylist())
     assert doctor(lake, grace=NOW) == ()
     assert verify(lake, object_names(lake)) == ()
@@ -119,7 +119,7 @@ def test_kills_during_ingest_lose_nothing_acknowledged(lake: Lake, start_worker:
     one_ingest = (time.monotonic() - began) / 3  # beside another process's, on this disk or store, under this load
     moments = random.Random(2020)
     killed = []
-    for wave in range(10):
+    for wave in range(6):
         pair = [start_worker(f"wave{wave}-{i}", count=1000, shared=3) for i in range(2)]
         for worker in pair:
             worker.await_line("ready")
@@ -130,7 +130,7 @@ def test_kills_during_ingest_lose_nothing_acknowledged(lake: Lake, start_worker:
         killed += pair
     acknowledged = set().union(*(worker.acknowledged() for worker in (*undisturbed, *killed)))
     rows = lake.rows()["artifact"].to_pylist()
-    assert sum(worker.was_interrupted() for worker in killed) >= 10  # the test has tested something
+    assert sum(worker.was_interrupted() for worker in killed) >= 6  # the test has tested something
     assert any(worker.acknowledged() for worker in killed)
     assert acknowledged <= set(rows)
     assert len(rows) == len(set(rows))

@@ -15,9 +15,17 @@ from measure.verdict import NOT_REJECTED, Conclusion
 from tests.measure.loop.drawn_statistics import SEGMENTS, SHED, Acting, judged, made, named, pulses, seen, slow
 
 
-def test_what_moments_alone_show_rejects_and_counts_in_what_an_effect_leaves() -> None:
+@pytest.fixture(scope="module")
+def turning() -> tuple[NullModel, Reference]:
+    """Of nulls whose moments are looked at."""
     bank = made(seed=7, moments=True)
-    null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+    return bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+
+
+def test_what_moments_alone_show_rejects_and_counts_in_what_an_effect_leaves(
+    turning: tuple[NullModel, Reference],
+) -> None:
+    null, reference = turning
     drag, lift = {"tangential-quadratic-drag.coefficient": 1.0}, {"lift.coefficient": 1.0}
 
     def found(acting: Acting, moments: Acting) -> LibraryJudgement:
@@ -29,11 +37,10 @@ def test_what_moments_alone_show_rejects_and_counts_in_what_an_effect_leaves() -
     assert (found(lift, lift | drag).conclusion, named(found(lift, lift | drag))) == (Conclusion.PARTLY, list(lift))
 
 
-def test_beside_gusts_moments_are_not_looked_at() -> None:
+def test_beside_gusts_moments_are_not_looked_at(turning: tuple[NullModel, Reference]) -> None:
     """Two true gusts of a challenge left 3.1 and 3.4 by the columns, of 3.9 that nulls leave, and 6.6 and 8.2 by the
     moments: a pressure that swings within a segment moves them however it is set free from one to the next."""
-    bank = made(seed=7, moments=True)
-    null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+    null, reference = turning
     drag = {"tangential-quadratic-drag.coefficient": 1.0}
     found = judge(seen(null, {}, gusts=1.0, moments=drag), reference, level=0.02)
     assert (found.conclusion, named(found)) == (Conclusion.EFFECT, ["gusts"])

@@ -125,5 +125,5 @@ def bank(nulls: tuple[Nulls, float], directions: tuple[Column, ...]) -> NullBank
 def pushed(specimen: Specimen) -> Experiment:
     """Four winds with a push of 8 m/s²; fitted to nulls of this size, one across the wind scatters by 0.2 m/s²."""
     calibrations = (Calibration(area_weight=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS)
-    batch = simulated(specimen, calibrations, SPEEDS, (SidePush(acceleration=PUSH),), 91)
+    batch = simulated(specimen, calibrations, SPEEDS, (SidePush(acceleration=PUSH),), 97)
     return Experiment(specimen=specimen, recordings=tuple(batch.simulate()))

@@ -26,7 +26,10 @@ SIDES = {side: {"dataset": "tiny", "side": side} for side in ("train", "test")}
 SEQUENCES, FILMS = 5, 10
 
 
-def test_a_build_holds_what_its_recipe_says(built: Path) -> None:
+def test_a_build_holds_what_its_recipe_says(built: Path, told: dict[str, Any]) -> None:
+    assert told["schema"] == "flagdata.build/1"
+    assert (told["new_sequences"], told["new_films"], told["clips"]) == (SEQUENCES, FILMS, FILMS)
+    assert Path(told["card"]).parent == built / "cards"
     lake = Lake.open(built)
     rows = lake.rows().to_pylist()
     assert Counter(row["kind"] for row in rows) == {"meshes": SEQUENCES, "recording": FILMS, "clip": FILMS}
@@ -129,62 +132,6 @@ def test_a_build_into_a_bucket_of_which_a_worker_is_preempted_makes_the_rows_of_
     assert sum(passed) < min(stored / 2, 20_000 * len(passed))
 
 
-def test_a_build_that_is_killed_twice_ends_as_an_unbroken_one(
-    recipe_file: Path, builds: Any, built: Path, tmp_path: Path
-) -> None:
-    """Among its sequences and among its films."""
-    lake = tmp_path / "lake"
-    for artifacts in (2, SEQUENCES + 4):
-        builds.kill(builds.start(recipe_file, lake, pause=artifacts))
-    assert builds.build(recipe_file, lake).exit_code == 0
-    assert builds.rows(lake) == builds.rows(built)
-    version = Lake.open(lake).resolve(None)
-    assert builds.build(recipe_file, lake).exit_code == 0  # nothing is made again
-    assert Lake.open(lake).resolve(None) == version
-
-
-def test_a_killed_workers_jobs_are_done_by_the_other(
-    recipe_file: Path, builds: Any, cluster: Any, built: Path, tmp_path: Path
-) -> None:
-    process = builds.start(recipe_file, tmp_path / "lake", pause=SEQUENCES)
-    cluster.workers[0].kill()
-    builds.finish(process)
-    assert builds.rows(tmp_path / "lake") == builds.rows(built)
-
-
-def test_a_build_ends_without_workers_and_without_its_scheduler_and_goes_on_when_there_are_some(
-    recipe_file: Path, doomed: Any, built: Path, builds: Any, tmp_path: Path
-) -> None:
-    own, lake = type(builds)(doomed, tmp_path / "said"), tmp_path / "lake"
-    process = own.start(recipe_file, lake, pause=SEQUENCES)
-    doomed.workers[0].kill()
-    said = own.refused(process)
-    assert "all workers are gone; waiting 2 s for new ones" in said
-    assert "no workers for 2 s" in said
-    assert "it goes on from what is kept" in said
-    kept = own.rows(lake)
-    assert len(kept) > SEQUENCES
-    doomed.add_worker()
-    process = own.start(recipe_file, lake, pause=len(kept))
-    doomed.scheduler.kill()
-    said = own.refused(process)
-    assert "the scheduler is gone" in said
-    assert "it goes on from what is kept" in said
-    assert kept.items() < own.rows(lake).items()
-    assert builds.build(recipe_file, lake).exit_code == 0
-    assert own.rows(lake) == builds.rows(built)
-
-
-def test_without_a_scheduler_it_is_built_by_processes_of_this_machine(
-    recipe_file: Path, built: Path, builds: Any, tmp_path: Path
-) -> None:
-    said = invoke("build", recipe_file, "--lake", tmp_path / "lake", "--workers", 1, "--json").document
-    assert said["schema"] == "flagdata.build/1"
-    assert (said["new_sequences"], said["new_films"], said["clips"]) == (SEQUENCES, FILMS, FILMS)
-    assert Path(said["card"]).parent == tmp_path / "lake" / "cards"
-    assert builds.rows(tmp_path / "lake") == builds.rows(built)
-
-
 def test_shards_on_branches_merged_are_the_whole_build(
     recipe_file: Path, built: Path, builds: Any, tmp_path: Path
 ) -> None:
@@ -230,3 +177,42 @@ def test_two_recipes_of_one_name_are_not_mixed(recipe_file: Path, builds: Any, b
     assert isinstance(refused, FlagdataError)
     assert "are of another recipe" in refused.what
     assert builds.rows(built) == before
+
+
+def test_a_build_that_is_killed_twice_and_loses_a_worker_ends_as_an_unbroken_one(
+    recipe_file: Path, builds: Any, cluster: Any, built: Path, tmp_path: Path
+) -> None:
+    """Killed among its sequences and among its films; then the other worker does a killed one's jobs."""
+    lake = tmp_path / "lake"
+    for artifacts in (2, SEQUENCES + 4):
+        builds.kill(builds.start(recipe_file, lake, pause=artifacts))
+    process = builds.start(recipe_file, lake, pause=SEQUENCES + 6)
+    cluster.workers[0].kill()
+    builds.finish(process)
+    assert builds.rows(lake) == builds.rows(built)
+    version = Lake.open(lake).resolve(None)
+    assert builds.build(recipe_file, lake).exit_code == 0  # nothing is made again
+    assert Lake.open(lake).resolve(None) == version
+
+
+def test_a_build_ends_without_workers_and_without_its_scheduler_and_goes_on_when_there_are_some(
+    recipe_file: Path, cluster: Any, built: Path, builds: Any, tmp_path: Path
+) -> None:
+    """The last test: it ends the cluster."""
+    lake = tmp_path / "lake"
+    process = builds.start(recipe_file, lake, pause=SEQUENCES)
+    for worker in cluster.workers:
+        worker.kill()
+    said = builds.refused(process)
+    assert "all workers are gone; waiting 2 s for new ones" in said
+    assert "no workers for 2 s" in said
+    assert "it goes on from the last commit" in said
+    kept = builds.rows(lake)
+    assert len(kept) > SEQUENCES
+    cluster.add_worker()
+    process = builds.start(recipe_file, lake, pause=len(kept))
+    cluster.scheduler.kill()
+    said = builds.refused(process)
+    assert "the scheduler is gone" in said
+    assert "it goes on from the last commit" in said
+    assert kept.items() < builds.rows(lake).items() <= builds.rows(built).items()

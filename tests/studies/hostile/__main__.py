@@ -1,15 +1,16 @@
-"""A class of the campaign in this process; `tests.studies.hostile.campaign.campaign` starts it."""
+"""Classes of the campaign in this process; `tests.studies.hostile.campaign.campaign` starts it."""
 
 from __future__ import annotations
 
 import argparse
 import gc
+import json
 import pkgutil
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
-from tests.studies.hostile import KINDS
 from tests.studies.hostile.campaign import run
 
 PACKAGES = {
@@ -33,11 +34,14 @@ def load(names: tuple[str, ...]) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("kind", choices=KINDS)
-    parser.add_argument("--count", type=int, required=True)
+    parser.add_argument("counts", nargs="+", metavar="KIND=COUNT")
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
-    load(PACKAGES.get(options.kind, ("flagdata",)))
-    subjects = import_module(f"tests.studies.hostile.{options.kind}").subjects()
-    run(subjects, count=options.count, start=options.seed, out=options.out)
+    counts = {kind: int(count) for kind, _, count in (one.partition("=") for one in options.counts)}
+    outcomes: dict[str, Any] = {}
+    for kind in sorted(counts, key=lambda kind: len(PACKAGES.get(kind, ()))):  # the fewest modules first
+        load(PACKAGES.get(kind, ("flagdata",)))
+        subjects = import_module(f"tests.studies.hostile.{kind}").subjects()
+        outcomes[kind] = run(subjects, count=counts[kind], start=options.seed)
+        options.out.write_text(json.dumps(outcomes))

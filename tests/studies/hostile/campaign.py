@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,17 +86,16 @@ def command(*arguments: object) -> str:
     return printed.getvalue()
 
 
-def campaign(kind: str, *, count: int, start: int) -> dict[str, Any]:
-    """Run a class of examples in a process of its own.
+def campaign(counts: Mapping[str, int], *, start: int) -> dict[str, dict[str, Any]]:
+    """Run classes of examples in a process of their own.
 
     Args:
-        kind: of `tests.studies.hostile.KINDS`.
-        count: of examples.
+        counts: of examples of each class, of `tests.studies.hostile.KINDS`.
         start: seed that all of them are drawn from.
 
     Returns:
-        `examples`, by subject; how many were `refused`; `slowest`, the most processor time of one [s]; `peak`, the most
-        memory of one [B]; and the `failures`, each with its subject, its example and what came of it.
+        By class: `examples`, by subject; how many were `refused`; `slowest`, the most processor time of one [s];
+        `peak`, the most memory of one [B]; and the `failures`, each with its subject, its example and what came of it.
     """
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "outcome.json"
@@ -108,19 +107,9 @@ def campaign(kind: str, *, count: int, start: int) -> dict[str, Any]:
             "OMP_NUM_THREADS": "1",
             "OPENBLAS_NUM_THREADS": "1",
         }
+        drawn = [f"{kind}={count}" for kind, count in counts.items()]
         done = subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                "tests.studies.hostile",
-                kind,
-                "--count",
-                str(count),
-                "--seed",
-                str(start),
-                "--out",
-                out,
-            ],
+            [sys.executable, "-m", "tests.studies.hostile", *drawn, "--seed", str(start), "--out", out],
             cwd=REPOSITORY,
             env=environment,
             stdin=subprocess.DEVNULL,
@@ -128,16 +117,14 @@ def campaign(kind: str, *, count: int, start: int) -> dict[str, Any]:
             text=True,
             check=False,
         )
-        if not out.exists():
-            raise RuntimeError(f"the campaign did not begin: {done.stderr[-2000:]}")
         if done.returncode:
             raise RuntimeError(f"the campaign ended with {done.returncode}: {done.stderr[-2000:]}")
-        outcome: dict[str, Any] = json.loads(out.read_text())
-        return outcome
+        outcomes: dict[str, dict[str, Any]] = json.loads(out.read_text())
+        return outcomes
 
 
-def run(subjects: Sequence[Subject], *, count: int, start: int, out: Path) -> None:
-    """Draw the examples of a class, read each and keep the outcome in the file `out`, also while it goes on."""
+def run(subjects: Sequence[Subject], *, count: int, start: int) -> dict[str, Any]:
+    """Draw the examples of a class and read each; the outcome."""
     outcome: dict[str, Any] = {
         "examples": {subject.name: 0 for subject in subjects},
         "refused": 0,
@@ -157,7 +144,7 @@ def run(subjects: Sequence[Subject], *, count: int, start: int, out: Path) -> No
             if seen["failure"] is not None:
                 example = {"subject": subject.name, "example": repr(damage)[:4000]}
                 outcome["failures"].append({**example, "what": seen["failure"]})
-            out.write_text(json.dumps(outcome))
+    return outcome
 
 
 def prepare(subject: Subject) -> None:

@@ -13,7 +13,7 @@ COUNTS = {"recipes": 60, "models": 66, "inputs": 100, "files": 202, "lakes": 72,
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    result = {str(seed): {kind: campaign(kind, count=count, start=seed) for kind, count in COUNTS.items()}}
+    result = {str(seed): campaign(COUNTS, start=seed)}
     (out / "validate-hostile.md").write_text(page(result), encoding="utf-8")
     return result
 
