@@ -19,7 +19,7 @@ from functools import cached_property
 from io import BytesIO
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -251,11 +251,28 @@ def simulated(
     return readings_of(design.batches(), folder=folder, workers=workers, advance=advance)[:, 0]
 
 
+class Simulatable(Protocol):
+    """Cloths that are simulated together and kept as one file."""
+
+    @property
+    def seeds(self) -> Sequence[int]:
+        """One for each cloth."""
+        ...
+
+    def content(self) -> Mapping[str, Any]:
+        """Returns all that the readings depend on, as JSON values."""
+        ...
+
+    def read(self) -> FloatArray:
+        """Simulates and reads them: (cloth, …)."""
+        ...
+
+
 def readings_of(
-    batches: Sequence[FlagBatch], *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
+    batches: Sequence[Simulatable], *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
 ) -> FloatArray:
-    """Returns (flag, place, window, observable) of batches, in order; those that the folder lacks are simulated. As
-    `simulated`."""
+    """Returns what batches read, (cloth, …) in order, of flags (flag, place, window, observable); those that the folder
+    lacks are simulated. As `simulated`."""
     paths = [folder / f"{digest(canonical(dict(batch.content())))[:32]}.npz" for batch in batches]
     missing = [number for number, path in enumerate(paths) if not path.exists()]
     if advance is not None and len(missing) < len(batches):
@@ -273,7 +290,7 @@ def readings_of(
     return np.concatenate([_read(path) for path in paths])
 
 
-def _make(batch: FlagBatch, path: Path) -> None:
+def _make(batch: Simulatable, path: Path) -> None:
     buffer = BytesIO()
     np.savez_compressed(buffer, readings=batch.read())
     put_if_absent(path, buffer.getvalue())
