@@ -209,10 +209,19 @@ class Calibrating(OfFlag, Drawn, BesideLake):
     recordings: Mapping[str, ArrayLike] | Path | str | Sequence[Mapping[str, ArrayLike] | Path | str] = argument(
         "One or several of one flag, each a table of observables as arrays of one length, in the units that "
         "`docs/weighing.md` lists (`time` [s], `wind` [m/s], `droop` [rad], …); the path of such a table; or a "
-        "recording of the lake by its name or id.",
+        "recording of the lake by its name or id. Or a folder of drapes (OBJ), or two, one for each face.",
         "RECORDING...",
     )
-    flag_size: tuple[float, float] | str = option(f"{LENGTHS}.", section=FLAG, metavar="LxH")
+    flag_size: tuple[float, float] | str | None = option(
+        f"{LENGTHS}; drapes have none.", default=None, section=FLAG, metavar="LxH"
+    )
+    area_weight: float | tuple[float, float] | str | Stated | None = option(
+        "Area weight of the cloth of drapes [kg/m²], as in 0.192±0.004; a flag is weighed.",
+        default=None,
+        section=FLAG,
+        type=STATED,
+        metavar="VALUE",
+    )
     simulations: int = option(
         "Simulated flags for each recording.", default=128, section=HOW, type=click.IntRange(min=64)
     )
@@ -229,16 +238,19 @@ def calibrate(chosen: Calibrating) -> Calibrated:
     found.quantities["area_weight"].interval  # kg/m²
     ```
 
-    It simulates flags for each recording, which takes minutes; they are kept for the next call.
+    It simulates flags for each recording, which takes minutes; they are kept for the next call. Of folders of drapes,
+    with `area_weight=`, it finds the bending (see `docs/cases/drapes.md`).
 
     Raises:
         MissingExtraError: torch is not installed.
-        InputError: a table that cannot be used, or a log that does not cover it.
+        InputError: a table that cannot be used, or a log that does not cover it; scans that are no drapes.
         NotFoundError: no such recording or lake.
-        RefusedError: no flag is found in a film.
+        RefusedError: no flag is found in a film; no simulated cloth drapes as scans do.
         UnknownNameError: a material like which no cloth was measured.
         UsageError: options that do not fit.
     """
+    if chosen.area_weight is not None:
+        return call("measure.drape.answer:calibrated", chosen)
     return call("measure.cloth.arrays:calibrated", chosen)
 
 

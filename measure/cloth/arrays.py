@@ -12,12 +12,12 @@ from flagdata.api.measuring import Calibrating, OfFlag
 from flagdata.caches import user_cache
 from flagdata.calibrated import Calibrated, Weighed
 from flagdata.dataset.source import lake_of
-from flagdata.errors import InputError, UnknownNameError
+from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake import Lake
 from flagdata.provenance import array_hash
 from flagdata.shared_options import ATTACHMENTS
 from flagdata.stated import Stated
-from measure.cloth.calibration import Calibration, calibrate
+from measure.cloth.calibration import Calibration, Quantity, calibrate
 from measure.cloth.design import FAR, CalibrationOptions
 from measure.cloth.prior import AZIMUTH, ELEVATION, Uncertain, fabric, stated_angle
 from measure.cloth.recording import Observed, cut
@@ -101,6 +101,10 @@ def calibrated(chosen: Calibrating) -> Calibrated:
     several = [several] if isinstance(several, Mapping | Path | str) else list(several)
     if not several:
         raise InputError("no recordings are given", where="recordings", fix="give at least one")
+    if chosen.flag_size is None:
+        raise UsageError(
+            "the flag's size is missing", where="flag_size", fix="give length and height in metres, as in (1.5, 1.0)"
+        )
     size = FlagSize.of(chosen.flag_size)
     drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
     options = options_of(chosen, size, **drawn)
@@ -135,8 +139,9 @@ def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
     return of_columns(table, name=name, identity=identity, wind_log=None)
 
 
-def _answer(calibration: Calibration) -> Calibrated:
-    quantities = {
+def weighed_by_name(quantities: Sequence[Quantity]) -> dict[str, Weighed]:
+    """Returns quantities by their names, as `flagdata.calibrate` does."""
+    return {
         quantity.name: Weighed(
             unit=quantity.unit,
             value=quantity.value,
@@ -146,8 +151,12 @@ def _answer(calibration: Calibration) -> Calibrated:
             bound=quantity.span.worded(lambda value: f"{value:.4g}", f" {quantity.unit}") if quantity.bounded else None,
             level=quantity.span.level,
         )
-        for quantity in calibration.cloth
+        for quantity in quantities
     }
+
+
+def _answer(calibration: Calibration) -> Calibrated:
+    quantities = weighed_by_name(calibration.cloth)
     return Calibrated(
         sentence=calibration.sentence,
         level=calibration.options.level,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -79,13 +80,21 @@ def calibrate(chosen: CalibrateCommand) -> None:
     NAME-sigma, what it is off by. Several recordings are of one flag; one that cannot be used is
     left out, with a warning. Where no weight is given, neither a value nor a bound, the exit code is 3.
 
+    Or, with --area-weight, RECORDING is a folder of drapes: scans (.obj, z upwards, in metres, texture coordinates of
+    the flat disc) of pieces of one cloth, discs of 0.3 m over a pedestal of 0.18 m. They show its bending; a second
+    folder is of drapes with the other face up.
+
     \b
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
       flagdata calibrate monday.csv tuesday.csv --flag-size 1.5x1.0 --lake lake --json
       flagdata calibrate tracked.csv --log 3f2a9c --clock-offset 0.3±0.1 --lake lake --flag-size 0.9x0.6
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --only anemometer --name garden
+      flagdata calibrate drapes/up drapes/down --area-weight 0.192±0.004
     """
     _check_only(chosen)
+    if chosen.area_weight is not None:
+        _drapes(chosen)
+        return
     if chosen.flag_size is None:
         raise UsageError(
             "the flag's size is missing: windows are as long as its size requires",
@@ -178,16 +187,37 @@ _OF_WEIGHT = {
 }
 
 
+_OF_DRAPES = {"recordings", "area_weight", "simulations", "level", "seed", "workers", "cache", "as_json"}
+
+
 def _check_only(chosen: CalibrateCommand) -> None:
     """Raises:
     UsageError: an option of what is not to be done.
     """
     ignored = {"weight": {"name", "model"}, "anemometer": _OF_WEIGHT}.get(chosen.only or "", set())
+    if chosen.area_weight is not None:
+        ignored = set(described(CalibrateCommand)) - _OF_DRAPES
+    other = "--area-weight" if chosen.area_weight is not None else f"--only {chosen.only}"
     for name in sorted(ignored & typed(chosen)):
         spelled = described(CalibrateCommand)[name][1].spelled(name)
-        raise UsageError(
-            f"{spelled} cannot be combined with --only {chosen.only}", where=spelled, fix=f"leave {spelled} out"
-        )
+        raise UsageError(f"{spelled} cannot be combined with {other}", where=spelled, fix=f"leave {spelled} out")
+
+
+def _drapes(chosen: CalibrateCommand) -> None:
+    """Finds and reports the cloth of drapes."""
+    from measure.cloth.calibration_page import shown_quantity as shown
+    from measure.drape.answer import draped
+
+    with progress(chosen.simulations, label="drape", unit="drape") as advance:
+        found = draped(chosen, workers=chosen.processes, advance=advance)
+    if chosen.as_json:
+        document("calibrate", {**found.as_dict(), "artifact": None, "anemometer": None})
+        return
+    echo(found.sentence)
+    for quantity in found.cloth:
+        echo(_line(shown(quantity)))
+    for finding in found.findings:
+        say_finding(finding)
 
 
 def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: FilmReading, lake: Lake | None) -> Made | None:
@@ -273,18 +303,22 @@ def _provenance(calibration: Calibration, artifact: str | None) -> dict[str, str
     return rows if artifact is None else {**rows, "artifact": artifact}
 
 
+def _line(row: Mapping[str, str]) -> str:
+    """Returns a quantity in one line."""
+    value = "not determined"
+    if row["value"]:
+        value = f"{row['value']} {row['interval']} {row['unit']}"
+    elif row["bounded"]:
+        value = f"{row['interval']} {row['unit']}, {row['level']}"
+    return f"{row['name']}: {value} (assumed: {row['assumed']})"
+
+
 def _print(calibration: Calibration, *, verbose: bool) -> None:
     from measure.cloth.calibration_page import shown_quantity as shown
 
     echo(calibration.sentence)
     for quantity in calibration.cloth[1:]:
-        row = shown(quantity)
-        value = "not determined"
-        if row["value"]:
-            value = f"{row['value']} {row['interval']} {row['unit']}"
-        elif row["bounded"]:
-            value = f"{row['interval']} {row['unit']}, {row['level']}"
-        echo(f"{row['name']}: {value} (assumed: {row['assumed']})")
+        echo(_line(shown(quantity)))
     if verbose:
         _print_fit(calibration)
     for finding in calibration.findings:

@@ -19,8 +19,7 @@ import torch
 from flagdata.arrays import FloatArray, IntArray
 from flagdata.rng import stream
 from flagdata.tables import Range, Scale
-from measure.cloth.design import readings_of
-from measure.cloth.prior import Uncertain, draws
+from measure.cloth import Uncertain, draws, readings_of
 from measure.drape.shape import rim_of, shape_of
 from sim.drape import DISC, PEDESTAL, at_rest, disc, draped
 from sim.effects import apply
@@ -67,8 +66,8 @@ SHEAR = Uncertain(
 CURVATURE = Uncertain(
     name="rest_curvature",
     unit="1/m",
-    prior=Range(low=-8.0, high=8.0),
-    source="of cloth rolled on a radius of 0.12 m or more",
+    prior=Range(low=-25.0, high=25.0),
+    source="of cloth rolled on a radius of 40 mm or more",
 )
 CLOTH = (BENDING_LENGTH, ANISOTROPY, SHEAR, CURVATURE)
 """What is simulated, in the order of its draws."""

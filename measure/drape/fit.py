@@ -1,0 +1,250 @@
+"""Bending over weight from drapes: a response surface of simulated ones, and the cloths under which it shows the same.
+
+Each figure of a drape is a quadratic polynomial of the logarithms of bending length and shear, of anisotropy and of
+rest curvature, fitted to simulated drapes by least squares; their scatter about it is that of the resting shapes that
+one cloth has. What is compared are means over drapes of one face. A lobe of the rim has the direction of the stiffer
+thread, so that lobes are taken along their common direction; the threads that the cloth curls along may be either.
+
+Posterior draws are weighted draws of the prior, from which evidences of models follow as mean weights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from scipy.stats import chi2
+
+from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.errors import InputError
+from flagdata.rng import stream
+from flagdata.tables import Range
+from measure.cloth import Uncertain, draws
+from measure.drape.simulation import ANISOTROPY, BENDING_LENGTH, CLOTH, CURVATURE, SHEAR
+from sim.drape import DISC, PEDESTAL
+
+COEFFICIENT, LOBE = 0, 1
+NUMERICS = (0.01, 0.004)
+"""What a finer mesh changes of drape coefficient and lobe, as standard deviations: the means of twelve drapes on meshes
+of 6, 9 and 12 rows differ by less."""
+UNLIKE = 0.01
+"""Tail probability of the misfit below which no simulated cloth drapes as the scans do, as for films."""
+WET_MASS = Uncertain(
+    name="wet_mass",
+    unit="1",
+    prior=Range(low=0.0, high=0.5),
+    source="share of the cloth's weight; moist air adds up to a tenth, a wet cloth its own weight",
+    limits=(0.0, np.inf),
+)
+SIDEDNESS = Uncertain(
+    name="sidedness",
+    unit="1",
+    prior=Range(low=-0.2, high=0.2),
+    source="logarithm of the bending length with the first face up over that of the mean: bending by up to 3 to 1",
+)
+_DRAWS = 1 << 16
+_KEPT = 4000
+
+
+class Model(StrEnum):
+    """What may differ between two faces of a cloth, or be beside its bending."""
+
+    BASE = "base"
+    CURLED = "rest-curvature"
+    """Its sign turns over with the cloth."""
+    ALIKE = "rest-curvature not turned over"
+    """The same on both faces, which no cloth can have: what the strength fits without its sign."""
+    WET = "wet-mass"
+    """More weight than was stated, on both faces."""
+    SIDED = "bending by face"
+    """Bending length that is larger with one face up and smaller with the other: of no effect in the library."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Face:
+    """Drapes with one face of the cloth up.
+
+    Attributes:
+        shapes: (drape, 7), see `Shape.numbers`.
+        specimen: (drape,) number of the piece of cloth that each is of; drapes of one are no independent ones.
+    """
+
+    shapes: FloatArray
+    specimen: IntArray
+
+    def of(self, specimens: Sequence[int]) -> Face:
+        """Selects some pieces of cloth."""
+        chosen = np.isin(self.specimen, specimens)
+        return Face(shapes=self.shapes[chosen], specimen=self.specimen[chosen])
+
+    def means(self, direction: float) -> FloatArray:
+        """Computes (specimen, 2) mean drape coefficient and lobe along a direction [rad]."""
+        lobe = (self.shapes[:, 1] + 1j * self.shapes[:, 2]) * np.exp(-2j * direction)
+        figures = np.stack([self.shapes[:, 0], lobe.real], axis=1)
+        return np.stack([figures[self.specimen == number].mean(axis=0) for number in np.unique(self.specimen)])
+
+    @property
+    def scatter(self) -> float:
+        """Returns the standard deviation of drape coefficients about the mean of their specimen; NaN without
+        repeats."""
+        groups = [self.shapes[self.specimen == number, 0] for number in np.unique(self.specimen)]
+        freedom = sum(len(group) - 1 for group in groups)
+        squares = sum(float(np.square(group - group.mean()).sum()) for group in groups)
+        return float(np.sqrt(squares / freedom)) if freedom else float("nan")
+
+    @property
+    def lost(self) -> float:
+        """Returns the share of the area that the scans lack, or have too much, in the mean."""
+        return abs(1 - float(self.shapes[:, 6].mean()))
+
+
+def together(faces: Sequence[Face]) -> Face:
+    """Joins drapes of both faces."""
+    return Face(
+        shapes=np.concatenate([face.shapes for face in faces]), specimen=np.concatenate([f.specimen for f in faces])
+    )
+
+
+def direction_of(faces: Sequence[Face]) -> float:
+    """Returns the direction of the rim's wider lobe in the flat cloth, from its u axis [rad]."""
+    shapes = together(faces).shapes
+    return float(np.angle(shapes[:, 1].mean() + 1j * shapes[:, 2].mean()) / 2)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """Drape coefficient and lobe as polynomials of the cloth.
+
+    Attributes:
+        coefficients: (term, 2).
+        inverse: (term, term) of the normal equations.
+        residual: (2,) standard deviation of one drape about it.
+    """
+
+    coefficients: FloatArray
+    inverse: FloatArray
+    residual: FloatArray
+
+    @classmethod
+    def fit(cls, values: Mapping[str, FloatArray], shapes: FloatArray) -> Surface:
+        """Fits it to simulated drapes.
+
+        Raises:
+            InputError: fewer drapes than twice its terms.
+        """
+        terms = _terms(values)
+        count, several = terms.shape
+        if count < 2 * several:
+            raise InputError(
+                f"{count} simulated drapes are too few for {several} terms", where="drapes", fix=f"give {2 * several}"
+            )
+        inverse = np.linalg.inv(terms.T @ terms)
+        figures = shapes[:, [COEFFICIENT, LOBE]]
+        coefficients = inverse @ terms.T @ figures
+        squares = np.square(figures - terms @ coefficients).sum(axis=0)
+        return cls(coefficients=coefficients, inverse=inverse, residual=np.sqrt(squares / (count - several)))
+
+    def at(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Computes the mean figures (cloth, 2) and the variances of these means."""
+        terms = _terms(values)
+        leverage = ((terms @ self.inverse) * terms).sum(axis=1)
+        return terms @ self.coefficients, leverage[:, None] * self.residual**2
+
+
+def _terms(values: Mapping[str, FloatArray]) -> FloatArray:
+    """Computes (cloth, term): all products of up to two scaled quantities, and the cube of the bending length's."""
+    scaled = []
+    for about in CLOTH:
+        low, high = about.at(np.array([0.0, 1.0]))
+        column = np.asarray(values[about.name], dtype=np.float64)
+        if about in (BENDING_LENGTH, SHEAR):
+            low, high, column = np.log(low), np.log(high), np.log(column)
+        scaled.append(2 * (column - low) / (high - low) - 1)
+    x = np.stack(scaled, axis=1)
+    pairs = [x[:, i] * x[:, j] for i in range(x.shape[1]) for j in range(i, x.shape[1])]
+    return np.stack([np.ones(len(x)), *x.T, *pairs, x[:, 0] ** 3, x[:, 0] ** 2 * x[:, 1]], axis=1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """Cloths that drape as the scans do.
+
+    Attributes:
+        model: what was let differ.
+        cloth: name → (n,) posterior draws; anisotropy of the direction of the lobes over that across it.
+        across: (n,) whether the cloth curls across that direction.
+        predicted: (n, face, 2) mean drape coefficient and lobe of each draw.
+        direction: of the lobes [rad].
+        evidence: logarithm.
+        tail: probability of a misfit as large as that of the best cloth.
+    """
+
+    model: Model
+    cloth: Mapping[str, FloatArray]
+    across: BoolArray
+    predicted: FloatArray
+    direction: float
+    evidence: float
+    tail: float
+
+
+def fitted(surface: Surface, faces: Sequence[Face], *, model: Model, seed: int) -> Fit:
+    """Finds the cloths that drape as scans of one face do, or of two.
+
+    Raises:
+        InputError: no face, more than two, a face of less than two specimens, or one face where faces are to differ.
+    """
+    if not 1 <= len(faces) <= 2 or any(len(np.unique(face.specimen)) < 2 for face in faces):
+        raise InputError(
+            f"{len(faces)} sets of drapes, the smallest of {min((len(f.specimen) for f in faces), default=0)} pieces",
+            where="drapes",
+            fix="give one folder of drapes, or two for two faces, with two pieces of cloth or more in each",
+        )
+    direction = direction_of(faces)
+    prior = dict(draws((*CLOTH, WET_MASS, SIDEDNESS), _DRAWS, seed=seed, name=f"drape fit {model.value}"))
+    # The lobe has the direction of the stiffer thread; the cloth curls along it or across it.
+    across = stream(seed, "drape", "thread").random(_DRAWS) < 0.5
+    log_weight = np.zeros(_DRAWS)
+    predicted = np.empty((_DRAWS, len(faces), 2))
+    least = np.zeros(_DRAWS)
+    for number, face in enumerate(faces):
+        values = _of_face(prior, model, number)
+        figures, variance = surface.at(values)
+        figures[:, LOBE] = np.where(across, -figures[:, LOBE], figures[:, LOBE])
+        means = face.means(direction)
+        measured = means.mean(axis=0)
+        repeats = means.var(axis=0, ddof=1) / len(means)
+        lost = np.array([face.lost * DISC**2 / (DISC**2 - PEDESTAL**2) * measured[COEFFICIENT], 0.0])
+        total = variance + repeats + np.square(NUMERICS) + lost**2
+        misfit = np.square(measured - figures) / total
+        log_weight -= (misfit + np.log(2 * np.pi * total)).sum(axis=1) / 2
+        least += misfit.sum(axis=1)
+        predicted[:, number] = figures
+    best = log_weight.max()
+    weight = np.exp(log_weight - best)
+    chosen = stream(seed, "drape", "resample").choice(_DRAWS, _KEPT, p=weight / weight.sum())
+    cloth = {name: column[chosen] for name, column in prior.items()}
+    cloth[ANISOTROPY.name] = np.where(across[chosen], -1.0, 1.0) * cloth[ANISOTROPY.name]
+    return Fit(
+        model=model,
+        cloth=cloth,
+        across=across[chosen],
+        predicted=predicted[chosen],
+        direction=direction,
+        evidence=float(best + np.log(weight.mean())),
+        tail=float(chi2.sf(least.min(), 2 * len(faces))),
+    )
+
+
+def _of_face(prior: Mapping[str, FloatArray], model: Model, number: int) -> Mapping[str, FloatArray]:
+    """Returns the cloths as they drape with a face up: 0 the first, 1 the other."""
+    values = dict(prior)
+    sign = {Model.CURLED: (1.0, -1.0), Model.ALIKE: (1.0, 1.0)}.get(model, (0.0, 0.0))[number]
+    values[CURVATURE.name] = sign * prior[CURVATURE.name]
+    if model is Model.WET:
+        values[BENDING_LENGTH.name] = prior[BENDING_LENGTH.name] / np.cbrt(1 + prior[WET_MASS.name])
+    if model is Model.SIDED:
+        values[BENDING_LENGTH.name] = prior[BENDING_LENGTH.name] * np.exp((1 - 2 * number) * prior[SIDEDNESS.name])
+    return values

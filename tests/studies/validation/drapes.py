@@ -1,0 +1,158 @@
+"""Measured drapes of five fabrics: bending by its own simulation, specimens left out predicted, faces compared.
+
+The criteria are in docs/decisions/074-drapes.md. The drapes are in the reference data; without them only the verdicts
+on simulated drapes are made. `shapes` reads a fabric: the published flat coordinates are shifted by one vertex, and the
+last one is missing, which lies at the gap of the rim.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import ttest_1samp
+
+from flagdata.caches import user_cache
+from measure.drape.fit import Face, Fit, Model, Surface, fitted, together
+from measure.drape.shape import rim_of, shape_of
+from measure.drape.simulation import BENDING_LENGTH, CURVATURE, ratio, simulated
+from sim.scene import GRAVITY
+from tests.evidence import ABSENT, REFERENCE
+
+FABRICS = ("cotton_white", "cotton_blue", "viscose_white", "cotton_pink", "wool_red")
+THIRDS = ((1, 2, 3), (4, 5, 6), (7, 8, 9))
+LEVEL = 0.9
+SIMULATIONS = 256
+SIGNIFICANCE = 0.01 / len(FABRICS)
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """Fits, predicts and compares all fabrics."""
+    folder = REFERENCE / "drapes"
+    if not folder.is_dir():
+        return dict(ABSENT)
+    surface = Surface.fit(*simulated(SIMULATIONS, seed=0, folder=user_cache() / "drapes"))
+    results = {}
+    for number, name in enumerate(FABRICS, start=1):
+        weight, faces = shapes(folder / f"fabric{number}_{name}.npz")
+        results[name] = fabric(surface, weight, faces, seed=seed)
+    passed = [name for name, result in results.items() if result["drape_coefficient_passed"]]
+    return {
+        "simulations": SIMULATIONS,
+        "residual": {"drape_coefficient": float(surface.residual[0]), "lobe": float(surface.residual[1])},
+        "passed": passed,
+        "fabrics": results,
+    }
+
+
+def shapes(path: Path) -> tuple[float, list[Face]]:
+    """Reads a fabric's area weight [kg/m²] and its drapes, with either face up."""
+    with np.load(path) as content:
+        position = content["q"].astype(np.float64) * 1e-5
+        rest = np.roll(content["flat"].astype(np.float64), -1, axis=0)
+        faces = content["faces"].astype(np.int64)
+        specimen, capture = content["sample_capture"].T
+        weight = float(content["area_weight"])
+    radius = np.hypot(rest[:-1, 0], rest[:-1, 1])
+    angle = np.sort(np.arctan2(rest[:-1, 1], rest[:-1, 0])[radius > radius.max() - 1e-4])
+    gaps = np.diff(np.append(angle, angle[0] + 2 * np.pi))
+    missing = angle[gaps.argmax()] + gaps.max() / 2
+    rest[-1] = radius.max() * np.cos(missing), radius.max() * np.sin(missing)
+    rim = rim_of(rest, faces)
+    figures = np.stack([shape_of(rest, faces, frame, rim=rim).numbers() for frame in position])
+    return weight, [Face(shapes=figures[up], specimen=specimen[up]) for up in (capture <= 2, capture > 2)]
+
+
+def fabric(surface: Surface, weight: float, faces: list[Face], *, seed: int) -> dict[str, Any]:
+    """Judges one fabric by the criteria of decision 074."""
+    whole = fitted(surface, [together(faces)], model=Model.BASE, seed=seed)
+    thirds = [third(surface, faces, out, seed=seed) for out in THIRDS]
+    first, second = (face.means(0.0)[:, 0] for face in faces)
+    difference = second - first
+    test = ttest_1samp(difference, 0.0)
+    scatter = together(faces).scatter
+    repeats = float(np.sqrt(np.mean([face.scatter**2 for face in faces])))
+    models = {model.value: fitted(surface, faces, model=model, seed=seed) for model in Model}
+    errors = {model.value: float(np.sqrt(np.mean([t["squares"][model.value] for t in thirds]))) for model in Model}
+    curled = models[Model.CURLED.value]
+    return {
+        "area_weight": weight,
+        "measured": {
+            "drape_coefficient": float(together(faces).shapes[:, 0].mean()),
+            "of_faces": [float(first.mean()), float(second.mean())],
+            "folds": float(together(faces).shapes[:, 4].mean()),
+            "folding": float(together(faces).shapes[:, 3].mean()),
+            "height": float(together(faces).shapes[:, 5].mean()),
+            "area": float(together(faces).shapes[:, 6].mean()),
+            "scatter_of_a_specimen": scatter,
+            "scatter_of_a_face": repeats,
+        },
+        "fit": answer(whole, weight),
+        "thirds": [{key: value for key, value in t.items() if key != "squares"} for t in thirds],
+        "drape_coefficient_passed": all(t["passed"] for t in thirds),
+        "faces": {
+            "difference": float(difference.mean()),
+            "standard_error": float(difference.std(ddof=1) / np.sqrt(len(difference))),
+            "p": float(test.pvalue),
+            "same_sign": int((np.sign(difference) == np.sign(difference.mean())).sum()),
+            "found": bool(test.pvalue < SIGNIFICANCE and abs(difference.mean()) > repeats / 3),
+            "errors": errors,
+            "evidence": {name: fit.evidence - models["base"].evidence for name, fit in models.items()},
+            "rest_curvature": interval(curled.cloth[CURVATURE.name]),
+            "lobe_difference": lobes(faces, curled.direction),
+            "lobe_difference_of_rest_curvature": interval(curled.predicted[:, 1, 1] - curled.predicted[:, 0, 1]),
+            "difference_of_rest_curvature": interval(curled.predicted[:, 1, 0] - curled.predicted[:, 0, 0]),
+            "sidedness": interval(models[Model.SIDED.value].cloth["sidedness"]),
+        },
+    }
+
+
+def third(surface: Surface, faces: list[Face], out: tuple[int, ...], *, seed: int) -> dict[str, Any]:
+    """Predicts three specimens from the other six."""
+    chosen = [n for n in range(1, 10) if n not in out]
+    trained, left = [face.of(chosen) for face in faces], [face.of(out) for face in faces]
+    base = fitted(surface, [together(trained)], model=Model.BASE, seed=seed)
+    predicted = float(base.predicted[:, 0, 0].mean())
+    measured = float(together(left).shapes[:, 0].mean())
+    tolerance = together(trained).scatter
+    squares = {}
+    for model in Model:
+        several = fitted(surface, trained, model=model, seed=seed).predicted[..., 0].mean(axis=0)
+        squares[model.value] = float(
+            np.mean([np.square(face.means(0.0)[:, 0] - several[n]).mean() for n, face in enumerate(left)])
+        )
+    return {
+        "left_out": list(out),
+        "predicted": predicted,
+        "interval": interval(base.predicted[:, 0, 0]),
+        "measured": measured,
+        "tolerance": tolerance,
+        "passed": abs(predicted - measured) <= tolerance,
+        "squares": squares,
+    }
+
+
+def answer(fit: Fit, weight: float) -> Mapping[str, Any]:
+    """Returns bending length [mm], bending [µN·m] and the ratio of the threads, with intervals."""
+    length = fit.cloth[BENDING_LENGTH.name]
+    return {
+        "bending_length_mm": interval(length * 1e3),
+        "bending_uN_m": interval(length**3 * weight * -GRAVITY[2] * 1e6),
+        "ratio": interval(np.array([ratio(float(a)) for a in fit.cloth["anisotropy"][::20]])),
+        "direction_deg": float(np.degrees(fit.direction)),
+        "tail": fit.tail,
+    }
+
+
+def lobes(faces: list[Face], direction: float) -> list[float]:
+    """Computes the difference of the faces' lobes and its standard error."""
+    first, second = (face.means(direction)[:, 1] for face in faces)
+    difference = second - first
+    return [float(difference.mean()), float(difference.std(ddof=1) / np.sqrt(len(difference)))]
+
+
+def interval(draws: np.ndarray) -> list[float]:
+    """Returns median and ends of the interval."""
+    return np.quantile(draws, [0.5, (1 - LEVEL) / 2, (1 + LEVEL) / 2]).tolist()
