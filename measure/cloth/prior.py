@@ -275,10 +275,15 @@ CLASSES = {
     ),
     "knit-polyester": ("camel-ponte-roma", "navy-sparkle-sweat", "tango-red-jet-set"),
     "knit-cotton": ("gray-interlock", "ivory-rib-knit"),
+    "cotton-59": ("11oz-black-denim", "royal-target"),
+    "cotton-114": ("11oz-black-denim", "royal-target"),
+    "cotton-192": ("11oz-black-denim", "royal-target"),
+    "wool-274": _WOVEN,
 }
 """Name → those of `TABLES` that a cloth of it may have. Fibres: denim 99 % cotton; royal target 65 % cotton, 35 %
 polyester; white dots, tango 100 % polyester; navy 96 % polyester; camel 60 % polyester, 40 % rayon; ivory 95 % cotton;
-gray interlock 60 % cotton, 40 % polyester; white swim 87 % nylon."""
+gray interlock 60 % cotton, 40 % polyester; white swim 87 % nylon. Cloths of which only weight and bending were measured
+have the tables of the class of their fibre."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -189,7 +189,7 @@ def answered(surface: Surface, faces: Sequence[Face], area_weight: Stated, *, le
             f"{together(faces).shapes[:, 0].mean():.3f}, the nearest simulated ones have {np.median(shown):.3f} "
             f"(p = {fit.tail:.2g})",
             where="drapes",
-            fix="look at the scans; cloth with a bending length below 9 mm is too limp for this model",
+            fix="look at the scans; cloth with a bending length below 10 mm is too limp for this model",
         )
     weight = _drawn(area_weight, len(fit.predicted), seed=seed)
     length = fit.cloth[BENDING_LENGTH.name]
@@ -223,7 +223,7 @@ def _drawn(area_weight: Stated, count: int, *, seed: int) -> FloatArray:
 
 
 def _lost(faces: Sequence[Face]) -> tuple[Finding, ...]:
-    lost = together(faces).lost
+    lost = abs(together(faces).lost)
     if lost < _LOST:
         return ()
     return (

@@ -96,8 +96,8 @@ class Face:
 
     @property
     def lost(self) -> float:
-        """Returns the share of the area that the scans lack, or have too much, in the mean."""
-        return abs(1 - float(self.shapes[:, 6].mean()))
+        """Returns the share of the area that the scans lack in the mean, below 0 where they have too much."""
+        return 1 - float(self.shapes[:, 6].mean())
 
 
 def together(faces: Sequence[Face]) -> Face:
@@ -206,22 +206,26 @@ def fitted(surface: Surface, faces: Sequence[Face], *, model: Model, seed: int) 
     prior = dict(draws((*CLOTH, WET_MASS, SIDEDNESS), _DRAWS, seed=seed, name=f"drape fit {model.value}"))
     # The lobe has the direction of the stiffer thread; the cloth curls along it or across it.
     across = stream(seed, "drape", "thread").random(_DRAWS) < 0.5
-    log_weight = np.zeros(_DRAWS)
-    predicted = np.empty((_DRAWS, len(faces), 2))
-    least = np.zeros(_DRAWS)
+    predicted, deviation = np.empty((2, _DRAWS, len(faces), 2))
+    measured, repeats = np.empty((2, len(faces), 2))
+    lost = np.zeros((len(faces), 2))
     for number, face in enumerate(faces):
-        values = _of_face(prior, model, number)
-        figures, variance = surface.at(values)
+        figures, variance = surface.at(_of_face(prior, model, number))
         figures[:, LOBE] = np.where(across, -figures[:, LOBE], figures[:, LOBE])
         means = face.means(direction)
-        measured = means.mean(axis=0)
-        repeats = means.var(axis=0, ddof=1) / len(means)
-        lost = np.array([face.lost * DISC**2 / (DISC**2 - PEDESTAL**2) * measured[COEFFICIENT], 0.0])
-        total = variance + repeats + np.square(NUMERICS) + lost**2
-        misfit = np.square(measured - figures) / total
-        log_weight -= (misfit + np.log(2 * np.pi * total)).sum(axis=1) / 2
-        least += misfit.sum(axis=1)
-        predicted[:, number] = figures
+        measured[number], repeats[number] = means.mean(axis=0), means.var(axis=0, ddof=1) / len(means)
+        lost[number, COEFFICIENT] = face.lost * DISC**2 / (DISC**2 - PEDESTAL**2) * measured[number, COEFFICIENT]
+        predicted[:, number], deviation[:, number] = figures, np.sqrt(variance)
+    misfit, determinant = np.zeros((2, _DRAWS))
+    for figure in (COEFFICIENT, LOBE):
+        # The surface, the mesh and lost area err alike on both faces; repeats do not.
+        alike = deviation[:, :, figure]
+        covariance = alike[:, :, None] * alike[:, None, :] + NUMERICS[figure] ** 2
+        covariance = covariance + np.outer(lost[:, figure], lost[:, figure]) + np.diag(repeats[:, figure])
+        apart = (measured - predicted)[:, :, figure, None]
+        misfit += (apart * np.linalg.solve(covariance, apart)).sum(axis=(1, 2))
+        determinant += np.linalg.slogdet(2 * np.pi * covariance)[1]
+    log_weight = -(misfit + determinant) / 2
     best = log_weight.max()
     weight = np.exp(log_weight - best)
     chosen = stream(seed, "drape", "resample").choice(_DRAWS, _KEPT, p=weight / weight.sum())
@@ -234,7 +238,7 @@ def fitted(surface: Surface, faces: Sequence[Face], *, model: Model, seed: int) 
         predicted=predicted[chosen],
         direction=direction,
         evidence=float(best + np.log(weight.mean())),
-        tail=float(chi2.sf(least.min(), 2 * len(faces))),
+        tail=float(chi2.sf(misfit.min(), 2 * len(faces))),
     )
 
 

@@ -54,7 +54,7 @@ ANISOTROPY = Uncertain(
     name="anisotropy",
     unit="1",
     prior=Range(low=-1.2, high=1.2),
-    source="half the logarithm of the tables' rows for edges across over along u: warp and weft by a factor of up to 4",
+    source="half the logarithm of the rows for edges across over along u: warp and weft by a factor of up to 3.3",
 )
 SHEAR = Uncertain(
     name="shear",

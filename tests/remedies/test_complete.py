@@ -32,6 +32,7 @@ OF_PARTS = {
     "measure/commands/close_loop": ("close-loop",),
     "measure/gate": ("measure",),
     "measure/cloth": ("calibrate", "observe", "close-loop"),
+    "measure/drape": ("calibrate",),
     "measure/anemometer": ("calibrate", "measure"),
     "measure/observables": ("observe",),
     "measure/closing": ("close-loop",),

@@ -110,6 +110,14 @@ CASES = [
         shows="--crop",
     ),
     Case(
+        "drape/answer.py",
+        "or leave --area-weight out",
+        "calibrate t.csv --area-weight 0.2",
+        (f"calibrate t.csv {SIZED}",),
+        files={"t.csv": GUSTY},
+        shows=WEIGHED,
+    ),
+    Case(
         "commands/calibrate.py",
         "or give --only weight",
         f"calibrate t.csv {SIZED} --name x",

@@ -41,6 +41,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "carried-cloth": ("tests.studies.validation.carried_cloth", "A verdict on a cloth that a robot swings."),
             "clock-recovery": ("tests.studies.validation.clock_recovery", "Hidden clock offsets and their intervals."),
             "datasets": ("tests.studies.validation.datasets", "A data set built, and built again after kills."),
+            "drapes": ("tests.studies.validation.drapes", "Measured drapes of five fabrics, and their faces."),
             "films": ("tests.studies.validation.films", "What measure answers on ArcSim's films by VTK."),
             "flags": ("tests.studies.validation.flags", "Shapes and motion against wind, damping, method."),
             "flips": ("tests.studies.validation.flips", "Single bits that flip in what flagdata keeps."),

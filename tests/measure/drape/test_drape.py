@@ -112,7 +112,7 @@ def test_the_bending_length_and_the_stiffer_thread_are_found(surface: Surface) -
     ("truth", "named", "other"),
     [({"curvature": 12.0}, Model.CURLED, Model.SIDED), ({"sidedness": 0.06}, Model.SIDED, Model.CURLED)],
 )
-def test_what_differs_between_faces_is_told_by_lobes(
+def test_lobes_distinguish_what_differs_between_faces(
     surface: Surface, truth: dict[str, float], named: Model, other: Model
 ) -> None:
     faces = faces_of(2, **truth)
@@ -142,7 +142,7 @@ def _run(*arguments: str | Path) -> Result:
 
 
 @pytest.mark.usefixtures("cheap")
-def test_folders_of_scans_tell_bending_on_the_command_line_and_in_python(scanned: Callable[..., Path]) -> None:
+def test_folders_of_scans_give_bending_on_the_command_line_and_in_python(scanned: Callable[..., Path]) -> None:
     rng = np.random.default_rng(0)
     up = scanned("up", 0.7 + 0.02 * rng.standard_normal(6))
     done = _run(up, "--area-weight", "0.2±0.004", "--json")

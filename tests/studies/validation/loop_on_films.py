@@ -43,10 +43,11 @@ from measure.cloth import (
     lasting,
     nulls,
     pairs,
+    readings_of,
     score,
     weighable,
 )
-from measure.cloth.design import Weighable, readings_of
+from measure.cloth.design import Weighable
 from measure.cloth.evidence import Weighing, weigh
 from measure.cloth.score_test import Judged, directions, judge
 from measure.cloth.simulations import Simulations, of_base, of_nulls, sights_of

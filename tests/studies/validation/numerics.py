@@ -33,8 +33,8 @@ from measure.cloth import (
     Projection,
     Uncertain,
     numerics,
+    readings_of,
 )
-from measure.cloth.design import readings_of
 
 DURATION = 30.0  # s
 BATCHES = {"little damping": 0, "middle": 3, "much damping": 7}

@@ -45,6 +45,7 @@ from flagdata.rng import stream
 from measure.cloth import (
     MEASURED,
     OBSERVED,
+    TABLES,
     CalibrationOptions,
     Design,
     Flag,
@@ -62,7 +63,7 @@ from sim.batch import Batch, Divergence, after
 from sim.effects import AnemometerLag
 from sim.handles import Handles
 from sim.integrate import BackwardEuler, Symplectic
-from sim.material import MATERIALS, named
+from sim.material import named
 from sim.mesh import Diagonals, Mesh, grid
 from sim.scene import Scene, assemble
 from sim.wind import Beyond, Even, SampledWind, VonKarman
@@ -141,7 +142,7 @@ def design() -> Design:
 def truths() -> list[Mapping[str, Any]]:
     """What each is."""
     order = stream(SEED, "weighed", "order").permutation(TRUTHS)
-    fabrics = [name for name in sorted(MATERIALS.names()) if name not in ("aluminium", "paper")]
+    fabrics = sorted(TABLES)
     found = []
     for number, place in enumerate(order.tolist()):
         rng = stream(SEED, "weighed", "truth", number)

@@ -29,6 +29,7 @@ from flagdata.rng import stream
 from measure.cloth import (
     MEASURED,
     OBSERVED,
+    TABLES,
     CalibrationOptions,
     Emulator,
     Observed,
@@ -56,7 +57,7 @@ _SETTLE, _STEP = 4.0, 0.5e-3  # s
 def truths() -> list[Mapping[str, Any]]:
     """What each is."""
     order, found, own = stream(SEED, "briefly", "order").permutation(TRUTHS), [], loop.designs()[WIND]
-    fabrics = [name for name in sorted(large.MATERIALS.names()) if name not in ("aluminium", "paper")]
+    fabrics = sorted(TABLES)
     low, high = large.WEIGHTS
     for number, place in enumerate(order.tolist()):
         rng = stream(SEED, "briefly", "truth", number)
