@@ -28,6 +28,9 @@ from sim.scene import GRAVITY
 _LOST = 0.03
 """Share of the area from which on a scan that lacks it is reported."""
 
+_FEWEST = 50
+"""Independent draws below which an interval is doubted."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Draped:
@@ -82,6 +85,7 @@ class Draped:
             "area_weight_stated": self.area_weight.recipe(),
             "direction_deg": float(np.degrees(self.fit.direction)),
             "misfit": self.fit.tail,
+            "effective_draws": self.fit.effective,
             "findings": [finding.as_dict() for finding in self.findings],
         }
 
@@ -211,7 +215,7 @@ def answered(surface: Surface, faces: Sequence[Face], area_weight: Stated, *, le
         cloth=cloth,
         draws={one.name: draws[one.name] for one in (BENDING_LENGTH, about, ANISOTROPY, SHEAR)},
         level=level,
-        findings=(*_lost(faces), *_differ(surface, faces, seed=seed)),
+        findings=(*_lost(faces), *_few(fit), *_differ(surface, faces, seed=seed)),
     )
 
 
@@ -233,6 +237,20 @@ def _lost(faces: Sequence[Face]) -> tuple[Finding, ...]:
             what=f"the scans' area differs from the flat cloth's by {lost:.1%}; the interval allows for it",
             value=lost,
             fix="scan the insides of the folds as well",
+        ),
+    )
+
+
+def _few(fit: Fit) -> tuple[Finding, ...]:
+    if fit.effective >= _FEWEST:
+        return ()
+    return (
+        Finding(
+            kind="few-draws",
+            severity=Severity.WARNING,
+            what=f"the interval is of {fit.effective:.0f} independent draws, and may be too narrow",
+            value=fit.effective,
+            fix="compare with the intervals of a part of the drapes",
         ),
     )
 

@@ -5,13 +5,14 @@ rest curvature, fitted to simulated drapes by least squares; their scatter about
 one cloth has. What is compared are means over drapes of one face. A lobe of the rim has the direction of the stiffer
 thread, so that lobes are taken along their common direction; the threads that the cloth curls along may be either.
 
-Posterior draws are weighted draws of the prior, from which evidences of models follow as mean weights.
+Posterior draws are weighted draws of the prior, at first of all of it, then of the ranges in which cloths were near.
+Evidences of models follow as mean weights.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -20,7 +21,7 @@ from scipy.stats import chi2
 from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from flagdata.tables import Range
+from flagdata.tables import Range, Scale
 from measure.cloth import Uncertain, draws
 from measure.drape.simulation import ANISOTROPY, BENDING_LENGTH, CLOTH, CURVATURE, SHEAR
 from sim.drape import DISC, PEDESTAL
@@ -45,6 +46,10 @@ SIDEDNESS = Uncertain(
     source="logarithm of the bending length with the first face up over that of the mean: bending by up to 3 to 1",
 )
 _DRAWS = 1 << 16
+_ROUNDS = 2
+"""How often the ranges are narrowed."""
+_NEAR = 12.0
+"""Logarithm of the likelihood, below the best draw's, beyond which cloths are not drawn again."""
 _KEPT = 4000
 
 
@@ -140,7 +145,7 @@ class Surface:
             raise InputError(
                 f"{count} simulated drapes are too few for {several} terms", where="drapes", fix=f"give {2 * several}"
             )
-        inverse = np.linalg.inv(terms.T @ terms)
+        inverse = np.asarray(np.linalg.inv(terms.T @ terms), dtype=np.float64)
         figures = shapes[:, [COEFFICIENT, LOBE]]
         coefficients = inverse @ terms.T @ figures
         squares = np.square(figures - terms @ coefficients).sum(axis=0)
@@ -179,6 +184,7 @@ class Fit:
         direction: of the lobes [rad].
         evidence: logarithm.
         tail: probability of a misfit as large as that of the best cloth.
+        effective: how many independent draws the weighted ones are worth (Kish 1965).
     """
 
     model: Model
@@ -188,6 +194,7 @@ class Fit:
     direction: float
     evidence: float
     tail: float
+    effective: float
 
 
 def fitted(surface: Surface, faces: Sequence[Face], *, model: Model, seed: int) -> Fit:
@@ -203,14 +210,67 @@ def fitted(surface: Surface, faces: Sequence[Face], *, model: Model, seed: int) 
             fix="give one folder of drapes, or two for two faces, with two pieces of cloth or more in each",
         )
     direction = direction_of(faces)
-    prior = dict(draws((*CLOTH, WET_MASS, SIDEDNESS), _DRAWS, seed=seed, name=f"drape fit {model.value}"))
+    quantities = (*CLOTH, WET_MASS, SIDEDNESS)
+    drawn = _weighed(surface, faces, direction, model, quantities, seed=seed)
+    narrowed = quantities
+    for _ in range(_ROUNDS):
+        near = drawn.log_weight > drawn.log_weight.max() - _NEAR
+        narrowed = tuple(_narrowed(about, drawn.values[about.name][near]) for about in narrowed)
+        drawn = _weighed(surface, faces, direction, model, narrowed, seed=seed)
+    volume = sum(_log_share(about, within) for about, within in zip(quantities, narrowed, strict=True))
+    best = drawn.log_weight.max()
+    weight = np.exp(drawn.log_weight - best)
+    chosen = stream(seed, "drape", "resample").choice(_DRAWS, _KEPT, p=weight / weight.sum())
+    cloth = {name: column[chosen] for name, column in drawn.values.items()}
+    cloth[ANISOTROPY.name] = np.where(drawn.across[chosen], -1.0, 1.0) * cloth[ANISOTROPY.name]
+    return Fit(
+        model=model,
+        cloth=cloth,
+        across=drawn.across[chosen],
+        predicted=drawn.predicted[chosen],
+        direction=direction,
+        evidence=float(best + np.log(weight.mean())) + volume,
+        tail=float(chi2.sf(drawn.misfit.min(), 2 * len(faces))),
+        effective=float(weight.sum() ** 2 / np.square(weight).sum()),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Weighed:
+    """Draws of cloths and how well they drape as the scans do.
+
+    Attributes:
+        values: name → (n,), with anisotropy of the thread that the cloth curls along over the other.
+        across: (n,) whether it curls across the lobes' direction.
+        predicted: (n, face, 2).
+        log_weight: (n,) logarithms of their likelihood.
+        misfit: (n,) χ².
+    """
+
+    values: Mapping[str, FloatArray]
+    across: BoolArray
+    predicted: FloatArray
+    log_weight: FloatArray
+    misfit: FloatArray
+
+
+def _weighed(
+    surface: Surface,
+    faces: Sequence[Face],
+    direction: float,
+    model: Model,
+    quantities: tuple[Uncertain, ...],
+    *,
+    seed: int,
+) -> _Weighed:
+    values = draws(quantities, _DRAWS, seed=seed, name=f"drape fit {model.value}")
     # The lobe has the direction of the stiffer thread; the cloth curls along it or across it.
     across = stream(seed, "drape", "thread").random(_DRAWS) < 0.5
     predicted, deviation = np.empty((2, _DRAWS, len(faces), 2))
     measured, repeats = np.empty((2, len(faces), 2))
     lost = np.zeros((len(faces), 2))
     for number, face in enumerate(faces):
-        figures, variance = surface.at(_of_face(prior, model, number))
+        figures, variance = surface.at(_of_face(values, model, number))
         figures[:, LOBE] = np.where(across, -figures[:, LOBE], figures[:, LOBE])
         means = face.means(direction)
         measured[number], repeats[number] = means.mean(axis=0), means.var(axis=0, ddof=1) / len(means)
@@ -226,20 +286,25 @@ def fitted(surface: Surface, faces: Sequence[Face], *, model: Model, seed: int) 
         misfit += (apart * np.linalg.solve(covariance, apart)).sum(axis=(1, 2))
         determinant += np.linalg.slogdet(2 * np.pi * covariance)[1]
     log_weight = -(misfit + determinant) / 2
-    best = log_weight.max()
-    weight = np.exp(log_weight - best)
-    chosen = stream(seed, "drape", "resample").choice(_DRAWS, _KEPT, p=weight / weight.sum())
-    cloth = {name: column[chosen] for name, column in prior.items()}
-    cloth[ANISOTROPY.name] = np.where(across[chosen], -1.0, 1.0) * cloth[ANISOTROPY.name]
-    return Fit(
-        model=model,
-        cloth=cloth,
-        across=across[chosen],
-        predicted=predicted[chosen],
-        direction=direction,
-        evidence=float(best + np.log(weight.mean())),
-        tail=float(chi2.sf(misfit.min(), 2 * len(faces))),
-    )
+    return _Weighed(values=values, across=across, predicted=predicted, log_weight=log_weight, misfit=misfit)
+
+
+def _narrowed(about: Uncertain, near: FloatArray) -> Uncertain:
+    """Returns a quantity within the range of draws that are not too far off."""
+    if not isinstance(about.prior, Range):
+        return about
+    low, high = float(near.min()), float(near.max())
+    if low == high:
+        return about
+    return replace(about, prior=replace(about.prior, low=low, high=high))
+
+
+def _log_share(about: Uncertain, within: Uncertain) -> float:
+    """Computes the logarithm of the share of a range that a narrower one is."""
+    whole, part = (np.array(one.ends or (0.0, 1.0)) for one in (about, within))
+    if isinstance(about.prior, Range) and about.prior.scale is Scale.LOG:
+        whole, part = np.log(whole), np.log(part)
+    return float(np.log(np.diff(part) / np.diff(whole))[0])
 
 
 def _of_face(prior: Mapping[str, FloatArray], model: Model, number: int) -> Mapping[str, FloatArray]:
