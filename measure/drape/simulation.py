@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,7 @@ ROWS = 9
 """Of triangles from the pedestal's edge to the rim."""
 LIMIT = 0.9
 """Time until a drape is measured [s]."""
-DENSITY = 0.2
+AREA_WEIGHT = 0.2
 """Of all simulated cloths [kg/m²]: rest depends on ratios to it."""
 _STRETCHING = 1500.0
 """Stretching over weight, Y h/ρ [m²/s²]: 300 N/m at 0.2 kg/m², so that its weight strains a drape by 0.0004."""
@@ -74,25 +74,18 @@ CLOTH = (BENDING_LENGTH, ANISOTROPY, SHEAR, CURVATURE)
 
 
 def material(bending_length: float, anisotropy: float, shear: float) -> Material:
-    """Makes a cloth of `DENSITY`; arguments as in `CLOTH`."""
-    stiffness = 4 * bending_length**3 * DENSITY * -GRAVITY[2] / _mean(anisotropy)
+    """Makes a cloth of `AREA_WEIGHT`; arguments as in `CLOTH`."""
+    stiffness = 4 * bending_length**3 * AREA_WEIGHT * -GRAVITY[2] / _mean(anisotropy)
     rows = stiffness * np.exp(np.array([-anisotropy, 0.0, anisotropy]))
-    base = isotropic(
+    cloth = isotropic(
         name="drape",
-        density=DENSITY,
-        stretching=_STRETCHING * DENSITY,
-        shear=shear * DENSITY,
+        area_weight=AREA_WEIGHT,
+        stretching=_STRETCHING * AREA_WEIGHT,
+        shear=shear * AREA_WEIGHT,
         bending=1.0,
         damping=_DAMPING,
     )
-    return Material(
-        name=base.name,
-        source=base.source,
-        density=base.density,
-        stretching=base.stretching,
-        bending=np.broadcast_to(rows[:, None], BENDING_SHAPE),
-        damping=base.damping,
-    )
+    return replace(cloth, bending=np.broadcast_to(rows[:, None], BENDING_SHAPE))
 
 
 def _shares(anisotropy: float) -> tuple[float, float]:

@@ -16,12 +16,14 @@ from sim.scene import assemble
 _G = 9.81
 
 
-def _cloth(bending_length: float, *, density: float = 0.2) -> Material:
+def _cloth(bending_length: float, *, area_weight: float = 0.2) -> Material:
     # Nearly equilateral triangles bend as a plate of a quarter of the tables' stiffness: with fold angles
     # θ = (√3/2) l (κ_n − κ_t/3) of hinges in three directions the energy is k/8 κ² per area for a cylinder, which a
     # plate of rigidity B stores as B/2 κ²; for a sphere it is k/6 κ², so that Poisson's ratio is −1/3.
-    rigidity = bending_length**3 * density * _G
-    return isotropic(name="test", density=density, stretching=300.0, shear=100.0, bending=4 * rigidity, damping=0.01)
+    rigidity = bending_length**3 * area_weight * _G
+    return isotropic(
+        name="test", area_weight=area_weight, stretching=300.0, shear=100.0, bending=4 * rigidity, damping=0.01
+    )
 
 
 def _at_rest(mesh: Mesh, materials: list[Material], *, sigma: float = 1e-3, seed: int = 0) -> FloatArray:
@@ -96,8 +98,8 @@ def test_finer_meshes_drape_alike_and_stiffer_cloth_less() -> None:
 
 def test_rest_depends_on_stiffness_over_weight_alone() -> None:
     mesh = disc(rows=3)
-    light = _cloth(0.02, density=0.1)
-    heavy = light.scaled(density=4.0, bending=4.0, stretching=4.0)
+    light = _cloth(0.02, area_weight=0.1)
+    heavy = light.scaled(area_weight=4.0, bending=4.0, stretching=4.0)
     # By a power of two, so that no digit rounds otherwise.
     np.testing.assert_allclose(_at_rest(mesh, [light]), _at_rest(mesh, [heavy]), atol=1e-9)
 

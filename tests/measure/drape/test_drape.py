@@ -53,7 +53,7 @@ def test_stiffer_warp_bends_less_along_the_warp() -> None:
     assert ratio(0.6) == pytest.approx(1 / ratio(-0.6))
     assert ratio(0.6) > 1.8
     cloth = material(0.02, 0.0, 300.0)
-    assert cloth.bending[0, 0] == pytest.approx(4 * 0.02**3 * cloth.density * G, rel=1e-3)
+    assert cloth.bending[0, 0] == pytest.approx(4 * 0.02**3 * cloth.area_weight * G, rel=1e-3)
 
 
 def test_a_batch_is_simulated_and_measured_and_a_stiffer_warp_makes_a_lobe_along_it() -> None:

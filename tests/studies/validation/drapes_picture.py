@@ -104,8 +104,8 @@ def bank() -> dict[str, list[float]]:
     cloths = {name: named(name) for name in WANG}
     return {
         name: [
-            cloth.density,
-            float(bending_length(np.array(cloth.bending.mean() / 4), np.array(cloth.density))),
+            cloth.area_weight,
+            float(bending_length(np.array(cloth.bending.mean() / 4), np.array(cloth.area_weight))),
         ]
         for name, cloth in cloths.items()
     }
