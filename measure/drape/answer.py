@@ -29,7 +29,7 @@ _LOST = 0.03
 """Share of the area from which on a scan that lacks it is reported."""
 
 _FEWEST = 50
-"""Independent draws below which an interval is doubted."""
+"""Independent draws below which an interval is reported with a warning."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
