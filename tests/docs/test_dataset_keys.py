@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import fields
 
+from sim.datasets import AnemometerSpec, CameraSpec
 from sim.datasets.reading import SIDES, _DatasetTables, _Render, _Scene, _SessionsSide
-from sim.datasets.recipe import AnemometerSpec, CameraSpec, GroupSpec, SessionSpec
+from sim.datasets.recipe import GroupSpec, SessionSpec
 from tests.docs.pages import DOCS
 
 TABLES = {
