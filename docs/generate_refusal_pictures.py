@@ -120,6 +120,34 @@ def tree(film: Film) -> Film:
     return _noisy(shown)
 
 
+def water(film: Film) -> Film:
+    """A stream: waves that run across each other."""
+    rng = stream(1, "refusals", "water")
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    bed = rows > 96 - 0.15 * columns + 4 * np.sin(columns / 9)
+    waves = [rng.uniform((0.05, -0.3, 3, 0), (0.25, 0.3, 9, 6)) for _ in range(8)]
+    shown = np.repeat(film[:1], COUNT, axis=0)
+    for k, frame in enumerate(shown):
+        height = sum(np.sin(a * columns + b * rows - w * k / RATE + phase) for a, b, w, phase in waves)
+        frame[bed] = np.clip(np.array([70, 105, 125]) + 13 * np.asarray(height)[bed][:, None], 0, 255)
+    return _noisy(shown)
+
+
+def hung(film: Film) -> Film:
+    """The picture turned, so that the pole lies above the cloth."""
+    return np.ascontiguousarray(np.rot90(film, axes=(1, 2))[:, 20:176])
+
+
+def without_background(film: Film) -> Film:
+    """A long flag and little else."""
+    return _noisy(_resized(film, 2 * WIDTH, HEIGHT)[:, 10:134, 136:392])
+
+
+def stretched(film: Film) -> Film:
+    """A flag twice as long."""
+    return _noisy(_resized(film, 2 * WIDTH, HEIGHT)[:, :, 100:420])
+
+
 def moving_camera(film: Film) -> Film:
     """Cloth before an even sky, filmed by hand."""
     time = np.arange(COUNT) / RATE
@@ -154,11 +182,13 @@ class Fault:
     made: of the film without the fault.
     shown: the frames that the picture has.
     rate: of the film [Hz].
+    aspect: length over height of the flag as it is given; None where it is not.
     """
 
     made: Callable[[Film], Film]
     shown: tuple[int, ...] = (COUNT // 2,)
     rate: float = RATE
+    aspect: float | None = None
 
 
 FAULTS: Mapping[str, Fault] = {
@@ -168,8 +198,12 @@ FAULTS: Mapping[str, Fault] = {
     "too-dark": Fault(made=dark),
     "no-motion": Fault(made=still, shown=(0, COUNT - 1)),
     "unlike-cloth": Fault(made=tree),
+    "no-pole": Fault(made=water),
+    "hangs-from-above": Fault(made=hung),
     "moving-camera": Fault(made=moving_camera, shown=(10, 35)),
     "cut-off": Fault(made=cut_off),
+    "no-background": Fault(made=without_background),
+    "another-shape": Fault(made=stretched, aspect=1.5),
     "scale": Fault(made=small),
     "several-flags": Fault(made=two_flags),
 }
@@ -184,7 +218,8 @@ def images(reason: str) -> Film:
 def looked_at(reason: str) -> ConditionedFilm:
     """The same, read to its end as `flagdata measure` reads it."""
     shown = images(reason)
-    film = ConditionedFilm(Frames(images=shown, time=np.arange(len(shown)) / FAULTS[reason].rate))
+    fault = FAULTS[reason]
+    film = ConditionedFilm(Frames(images=shown, time=np.arange(len(shown)) / fault.rate), aspect=fault.aspect)
     for _ in film.frames(0.0, film.duration):
         pass
     return film

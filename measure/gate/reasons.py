@@ -45,8 +45,8 @@ REASONS: dict[str, Fault] = {
         of_motion=True,
     ),
     "no-pole": Fault(
-        sentence="what moves may be no flag on a pole: no upright edge that stands still was found beside it",
-        fix="film so that the whole flag and its pole are in the picture, or choose the flag by --flag or --crop",
+        sentence="what moves may be no flag on a pole, as no upright edge stands still beside it",
+        fix="make sure that a flag and its pole are in the picture, and choose the flag by --flag or --crop",
         of_motion=True,
         of_flags=True,
     ),

@@ -273,7 +273,7 @@ def conditioning_of(
         kept=np.minimum(_USUAL * level / spread, 1.0).astype(np.float32),
         path=np.stack([_centre(square, transform, scale) for transform in transforms]),
         cut=cut,
-        standing=Standing.of(stack, _shown(square, size, width=width, height=height)),
+        standing=Standing.of(stack, _shown(square, size, width=width, height=height), enlarged=size / square.side),
     )
 
 

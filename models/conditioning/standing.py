@@ -21,14 +21,17 @@ _BLUR = 1.2
 _ABSENT, _LEFT = 0.5, 0.5
 """Share of the time in which the slope of an edge at rest may be below this share of its mean: cloth flies before it,
 and frames of a camera that moves are registered to a pixel. Higher takes what comes again for what stands."""
-_FAINT, _CLEAR = 1.5, 4.0
+_FAINT, _CLEAR = 1.0, 2.5
 """Slopes [gray levels/px] of the mean picture at which an edge ends, and from which on there is one (Canny)."""
 _ACROSS = 25.0
 """Degrees by which the slope at an edge may differ from that across a line."""
 _TILT = 20
 """Degrees by which a line may differ from the upright, or the level, in steps of one."""
-_GAP = 0.06
+_GAP = 0.03
 """Gaps in a line, in lengths of what it is compared with: where cloth or a rope is before it."""
+_OUTSIDE, _INSIDE = 0.25, 0.1
+"""How far outside and inside a box's side a line is looked for, in sizes of the box: plain cloth at its hoist moves
+too little to be found, and a slack rope keeps it from the pole. More takes what stands in the background for a pole."""
 _UNITS = 64
 """Steps of a slope of one gray level a pixel, as whole numbers."""
 
@@ -49,37 +52,36 @@ class Standing:
     level: BoolArray
 
     @classmethod
-    def of(cls, pictures: UInt8Array, inside: BoolArray) -> Standing:
+    def of(cls, pictures: UInt8Array, inside: BoolArray, *, enlarged: float = 1.0) -> Standing:
         """Finds them.
 
         Args:
             pictures: (n, height, width) gray, registered, of the whole film.
             inside: (height, width) what the film shows: beyond its edge the picture is padded by stripes.
+            enlarged: by how much the film was, which makes its edges less steep.
         """
         slopes = np.stack([_slopes(picture) for picture in pictures[:: -(-len(pictures) // _PICTURES)]])
+        slopes *= max(enlarged, 1.0)
         mean = slopes.mean(axis=0)  # (2, height, width): along x and y
         steep = np.hypot(*mean)
         along = (slopes * (mean / np.maximum(steep, 1e-6))).sum(axis=1)
         rests = np.sort(along, axis=0)[int(_ABSENT * len(along))] > _LEFT * steep
-        across, down = np.rint(mean * (rests & inside) * _UNITS).astype(np.int16)
+        across, down = np.rint((mean * (rests & inside) * _UNITS).clip(-32_000, 32_000)).astype(np.int16)
         edges = cv2.Canny(across, down, _FAINT * _UNITS, _CLEAR * _UNITS, L2gradient=True) > 0
         angle = np.degrees(np.arctan2(np.abs(mean[1]), np.abs(mean[0])))
         return cls(upright=edges & (angle < _ACROSS), level=edges & (angle > 90 - _ACROSS))
 
-    def beside(self, box: Box, reach: float) -> float:
-        """Measures the longest upright line beside or before a box that reaches its rows, in heights of the box.
-
-        Args:
-            reach: how far the line may lie from the box's left or right side, in sizes of the box.
-        """
+    def beside(self, box: Box) -> float:
+        """Measures the longest upright line at the left or right side of a box, in heights of the box: 0 without one
+        that reaches its rows."""
         left, top, right, bottom = box
-        near = reach * max(right - left, bottom - top)
-        return _longest(self.upright, (top, bottom), ((left - near, left + near), (right - near, right + near)))
+        out, within = (share * max(right - left, bottom - top) for share in (_OUTSIDE, _INSIDE))
+        return _longest(self.upright, (top, bottom), ((left - out, left + within), (right - within, right + out)))
 
-    def above(self, box: Box, reach: float) -> float:
-        """Measures the longest level line along the box's top, in widths of the box; see `beside`."""
+    def above(self, box: Box) -> float:
+        """Measures the longest level line at the top of a box, in widths of the box; see `beside`."""
         left, top, right, bottom = box
-        near = reach * max(right - left, bottom - top)
+        near = _INSIDE * max(right - left, bottom - top)
         return _longest(self.level.T, (left, right), ((top - near, top + near),))
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 import pytest
@@ -64,14 +67,70 @@ def drawn(
     return np.clip(np.rint(out), 0, 255).astype(np.uint8)
 
 
-def counted(frames: UInt8Array) -> list[Finding]:
+ROWS, COLUMNS = np.mgrid[:HEIGHT, :WIDTH].astype(np.float64)
+TIMES = np.arange(COUNT) / RATE
+
+
+def scenery() -> UInt8Array:
+    """The same without cloth and pole."""
+    return drawn(box=(0, 0, 1, 1), pole=False)
+
+
+def water() -> UInt8Array:
+    """Waves that run across each other."""
+    rng = stream(8, "water")
+    waves = [rng.uniform((0.05, -0.3, 3, 0), (0.25, 0.3, 9, 6)) for _ in range(8)]
+    bed = (ROWS > 70) & (ROWS < 165) & (COLUMNS > 15) & (COLUMNS < 225)
+    frames = scenery()
+    for frame, time in zip(frames, TIMES, strict=True):
+        height = sum(np.sin(a * COLUMNS + b * ROWS - w * time + phase) for a, b, w, phase in waves)
+        frame[bed] = np.clip(110 + 18 * np.asarray(height), 0, 255)[bed]
+    return frames
+
+
+def crowd() -> UInt8Array:
+    """Heads that sway, each by itself."""
+    rng = stream(9, "crowd")
+    heads = rng.uniform((70, 60, 4, 0, 40), (170, 130, 9, 6, 220), (18, 5))
+    frames = scenery()
+    for frame, time in zip(frames, TIMES, strict=True):
+        for x, y, rate, phase, gray in heads:
+            at = (round(x + 7 * np.sin(rate * time + phase)), round(y + 3 * np.cos(1.3 * rate * time)))
+            cv2.ellipse(frame, at, (5, 9), 0, 0, 360, float(gray), -1)
+    return frames
+
+
+def rotor() -> UInt8Array:
+    """Three blades that turn on a tower, at no simple share of a turn a frame."""
+    frames = scenery()
+    frames[:, 80:, 118:122] = 20
+    for frame, time in zip(frames, TIMES, strict=True):
+        for angle in 5.3 * time + 0.4 * time**2 + np.array([0, 2, 4]) * np.pi / 3:
+            cv2.line(frame, (120, 80), (round(120 + 45 * np.cos(angle)), round(80 + 45 * np.sin(angle))), 230.0, 4)
+    return frames
+
+
+def hung() -> UInt8Array:
+    """Cloth below a bar on two posts, whose lower part swings."""
+    frames = scenery()
+    frames[:, 36:40, 30:220] = frames[:, 36:110, 76:79] = frames[:, 36:110, 154:157] = 20
+    down = (ROWS - 40) / 90
+    for frame, time in zip(frames, TIMES, strict=True):
+        along = (COLUMNS - 85 - 14 * down**2 * (np.sin(5.1 * time) + 0.6 * np.sin(8.3 * time + 1))) / 60
+        cloth = np.where((along * 5).astype(int) % 2, 200, 60) + 15 * np.cos(9 * time - 6 * down)
+        own = (along >= 0) & (along < 1) & (down >= 0) & (down < 1)
+        frame[own] = np.clip(cloth, 0, 255)[own]
+    return frames
+
+
+def counted(frames: UInt8Array, **stated: float) -> list[Finding]:
     """The faults of a film at 25 Hz."""
     found, watch = conditioning_of(frames, size=120), FilmWatch(rate=RATE)
     follower = Follower(found)
     for k, frame in enumerate(frames):
         watch.look(k / RATE, frame)
         follower.show(frame)
-    return list(reasons(watch, found, follower))
+    return list(reasons(watch, found, follower, **stated))
 
 
 def kinds(frames: UInt8Array) -> list[str]:
@@ -147,12 +206,47 @@ def test_a_flag_of_few_pixels_is_too_small() -> None:
 def test_what_moves_as_finely_as_leaves_is_no_cloth() -> None:
     """Pixels that take one of two values by themselves: a pixel changes by half of their difference d on average, the
     mean of 36 by √(2/π) σ with σ = d √½/6."""
-    leaves = drawn(box=(0, 0, 1, 1))
+    leaves = scenery()
     leaves[:, 60:130, 70:170] = stream(6, "leaves").integers(0, 2, (COUNT, 70, 100)) * 120 + 60
-    (fault,) = counted(leaves)
-    assert fault.kind == "unlike-cloth"
+    fault, no_pole = counted(leaves)
+    assert (fault.kind, no_pole.kind) == ("unlike-cloth", "no-pole")
+    stated, limit = re.findall(r"(\d+(?:\.\d)?)%", fault.what)
+    assert float(stated) < float(limit)
     assert fault.value == pytest.approx(np.sqrt(2 / np.pi) * np.sqrt(0.5) / 6 / 0.5, abs=0.03)
 
 
 def test_a_spot_of_a_few_pixels_is_too_small_rather_than_still() -> None:
     assert kinds(drawn(box=(100, 60, 12, 8), noise=0.3)) == ["scale"]
+
+
+@pytest.mark.parametrize("film", [water, crowd, rotor])
+def test_what_moves_beside_no_pole_is_no_flag(film: Callable[[], UInt8Array]) -> None:
+    (fault,) = (fault for fault in counted(film()) if fault.kind not in ("repeated-frames", "unlike-cloth"))
+    assert fault.kind == "no-pole"
+    assert fault.value is not None
+    assert fault.value < 0.45
+
+
+def test_cloth_below_a_bar_hangs_and_a_flag_on_a_pole_beside_one_does_not() -> None:
+    (fault,) = counted(hung())
+    assert fault.kind == "hangs-from-above"
+    assert fault.value is not None
+    assert 1.3 < fault.value < 2.5  # the bar is 190 px long, what moves 85 to 110 px wide
+    assert kinds(drawn(bar=True)) == []
+
+
+def test_a_flag_that_fills_the_picture_shows_no_background() -> None:
+    wide = drawn(box=(40, 70, 150, 50))
+    assert kinds(wide) == []
+    (fault,) = counted(np.ascontiguousarray(wide[:, 46:144, 24:208]))
+    assert fault.kind == "no-background"
+    assert fault.value is not None
+    assert fault.value > 0.35
+
+
+def test_an_outline_longer_than_the_flag_that_was_given_is_another_thing() -> None:
+    wide = drawn(box=(40, 70, 150, 50))
+    assert counted(wide, aspect=3.0) == []
+    (fault,) = counted(wide, aspect=1.0)
+    assert fault.kind == "another-shape"
+    assert fault.value == pytest.approx(150 / 65, rel=0.15)  # the waves at the free end reach beyond the hoist's 50 px
