@@ -191,7 +191,7 @@ class Calibration:
         weight = self.weight
         if weight.value is None or weight.sigma is None:
             return None
-        return f"{weight.value:g}±{weight.sigma:g}"
+        return f"{weight.value:.4g}±{weight.sigma:.2g}"
 
     @property
     def weighs(self) -> bool:
@@ -237,9 +237,7 @@ class Calibration:
             ],
             "area_weight_stated": self.stated,
             "withheld": self.withheld,
-            "close_loop": None
-            if weight.value is None or weight.sigma is None
-            else {"area-weight": f"{weight.value:g}±{weight.sigma:g}"},
+            "close_loop": None if self.stated is None else {"area-weight": self.stated},
             "check": self.check.as_dict(),
             "options": self.options.recipe(),
             "level": self.options.level,

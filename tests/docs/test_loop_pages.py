@@ -28,7 +28,6 @@ from sim.mesh import grid
 from tests.docs.pages import Shell, blocks, commands
 from tests.measure.observe.flags import HEIGHT, WIDTH, flutter
 from tests.measure.report.verdicts import Size, verdict
-from tests.pools import Here
 
 SPEEDS = (4.0, 6.0)
 
@@ -92,7 +91,6 @@ def test_every_command_of_closing_the_loop_runs(folder: Path, monkeypatch: pytes
 
     monkeypatch.setattr("measure.closing.close.close_loop", instead)
     monkeypatch.setattr("measure.nulls.bank.build", first_kind)
-    monkeypatch.setattr("measure.nulls.bank.ProcessPoolExecutor", Here)
     monkeypatch.chdir(folder)
     shell = Shell(patch=monkeypatch)
     for command in commands("closing-the-loop.md"):
