@@ -218,7 +218,6 @@ class Calibration:
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
-        weight = self.weight
         return {
             "sentence": self.sentence,
             "cloth": {q.name: q.as_dict() for q in self.cloth},
