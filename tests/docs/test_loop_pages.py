@@ -72,7 +72,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def concluded() -> Verdict:
     """That lift acts, with the parameters that closing the loop reports."""
-    values = {"density": 1.0, "bending": 0.8, "damping": 0.002}
+    values = {"area_weight": 1.0, "bending": 0.8, "damping": 0.002}
     parameters = tuple(
         Parameter(name=name, before=one, after=one, shift=0.0)
         for name, one in ((n, Estimate(value=v, low=0.9 * v, high=1.1 * v, unit="1")) for n, v in values.items())
