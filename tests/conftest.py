@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import uuid
@@ -55,6 +56,7 @@ def pytest_sessionfinish() -> None:
     """Searches once for garbage, whose finalizers may fail; pytest would search five times, seconds each."""
     gc.collect()
     gc.freeze()
+    atexit.register(gc.unfreeze)  # what libraries of C hold is let go at the exit, or they report it as leaked
 
 
 @pytest.fixture(scope="session")
