@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import subprocess
@@ -9,6 +10,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -22,6 +24,7 @@ from measure.demo import MINUTES, RecordingRecipe, Story
 from measure.demo.command import SCHEMA
 from tests.docs.pages import Shell
 from tests.pools import Here
+from tests.program import invoke
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -38,6 +41,14 @@ def commands() -> list[str]:
     return [line[2:] for block in blocks("console") for line in block.splitlines() if line.startswith("$ ")]
 
 
+def started(command: list[str], *, cwd: Path, **_: object) -> subprocess.CompletedProcess[str]:
+    """A command that the demonstration types, run by this process: a start takes longer than its work."""
+    assert command[1:3] == ["-m", "flagdata.cli"]
+    with contextlib.chdir(cwd):
+        ended = invoke(*command[3:])
+    return subprocess.CompletedProcess(command, ended.code, ended.out)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The shortest demonstration, on a coarse mesh, in small pictures."""
@@ -46,6 +57,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         small = partial(RecordingRecipe, rate=25, columns=8, step=8e-3, width=240, rows=180, samples=1)
         patch.setattr("measure.demo.story.RecordingRecipe", small)
         patch.setattr("measure.camera.ProcessPoolExecutor", Here)
+        patch.setattr("measure.demo.transcript.subprocess", SimpleNamespace(run=started, PIPE=subprocess.PIPE))
         Shell(patch=patch).run(f"flagdata demo --out {out}")
     return out
 

@@ -36,9 +36,9 @@ class _SizedBlosc:
             ValueError: it has another length than its head states.
         """
         data = memoryview(chunk).cast("B")
-        stated = int.from_bytes(data[_HEAD - 4 : _HEAD], "little")
-        if len(data) < _HEAD or stated != len(data):
-            raise ValueError(f"a chunk has {len(data)} bytes and states {stated}")
+        length = int.from_bytes(data[_HEAD - 4 : _HEAD], "little")
+        if len(data) < _HEAD or length != len(data):
+            raise ValueError(f"a chunk has {len(data)} bytes and states {length}")
         return self.blosc.decode(chunk, out)
 
 

@@ -117,13 +117,13 @@ def builds(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Builds
 
 
 @pytest.fixture(scope="session")
-def told(recipe_file: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def report(recipe_file: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What `flagdata build` says of the tiny data set, built without interruption by a process of this machine."""
     lake = tmp_path_factory.mktemp("built") / "lake"
     return invoke("build", recipe_file, "--lake", lake, "--workers", 1, "--json").document
 
 
 @pytest.fixture(scope="session")
-def built(told: dict[str, Any]) -> Path:
+def built(report: dict[str, Any]) -> Path:
     """The lake of it."""
-    return Path(told["card"]).parents[1]
+    return Path(report["card"]).parents[1]

@@ -26,10 +26,10 @@ SIDES = {side: {"dataset": "tiny", "side": side} for side in ("train", "test")}
 SEQUENCES, FILMS = 5, 10
 
 
-def test_a_build_holds_what_its_recipe_says(built: Path, told: dict[str, Any]) -> None:
-    assert told["schema"] == "flagdata.build/1"
-    assert (told["new_sequences"], told["new_films"], told["clips"]) == (SEQUENCES, FILMS, FILMS)
-    assert Path(told["card"]).parent == built / "cards"
+def test_a_build_holds_what_its_recipe_says(built: Path, report: dict[str, Any]) -> None:
+    assert report["schema"] == "flagdata.build/1"
+    assert (report["new_sequences"], report["new_films"], report["clips"]) == (SEQUENCES, FILMS, FILMS)
+    assert Path(report["card"]).parent == built / "cards"
     lake = Lake.open(built)
     rows = lake.rows().to_pylist()
     assert Counter(row["kind"] for row in rows) == {"meshes": SEQUENCES, "recording": FILMS, "clip": FILMS}
