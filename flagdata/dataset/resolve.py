@@ -150,14 +150,14 @@ def check_divided(
     count = len(set(groups(origins).tolist()))
     if count == 1 and isinstance(split_by, HashedSplit):
         side = split_by.assign(origins)[0]
-        whole = f"all {len(clips)} clips belong together ({_shared(origins)}), and are on the side {side!r}"
+        grouping = f"all {len(clips)} clips belong together ({_shared(origins)}), and are on the side {side!r}"
         if not empty:
-            _LOG.warning("warning: %s: the others are empty", whole)
+            _LOG.warning("warning: %s: the others are empty", grouping)
     else:
-        whole = f"the catalog has {count} independent groups"
+        grouping = f"the catalog has {count} independent groups"
     if empty:
         raise RefusedError(
-            f"split {split!r} holds none of the clips; {whole}",
+            f"split {split!r} holds none of the clips; {grouping}",
             where=where,
             fix="record more days and sessions, or give an ExplicitSplit",
         )

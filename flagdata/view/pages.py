@@ -281,8 +281,8 @@ def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
 
 def _sentence(report: Mapping[str, Any]) -> str | None:
     """Returns what a result says in a sentence, as `flagdata show` prints it."""
-    said_in_words = report.get("sentence") or report.get("words")
-    return None if said_in_words is None else printable(str(said_in_words))
+    text = report.get("sentence") or report.get("words")
+    return None if text is None else printable(str(text))
 
 
 def _together(text: str | None) -> str | None:

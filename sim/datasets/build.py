@@ -92,9 +92,9 @@ class Build:
         begun = time.perf_counter()
         self._refuse_other_names(self.films(Roll(cast=cast) for cast in casts(self.recipe)))
         rolls = [Roll(cast=cast) for cast in casts(self.recipe)]
-        made = None if self.shard is None else self.shard.sequences(rolls)
-        sequences = self._simulate(rolls, made)
-        films = self._film(rolls, made)
+        in_shard = None if self.shard is None else self.shard.sequences(rolls)
+        sequences = self._simulate(rolls, in_shard)
+        films = self._film(rolls, in_shard)
         failed = [f"{roll.cast.simulation.name} {index}: {why}" for roll in rolls for index, why in roll.failed.items()]
         return BuildReport(
             sequences=sequences,
@@ -109,17 +109,17 @@ class Build:
 
     # Sequences
 
-    def _simulate(self, rolls: Sequence[Roll], made: Collection[str] | None) -> int:
+    def _simulate(self, rolls: Sequence[Roll], in_shard: Collection[str] | None) -> int:
         """Simulates what is missing of the sequences that are made here, and returns how many those are."""
         in_lake = whole(self.lake, [roll.id(i) for roll in rolls for i in roll.candidates], branch=self.branch)
-        total = sum(len(roll.pending((), made)) for roll in rolls)
+        total = sum(len(roll.pending((), in_shard)) for roll in rolls)
         with self.bars(total, f"{self.recipe.name}: simulate", "flag") as advance:
-            todo = [(roll, roll.pending(in_lake, made)) for roll in rolls]
+            todo = [(roll, roll.pending(in_lake, in_shard)) for roll in rolls]
             advance(total - sum(len(pending) for _, pending in todo))
             while any(pending for _, pending in todo):
                 self._simulate_once([entry for entry in todo if entry[1]], advance)
                 self._refuse_replacing(rolls)
-                todo = [(roll, roll.pending(in_lake, made)) for roll, _ in todo]
+                todo = [(roll, roll.pending(in_lake, in_shard)) for roll, _ in todo]
         return total
 
     def _refuse_replacing(self, rolls: Sequence[Roll]) -> None:
@@ -170,11 +170,11 @@ class Build:
             for film in Sequences(recipe=self.recipe, side=side, members=tuple(side_members)).films()
         ]
 
-    def _film(self, rolls: Iterable[Roll], made: Collection[str] | None) -> list[PlannedFilm]:
+    def _film(self, rolls: Iterable[Roll], in_shard: Collection[str] | None) -> list[PlannedFilm]:
         films = self.films(rolls)
         self._refuse_other_names(films)
         self._refuse_mixture({film.artifact().id for film in films})
-        films = [film for film in films if made is None or film.sequence in made]
+        films = [film for film in films if in_shard is None or film.sequence in in_shard]
         film_ids = {film.artifact().id for film in films}
         in_lake = whole(self.lake, film_ids, branch=self.branch)
         missing = [film for film in films if film.artifact().id not in in_lake]

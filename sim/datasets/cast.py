@@ -147,15 +147,15 @@ class Roll:
         count = self.cast.simulation.count
         return range(count + max(4, math.ceil(count / 4)))
 
-    def pending(self, in_lake: Collection[str], made: Collection[str] | None = None) -> list[int]:
+    def pending(self, in_lake: Collection[str], in_shard: Collection[str] | None = None) -> list[int]:
         """Returns the chosen members that are not in the lake.
 
         Args:
             in_lake: artifact ids that are there, and whole.
-            made: artifact ids that are to be made here; None for all.
+            in_shard: artifact ids that are to be made; None for all.
         """
         self.done |= {index for index in self.chosen if self.id(index) in in_lake}
-        return [i for i in self.chosen if i not in self.done and (made is None or self.id(i) in made)]
+        return [i for i in self.chosen if i not in self.done and (in_shard is None or self.id(i) in in_shard)]
 
     def id(self, index: int) -> str:
         """Returns the identity of a member's mesh sequence."""

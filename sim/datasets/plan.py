@@ -119,7 +119,7 @@ def plan(
     if lake is not None:
         in_lake = set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
     rolls = [Roll(cast=cast) for cast in casts(recipe)]
-    made = None if shard is None else shard.sequences(rolls)
+    in_shard = None if shard is None else shard.sequences(rolls)
     films = 0
     frames: dict[str, list[int]] = {side.name: [] for side in recipe.sides}
     for side in recipe.sides:
@@ -127,14 +127,14 @@ def plan(
         members = tuple((roll.cast, index, roll.id(index)) for roll in side_rolls for index in roll.chosen)
         side_films = Sequences(recipe=recipe, side=side.name, members=members).films()
         for film in side_films:
-            films += film.artifact().id not in in_lake and (made is None or film.sequence in made)
+            films += film.artifact().id not in in_lake and (in_shard is None or film.sequence in in_shard)
             frames[side.name].append(film.cast.simulation.time.frames)
     return Plan(
         recipe=recipe,
         sequences={side.name: side.sequences for side in recipe.sides},
         films={side.name: side.renders for side in recipe.sides},
         clips={side: sum(count // CLIP_FRAMES for count in counts) for side, counts in frames.items()},
-        missing_sequences=sum(len(roll.pending(in_lake, made)) for roll in rolls),
+        missing_sequences=sum(len(roll.pending(in_lake, in_shard)) for roll in rolls),
         missing_films=films,
         rates=rates or measure(recipe, _typical([roll.cast for roll in rolls]), device=device),
         workers=workers,

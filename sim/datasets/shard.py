@@ -33,8 +33,8 @@ class Shard:
         Raises:
             UsageError: it is none.
         """
-        found = _WRITTEN.fullmatch(text.strip())
-        number, of = (int(found[1]), int(found[2])) if found else (0, 0)
+        match = _WRITTEN.fullmatch(text.strip())
+        number, of = (int(match[1]), int(match[2])) if match else (0, 0)
         if not 1 <= number <= of:
             raise UsageError(
                 f"{text!r} is no shard",

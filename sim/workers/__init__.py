@@ -13,8 +13,8 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from sim.workers.connect import connected
-    from sim.workers.here import Here, single_threaded
     from sim.workers.jobs import Job, WorkerError, Workers
+    from sim.workers.local import LocalWorkers, single_threaded
     from sim.workers.scheduled import Scheduled
 
 __getattr__ = lazy_exports(__name__, __file__)

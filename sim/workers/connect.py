@@ -6,8 +6,8 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 
 from flagdata.extras import explained
-from sim.workers.here import processes
 from sim.workers.jobs import Workers
+from sim.workers.local import processes
 
 
 def connected(

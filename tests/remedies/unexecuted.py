@@ -34,7 +34,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("sim/datasets/build.py", "build the data set without --shard"),
     ),
     "a machine that kills the processes of a build, three times": (
-        ("sim/workers/here.py", "see whether it lacks mem"),
+        ("sim/workers/local.py", "see whether it lacks mem"),
     ),
     "a lake that fails while a command says what it published before another failure": (
         ("flagdata/console.py", "what was finished before"),

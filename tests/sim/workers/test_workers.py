@@ -12,7 +12,7 @@ import pytest
 from distributed import CancelledError
 
 from flagdata.errors import MissingExtraError
-from sim.workers import Here, Scheduled, WorkerError, connected, scheduled
+from sim.workers import LocalWorkers, Scheduled, WorkerError, connected, scheduled
 from tests.sim.workers.worked import environment, fatal, fatal_result, once
 
 NAMES = ("OMP_NUM_THREADS", "MALLOC_TRIM_THRESHOLD_", "MALLOC_MMAP_THRESHOLD_")
@@ -29,7 +29,7 @@ def test_processes_keep_their_memory_take_one_thread_each_and_are_replaced_when_
         results = workers.results((once, [tmp_path / "note", number]) for number in range(6))
         assert sorted(results) == list(range(6))
         assert said == ["a process has died; its jobs are done again"]
-        monkeypatch.setattr("sim.workers.here.TRIES", 2)
+        monkeypatch.setattr("sim.workers.local.TRIES", 2)
         with pytest.raises(WorkerError, match="died 2 times over the same jobs"):
             list(workers.results([(fatal, [0])]))
     assert os.environ["OMP_NUM_THREADS"] == "7"
@@ -55,13 +55,13 @@ def test_jobs_of_this_machine_need_no_dask(monkeypatch: pytest.MonkeyPatch) -> N
     with connected(None, workers=1) as workers:
         assert list(workers.results([(max, [(1, 2)])])) == [2]
     monkeypatch.delitem(sys.modules, "sim.workers.scheduled")
-    with pytest.raises(MissingExtraError, match="dask"):
+    with pytest.raises(MissingExtraError, match="the workers of a scheduler need distributed"):
         connected("tcp://127.0.0.1:1", workers=1)
 
 
 def test_an_error_of_a_job_is_that_of_the_iteration() -> None:
     with pytest.raises(ZeroDivisionError):
-        list(Here(1).results([(divmod, [1, 0])]))
+        list(LocalWorkers(1).results([(divmod, [1, 0])]))
 
 
 @pytest.mark.timeout(120)

@@ -52,7 +52,7 @@ def _leave_with_parent() -> None:
         os._exit(1)
 
 
-class Here:
+class LocalWorkers:
     """Workers of this machine. Processes start with the first jobs, and end with the context of `processes`.
 
     Args:
@@ -144,14 +144,14 @@ class Here:
 
 
 @contextmanager
-def processes(workers: int, *, say: Callable[[str], object]) -> Iterator[Here]:
+def processes(workers: int, *, say: Callable[[str], object]) -> Iterator[LocalWorkers]:
     """Makes workers of this machine, and ends their processes after the context."""
-    here = Here(workers, say=say)
+    local = LocalWorkers(workers, say=say)
     with _environment(_OF_PROCESSES):
         try:
-            yield here
+            yield local
         finally:
-            here.close()
+            local.close()
 
 
 @contextmanager
