@@ -34,7 +34,7 @@ ALLOWED = {
     "measure/closing/artifacts.py": LAKE,
     "measure/commands/measurement_artifact.py": LAKE + "; or into a scratch folder (--zarr)",
     "models/training/command.py": LAKE,
-    "sim/datasets/build.py": LAKE,
+    "sim/datasets/jobs.py": LAKE,
     "flagdata/checksums.py": "states the checksums inside a folder that its caller made",
     "flagdata/locks.py": "the lock in a run folder or a cache",
     "flagdata/record/output.py": "writes a record into staging or to a scratch path, and only where nothing is",

@@ -39,7 +39,7 @@ def test_the_answer_stands_first_and_every_quantity_has_a_row(found: Measurement
     text = drawn(found)
     assert found.sentence in text
     assert text.index(found.sentence) < text.index("What the film says")
-    folded = text.partition("What this film does not tell")[2].partition("</details>")[0]
+    folded = text.partition("Not constrained by this film")[2].partition("</details>")[0]
     for quantity in found.quantities:
         assert (f"<td>{SHORT[quantity.name]}</td>" in folded) is not quantity.constrained
     assert [text.count(f"<td>{name}</td>") for name in ("wind", "area weight", "bending", "anisotropy")] == [1] * 4
