@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -279,9 +280,10 @@ def _without_windows(
     still = [fault for fault in faults if fault.kind == "no-motion"]
     if distinct.share > _REPEATING and not still:
         repeating = f"{distinct.share:.0%} of {distinct.frames} frames repeat the one before"
+        scale = float(considered.scale.max())
         left, needed = (1 - distinct.share) * film.rate, RATE_SLACK / max(reader.layout.spacings)
-        if left < needed:
-            length = trained.length * float(considered.scale.max())
+        if needed * math.sqrt(scale) <= left < needed:  # enough of a flag as large as those of the training
+            length = trained.length * scale
             return RefusedError(
                 f"{REASONS['low-frame-rate'].sentence}: {repeating}, {left:.3g} different ones a second are left, a "
                 f"{trained.noun} of {length:.3g} m needs {needed:.3g}, and {windows}",

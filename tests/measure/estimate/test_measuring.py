@@ -19,7 +19,7 @@ from torch import Tensor
 from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.film_array import Frames
-from flagdata.findings import Severity
+from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed
 from flagdata.stated import parse
 from measure.commands.measure import _Done, _report
@@ -434,6 +434,57 @@ def test_a_film_full_of_gaps_is_refused(model: Estimator) -> None:
     times = np.delete(np.arange(60) / RATE, np.arange(5, 60, 8))
     with pytest.raises(UsageError, match=r"in the one at 0\.00 s 80 ms lie between two pictures"):
         measured(Frames(time=times, images=pictures(len(times))), model)
+
+
+@pytest.mark.parametrize(("whole", "refused"), [(2, True), (4, False)])
+def test_an_answer_of_fewer_than_a_third_of_the_windows_is_refused(whole: int, refused: bool, model: Estimator) -> None:
+    """Of nine windows so many have all their frames, and the others a gap in the middle of each."""
+    lost = [k for k in range(whole * FRAMES + 2, 9 * FRAMES) if k % FRAMES in (5, 6)]
+    times = np.delete(np.arange(9 * FRAMES) / RATE, lost)
+    film = Frames(time=times, images=pictures(len(times)))
+    found = measure(film, model, gate=Listed(*[0.5] * 9), dependence=APART, options=Options(size=WHOLE))
+    assert found.combined == whole
+    assert [reason.kind for reason in found.verdict.faults] == ["few-windows"] * refused
+    assert found.verdict.refused == refused
+    if refused:
+        assert re.search(rf": on {whole} of [89] windows, a third at least is needed$", found.verdict.faults[0].what)
+
+
+@pytest.mark.parametrize("hangs", [False, True])
+def test_only_of_a_flag_it_is_a_fault_to_hang_from_above_and_beside_no_pole(
+    hangs: bool, model: Estimator, cloth_model: Estimator
+) -> None:
+    faults = [
+        Finding(kind=kind, severity=Severity.ERROR, what=kind, fix="")
+        for kind in ("no-pole", "hangs-from-above", "cut-off")
+    ]
+
+    class Faulty(Frames):
+        def findings(self) -> tuple[Finding, ...]:
+            return tuple(faults)
+
+    found = measured(Faulty(time=np.arange(40) / RATE, images=pictures(40)), cloth_model if hangs else model)
+    expected = ["cut-off"] if hangs else [fault.kind for fault in faults]
+    assert [reason.kind for reason in found.verdict.faults] == expected
+    assert [finding.kind for finding in found.findings if finding in faults] == expected
+
+
+def test_a_size_typed_height_first_is_named_where_the_film_is_too_slow_for_it(model: Estimator) -> None:
+    """A flag of 1 m needs √1.5 times the pictures of one of 1.5 m, or 29.1 a second if one in twenty may be lacking."""
+    different = (np.arange(200) // 20) * 9 + np.minimum(np.arange(200) % 20 // 2, 8)  # 27 of 60 frames a second
+    film = Frames(time=np.arange(200) / 60.0, images=pictures(100)[different])
+    with pytest.raises(RefusedError, match="there are too few frames a second") as caught:
+        measured(film, model, size=FlagSize(length=1.0, height=1.5))
+    assert "a flag of 1 m needs 29.1" in caught.value.what
+    assert caught.value.fix is not None
+    assert caught.value.fix.endswith("of a flag 1 m high and 1.5 m long give --flag-size 1.5x1")
+    with pytest.raises(RefusedError, match=r"needs 29\.09") as slow:
+        measured(even(40), model, size=FlagSize(length=1.0, height=1.5))
+    assert slow.value.fix is not None
+    assert slow.value.fix.endswith("give --flag-size 1.5x1")
+    with pytest.raises(RefusedError) as small:
+        measured(even(40), model, size=FlagSize(length=1.0, height=0.7))
+    assert "--flag-size" not in str(small.value.fix)
 
 
 @pytest.mark.parametrize(("every", "raised"), [(2, RefusedError), (FRAMES, UsageError)])
