@@ -46,7 +46,7 @@ REASONS: dict[str, Fault] = {
     ),
     "no-pole": Fault(
         sentence="what moves may be no flag on a pole, as no upright edge stands still beside it",
-        fix="make sure that a flag and its pole are in the picture, and choose the flag by --flag or --crop",
+        fix="make sure that a flag on its pole is in the picture, and crop to both",
         of_motion=True,
         of_flags=True,
     ),

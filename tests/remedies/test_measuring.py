@@ -135,7 +135,7 @@ def test_one_of_several_flags_is_chosen(user: User, command: tuple[str, ...]) ->
 
 def test_a_flag_that_is_longer_than_its_size_says_is_given_its_size(user: User, command: tuple[str, ...]) -> None:
     given = ("measure", "example:flag", *command[2:], "--anyway")
-    user.meets("film/conditioned.py", "check --flag-size: length along the wind", *given, "--flag-size", "1.5x5")
+    user.meets("gate/reasons.py", "check --flag-size: length along the wind", *given, "--flag-size", "1.5x5")
     user.follows(*given, *SIZED, shows=WIND)
 
 

@@ -62,6 +62,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("measure/gate/verdict.py", "crop to the flag by --cr"),
         ("measure/gate/verdict.py", "give --flag-size, the le"),
         ("measure/estimate/joint.py", "weigh the cloth and give"),
+        ("measure/gate/reasons.py", "give the part in which t"),
         ("measure/estimate/measuring.py", "check --area-weight and"),
         ("measure/estimate/measuring.py", "choose a part of the fil"),
         ("measure/estimate/measuring.py", "give the wind of single"),
