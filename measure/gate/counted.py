@@ -41,8 +41,8 @@ pole: a hoist is as long as its flag is high, and a flag visits places of twice 
 the least was 0.67, of water 0.46, of wind turbines 0.27."""
 _BAR, _OVER = 1.0, 1.5
 """Length of a level line along the cloth's top, in widths of its places, and the same over the height of the pole, from
-both of which on it hangs from a bar. Of these films none had more than 1.0 and more than 0.71 together, a flag that hangs
-from a line had 1.23 and 2.4."""
+both of which on it hangs from a bar. Of these films none had more than 1.0 and more than 0.71 together, a flag that
+hangs from a line had 1.23 and 2.4."""
 _PADDED = 1 / 3
 """Share of the square about the cloth that lies beyond the picture, above which too little but cloth is shown. Of films
 of whole flags the most was 0.2."""
