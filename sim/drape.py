@@ -37,7 +37,7 @@ DISC = 0.15
 """Radius of the cloth [m], the medium one of the three that the standards have."""
 
 
-def disc(*, radius: float = DISC, pedestal: float = PEDESTAL, rows: int = 7, seed: int = 0) -> Mesh:
+def disc(rng: np.random.Generator, *, radius: float = DISC, pedestal: float = PEDESTAL, rows: int = 7) -> Mesh:
     """Makes a disc of nearly equilateral triangles, in rings turned against each other at random, so that no direction
     is preferred.
 
@@ -45,6 +45,7 @@ def disc(*, radius: float = DISC, pedestal: float = PEDESTAL, rows: int = 7, see
     triangles bends half of its width alone, so that this is where the cloth is clamped, to second order in the width.
 
     Args:
+        rng: of the rings' turns.
         radius, pedestal: [m].
         rows: of triangles from the edge outwards, beside half of one; vertices on the pedestal are farther apart.
 
@@ -61,7 +62,6 @@ def disc(*, radius: float = DISC, pedestal: float = PEDESTAL, rows: int = 7, see
         raise InputError(f"a border of {rows} rows of triangles", where="drape", fix="give at least 3")
     from scipy.spatial import Delaunay
 
-    rng = np.random.default_rng(seed)
     height = (radius - pedestal) / (rows + 0.5)
     side = 2 * height / math.sqrt(3)
     radii = pedestal + height * (np.arange(rows + 2) - 0.5)

@@ -1,1 +1,24 @@
 """The cloth of a drape test: scans of discs over a pedestal, simulated drapes, and the bending that fits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from measure.drape.answer import answered
+    from measure.drape.fit import Face, Fit, Model, Surface, fitted, together
+    from measure.drape.shape import rim_of, shape_of
+    from measure.drape.simulation import (
+        BENDING_LENGTH,
+        CLOTH,
+        CURVATURE,
+        DrapeBatch,
+        material,
+        mesh,
+        ratio,
+        simulated,
+    )
+
+__getattr__ = lazy_exports(__name__, __file__)

@@ -113,7 +113,7 @@ def ratio(anisotropy: float) -> float:
 @functools.cache
 def mesh(rows: int = ROWS) -> tuple[Mesh, IntArray]:
     """Makes the mesh of all simulated drapes, with its rim."""
-    made = disc(rows=rows)
+    made = disc(np.random.default_rng(0), rows=rows)  # the mesh of the sheet
     return made, rim_of(made.rest, made.faces)
 
 

@@ -75,7 +75,7 @@ def _plate_droop(bending_length: float, poisson: float) -> float:
 
 
 def test_a_stiff_disc_droops_as_an_annular_plate() -> None:
-    mesh = disc(rows=7)
+    mesh = disc(np.random.default_rng(0), rows=7)
     droop = -_at_rest(mesh, [_cloth(0.14)], sigma=0.0)[..., 0]
     rim = np.hypot(mesh.rest[:, 0], mesh.rest[:, 1]) > DISC - 1e-6
     # Second order in the width of a row, an eighth of the border; the membrane adds (droop/border)², < 0.1 %.
@@ -86,7 +86,7 @@ def test_finer_meshes_drape_alike_and_stiffer_cloth_less() -> None:
     lengths = (0.018, 0.024)
     found = []
     for rows in (4, 6):
-        mesh = disc(rows=rows, seed=rows)
+        mesh = disc(np.random.default_rng(rows), rows=rows)
         positions = _at_rest(mesh, [_cloth(length) for length in lengths])
         found.append([_projected(mesh, positions[..., i]) for i in range(len(lengths))])
         radius = np.hypot(positions[:, 0], positions[:, 1])
@@ -97,7 +97,7 @@ def test_finer_meshes_drape_alike_and_stiffer_cloth_less() -> None:
 
 
 def test_rest_depends_on_stiffness_over_weight_alone() -> None:
-    mesh = disc(rows=3)
+    mesh = disc(np.random.default_rng(0), rows=3)
     light = _cloth(0.02, area_weight=0.1)
     heavy = light.scaled(area_weight=4.0, bending=4.0, stretching=4.0)
     # By a power of two, so that no digit rounds otherwise.
@@ -105,7 +105,7 @@ def test_rest_depends_on_stiffness_over_weight_alone() -> None:
 
 
 def test_what_lies_on_the_pedestal_is_clamped_half_a_row_around_its_edge() -> None:
-    mesh = disc(rows=4)
+    mesh = disc(np.random.default_rng(0), rows=4)
     radius = np.hypot(mesh.rest[:, 0], mesh.rest[:, 1])
     held = list(on_pedestal(mesh))
     height = (DISC - PEDESTAL) / 4.5
@@ -116,4 +116,4 @@ def test_what_lies_on_the_pedestal_is_clamped_half_a_row_around_its_edge() -> No
 @pytest.mark.parametrize(("arguments", "match"), [({"pedestal": 0.2}, "under a cloth"), ({"rows": 2}, "2 rows")])
 def test_a_disc_without_a_border_is_refused(arguments: dict[str, float], match: str) -> None:
     with pytest.raises(InputError, match=match):
-        disc(**arguments)  # pyright: ignore[reportArgumentType]
+        disc(np.random.default_rng(0), **arguments)  # pyright: ignore[reportArgumentType]

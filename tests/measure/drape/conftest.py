@@ -11,8 +11,7 @@ import pytest
 from flagdata.arrays import FloatArray
 from flagdata.ingest.meshes import Obj, write_obj
 from measure.cloth import draws
-from measure.drape import answer
-from measure.drape.simulation import CLOTH
+from measure.drape import CLOTH, answer
 from sim.drape import DISC, PEDESTAL, disc
 
 COUNT = 128
@@ -40,7 +39,7 @@ def simulated(count: int, *, seed: int, **_: object) -> tuple[Mapping[str, Float
 
 def scan(coefficient: float, *, lobe: float = 0.0) -> Obj:
     """A drape with folds of the seventh order and this drape coefficient, z upwards, on a table 0.3 m above zero."""
-    mesh = disc(rows=5)
+    mesh = disc(np.random.default_rng(0), rows=5)
     radius = np.hypot(mesh.rest[:, 0], mesh.rest[:, 1])
     angle = np.arctan2(mesh.rest[:, 1], mesh.rest[:, 0])
     outside = np.clip(radius - PEDESTAL, 0.0, None)

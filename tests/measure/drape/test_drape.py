@@ -16,10 +16,7 @@ from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.findings import Finding
 from flagdata.stated import Stated
 from measure.commands.calibrate import calibrate
-from measure.drape.answer import answered
-from measure.drape.fit import Face, Model, Surface, fitted
-from measure.drape.shape import rim_of, shape_of
-from measure.drape.simulation import DrapeBatch, material, ratio
+from measure.drape import DrapeBatch, Face, Model, Surface, answered, fitted, material, ratio, rim_of, shape_of
 from sim.drape import disc
 from tests.measure.drape.conftest import COUNT, NOISE, scan, shapes, simulated
 
@@ -27,7 +24,7 @@ G = 9.81
 
 
 def test_a_flat_disc_covers_its_border_and_has_no_folds() -> None:
-    mesh = disc(rows=5)
+    mesh = disc(np.random.default_rng(0), rows=5)
     flat = np.concatenate([mesh.rest, np.zeros((mesh.vertex_count, 1))], axis=1)
     seen = shape_of(mesh.rest, mesh.faces, flat)
     assert seen.coefficient == pytest.approx(1.0, abs=0.003)  # a polygon of 81 corners

@@ -15,9 +15,21 @@ import numpy as np
 from scipy.stats import ttest_1samp
 
 from flagdata.caches import user_cache
-from measure.drape.fit import Face, Fit, Model, Surface, fitted, together
-from measure.drape.shape import rim_of, shape_of
-from measure.drape.simulation import BENDING_LENGTH, CURVATURE, DrapeBatch, ratio, simulated
+from measure.drape import (
+    BENDING_LENGTH,
+    CURVATURE,
+    DrapeBatch,
+    Face,
+    Fit,
+    Model,
+    Surface,
+    fitted,
+    ratio,
+    rim_of,
+    shape_of,
+    simulated,
+    together,
+)
 from sim.scene import GRAVITY
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.drapes_picture import bank, cantilevers, draw

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from measure.drape.fit import Surface
-from measure.drape.simulation import DrapeBatch, mesh
+from measure.drape import DrapeBatch, Surface, mesh
 from sim.material import named
 from sim.scene import GRAVITY
 from tests.evidence import REFERENCE
