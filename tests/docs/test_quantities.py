@@ -28,6 +28,7 @@ OF_THE_AIR = {
     "measure/observe/recipe.py",
     "measure/report/statement.py",
     "sim/air.py",
+    "sim/drape.py",
     "sim/run/reading.py",
     *(f"sim/{part}/{name}.py" for part, name in (("kernel", "fused"), ("kernel_warp", "batch"))),
     "sim/kernel_warp/leapfrog.py",

@@ -14,7 +14,7 @@ from tests.docs.calls import example
 from tests.flagdata.conftest import write_video
 
 ELSEWHERE = {
-    "measure", "example", "calibrate", "close_loop", "build", "train", "evaluate",  # minutes
+    "measure", "example", "calibrate", "close_loop", "propose", "build", "train", "evaluate",  # minutes
     "clone", "push", "pull",  # a bucket
     "declare_cloths",  # films of many cloths
 }  # fmt: skip
