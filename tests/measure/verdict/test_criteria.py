@@ -18,7 +18,7 @@ STAGES = ("verdict", "forecasting", "probes", "inference", "nulls", "loop", "clo
 METHOD = {
     "closing/joint": {"_CERTAIN"},
     "forecasting/alignment": {"_CALM"},
-    "forecasting/calibration": {"_DENSITY", "_BENDING", "_DAMPING", "PRIOR", "PRIOR_WITHOUT_MASS"},
+    "forecasting/calibration": {"_AREA_WEIGHT", "_BENDING", "_DAMPING", "PRIOR", "PRIOR_WITHOUT_MASS"},
     "forecasting/model": {"_SHARE"},
     "forecasting/observer": {"WIDEST", "_JOINT"},
     "forecasting/regressors": {"_MODES", "_MOTIONS"},
@@ -31,7 +31,7 @@ METHOD = {
     "probes/wind_log": {"NUISANCES", "DIRECTION", "_STEPS", "_REACH", "_LAGS", "_CALM"},
     "inference/evidence": {"_HERE"},
     "inference/random_effect": {"_SHIFTS", "_POWERS", "_UNSEEN"},
-    "nulls/bank": {"WINDS", "_VERSION", "_DENSITY", "_BENDING", "_DAMPING"},
+    "nulls/bank": {"WINDS", "_VERSION", "_AREA_WEIGHT", "_BENDING", "_DAMPING"},
     "nulls/conformal": {"MOST_KINDS"},
     "nulls/free_run": {"_COPIES"},
     "nulls/stiffness": {"_STRETCHING", "_APART"},

@@ -25,7 +25,7 @@ Make = Callable[..., DatasetRecipe]
 def build_of(lake: Lake, recipe: DatasetRecipe) -> Build:
     """A build without workers: what it asks of them fails."""
     nobody: Any = None
-    return Build(lake=lake, recipe=recipe, client=nobody, bars=lambda *_: nullcontext(lambda _: None), say=print)
+    return Build(lake=lake, recipe=recipe, workers=nobody, bars=lambda *_: nullcontext(lambda _: None))
 
 
 def films(lake: Lake, recipe: DatasetRecipe) -> list[PlannedFilm]:

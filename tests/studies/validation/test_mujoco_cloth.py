@@ -51,7 +51,7 @@ def _hanging(sheet: Sheet) -> FloatArray:
 FREE = Sheet(
     mesh=grid(width=0.6, height=0.4, columns=6, rows=4),
     held=(),
-    density=0.284,
+    area_weight=0.284,
     stretching=80.0,
     poisson=0.2,
     bending=2e-5,
@@ -85,7 +85,7 @@ def test_a_level_sheet_in_air_falls_towards_its_terminal_speed(mujoco: Path, met
         frames=21,
         gravity=GRAVITY,
     )
-    terminal = math.sqrt(FREE.density * GRAVITY / 1.3)
+    terminal = math.sqrt(FREE.area_weight * GRAVITY / 1.3)
     expected = -terminal * np.tanh(GRAVITY * np.arange(21) * 0.04 / terminal)
     # Forces are those at the start of a step: late by half a step, h g/2 at most.
     np.testing.assert_allclose(made.velocities[:, :, 2].mean(axis=1), expected, atol=method.step * GRAVITY / 2)
@@ -106,7 +106,7 @@ def test_a_level_sheet_whose_pressure_lags_falls_as_wagners_function_has_it(mujo
         held_back = 0.165 * (load - slow) + 0.335 * (load - fast)
         tau = 2 * abs(speed) / 0.6
         return [
-            GRAVITY - (load - 0.8 * held_back) / FREE.density,
+            GRAVITY - (load - 0.8 * held_back) / FREE.area_weight,
             tau * 0.0455 * (load - slow),
             tau * 0.3 * (load - fast),
         ]
@@ -135,7 +135,7 @@ def test_air_that_is_carried_slows_the_first_fall_of_a_level_sheet(mujoco: Path)
     mass = 0.9 / ((math.pi / 0.6 / 2) ** 1.5 + (4 / (math.pi * 0.4)) ** 1.5) ** (2 / 3)
     ellipse = np.sqrt(np.clip(1 - (FREE.mesh.rest[:, 1] / 0.2 - 1) ** 2, 0, None))
     ellipse /= (ellipse * FREE.mesh.vertex_areas).sum() / FREE.mesh.vertex_areas.sum()
-    expected = -GRAVITY * 1e-3 * FREE.density / (FREE.density + mass * ellipse)
+    expected = -GRAVITY * 1e-3 * FREE.area_weight / (FREE.area_weight + mass * ellipse)
     np.testing.assert_allclose(made.velocities[1, :, 2], expected, rtol=1e-3)
 
 
@@ -193,9 +193,10 @@ def test_the_wind_pushes_a_level_sheet_by_its_tangential_drag(mujoco: Path) -> N
         frames=11,
         gravity=0.0,
     )
-    expected = 3.0 * -np.expm1(-0.4 * np.arange(11) * 0.04 / FREE.density)
+    expected = 3.0 * -np.expm1(-0.4 * np.arange(11) * 0.04 / FREE.area_weight)
     # An explicit step of h errs by h c/(2 σ) of what changes.
-    np.testing.assert_allclose(made.velocities[:, :, 0].mean(axis=1), expected, atol=3.0 * 0.5e-3 * 0.4 / FREE.density)
+    bound = 3.0 * 0.5e-3 * 0.4 / FREE.area_weight
+    np.testing.assert_allclose(made.velocities[:, :, 0].mean(axis=1), expected, atol=bound)
 
 
 @pytest.mark.parametrize("along", [0, 1])
@@ -212,7 +213,7 @@ def test_a_clamped_sheet_vibrates_as_an_elastic_beam(mujoco: Path, along: int) -
     mesh = grid(**size)
     place = mesh.rest[:, along]
     held = tuple(np.flatnonzero(place < 1.5 * length / cells).tolist())
-    sheet = Sheet(mesh=mesh, held=held, density=density, stretching=200.0, bending=rigidity)
+    sheet = Sheet(mesh=mesh, held=held, area_weight=density, stretching=200.0, bending=rigidity)
     beta, reach = 1.875104 / length, 0.734096
     s = place - length / cells
     mode = np.cosh(beta * s) - np.cos(beta * s) - reach * (np.sinh(beta * s) - np.sin(beta * s))
@@ -244,7 +245,7 @@ def test_a_hanging_sheet_sags_under_its_own_weight(mujoco: Path, method: Method)
     """The weight below a point is the tension there, Y λ (λ² − 1)/2 of a Saint Venant–Kirchhoff strip of stretch λ."""
     mesh = grid(width=0.05, height=1.0, columns=1, rows=20)
     top = tuple(np.flatnonzero(mesh.rest[:, 1] > 1 - 1e-9).tolist())
-    sheet = Sheet(mesh=mesh, held=top, density=0.3, stretching=20.0, bending=1e-6, damping=20e-3)
+    sheet = Sheet(mesh=mesh, held=top, area_weight=0.3, stretching=20.0, bending=1e-6, damping=20e-3)
     made = fly(
         mujoco,
         sheet,
@@ -259,7 +260,7 @@ def test_a_hanging_sheet_sags_under_its_own_weight(mujoco: Path, method: Method)
     )
 
     def stretch(below: float) -> float:
-        tension = sheet.density * GRAVITY * below
+        tension = sheet.area_weight * GRAVITY * below
         return float(np.roots([sheet.stretching / 2, 0.0, -sheet.stretching / 2, -tension]).real.max())
 
     length = quad(stretch, 0.0, 1.0)[0]
@@ -273,7 +274,7 @@ def test_a_hanging_strip_swings_with_the_period_of_a_chain(mujoco: Path) -> None
     """Bernoulli's hanging chain: ω = (j₀,₁/2) √(g/L) with j₀,₁ = 2.4048, its shape J₀(j₀,₁ √(s/L))."""
     mesh = grid(width=0.1, height=1.0, columns=1, rows=20)
     top = tuple(np.flatnonzero(mesh.rest[:, 1] > 1 - 1e-9).tolist())
-    sheet = Sheet(mesh=mesh, held=top, density=0.3, stretching=2000.0, bending=1e-8, damping=1e-4)
+    sheet = Sheet(mesh=mesh, held=top, area_weight=0.3, stretching=2000.0, bending=1e-8, damping=1e-4)
     start = _hanging(sheet)
     reference = start.copy()
     start[:, 1] = 0.01 * j0(2.40483 * np.sqrt(mesh.rest[:, 1]))
@@ -299,7 +300,7 @@ def test_a_hanging_strip_swings_with_the_period_of_a_chain(mujoco: Path) -> None
 def test_a_swinging_sheet_without_losses_keeps_its_energy(mujoco: Path) -> None:
     """Semi-implicit Euler is symplectic: its energy wavers by the step and does not drift."""
     mesh = grid(width=0.5, height=0.5, columns=6, rows=6)
-    sheet = Sheet(mesh=mesh, held=(0, 42), density=0.284, stretching=80.0, poisson=0.2, bending=1e-7)
+    sheet = Sheet(mesh=mesh, held=(0, 42), area_weight=0.284, stretching=80.0, poisson=0.2, bending=1e-7)
     u, v = mesh.rest.T
     start = np.stack([u * math.cos(0.5), u * math.sin(0.5), v], axis=1)
     made = fly(

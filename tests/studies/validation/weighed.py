@@ -196,7 +196,7 @@ def by_mujoco(truth: Mapping[str, Any]) -> FloatArray:
     sheet = Sheet(
         mesh=own,
         held=handles.corners(own.rest),
-        density=truth["area_weight"],
+        area_weight=truth["area_weight"],
         stretching=NOMINAL.stretching * truth["stretching_factor"],
         poisson=NOMINAL.poisson,
         bending=NOMINAL.bending * truth["bending_factor"],
@@ -245,7 +245,7 @@ def _scene(own: Mesh, truth: Mapping[str, Any], *, damped: float) -> Scene:
     base = named(truth["fabric"])
     material = replace(
         base,
-        density=truth["area_weight"],
+        area_weight=truth["area_weight"],
         bending=base.bending * truth["bending_factor"],
         stretching=base.stretching * truth["stretching_factor"],
         damping=max(truth["damping"] - damped, 0.0),

@@ -63,7 +63,7 @@ class Sheet:
     Attributes:
         mesh: at rest.
         held: vertices that are held rigidly.
-        density: mass for each area [kg/m²].
+        area_weight: mass for each area [kg/m²].
         stretching: Y = E t, Young's modulus times thickness [N/m].
         poisson: Poisson's ratio.
         bending: D = E t³/(12 (1 − ν²)), flexural rigidity [N·m].
@@ -73,7 +73,7 @@ class Sheet:
 
     mesh: Mesh
     held: tuple[int, ...]
-    density: float
+    area_weight: float
     stretching: float
     poisson: float = 0.0
     bending: float
@@ -88,7 +88,7 @@ class Sheet:
     @property
     def mass(self) -> FloatArray:
         """(vertex,) a third of each face's at its corners, and what is added [kg]."""
-        own = self.density * self.mesh.vertex_areas
+        own = self.area_weight * self.mesh.vertex_areas
         return own if self.added is None else own + self.added
 
 

@@ -42,7 +42,7 @@ NOMINAL = Sheet(
     bending=9e-6,
     damping=0.25e-3,
 )
-"""About Camel Ponte Roma, isotropic: its area area weight, tension at small strain, and k/4 of its bending table."""
+"""About Camel Ponte Roma, isotropic: its area weight, tension at small strain, and k/4 of its bending table."""
 SPREAD: Mapping[str, tuple[float, float]] = {
     "area_weight": (0.85, 1.18),
     "stretching": (0.7, 1.5),
@@ -204,14 +204,14 @@ def write(truth: Truth, folder: Path, *, python: Path, seed: int) -> Path:
 def material_text() -> str:
     """The nominal cloth as a material file: entries that act as this membrane and these hinges do.
 
-    The tables' entries count twice in the membrane, whose energy area weight is (k0 G00² + 2 k1 G00 G11 + k2 G11² +
+    The tables' entries count twice in the membrane, whose energy density is (k0 G00² + 2 k1 G00 G11 + k2 G11² +
     2 k3 G01²)/2, and hinges of an entry k store k/4 κ²/2 in a cylinder.
     """
     plain = NOMINAL.stretching / (1 - NOMINAL.poisson**2)
     row = [plain / 2, NOMINAL.poisson * plain / 2, plain / 2, NOMINAL.stretching / (1 + NOMINAL.poisson) / 2]
     bending = [4 * NOMINAL.bending] * 5
     return (
-        f'source = "constant stiffness"\ndensity = {NOMINAL.area_weight}\ndamping = {NOMINAL.damping}\n'
+        f'source = "constant stiffness"\narea-weight = {NOMINAL.area_weight}\ndamping = {NOMINAL.damping}\n'
         f"stretching = {[row] * 6}\nbending = {[bending] * 3}\n"
     )
 

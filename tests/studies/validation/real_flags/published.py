@@ -19,7 +19,7 @@ from tests.studies.validation.real_flags.runs import AIR, HEIGHT, LENGTH, READIN
 
 DENSITIES = (0.284, 0.11)
 SPEEDS = (2.5, 4.0, 6.0, 10.0)
-FLAGS = tuple(Flag(density=density, speed=speed) for density in DENSITIES for speed in SPEEDS)
+FLAGS = tuple(Flag(area_weight=density, speed=speed) for density in DENSITIES for speed in SPEEDS)
 STREAMING = tuple(flag for flag in FLAGS if flag.speed >= 6)
 """Those whose drag and waves are compared: the sources are about flags that stream."""
 _AREA = LENGTH * HEIGHT
@@ -63,12 +63,12 @@ def about(value: float, share: float) -> tuple[float, float]:
 
 def code_drag(flag: Flag, *, constant: float) -> float:
     """C_D of a free flag: constant + 0.7 (m/ρH) (LH/H²)^−1.25, as the codes have it."""
-    return constant + 0.7 * flag.density / (AIR * HEIGHT) * (_AREA / HEIGHT**2) ** -1.25
+    return constant + 0.7 * flag.area_weight / (AIR * HEIGHT) * (_AREA / HEIGHT**2) ** -1.25
 
 
 def label(flag: Flag) -> str:
     """A flag in words."""
-    return f"{1e3 * flag.density:g} g/m², {flag.speed:g} m/s"
+    return f"{1e3 * flag.area_weight:g} g/m², {flag.speed:g} m/s"
 
 
 def _each(reading: str, flags: tuple[Flag, ...]) -> Callable[[FloatArray], list[float]]:
@@ -85,7 +85,7 @@ def _speed_of_droop(values: FloatArray) -> list[float]:
     column = READINGS.index("droop")
     found = []
     for density in DENSITIES:
-        rows = [i for i, flag in enumerate(FLAGS) if flag.density == density]
+        rows = [i for i, flag in enumerate(FLAGS) if flag.area_weight == density]
         droops, winds = values[rows, column], np.log(SPEEDS)
         found.append(float(np.exp(np.interp(-math.pi / 4, -droops, winds))))
     return found
@@ -94,7 +94,7 @@ def _speed_of_droop(values: FloatArray) -> list[float]:
 def _exponents(values: FloatArray) -> list[float]:
     """n of F ∝ Uⁿ from 6 to 10 m/s, by density."""
     column = READINGS.index("drag")
-    drags = [[values[FLAGS.index(Flag(density=d, speed=u)), column] for u in (6.0, 10.0)] for d in DENSITIES]
+    drags = [[values[FLAGS.index(Flag(area_weight=d, speed=u)), column] for u in (6.0, 10.0)] for d in DENSITIES]
     return [2 + math.log(fast / slow) / math.log(10 / 6) for slow, fast in drags]
 
 
@@ -102,7 +102,7 @@ def _amplitude_exponents(values: FloatArray) -> list[float]:
     """n of amplitude ∝ mⁿ, by wind."""
     column = READINGS.index("amplitude")
     heavy, light = DENSITIES
-    sizes = [[values[FLAGS.index(Flag(density=d, speed=u)), column] for d in DENSITIES] for u in (6.0, 10.0)]
+    sizes = [[values[FLAGS.index(Flag(area_weight=d, speed=u)), column] for d in DENSITIES] for u in (6.0, 10.0)]
     return [math.log(a / b) / math.log(heavy / light) for a, b in sizes]
 
 

@@ -38,7 +38,7 @@ def test_a_wave_towards_the_hoist_has_no_length() -> None:
 
 
 def test_readings_have_the_units_that_they_state() -> None:
-    flag = Flag(density=0.2, speed=5.0)
+    flag = Flag(area_weight=0.2, speed=5.0)
     across = 0.1 * ALONG * np.cos(2 * np.pi * (2 * TIMES[:, None] - ALONG / 1.5))
     course = np.stack([np.tile(1.5 * ALONG, (300, 1)), across, np.tile(-0.75 * ALONG, (300, 1))], axis=2)
     force = np.tile([2.25, 0.0, 0.0], (300, 1))
@@ -57,7 +57,7 @@ def test_readings_have_the_units_that_they_state() -> None:
 
 def test_the_codes_drag_is_that_of_a_worked_example() -> None:
     """0.284/1.2 = 0.2367; 1.5^−1.25 = 0.6024; 0.7 of their product is 0.0998."""
-    assert code_drag(Flag(density=0.284, speed=6.0), constant=0.02) == pytest.approx(0.1198, abs=1e-4)
+    assert code_drag(Flag(area_weight=0.284, speed=6.0), constant=0.02) == pytest.approx(0.1198, abs=1e-4)
 
 
 def test_at_least_ten_numbers_are_comparable_and_none_both_fits_and_judges() -> None:
