@@ -87,7 +87,7 @@ def loop_scene(folder: Path) -> Scene:
         noise=NOISE,
         speeds=SPEEDS,
         seed=77,
-        calibrations=(Calibration(density=1.1, bending=0.7, damping=1e-3),) * len(SPEEDS),
+        calibrations=(Calibration(area_weight=1.1, bending=0.7, damping=1e-3),) * len(SPEEDS),
         effects=(EFFECTS["lift"](coefficient=0.6),),
     ).simulate()
     _tracks(folder / "tracks.csv", mesh.rest, [recording.positions for recording in recordings])

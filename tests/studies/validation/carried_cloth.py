@@ -115,7 +115,7 @@ def recorded(experiment: Experiment, effects: Sequence[Effect], *, seed: int) ->
         rate=first.rate,
         duration=lasting,
         noise=noise,
-        calibrations=(Calibration(density=1.1, bending=1.5, damping=3e-3),) * count,
+        calibrations=(Calibration(area_weight=1.1, bending=1.5, damping=3e-3),) * count,
         speeds=(0.0,) * count,
         seed=seed,
         tracks=tracks.like(aligned.recordings, specimen.seats, count, duration=lasting, seed=seed),

@@ -73,7 +73,7 @@ def _plain(values: FloatArray) -> list[float | None]:
 
 def broadside_speed() -> float:
     """Wind whose force on the cloth spread across it equals the cloth's weight, √(ρ_s g/ρ), ρ = 1 kg/m³ [m/s]."""
-    return math.sqrt(CAMEL.density * -GRAVITY[2])
+    return math.sqrt(CAMEL.area_weight * -GRAVITY[2])
 
 
 def _scatter(axes: Axes, ensemble: Ensemble, name: str, colour: str, label: str, *, shift: float = 0.0) -> None:

@@ -79,7 +79,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
                 rows[kind][name] = projection.of(readings_of([made], folder=folder)[:, 0]) - base
     sheet = {
         "observables": list(OBSERVED),
-        "stated": {"bias": numerics.BIAS.tolist(), "sigma": numerics.SIGMA.tolist()},
+        "stated": {"mean": numerics.MEASURED.mean.tolist(), "sigma": numerics.MEASURED.sigma.tolist()},
         "found": {
             kind: {name: _about(change) for name, change in {**of, "all": np.concatenate(list(of.values()))}.items()}
             for kind, of in rows.items()

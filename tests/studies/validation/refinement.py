@@ -156,7 +156,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         "model": estimator.name,
         "budget": budget,
         "level": LEVEL,
-        "density_range": space.density.high - space.density.low,
+        "density_range": space.area_weight.high - space.area_weight.low,
         "methods": rows,
         "scores": [vars(score).copy() for score in scores],
         "seconds_per_evaluation": {stage: float(np.median(values)) for stage, values in stages.items()},

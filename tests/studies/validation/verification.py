@@ -102,12 +102,12 @@ def verify(seed: int) -> dict[str, Any]:
 
 
 def _elastica() -> dict[str, Any]:
-    tips = drooped_tips(_TABLES, columns=24, length=_STRIP, density=_DENSITY)
+    tips = drooped_tips(_TABLES, columns=24, length=_STRIP, area_weight=_DENSITY)
     exact = np.array([elastica_tip(k / 5, _DENSITY * G, _STRIP) for k in _TABLES])
     middle, columns = 2, (6, 12, 24)
     errors = []
     for n in columns:
-        found = drooped_tips(_TABLES[middle : middle + 1], columns=n, length=_STRIP, density=_DENSITY)[0]
+        found = drooped_tips(_TABLES[middle : middle + 1], columns=n, length=_STRIP, area_weight=_DENSITY)[0]
         errors.append(float(np.linalg.norm(found - exact[middle])) / _STRIP)
     return {
         "load": [_DENSITY * G * _STRIP**3 / (k / 5) for k in _TABLES],
