@@ -216,7 +216,7 @@ def _arcsim(count: int, *, frames: int, seed: int) -> list[Target]:
     otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
     clips = reference_clips(REFERENCE / "arcsim", seed, frames, views=-(-count // REFERENCE_RUNS))
     return [
-        Target(name=name, clip=film[:frames], view=otherwise, truth={"wind_speed": wind, "density": density})
+        Target(name=name, clip=film[:frames], view=otherwise, truth={"wind_speed": wind, "area_weight": density})
         for name, (film, wind, density) in list(clips)[:count]
     ]
 
@@ -238,7 +238,7 @@ def _regression(target: Target, estimator: Estimator, space: Space, seed: int) -
     draws = start.amortised(estimator, target.clip, space, aspect=1.5, seed=seed, draws=models.DRAWS)
     seconds = time.perf_counter() - begun
     low, middle, high = np.quantile(draws, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0)
-    wind, density = target.truth["wind_speed"], target.truth["density"]
+    wind, density = target.truth["wind_speed"], target.truth["area_weight"]
     return Score(
         method=_REGRESSION,
         wind_error=abs(middle[0] - wind),
@@ -267,14 +267,14 @@ def _boosting(target: Target, models: Fitted) -> Score:
     seconds = time.perf_counter() - begun
     level = models.boosting.levels
     low, middle, high = (quantiles[level.index(p)] for p in (0.05, 0.5, 0.95))
-    wind, density = (TARGETS.index(name) for name in ("wind_speed", "density"))
+    wind, density = (TARGETS.index(name) for name in ("wind_speed", "area_weight"))
     true = target.truth
     return Score(
         method="boosting on hand-made features",
         wind_error=abs(middle[wind] - true["wind_speed"]),
-        density_error=abs(middle[density] - true["density"]),
+        density_error=abs(middle[density] - true["area_weight"]),
         wind_inside=bool(low[wind] <= true["wind_speed"] <= high[wind]),
-        density_inside=bool(low[density] <= true["density"] <= high[density]),
+        density_inside=bool(low[density] <= true["area_weight"] <= high[density]),
         evaluations=0,
         seconds=seconds,
     )
@@ -287,7 +287,7 @@ def _seconds(found: Refinement) -> float:
 def _of_own(target: Target, found: Refinement) -> Score:
     """Errors of the posterior's medians, also where `found` gives a bound instead: no hard target is left out."""
     wind, density = (entry.span for entry in found.intervals[:2])
-    truth = target.truth["wind_speed"], target.truth["density"]
+    truth = target.truth["wind_speed"], target.truth["area_weight"]
     values = found.evaluators[0].simulator.space.values(found.posterior.points)
     middle = np.median(found.posterior.winds[:, 0]), np.median(values[:, DENSITY])
     return Score(
@@ -317,7 +317,7 @@ def _of_trace(
     return Score(
         method=method,
         wind_error=abs(value[WIND] - target.truth["wind_speed"]),
-        density_error=abs(value[DENSITY] - target.truth["density"]),
+        density_error=abs(value[DENSITY] - target.truth["area_weight"]),
         wind_inside=None,
         density_inside=None,
         evaluations=count,
