@@ -293,7 +293,8 @@ def _without_windows(
             )
         repeated = REASONS["repeated-frames"]
         return RefusedError(
-            f"{repeated.sentence}: {repeating}, and {windows}",
+            f"{repeated.sentence}: {repeating}, and none of {reader.layout.count} windows has all its frames: in the "
+            f"one at {start:.2f} s {lack}",
             where=film.name,
             fix=repeated.fix,
         )

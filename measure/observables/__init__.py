@@ -44,7 +44,7 @@ OBSERVABLES = Registry(
         "middle-speed": "measure.observables.middle_speed:MIDDLE_SPEED",
         "outline-speed": "measure.observables.outline_speed:OUTLINE_SPEED",
         "frequency": "measure.observables.frequency:FREQUENCY",
-        "bandwidth": "measure.observables.bandwidth:BANDWIDTH",
+        "bandwidth": "measure.observables.frequency:BANDWIDTH",
         "amplitude-up": "measure.observables.amplitude_up:AMPLITUDE_UP",
         "amplitude-across": "measure.observables.amplitude_across:AMPLITUDE_ACROSS",
         "wave-speed": "measure.observables.wave_speed:WAVE_SPEED",

@@ -1,4 +1,4 @@
-"""Centroid of the free edge's spectrum."""
+"""Centroid and bandwidth of the free edge's spectrum."""
 
 from __future__ import annotations
 
@@ -41,4 +41,24 @@ FREQUENCY = Observable(
     geometry=frequency,
     bias=0.212,
     sigma=0.209,
+)
+
+
+def bandwidth(window: Window) -> float:
+    """Computes the deviation of the frequencies, each weighed by its power [Hz]."""
+    frequencies, power = moving(window)
+    share = power / power.sum()
+    return float(np.sqrt((share * np.square(frequencies - share @ frequencies)).sum()))
+
+
+BANDWIDTH = Observable(
+    name="bandwidth",
+    unit="Hz",
+    meaning="standard deviation of the frequencies in the same spectrum",
+    blind="whether a broad spectrum is of many waves or of one whose frequency follows the wind",
+    pixels=bandwidth,
+    geometry=bandwidth,
+    bias=0.325,
+    sigma=0.225,
+    quadratic=True,
 )

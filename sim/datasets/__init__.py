@@ -17,6 +17,6 @@ if TYPE_CHECKING:
     from sim.datasets.films import EPOCH, PlannedFilm, Sequences
     from sim.datasets.picture import coded, settings
     from sim.datasets.reading import DATASETS, load, parse
-    from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, Truth
+    from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, Truth, with_counts
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -38,8 +38,8 @@ def build(chosen: Building) -> Iterator[Result]:
       flagdata build flagsim --lake /shared/lake --scheduler tcp://10.0.0.1:8786
     """
     from flagdata.errors import UsageError
-    from sim.datasets.counts import with_counts
     from sim.datasets.reading import load, with_renderer
+    from sim.datasets.recipe import with_counts
     from sim.datasets.shard import Shard
 
     branch, device, scheduler = chosen.branch, chosen.device, chosen.scheduler

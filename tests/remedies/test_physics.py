@@ -48,7 +48,7 @@ CASES = [
         shows="first",
     ),
     Case(
-        "datasets/counts.py",
+        "datasets/recipe.py",
         "or more: ",
         f"{BUILD} --sequences 2",
         (f"{BUILD} --sequences 3",),
@@ -56,7 +56,7 @@ CASES = [
         code=2,
     ),
     Case(
-        "datasets/counts.py",
+        "datasets/recipe.py",
         "or more, or --sequences",
         f"{BUILD} --films 300",
         (f"{BUILD} --films 400", OR, f"{BUILD} --films 300 --sequences 300"),

@@ -10,9 +10,8 @@ from typing import NoReturn
 import pytest
 
 from flagdata.lake import Lake
-from sim.datasets import casts, jobs, load, plan
+from sim.datasets import casts, jobs, load, plan, with_counts
 from sim.datasets.build import BuildReport
-from sim.datasets.counts import with_counts
 from sim.datasets.plan import Rates
 from sim.datasets.shard import Shard
 from tests.program import Ended, invoke

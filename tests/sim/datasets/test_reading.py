@@ -10,8 +10,7 @@ import torch
 
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.tables import Range, ends
-from sim.datasets import DATASETS, DatasetRecipe, Truth, casts, load, parse
-from sim.datasets.counts import with_counts
+from sim.datasets import DATASETS, DatasetRecipe, Truth, casts, load, parse, with_counts
 from sim.datasets.reading import with_renderer
 from sim.effects import FiniteSpanLoading
 from sim.run import Crew
