@@ -30,9 +30,10 @@ if TYPE_CHECKING:
     from measure.cloth.posterior import weighed
     from measure.cloth.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, TABLES, Normal, Uncertain, draws
     from measure.cloth.recording import LEAST_WINDOWS, Observed, Projection, constant_wind, usable
-    from measure.cloth.score_test import score
+    from measure.cloth.score_test import Judged, directions, judge, score
     from measure.cloth.sight import Sight
     from measure.cloth.simulation import COLUMNS, OBSERVED, Discretisation, Flag, FlagBatch, mean_bending
+    from measure.cloth.simulations import Simulations, of_base, of_nulls, sights_of
     from measure.cloth.sources import Part, films_among
     from measure.cloth.tables import of_table
     from measure.cloth.verdict import close_loop, verdict_of

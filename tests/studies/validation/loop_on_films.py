@@ -36,21 +36,26 @@ from measure.cloth import (
     Finer,
     Flag,
     FlagBatch,
+    Judged,
     Log,
     Normal,
     Observed,
+    Simulations,
     Uncertain,
+    directions,
+    judge,
     lasting,
     nulls,
+    of_base,
+    of_nulls,
     pairs,
     readings_of,
     score,
+    sights_of,
     weighable,
 )
 from measure.cloth.design import Weighable
 from measure.cloth.evidence import Weighing, weigh
-from measure.cloth.score_test import Judged, directions, judge
-from measure.cloth.simulations import Simulations, of_base, of_nulls, sights_of
 from sim.effects import AnemometerLag
 from sim.wind import VonKarman
 
