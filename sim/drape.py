@@ -72,10 +72,7 @@ def disc(rng: np.random.Generator, *, radius: float = DISC, pedestal: float = PE
         angle = rng.uniform(0, 2 * math.pi) + 2 * math.pi * np.arange(count) / count
         points.append(ring * np.stack([np.cos(angle), np.sin(angle)], axis=1))
     rest = np.concatenate(points)
-    faces = Delaunay(rest).simplices
-    a, b, c = (rest[faces[:, corner]] for corner in range(3))
-    doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    return Mesh(rest=rest, faces=np.where(doubled[:, None] < 0, faces[:, ::-1], faces))
+    return Mesh(rest=rest, faces=Delaunay(rest).simplices.astype(np.int64))  # in two dimensions counter-clockwise
 
 
 def on_pedestal(mesh: Mesh, pedestal: float = PEDESTAL) -> tuple[int, ...]:

@@ -13,11 +13,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -25,6 +23,7 @@ import numpy as np
 
 from flagdata import workload
 from flagdata.arrays import FloatArray, IntArray, read_arrays
+from flagdata.console import say_beside_bars
 from flagdata.durable import put_if_absent
 from flagdata.errors import CorruptError, InputError
 from flagdata.provenance import canonical, digest
@@ -48,7 +47,7 @@ from measure.cloth.simulation import BATCH, LITTLE, Discretisation, Flag, FlagBa
 from measure.cloth.wind import Log
 from measure.forecasting.strengths import Strengths, all_strengths
 from measure.observables.observable import WINDOW
-from sim.workers import single_threaded
+from sim.workers import connected
 
 _HOIST = "full-hoist.stiffness"
 
@@ -279,21 +278,19 @@ def readings_of(
         advance(sum(len(batch.seeds) for number, batch in enumerate(batches) if number not in set(missing)))
     folder.mkdir(parents=True, exist_ok=True)
     if missing:
-        with ProcessPoolExecutor(
-            min(workers, len(missing)), mp_context=get_context("spawn"), initializer=single_threaded
-        ) as pool:
-            running = {pool.submit(_make, batches[number], paths[number]): number for number in missing}
-            for done in as_completed(running):
-                done.result()
+        with connected(None, workers=min(workers, len(missing)), say=say_beside_bars) as pool:
+            for count in pool.results((_make, (batches[number], paths[number])) for number in missing):
                 if advance is not None:
-                    advance(len(batches[running[done]].seeds))
+                    advance(count)
     return np.concatenate([_read(path) for path in paths])
 
 
-def _make(batch: Simulatable, path: Path) -> None:
+def _make(batch: Simulatable, path: Path) -> int:
+    """Simulates a batch into its file; returns how many cloths it has."""
     buffer = BytesIO()
     np.savez_compressed(buffer, readings=batch.read())
     put_if_absent(path, buffer.getvalue())
+    return len(batch.seeds)
 
 
 def _read(path: Path) -> FloatArray:

@@ -21,8 +21,9 @@ from flagdata.stated import Stated
 from flagdata.tables import Range, Scale
 from measure.cloth import Quantity, Uncertain, folder_of, quantity, weighed_by_name
 from measure.drape.fit import UNLIKE, Face, Fit, Model, Surface, fitted, together
-from measure.drape.shape import placed, rim_of, shape_of
+from measure.drape.shape import placed, shape_of
 from measure.drape.simulation import ANISOTROPY, BENDING_LENGTH, SHEAR, simulated
+from sim.mesh import Mesh
 from sim.scene import GRAVITY
 
 _LOST = 0.03
@@ -115,7 +116,7 @@ def face_of(folder: Path, *, first: int = 0) -> Face:
                 fix="export the mesh with texture coordinates of the flat disc",
             )
         flat, position = placed(scan.rest, scan.positions, where=str(path))
-        shapes.append(shape_of(flat, scan.faces, position, rim=rim_of(flat, scan.faces)).numbers())
+        shapes.append(shape_of(Mesh(rest=flat, faces=scan.faces), position).numbers())
     return Face(shapes=np.stack(shapes), specimen=first + np.arange(len(files)))
 
 
@@ -206,14 +207,14 @@ def answered(surface: Surface, faces: Sequence[Face], area_weight: Stated, *, le
         source="of the bending length and the stated weight",
         limits=(0.0, np.inf),
     )
-    draws = {**fit.cloth, "bending": bending, "area_weight": weight}
-    cloth = tuple(quantity(one, draws[one.name], level) for one in (BENDING_LENGTH, about, ANISOTROPY, SHEAR))
+    draws = {**fit.cloth, "bending": bending}
+    reported = (BENDING_LENGTH, about, ANISOTROPY, SHEAR)
     return Draped(
         area_weight=area_weight,
         faces=tuple(faces),
         fit=fit,
-        cloth=cloth,
-        draws={one.name: draws[one.name] for one in (BENDING_LENGTH, about, ANISOTROPY, SHEAR)},
+        cloth=tuple(quantity(one, draws[one.name], level) for one in reported),
+        draws={one.name: draws[one.name] for one in reported},
         level=level,
         findings=(*_lost(faces), *_few(fit), *_differ(surface, faces, seed=seed)),
     )

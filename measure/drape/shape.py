@@ -48,15 +48,14 @@ class Shape:
         return np.array([coefficient, lobe.real, lobe.imag, *others])
 
 
-def rim_of(rest: FloatArray, faces: IntArray) -> IntArray:
-    """Lists the vertices at the edge of a flat disc (vertex, 2), by ascending angle."""
-    rim = Mesh(rest=rest, faces=faces).boundary
-    return rim[np.argsort(np.arctan2(rest[rim, 1], rest[rim, 0]))]
+def rim_of(mesh: Mesh) -> IntArray:
+    """Lists the vertices at the edge of a flat disc, by ascending angle."""
+    rim = mesh.boundary
+    return rim[np.argsort(np.arctan2(mesh.rest[rim, 1], mesh.rest[rim, 0]))]
 
 
 def shape_of(
-    rest: FloatArray,
-    faces: IntArray,
+    mesh: Mesh,
     position: FloatArray,
     *,
     rim: IntArray | None = None,
@@ -66,29 +65,27 @@ def shape_of(
     """Measures one drape.
 
     Args:
-        rest: (vertex, 2) of the flat cloth, the pedestal's axis at the origin [m].
+        mesh: the flat cloth, the pedestal's axis at the origin.
         position: (vertex, 3), z upwards from the pedestal's top, whose axis is at x = y = 0 [m].
         rim: as `rim_of` lists it, where it is known.
     """
-    rim = rim_of(rest, faces) if rim is None else rim
+    rim = rim_of(mesh) if rim is None else rim
     x, y, z = position[rim].T
     projected = abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))) / 2
-    angle = np.arctan2(rest[rim, 1], rest[rim, 0])
+    angle = np.arctan2(mesh.rest[rim, 1], mesh.rest[rim, 0])
     even = 2 * np.pi * np.arange(_ANGLES) / _ANGLES
     distance = np.interp(even, angle, np.hypot(x, y), period=2 * np.pi)
     series = 2 * np.conj(np.fft.rfft(distance)) / _ANGLES / radius
     folds = np.abs(series[list(_FOLDS)])
-    corners = position[faces]
+    corners = position[mesh.faces]
     spanned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat = rest[faces]
-    e, f = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     return Shape(
         coefficient=(projected - np.pi * pedestal**2) / (np.pi * (radius**2 - pedestal**2)),
         lobe=complex(series[2]),
         folding=float(np.sqrt((folds**2).sum() / 2)),
         folds=int(_FOLDS[int(folds.argmax())]),
         height=float(np.interp(even, angle, z, period=2 * np.pi).mean()),
-        area=float(np.linalg.norm(spanned, axis=1).sum() / np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]).sum()),
+        area=float(np.linalg.norm(spanned, axis=1).sum() / (2 * mesh.areas.sum())),
     )
 
 

@@ -114,7 +114,7 @@ def ratio(anisotropy: float) -> float:
 def mesh(rows: int = ROWS) -> tuple[Mesh, IntArray]:
     """Makes the mesh of all simulated drapes, with its rim."""
     made = disc(np.random.default_rng(0), rows=rows)  # the mesh of the sheet
-    return made, rim_of(made.rest, made.faces)
+    return made, rim_of(made)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -159,9 +159,7 @@ class DrapeBatch:
         """Simulates and measures them: (drape, 7), see `Shape.numbers`."""
         made, rim = mesh(self.rows)
         positions = self.positions()
-        return np.stack(
-            [shape_of(made.rest, made.faces, positions[..., i], rim=rim).numbers() for i in range(len(self.seeds))]
-        )
+        return np.stack([shape_of(made, positions[..., i], rim=rim).numbers() for i in range(len(self.seeds))])
 
 
 def batches(count: int, *, seed: int) -> list[DrapeBatch]:

@@ -279,22 +279,21 @@ def _without_windows(
     windows = f"none of {reader.layout.count} windows has all its frames: in the one at {start:.2f} s {lack}"
     still = [fault for fault in faults if fault.kind == "no-motion"]
     if distinct.share > _REPEATING and not still:
-        repeating = f"{distinct.share:.0%} of {distinct.frames} frames repeat the one before"
+        share = f"{distinct.share:.0%} of {distinct.frames}"
         scale = float(considered.scale.max())
         left, needed = (1 - distinct.share) * film.rate, RATE_SLACK / max(reader.layout.spacings)
         if needed * math.sqrt(scale) <= left < needed:  # enough of a flag as large as those of the training
             length = trained.length * scale
             return RefusedError(
-                f"{REASONS['low-frame-rate'].sentence}: {repeating}, {left:.3g} different ones a second are left, a "
-                f"{trained.noun} of {length:.3g} m needs {needed:.3g}, and {windows}",
+                f"{REASONS['low-frame-rate'].sentence}: {share} frames repeat the one before, {left:.3g} different "
+                f"ones a second are left, a {trained.noun} of {length:.3g} m needs {needed:.3g}, and {windows}",
                 where=film.name,
                 fix=f"film at {needed:.3g} frames a second or more that are all different"
                 + length_first(considered.given),
             )
         repeated = REASONS["repeated-frames"]
         return RefusedError(
-            f"{repeated.sentence}: {repeating}, and none of {reader.layout.count} windows has all its frames: in the "
-            f"one at {start:.2f} s {lack}",
+            f"{repeated.sentence}: {share} frames repeat the one before, and {windows}",
             where=film.name,
             fix=repeated.fix,
         )

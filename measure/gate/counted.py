@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 from flagdata.findings import Finding, Severity
 from measure.gate.reasons import REASONS
@@ -60,7 +61,7 @@ class _Film:
     follower: Follower
     aspect: float | None
 
-    @property
+    @cached_property
     def pole(self) -> float:
         """Returns the height of an upright edge at rest beside the cloth's places, in heights of them; see `_POLE`."""
         region, standing = self.conditioning.region, self.conditioning.standing

@@ -364,7 +364,7 @@ def _material(form: Mapping[str, Any], folder: Path, *, where: str) -> Material 
         stretching=thicken * form.get("stretching-factor", 1.0),
         bending=thicken * form.get("bending-factor", 1.0),
     )
-    return replace(material, **{key: form[key] for key in ("damping",) if key in form})
+    return replace(material, damping=form["damping"]) if "damping" in form else material
 
 
 def _recording(content: Mapping[str, Any], folder: Path, *, where: str) -> RecordingSource:

@@ -18,6 +18,7 @@ from flagdata.stated import Stated
 from measure.commands.calibrate import calibrate
 from measure.drape import DrapeBatch, Face, Model, Surface, answered, fitted, material, ratio, rim_of, shape_of
 from sim.drape import disc
+from sim.mesh import Mesh
 from tests.measure.drape.conftest import COUNT, NOISE, scan, shapes, simulated
 
 G = 9.81
@@ -26,7 +27,7 @@ G = 9.81
 def test_a_flat_disc_covers_its_border_and_has_no_folds() -> None:
     mesh = disc(np.random.default_rng(0), rows=5)
     flat = np.concatenate([mesh.rest, np.zeros((mesh.vertex_count, 1))], axis=1)
-    seen = shape_of(mesh.rest, mesh.faces, flat)
+    seen = shape_of(mesh, flat)
     assert seen.coefficient == pytest.approx(1.0, abs=0.003)  # a polygon of 81 corners
     assert abs(seen.lobe) + seen.folding + abs(seen.height) < 1e-6
     assert seen.area == pytest.approx(1.0)
@@ -36,13 +37,14 @@ def test_folds_lobes_and_drape_coefficient_are_those_that_were_made() -> None:
     made = scan(0.6, lobe=0.03)
     position = made.positions - np.array([1.0, 2.0, 0.3])
     rest = (made.rest - 5.0) / 10
-    seen = shape_of(rest, made.faces, position, rim=rim_of(rest, made.faces))
+    flat = Mesh(rest=rest, faces=made.faces)
+    seen = shape_of(flat, position, rim=rim_of(flat))
     assert seen.coefficient == pytest.approx(0.6, abs=0.006)
     assert seen.folds == 7
     assert seen.folding == pytest.approx(0.004 / np.sqrt(2), rel=0.03)
     assert seen.lobe == pytest.approx(0.03, abs=5e-4)
     turned = rest @ np.array([[0.0, 1.0], [-1.0, 0.0]])  # the flat cloth by 90°, so that its lobe is along v
-    assert shape_of(turned, made.faces, position).lobe == pytest.approx(-0.03, abs=5e-4)
+    assert shape_of(Mesh(rest=turned, faces=made.faces), position).lobe == pytest.approx(-0.03, abs=5e-4)
 
 
 def test_stiffer_warp_bends_less_along_the_warp() -> None:

@@ -30,6 +30,7 @@ from measure.drape import (
     simulated,
     together,
 )
+from sim.mesh import Mesh
 from sim.scene import GRAVITY
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.drapes_picture import bank, cantilevers, draw
@@ -81,8 +82,9 @@ def shapes(path: Path) -> tuple[float, list[Face]]:
     gaps = np.diff(np.append(angle, angle[0] + 2 * np.pi))
     missing = angle[gaps.argmax()] + gaps.max() / 2
     rest[-1] = radius.max() * np.cos(missing), radius.max() * np.sin(missing)
-    rim = rim_of(rest, faces)
-    figures = np.stack([shape_of(rest, faces, frame, rim=rim).numbers() for frame in position])
+    flat = Mesh(rest=rest, faces=faces)
+    rim = rim_of(flat)
+    figures = np.stack([shape_of(flat, frame, rim=rim).numbers() for frame in position])
     return weight, [Face(shapes=figures[up], specimen=specimen[up]) for up in (capture <= 2, capture > 2)]
 
 

@@ -9,24 +9,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from measure.cloth import TABLES
 from measure.drape import DrapeBatch, Surface, mesh
 from sim.material import named
 from sim.scene import GRAVITY
 from tests.evidence import REFERENCE
 
 LENGTHS = (0.012, 0.016, 0.020, 0.025)
-WANG = (
-    "11oz-black-denim",
-    "camel-ponte-roma",
-    "gray-interlock",
-    "ivory-rib-knit",
-    "navy-sparkle-sweat",
-    "pink-ribbon-brown",
-    "royal-target",
-    "tango-red-jet-set",
-    "white-dots-on-blk",
-    "white-swim-solid",
-)
 _BLUE, _RUST, _GREY = "#2f6690", "#b5532a", "#b9b9b9"
 
 
@@ -100,7 +89,7 @@ def bending_length(rigidity: np.ndarray, weight: np.ndarray) -> np.ndarray:
 def bank() -> dict[str, list[float]]:
     """Returns area weight [kg/m²] and bending length [mm] of the catalog's measured cloths, a quarter of the mean
     coefficient of their tables."""
-    cloths = {name: named(name) for name in WANG}
+    cloths = {name: named(name) for name in TABLES}
     return {
         name: [
             cloth.area_weight,

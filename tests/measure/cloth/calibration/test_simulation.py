@@ -14,7 +14,6 @@ from measure.cloth import OBSERVED, TABLES, Design, Flag, FlagBatch, Log, mean_b
 from measure.cloth.simulation import cloth
 from sim.integrate import BackwardEuler, Symplectic
 from sim.material import named
-from tests.pools import Here
 
 _LOG = Log(times=np.arange(-10.0, 20.0), speed=np.full(30, 5.0), distance=0.0)
 
@@ -105,7 +104,6 @@ def test_kept_simulations_are_not_made_anew(tmp_path: Path, monkeypatch: pytest.
         return batch.values["area_weight"][:, None, None, None] * np.ones((1, 1, 2, len(OBSERVED)))
 
     monkeypatch.setattr(FlagBatch, "read", read)
-    monkeypatch.setattr("measure.cloth.design.ProcessPoolExecutor", Here)
     design = Design(flag=Flag(length=1.5, height=1.0), log=_LOG, duration=5.0, count=24, seed=1)
     steps: list[int] = []
     first = simulated(design, folder=tmp_path, advance=steps.append)

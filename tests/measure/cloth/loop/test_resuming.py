@@ -10,10 +10,8 @@ import pytest
 
 from flagdata.arrays import FloatArray
 from measure.cloth import FlagBatch, close_loop, design, simulations
-from measure.cloth import design as designs
 from measure.report import as_document
 from tests.measure.cloth.loop.conftest import options, readings, recording
-from tests.pools import Here
 
 KINDS = 20
 
@@ -30,7 +28,6 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         return readings(self)[:, None]
 
     monkeypatch.setattr(FlagBatch, "read", read)
-    monkeypatch.setattr(designs, "ProcessPoolExecutor", Here)
     for module in (design, simulations):
         monkeypatch.setattr(module, "TOGETHER", 2)
     return counted
