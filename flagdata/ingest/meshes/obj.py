@@ -19,6 +19,8 @@ from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.files import check_input
 
+FACE_CORNERS = 10_000
+"""Most corners of a face that is read: what describes a cloth has four or fewer."""
 CORNERS = 256
 """Most corners of a polygon that is not convex: the time that it takes grows with their cube."""
 _FLAT = 1e-9
@@ -202,6 +204,12 @@ def read_obj(path: Path) -> Obj:
             elif keyword == "f":
                 if len(values) < 3:
                     raise InputError("a face has fewer than three corners", where=where, fix="give at least three")
+                if len(values) > FACE_CORNERS:
+                    raise InputError(
+                        f"a face has {len(values):,} corners, more than the {FACE_CORNERS:,} that are read",
+                        where=where,
+                        fix="triangulate the mesh in the program that made it",
+                    )
                 for word in values:
                     corners.extend(_corner(word, len(positions) // 3, len(texture) // 2, where))
                 sizes.append(len(values))

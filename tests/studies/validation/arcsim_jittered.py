@@ -14,6 +14,7 @@ not, so that only for that of 30 ms it is reported whether the interval of dampi
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 from collections.abc import Mapping
@@ -157,7 +158,7 @@ def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
                 "effect": c.effect,
                 "low": c.strength.low,
                 "value": c.strength.value,
-                "high": c.strength.high,
+                "high": c.strength.high if math.isfinite(c.strength.high) else None,
                 "gain": c.gain,
                 "behind": c.behind,
                 "leftover": c.leftover,
@@ -225,7 +226,7 @@ def _table(heading: str, verdicts: Mapping[str, Any]) -> list[str]:
             *unseen,
         ]
     named = [
-        f"| {name} | {c['effect']} | {c['value']:.3g} [{c['low']:.3g}, {c['high']:.3g}] |"
+        f"| {name} | {c['effect']} | {_strength(c)} |"
         for name, own in verdicts.items()
         for c in own["candidates"]
         if c["effect"] in own["named"]
@@ -233,6 +234,13 @@ def _table(heading: str, verdicts: Mapping[str, Any]) -> list[str]:
     if named:
         lines += ["", "| what acted | named | strength, 90 % |", "|---|---|---|", *named]
     return [*lines, ""]
+
+
+def _strength(candidate: Mapping[str, Any]) -> str:
+    """Writes a strength with its interval, and as a bound where it has no upper end."""
+    if candidate["high"] is None:
+        return f"at least {candidate['low']:.3g}"
+    return f"{candidate['value']:.3g} [{candidate['low']:.3g}, {candidate['high']:.3g}]"
 
 
 def _span(found: Mapping[str, Any], unit: float = 1.0) -> str:

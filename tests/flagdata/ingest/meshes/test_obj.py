@@ -56,6 +56,7 @@ def test_a_malformed_line_is_refused_by_its_number(tmp_path: Path) -> None:
         (TRIANGLE + "f 0/1 2/2 3/3\n", "what is not there", 7),
         (TRIANGLE + "f -4/1 2/2 3/3\n", "what is not there", 7),
         (TRIANGLE + "f 1/1 2/2\n", "fewer than three", 7),
+        (TRIANGLE + "f" + " 1/1" * 10_001 + "\n", "10,001 corners", 7),
         (TRIANGLE + "f 1/1 2/x 3/3\n", "not a corner", 7),
         (TRIANGLE + "f 1/1 2/2 3/3\nf 1/2 2/2 3/3\n", "two material coordinates", 8),
         ("v 0 0 nan\n", "not 3 finite", 1),
