@@ -8,11 +8,11 @@ artifacts and objects as an unbroken one.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from flagdata.errors import ConflictError, RefusedError
 from flagdata.lake import Lake
@@ -23,13 +23,13 @@ from sim.datasets.films import PlannedFilm, Sequences
 from sim.datasets.jobs import PutFilm, PutSequences
 from sim.datasets.recipe import DatasetRecipe
 from sim.datasets.shard import Shard
-from sim.run.publish import commit, whole
+from sim.run.publish import Deposited, commit, whole
 from sim.workers import Job, Workers
 
-COMMIT_FILMS = 32
-"""Films of one commit."""
+COMMIT_RESULTS = 32
+"""Results of jobs, films or batches of sequences, of one commit."""
 COMMIT_SECONDS = 30.0
-"""A commit is due after this time, however few films there are."""
+"""A commit is due after this time, however few results there are."""
 
 Advance: TypeAlias = Callable[[int], None]
 Bars: TypeAlias = Callable[[int, str, str], AbstractContextManager[Advance]]
@@ -136,16 +136,37 @@ class Build:
     def _simulate_once(self, todo: Sequence[tuple[Roll, list[int]]], advance: Advance) -> None:
         """Simulates all pending members of the rolls once; those that fail are noted on their roll."""
         by_name = {roll.cast.simulation.name: roll for roll, _ in todo}
-        done: PutSequences
-        for done in self.workers.results(self._batches(todo)):
-            roll = by_name[done.name]
-            roll.failed |= done.failed
-            if done.stored:
-                committed = commit(self.lake, roll.cast.simulation, done.stored, branch=self.branch)
-                roll.done |= set(done.stored)
-                self._new_sequences += len(committed.added)
-                self._healed += len(committed.healed)
-                advance(len(done.stored))
+
+        def commit_sequences(results: Sequence[PutSequences]) -> int:
+            stored: dict[str, dict[int, Deposited]] = {}
+            for done in results:
+                by_name[done.name].failed |= done.failed
+                stored.setdefault(done.name, {}).update(done.stored)
+            return sum(self._commit_sequences(by_name[name], members) for name, members in stored.items() if members)
+
+        self._commit_each(self._batches(todo), commit_sequences, advance)
+
+    def _commit_sequences(self, roll: Roll, stored: Mapping[int, Deposited]) -> int:
+        """Commits sequences that are in the store and returns how many."""
+        committed = commit(self.lake, roll.cast.simulation, stored, branch=self.branch)
+        roll.done |= set(stored)
+        self._new_sequences += len(committed.added)
+        self._healed += len(committed.healed)
+        return len(stored)
+
+    def _commit_each(self, work: Iterator[Job], commit_results: Callable[[Any], int], advance: Advance) -> None:
+        """Has jobs done and commits their results, some together; what is done stays where the work is stopped."""
+        waiting: list[Any] = []
+        last = time.monotonic()
+        try:
+            for done in self.workers.results(work):
+                waiting.append(done)
+                if len(waiting) >= COMMIT_RESULTS or time.monotonic() - last > COMMIT_SECONDS:
+                    ready, waiting = waiting, []
+                    advance(commit_results(ready))
+                    last = time.monotonic()
+        finally:
+            advance(commit_results(waiting))
 
     def _batches(self, todo: Sequence[tuple[Roll, list[int]]]) -> Iterator[Job]:
         for roll, pending in todo:
@@ -182,17 +203,7 @@ class Build:
         self._clips = sum(recording in film_ids for recording in clips)
         with self.bars(len(films), f"{self.recipe.name}: render", "film") as advance:
             advance(len(films) - len(missing))
-            waiting: list[PutFilm] = []
-            last = time.monotonic()
-            try:
-                for done in self.workers.results(self._shots(missing)):
-                    waiting.append(done)
-                    if len(waiting) >= COMMIT_FILMS or time.monotonic() - last > COMMIT_SECONDS:
-                        ready, waiting = waiting, []
-                        advance(self._commit(ready))
-                        last = time.monotonic()
-            finally:  # what is done stays, also where workers are lost or the build is stopped
-                advance(self._commit(waiting))
+            self._commit_each(self._shots(missing), self._commit_films, advance)
         return films
 
     def _refuse_mixture(self, film_ids: set[str]) -> None:
@@ -231,7 +242,7 @@ class Build:
         path = self.lake.path
         return str(path.absolute() if isinstance(path, Path) else path)
 
-    def _commit(self, filmed: Sequence[PutFilm]) -> int:
+    def _commit_films(self, filmed: Sequence[PutFilm]) -> int:
         """Commits films that are in the store and returns how many."""
         if not filmed:
             return 0

@@ -40,6 +40,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "card-flag": ("tests.studies.validation.card_flag", "A camera and an anemometer that disagree."),
             "carried-cloth": ("tests.studies.validation.carried_cloth", "A verdict on a cloth that a robot swings."),
             "clock-recovery": ("tests.studies.validation.clock_recovery", "Hidden clock offsets and their intervals."),
+            "cluster": ("tests.studies.validation.cluster", "A data set built by workers that are killed."),
             "datasets": ("tests.studies.validation.datasets", "A data set built, and built again after kills."),
             "drapes": ("tests.studies.validation.drapes", "Measured drapes of five fabrics, and their faces."),
             "films": ("tests.studies.validation.films", "What measure answers on ArcSim's films by VTK."),

@@ -29,7 +29,7 @@ def pause_at(artifacts: int) -> None:
 
 
 if __name__ == "__main__":
-    sim.datasets.build.COMMIT_FILMS = 2
+    sim.datasets.build.COMMIT_RESULTS = 2
     sim.workers.scheduled.PATIENCE = 2.0
     pause_at(int(sys.argv.pop(1)))
     main()
