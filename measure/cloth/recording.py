@@ -197,8 +197,8 @@ class Observed:
                 f"no observable could be read in {SHOWN:.0%} of the windows, the best in {most} of "
                 f"{len(self.readings)}: the outline is lost in the others, or what is followed is not the flag",
                 where=self.name,
-                fix="look at the flag on the page of flagdata measure --report, and choose it by --crop or --flag, or a "
-                "part by --start and --end; flagdata observe says why windows show nothing",
+                fix="look at the flag on the page of flagdata measure --report, and choose it by --crop or --flag, or "
+                "a part by --start and --end; flagdata observe says why windows show nothing",
             )
 
     @property
