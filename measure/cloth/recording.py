@@ -192,10 +192,13 @@ class Observed:
             )
         check_duration(len(self.readings) * WINDOW, where=self.name)
         if not shown(self.readings).any():
+            most = int(np.isfinite(self.readings).sum(axis=0).max())
             raise RefusedError(
-                f"no observable could be read in {SHOWN:.0%} of the windows: what is followed may not be the flag",
+                f"no observable could be read in {SHOWN:.0%} of the windows, the best in {most} of "
+                f"{len(self.readings)}: the outline is lost in the others, or what is followed is not the flag",
                 where=self.name,
-                fix="look at the film with flagdata observe --picture, and choose the flag with --crop or --flag",
+                fix="look at the flag on the page of flagdata measure --report, and choose it by --crop or --flag, or "
+                "a part by --start and --end; flagdata observe says why windows show nothing",
             )
 
     @property

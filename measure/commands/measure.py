@@ -189,9 +189,10 @@ class _Job:
         if lake is not None:
             row = artifact_of(measured, subject, self.network, self.request.reading)
             artifact = placed(lake, row, branch=self.chosen.branch).artifact.id
+        elsewhere = wind_elsewhere(measured, self.chosen)
         text = None
         if self.chosen.report is not None:
-            text = self._page(measured, series, subject, artifact, refinement)
+            text = self._page(measured, series, subject, artifact, refinement, elsewhere)
         published = False
         if lake is not None and artifact is not None:
             placed_row = keep(
@@ -223,7 +224,7 @@ class _Job:
             artifact=artifact,
             subject=subject,
             refinement=refinement,
-            elsewhere=wind_elsewhere(measured, self.chosen),
+            elsewhere=elsewhere,
         )
 
     def refuse(self, done: _Done) -> None:
@@ -248,6 +249,7 @@ class _Job:
         subject: Subject,
         artifact: str | None,
         refinement: Refinement | None,
+        elsewhere: WindComparison | None,
     ) -> str:
         """Renders the page of a report.
 
@@ -280,6 +282,7 @@ class _Job:
             rate=model.front_end.rate,
             steps=steps(subject.film),
             figures=subject.film.sentences,
+            elsewhere=elsewhere,
         )
         sections = ()
         if refinement is not None:

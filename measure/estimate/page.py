@@ -10,6 +10,7 @@ from markupsafe import Markup
 from flagdata.pages.pictures import moving
 from flagdata.pages.render import render
 from flagdata.provenance import code_version
+from flagdata.wind_elsewhere import WindComparison
 from measure.estimate import pictures
 from measure.estimate.answer import SHORT, Quantity
 from measure.estimate.measuring import Measurement
@@ -45,6 +46,7 @@ class Context:
         rate: of the network's frames [Hz].
         steps: picture of how the film was made fit, as a URL; None where it was too short for it.
         figures: what was measured for that, in sentences.
+        elsewhere: the comparison with a wind from elsewhere; None where none was stated or no estimate is shown.
     """
 
     provenance: Mapping[str, str]
@@ -54,6 +56,7 @@ class Context:
     rate: float
     steps: str | None = None
     figures: Sequence[str] = ()
+    elsewhere: WindComparison | None = None
 
 
 def page(
@@ -87,6 +90,7 @@ def page(
         "compared": context.compared,
         "steps": context.steps,
         "figures": list(context.figures),
+        "elsewhere": context.elsewhere,
         "corner": pictures.corner(measured) if shown else None,
         "series": pictures.series(series, level=measured.verdict.level) if shown and len(series.time) > 1 else None,
         "spectra": None if series.spectrum is None or not shown else pictures.spectra(series.spectrum),

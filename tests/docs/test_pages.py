@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import flagdata
 from flagdata.cli import main
 from flagdata.errors import InputError
 from flagdata.ingest import Head, WindOptions
@@ -129,6 +130,17 @@ def test_every_command_of_a_page_that_stands_alone_runs(
                 tmp_path / row.split(",")[0], np.full(35, 3.0 + number), rate=RECIPE.rate, seed=RECIPE.seed, flag=FLAG
             )
     assert any(run_page(page, monkeypatch))
+
+
+def test_the_program_of_the_simulator_page_films_a_flag_beside_its_wind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (name,) = (name for name in files("simulator.md") if name.endswith(".py"))
+    exec(compile(files("simulator.md")[name], name, "exec"), {})
+    assert flagdata.frames("filmed.mp4").images.shape == (50, 300, 300)
+    wind = flagdata.wind("wind.csv")
+    assert len(wind.time) == 4
 
 
 def test_the_transcripts_of_a_draft_are_what_the_program_prints(

@@ -21,7 +21,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "a film, real or rendered, whose flag or camera is lost in the whole and found in a part": (
         ("measure/cloth/sources.py", "film from a tripod, or c"),
-        ("measure/cloth/recording.py", "look at the film with fl"),
+        ("measure/cloth/recording.py", "look at the flag on the "),
         ("measure/commands/observe.py", "give --crop around one w"),
         ("measure/film/conditioned.py", "choose a part of the fil"),
         ("models/conditioning/conditioning.py", "give --crop around the f"),

@@ -11,6 +11,8 @@ import pytest
 from markupsafe import Markup
 
 from flagdata.film_array import Frames
+from flagdata.stated import Stated
+from flagdata.wind_elsewhere import WindComparison
 from measure.estimate import Context, Measurement, Section, beside
 from measure.estimate.answer import SHORT
 from measure.estimate.nearest import Neighbour
@@ -43,6 +45,13 @@ def test_the_answer_stands_first_and_every_quantity_has_a_row(found: Measurement
     for quantity in found.quantities:
         assert (f"<td>{SHORT[quantity.name]}</td>" in folded) is not quantity.constrained
     assert [text.count(f"<td>{name}</td>") for name in ("wind", "area weight", "bending", "anisotropy")] == [1] * 4
+
+
+def test_a_wind_from_elsewhere_is_compared_on_the_page_too(found: Measurement) -> None:
+    compared = WindComparison(stated=Stated.of("3±1"), difference=(-2.7, 1.0), level=0.9)
+    text = unescape(drawn(found, replace(PLAIN, elsewhere=compared)))
+    assert f"A wind from elsewhere: {compared.sentence}; {compared.advice}." in text
+    assert "A wind from elsewhere" not in drawn(found)
 
 
 def test_a_bound_is_shown_as_one_without_a_value(model: Estimator) -> None:

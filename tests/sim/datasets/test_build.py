@@ -159,6 +159,7 @@ def test_the_card_says_what_was_built(built: Path, make: Callable[..., DatasetRe
     text = card.read_text()
     assert make().hash in text
     assert "CC0-1.0" in text
+    assert "<pre>import flagdata\nfrom flagdata.dataset import ExplicitSplit" in text
     assert "data:image/jpeg;base64," in text
     for name in ("wind_speed", "area_weight", "camera_radius", "anemometer-lag.distance", "flag/"):
         assert name in text
