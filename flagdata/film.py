@@ -102,12 +102,12 @@ class CameraFilm:
     def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
         with open_camera(self.path, self._options) as stream:
             try:
-                for frame in stream:
+                for frame in stream.unpadded():
                     time = frame.time / NANOSECONDS
                     if time > last:
                         break
                     if time >= first:
-                        yield time, stream.unpadded(frame.image)
+                        yield time, frame.image
             finally:
                 self._findings = tuple(finding for finding in stream.findings if finding.kind not in _OF_PADDING)
 

@@ -169,7 +169,7 @@ class _Job:
         from measure.estimate.series import beside
 
         estimator = self.network.estimator
-        with _advancing("measure", "window") as advance:
+        with _advancing("search", "frame") as subject.film.searched, _advancing("measure", "window") as advance:
             measured = run(subject, self.network, self.request.options, advance=advance)
         wind = None if subject.record is None else subject.record.wind()
         series = beside(measured, start=subject.film.start, wind=wind)
@@ -360,6 +360,8 @@ def _report(done: _Done, *, series: bool) -> None:
     for title, agreement in (("window", done.series.window), ("minute", done.series.of_minute)):
         if agreement is not None:
             say(f"  against the anemometer's {title} means: {agreement.sentence}")
+    if done.series.spectrum is not None:
+        say(f"  {done.series.spectrum.sentence}")
 
 
 @contextmanager

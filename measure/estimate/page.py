@@ -94,6 +94,7 @@ def page(
         "corner": pictures.corner(measured) if shown else None,
         "series": pictures.series(series, level=measured.verdict.level) if shown and len(series.time) > 1 else None,
         "spectra": None if series.spectrum is None or not shown else pictures.spectra(series.spectrum),
+        "coherence": None if series.spectrum is None or not shown else series.spectrum.sentence,
         "agreement": [_agreement("over the window", series.window), _agreement("minute mean", series.of_minute)]
         if series.logged is not None and shown
         else [],

@@ -104,9 +104,34 @@ class Spectrum:
     chance: float
     windows: int
 
+    @property
+    def shared(self) -> float:
+        """Frequency below which the series have more in common than chance gives [Hz]: that of the first of two
+        neighbouring coherences at or below `chance`; infinite where there are none, 0 where they are the lowest."""
+        by_chance = self.coherence <= self.chance
+        first = np.flatnonzero(by_chance[:-1] & by_chance[1:])
+        if not len(first):
+            return math.inf
+        return float(self.frequency[first[0]]) if first[0] else 0.0
+
+    @property
+    def sentence(self) -> str:
+        """Phrases the coherence."""
+        if self.shared == 0:
+            return "The film's wind and the anemometer's are found to have nothing in common at any frequency"
+        common = self.coherence[self.frequency < self.shared].mean()
+        if math.isinf(self.shared):
+            last = self.frequency[-1]
+            return f"The film's wind follows the anemometer's up to {last:.2g} Hz (mean coherence {common:.2f})"
+        return (
+            f"Below {self.shared:.2g} Hz, in gusts of more than {1 / self.shared:.2g} s, the film's wind follows the "
+            f"anemometer's (mean coherence {common:.2f}); above, they are found to have nothing in common"
+        )
+
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
         return {
+            "sentence": self.sentence,
             "frequency": self.frequency.tolist(),
             "estimated": self.estimated.tolist(),
             "logged": self.logged.tolist(),

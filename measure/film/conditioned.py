@@ -96,8 +96,9 @@ class CutOff:
         )
 
 
-_HELD = 200_000_000
-"""Bytes of frames that are held, so that a short film is decoded once."""
+_HELD = 640_000_000
+"""Bytes of frames up to which a film is held, so that it is decoded once: ten seconds of 1080p. Longer ones are decoded
+twice and hold a sample."""
 _LOST = 0.05
 """Share of frames without the background's features from which on a warning is due."""
 _ENLARGED = 2.0
@@ -132,6 +133,7 @@ class ConditionedFilm:
     Attributes:
         found: what the last reading found; None before the first, and of fewer frames than a search takes.
         reference: (height, width) the frame that all others are registered to; None likewise.
+        searched: called after each frame in which camera and flag are sought, with about how many there are and 1.
 
     Raises:
         UsageError: a crop beyond the picture.
@@ -152,6 +154,7 @@ class ConditionedFilm:
         self._cut: CutOff | None = None
         self.found: Conditioning | None = None
         self.reference: UInt8Array | None = None
+        self.searched: Callable[[int, int], None] | None = None
 
     @property
     def name(self) -> str:
@@ -170,19 +173,22 @@ class ConditionedFilm:
         return self._film.start
 
     def frames(self, first: float, last: float) -> Iterator[TimedFrame]:
-        in_memory: list[TimedFrame] | None = []
+        in_memory: list[TimedFrame] = []
         sample: list[TimedFrame] = []
-        chosen = _chosen(self.rate, min(last, self.duration) - max(first, 0.0))
-        bytes_held = 0
+        duration = min(last, self.duration) - max(first, 0.0)
+        chosen, total = _chosen(self.rate, duration), math.ceil(duration * self.rate)
+        is_held = True
         for k, (time, picture) in enumerate(self._film.frames(first, last)):
             if chosen(k):
                 sample.append((time, picture))
-            bytes_held += picture.nbytes
-            if in_memory is not None:
+            is_held = is_held and max(k + 1, total) * picture.nbytes <= _HELD
+            if is_held:
                 in_memory.append((time, picture))
-            if bytes_held > _HELD:
-                in_memory = None
-        source = in_memory if in_memory is not None else self._film.frames(first, last)
+            else:
+                in_memory.clear()
+            if self.searched is not None:
+                self.searched(total, 1)
+        source = in_memory if is_held else self._film.frames(first, last)
         if len(sample) < LEAST:
             yield from source
             return

@@ -91,7 +91,7 @@ class FilmWatch:
         if len(self.times) % _SAMPLED == 1 and len(self._sample) < _KEPT:
             self._sample.append(small)
             self._bright.append(float(np.quantile(picture[::4, ::4], 0.99)))
-            self._noise.append(noise.deviation(noise.rough(picture.astype(np.float32))[2:-2, 2:-2]))
+            self._noise.append(noise.deviation_in(picture))
 
     def _change(self, small: Float32Array) -> None:
         """Add up how much the picture changes, in itself and averaged."""

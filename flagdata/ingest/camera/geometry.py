@@ -8,7 +8,6 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from flagdata.arrays import UInt8Array
@@ -147,11 +146,7 @@ class Geometry:
             luma: mode L or F, `width` × `height`.
             black, white: luma values of reference black and white.
         """
-        wide, high = self._content
-        target = (high, wide) if self.orientation.transpose else (wide, high)
-        scaled = luma.resize(target, Image.Resampling.HAMMING, box=self._stored_box)
-        gray = _stretch(np.asarray(scaled), black=black, white=white)
-        gray = self.orientation.apply(gray)
+        gray = self.content(luma, black=black, white=white)
         if not self.padded:
             return np.ascontiguousarray(gray)
         square = np.zeros((self.size, self.size), dtype=np.uint8)
@@ -159,14 +154,25 @@ class Geometry:
         square[top : top + high, left : left + wide] = gray
         return square
 
+    def content(self, luma: Image.Image, *, black: float, white: float) -> UInt8Array:
+        """Renders as `render`, without the padding; (height, width) uint8, the longer side `size`."""
+        wide, high = self._content
+        target, box = (high, wide) if self.orientation.transpose else (wide, high), self._stored_box
+        is_whole = luma.size == target and box == (0, 0, *target)
+        scaled = luma if is_whole else luma.resize(target, Image.Resampling.HAMMING, box=box)
+        return self.orientation.apply(_stretched(scaled, black=black, white=white))
 
-def _stretch(image: NDArray[np.generic], *, black: float, white: float) -> UInt8Array:
-    if image.dtype == np.uint8:
-        if (black, white) == (0, 255):
-            return image.astype(np.uint8, copy=False)
-        table = np.clip(np.rint((np.arange(256) - black) * (255 / (white - black))), 0, 255).astype(np.uint8)
-        return table[image.astype(np.uint8, copy=False)]
-    return np.clip(np.rint((image.astype(np.float64) - black) * (255 / (white - black))), 0, 255).astype(np.uint8)
+
+def _stretched(image: Image.Image, *, black: float, white: float) -> UInt8Array:
+    """Stretches `black` … `white` of an image of mode L or F to 0 … 255."""
+    if image.mode == "L" and (black, white) == (0, 255):
+        return np.asarray(image)
+    factor = 255 / (white - black)
+    if image.mode == "L":
+        table = np.clip(np.rint((np.arange(256) - black) * factor), 0, 255)
+        return np.asarray(image.point(table.astype(int).tolist()))
+    values = np.asarray(image, dtype=np.float64)
+    return np.clip(np.rint((values - black) * factor), 0, 255).astype(np.uint8)
 
 
 def _turned(image: Image.Image, steps: Sequence[Image.Transpose]) -> Image.Image:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -163,25 +163,27 @@ class CameraStream:
     def close(self) -> None:
         self._source.close()
 
-    def unpadded(self, image: UInt8Array) -> UInt8Array:
-        """Returns the crop in a frame's image (size, size), without the padding about it; (height, width) uint8."""
-        top, left, high, wide = self._geometry.placement
-        return image[top : top + high, left : left + wide]
-
     def __iter__(self) -> Iterator[Frame]:
+        return self._once(self._geometry.render)
+
+    def unpadded(self) -> Iterator[Frame]:
+        """Yields the same frames, their images (height, width) the crop alone, without the padding about it."""
+        return self._once(self._geometry.content)
+
+    def _once(self, render: Callable[..., UInt8Array]) -> Iterator[Frame]:
         if self._started:
             raise UsageError("a camera stream is read once", fix="open the file again")
         self._started = True
-        return self._frames()
+        return self._frames(render)
 
-    def _frames(self) -> Iterator[Frame]:
+    def _frames(self, render: Callable[..., UInt8Array]) -> Iterator[Frame]:
         repair: StampRepair[Picture] = StampRepair(period=self._period)
         sampler = self._sampler()
         for stamp, picture in self._repaired(repair):
             for pick in sampler.push(stamp, picture):
-                yield self._frame(pick)
+                yield self._frame(pick, render)
         for pick in sampler.finish():
-            yield self._frame(pick)
+            yield self._frame(pick, render)
         if self._options.rate != "native":
             self._closing += _grid_findings(sampler.report, self._options.rate)
         self._closing += _gap_findings(sampler.report)
@@ -214,9 +216,9 @@ class CameraStream:
             yield from repair.push(stamp, picture)
         yield from repair.finish()
 
-    def _frame(self, pick: Pick[Picture]) -> Frame:
+    def _frame(self, pick: Pick[Picture], render: Callable[..., UInt8Array]) -> Frame:
         luma = pick.source.luma()
-        image = self._geometry.render(luma.image, black=luma.black, white=luma.white)
+        image = render(luma.image, black=luma.black, white=luma.white)
         time = self.info.start + pick.time + self._shift
         return Frame(time=time, image=image, stamp_error=pick.error / NANOSECONDS)
 

@@ -125,4 +125,5 @@ def test_a_long_film_beside_an_anemometer_shows_errors_spectra_and_delay(model: 
     assert "bias +0.5" in text
     assert "n = 140 windows" in text
     assert "Spectra and coherence" in text
+    assert "the film&#39;s wind follows the anemometer&#39;s" in text
     assert re.search(r"Clocks: (no delay|[+-]\d)", text)

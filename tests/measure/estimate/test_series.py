@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from flagdata.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
 from measure.ends import Bound, Span
 from measure.estimate import Beside, Measurement, Quantity, beside
-from measure.estimate.series import agreement, spectrum
+from measure.estimate.series import Spectrum, agreement, spectrum
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even
 from tests.measure.estimate.test_measuring import measured
@@ -134,6 +135,28 @@ def test_series_that_share_a_slow_part_are_coherent_there_and_not_elsewhere() ->
     assert found.coherence[above].mean() < 0.5
     # Parseval: the density integrates to the variance.
     assert np.sum(found.logged) * found.frequency[0] == pytest.approx(np.var(slow) + 0.25, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("coherence", "sentence"),
+    [
+        ((0.9, 0.7, 0.1, 0.2, 0.8), "Below 0.3 Hz, in gusts of more than 3.3 s, .*coherence 0.80.*; above, they are"),
+        ((0.9, 0.7, 0.1, 0.9, 0.8), "up to 0.5 Hz"),
+        ((0.3, 0.2, 0.9, 0.9, 0.9), "nothing in common at any frequency"),
+    ],
+)
+def test_the_frequency_up_to_which_film_and_anemometer_agree_is_said(coherence: tuple[float], sentence: str) -> None:
+    frequency = np.linspace(0.1, 0.5, 5)
+    found = Spectrum(
+        frequency=frequency,
+        estimated=frequency,
+        logged=frequency,
+        coherence=np.array(coherence),
+        chance=0.63,
+        windows=40,
+    )
+    assert re.search(sentence, found.sentence)
+    assert found.as_dict()["sentence"] == found.sentence
 
 
 def test_a_gap_or_a_constant_leaves_no_spectrum_of_what_is_too_short() -> None:

@@ -36,6 +36,13 @@ def test_a_film_too_large_to_be_held_is_read_twice_and_shows_the_same(monkeypatc
     np.testing.assert_array_equal(read(ConditionedFilm(source)), held)
 
 
+def test_every_frame_of_the_search_advances_it_before_the_first_one_is_shown() -> None:
+    made, advanced = ConditionedFilm(film(Drawn())), []
+    made.searched = lambda total, count: advanced.append((total, count))
+    next(iter(made.frames(0.4, 0.8)))
+    assert advanced == [(10, 1)] * 11
+
+
 def test_a_part_of_a_film_has_its_own_instants(monkeypatch: pytest.MonkeyPatch) -> None:
     made = ConditionedFilm(film(Drawn()))
     times = [time for time, _ in made.frames(0.4, 0.8)]

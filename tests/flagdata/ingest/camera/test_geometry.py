@@ -108,6 +108,7 @@ def test_an_oblong_crop_is_padded_and_never_stretched() -> None:
     assert (out[75:225] > 0).all()
     bright = out > 157
     assert bright.any(axis=1).sum() == bright.any(axis=0).sum() == pytest.approx(120, abs=1)
+    np.testing.assert_array_equal(geometry.content(Image.fromarray(disk), black=0, white=255), out[75:225])
 
 
 def test_shrinking_averages_over_area_and_does_not_alias() -> None:
