@@ -198,7 +198,7 @@ class Observed:
                 f"{len(self.readings)}: the outline is lost in the others, or what is followed is not the flag",
                 where=self.name,
                 fix="look at the flag on the page of flagdata measure --report, and choose it by --crop or --flag, or "
-                "a part by --start and --end; flagdata observe says why windows show nothing",
+                "a part by --start and --end; flagdata observe with its --flag-size says why windows show nothing",
             )
 
     @property
