@@ -13,7 +13,7 @@ _NUMBER = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 _ALONE = re.compile(_NUMBER)
 _SIGMA = re.compile(rf"{_NUMBER}(?:±|\+-|\+/-){_NUMBER}")
 _RANGE = re.compile(rf"{_NUMBER}:{_NUMBER}")
-FORMS = "0.284, 0.284±0.01 (one standard deviation) or 0.27:0.30 (a range)"
+FORMS = "a number alone, as in 0.28, with its standard deviation, as in 0.28±0.01, or a range, as in 0.27:0.30"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,6 +24,8 @@ from flagdata.retired_names import with_present_keys
 
 STRETCHING_SHAPE = (6, 4)
 BENDING_SHAPE = (3, 5)
+HEAVIEST = 20.0
+"""Area weight that no cloth has [kg/m²], 2.5 mm of steel: what is above it was meant in g/m²."""
 MATERIALS = Shelf(folder="materials", noun="material")
 
 
@@ -59,6 +61,10 @@ class Material:
         object.__setattr__(self, "bending", self._table(self.bending, BENDING_SHAPE, "bending"))
         if not (math.isfinite(self.area_weight) and self.area_weight > 0):
             raise self._error(f"area weight {self.area_weight!r} is not positive", "give the mass per area in kg/m²")
+        if self.area_weight > HEAVIEST:
+            raise self._error(
+                f"area weight {self.area_weight:g} kg/m² is above {HEAVIEST:g} kg/m²", "give kg/m² (100 g/m² is 0.1)"
+            )
         if not (math.isfinite(self.damping) and self.damping >= 0):
             raise self._error(f"damping {self.damping!r} is negative or not finite", "give d in seconds, 0 for none")
         if self.bending.min() < 0:

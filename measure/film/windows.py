@@ -105,7 +105,7 @@ def lay_out(
         first, last: the part of the film to use [s]; by default all.
 
     Raises:
-        UsageError: a part that the film does not have, or a step that is not above 0.
+        UsageError: a part that the film does not have, or a step that is not above 0 or longer than the part.
         InputError: the film is shorter than one window.
     """
     begin, end = first if first is not None else 0.0, last if last is not None else duration
@@ -119,6 +119,12 @@ def lay_out(
         raise UsageError(
             f"the time between windows is {step:g} s", where="--windows", fix="give a time above 0, as in 1.2s"
         )
+    if step is not None and step > min(end, duration) - begin:
+        raise UsageError(
+            f"the time between windows is {step:g} s, and {min(end, duration) - begin:.2f} s of film are used",
+            where="--windows",
+            fix="give less than that, as in 1.2s; without it windows follow each other",
+        )
     longest = frames * max(spacings)
     layout = WindowLayout(
         frames=frames,
@@ -131,8 +137,9 @@ def lay_out(
     if layout.count < 1:
         raise InputError(
             f"{layout.last - layout.first:.2f} s of film, a measurement takes {layout.length:.2f} s",
-            where="length",
-            fix=f"give at least {layout.length:.2f} s, {frames} frames at {1 / max(spacings):.3g} Hz",
+            where="length of the film",
+            fix=f"give at least {layout.length:.2f} s, {frames} frames at {1 / max(spacings):.3g} Hz; "
+            "if the film lasts longer, check the rate that was given",
         )
     return layout
 

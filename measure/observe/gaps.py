@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding
-from measure.observe.trajectory import Trajectory
+from measure.observe.trajectory import Trajectory, marker_at
 
 LONGEST = 0.12
 """Longest gap that the marker's own motion fills [s]: three frames at 25 a second."""
@@ -105,10 +105,9 @@ def fill_positions(positions: FloatArray, markers: FloatArray, *, period: float,
     markers_used = tracked.mean(axis=0) >= _LEAST
     lost = int((~markers_used).sum())
     if lost > _LOST * len(markers_used):
-        marker = int(np.flatnonzero(~markers_used)[0])
         raise InputError(
             f"{lost} of {len(markers_used)} markers were tracked in fewer than half of the frames",
-            where=f"{where}, marker {marker}",
+            where=f"{where}, {marker_at(markers[~markers_used][0])}",
             fix="track them again, or cut the recording to where they are tracked",
         )
     if lost:
@@ -116,7 +115,7 @@ def fill_positions(positions: FloatArray, markers: FloatArray, *, period: float,
             Finding.of(
                 "markers-left-out",
                 f"{lost} of {len(markers_used)} markers were tracked in fewer than half of the frames: left out",
-                where=f"{where}, marker {int(np.argmin(markers_used))}",
+                where=f"{where}, {marker_at(markers[~markers_used][0])}",
                 count=lost,
                 fix="track them again, if they matter",
             )

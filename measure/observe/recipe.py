@@ -489,5 +489,9 @@ def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTra
             "an artifact's wind was read before", where=source.log, fix="leave the sensor and the zone out"
         )
     if lake is None:
-        raise NotFoundError("the log does not exist", where=source.log, fix="check the path, or open a lake for ids")
+        raise NotFoundError(
+            "the wind is neither a number nor a log that exists",
+            where=source.log,
+            fix="give a speed in m/s as a number alone, or correct the path; an id needs its lake",
+        )
     return wind.from_artifact(lake, lake.artifact(source.log, kinds=(Kind.WIND,)), placement)

@@ -301,9 +301,14 @@ class Experiment:
                 marker = int(np.flatnonzero(beyond.any(axis=1))[0])
                 raise InputError(
                     f"{int(beyond.any(axis=1).sum())} markers are not on the cloth",
-                    where=f"recording {recording.name!r}, marker {marker}",
+                    where=f"recording {recording.name!r}, {marker_at(recording.markers[marker])}",
                     fix="give rest coordinates in the cloth's own frame and in metres",
                 )
+
+
+def marker_at(rest: FloatArray) -> str:
+    """Returns how a marker is named in messages: by its rest coordinates (2,) [m], since its index is not its name."""
+    return f"marker at (u, v) = ({rest[0]:.4g}, {rest[1]:.4g}) m"
 
 
 def _frozen(values: FloatArray) -> FloatArray:

@@ -27,7 +27,7 @@ import torch
 from msgspec import Meta
 
 from flagdata.dataset.splits import ExplicitSplit
-from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
+from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError, UsageError
 from flagdata.lake import Lake
 from flagdata.lake.matching import Values
 from flagdata.provenance import recipe_hash
@@ -98,10 +98,14 @@ class DataSpec:
         """Checks that a lake has all of these data sets.
 
         Raises:
+            NotFoundError: it has no data set at all.
             UnknownNameError: one that it has not; the nearest is named.
         """
         available = set(lake.rows({"kind": Kind.CLIP}, at=at, columns=["dataset"])["dataset"].drop_null().to_pylist())
         for dataset in self.datasets:
+            if not available:
+                message = f"the lake has no clips of a data set, and the recipe learns from {dataset!r}"
+                raise NotFoundError(message, where=str(lake.path), fix=f"build it first: flagdata build {dataset}")
             if dataset not in available:
                 raise UnknownNameError.of("data set", dataset, available, where=str(lake.path))
 

@@ -45,6 +45,6 @@ def test_other_texts_are_refused_with_the_forms_that_are_read() -> None:
         "1e999",
         "284g",
     ]
-    assert unrefused(parse, [(text, "0.284±0.01") for text in texts], UsageError) == []
+    assert unrefused(parse, [(text, "0.28±0.01") for text in texts], UsageError) == []
     with pytest.raises(click.BadParameter, match=r"0\.27:0\.30"):
         STATED.convert("light", None, None)

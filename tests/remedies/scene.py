@@ -51,6 +51,9 @@ def make_scene(folder: Path) -> Path:
     The lake has the film `first` and the log `mast` on main, the film `third` on the branch side, the tag v0, a film
     that was withdrawn, and an abandoned folder in staging; `cut.mcap` is a record that was cut off.
     """
+    (folder / "frames.csv").write_text(
+        "frame,marker,u,v,x,y,z\n0,a,0,0,0,0,0\n0,b,1,0,1,0,0\n1,a,0,0,0,0,0\n1,b,1,0,1,0,0\n"
+    )
     lake = Lake.create(folder / "lake")
     ingest_camera(lake, write_film(folder / "first.mp4", frames=30))
     ingest_wind(lake, write_log(folder / "mast.csv", speed=5))

@@ -33,6 +33,12 @@ CASES = [
         f"{FILM} --exposure 0.1",
         (f"{FILM} --exposure 0.002", OR, f"{FILM} --exposure 0.1 --true-fps 5"),
     ),
+    Case(
+        "markers/table.py",
+        "give the frames per second by --rate",
+        "ingest frames.csv",
+        ("ingest frames.csv --rate 25",),
+    ),
     Case("meshes/folder.py", "give it by --rate", "ingest meshes", ("ingest meshes --rate 25",)),
     Case(
         "meshes/store.py",

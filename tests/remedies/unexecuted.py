@@ -72,6 +72,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/dataset/table.py", "run flagdata doctor"),
         ("models/training/checkpoint.py", "name another folder by -"),
         ("models/training/command.py", "wait until it has ended,"),
+        ("models/training/recipe.py", "build it first: flagdata build"),
         ("models/evaluation/command.py", "name one, such as wave o"),
     ),
     "an error that is caught: the message which is printed in its place says --start": (

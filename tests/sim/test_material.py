@@ -77,6 +77,7 @@ def test_impossible_materials_are_refused_with_the_reason() -> None:
         ({"area_weight": -0.1}, "area weight"),
         ({"area_weight": float("nan")}, "area weight"),
         ({"damping": -1.0}, "damping"),
+        ({"area_weight": 155.0}, "155 kg/m² is above 20"),
         ({"stretching": np.zeros((5, 4))}, "stretching"),
         ({"bending": -np.ones((3, 5))}, "bending"),
         ({"bending": np.full((3, 5), np.inf)}, "bending"),

@@ -37,6 +37,8 @@ PICTURES = {
     ".webp": "WEBP",
 }
 """Endings of the names of pictures that are read, and their formats."""
+VIDEOS = frozenset({".mp4", ".mov", ".mts", ".avi", ".mkv", ".webm"})
+"""Endings of films, one of which is given by its own path."""
 _FORMATS = tuple(sorted(set(PICTURES.values())))
 _EXIF = 0x8769
 _ORIENTATION, _TAKEN, _TAKEN_PART, _TAKEN_ZONE = 0x0112, 0x9003, 0x9291, 0x9011
@@ -211,7 +213,9 @@ class SequenceSource:
                 "the folder holds no PNG, JPEG, TIFF, BMP or WebP image"
                 + (f", but files: {listed}" if other_files else ""),
                 where=self._where,
-                fix="give the folder of the images; convert those of other formats to PNG",
+                fix="give one video by its own path, not the folder"
+                if VIDEOS & set(other_files)
+                else "give the folder of the images; convert those of other formats to PNG",
             )
         kinds = sorted({PICTURES[path.suffix.lower()] for path in paths})
         if len(kinds) > 1:

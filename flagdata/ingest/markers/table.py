@@ -135,7 +135,7 @@ def _check_columns(names: list[str], options: MarkerOptions, where: str) -> None
             fix="add the number of the frame, or its time in s",
         )
     if "time" not in names and options.rate is None:
-        raise UsageError("the table has frame numbers only", where=where, fix="give its rate, in frames a second")
+        raise UsageError("the table has frame numbers only", where=where, fix="give the frames per second by --rate")
     if "time" in names and options.rate is not None:
         raise UsageError("the table has times of its own", where=where, fix="leave the rate out, or the column time")
 

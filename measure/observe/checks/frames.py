@@ -12,6 +12,7 @@ from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe.gaps import LONGEST, frames_of
 from measure.observe.observation import Observation
+from measure.observe.trajectory import marker_at
 
 SHORTEST = 2.0
 """Seconds that a recording must last."""
@@ -161,7 +162,7 @@ def without_stuck_markers(observation: Observation) -> Observation:
         f"{count} positions are exactly those of the frame before while the markers around move on, or are "
         "(0, 0, 0): not tracked",
         count=count,
-        where=f"recording {observation.name!r}, frame {int(frame)}, marker {int(marker)}",
+        where=f"recording {observation.name!r}, frame {int(frame)}, {marker_at(observation.markers[marker])}",
     )
     return replace(observation, positions=positions, findings=(*observation.findings, finding))
 

@@ -13,6 +13,7 @@ from flagdata.errors import InputError
 from flagdata.findings import Finding
 from measure.observe import cloth
 from measure.observe.observation import Observation
+from measure.observe.trajectory import marker_at
 
 FEWEST = 30
 """Markers that a recording must have."""
@@ -144,7 +145,7 @@ def without_strays(observation: Observation, edges: Edges, sigma: float) -> Obse
         "markers-astray",
         f"{count} positions are further from the markers around than cloth can stretch; they are left out",
         count=count,
-        where=f"recording {observation.name!r}, frame {int(frame)}, marker {int(marker)}",
+        where=f"recording {observation.name!r}, frame {int(frame)}, {marker_at(observation.markers[marker])}",
         fix="look at the track there: was the marker exchanged with another?",
     )
     return replace(observation, positions=positions, findings=(*observation.findings, finding))

@@ -145,6 +145,12 @@ def test_a_part_that_the_film_does_not_have_is_refused(part: tuple[float, float 
         lay_out(frames=5, spacings=(0.04,), rate=25.0, duration=4.0, step=None, first=part[0], last=part[1])
 
 
+def test_windows_further_apart_than_the_film_is_long_are_refused() -> None:
+    with pytest.raises(UsageError, match=r"is 60 s, and 4\.00 s of film are used"):
+        lay_out(frames=5, spacings=(0.04,), rate=25.0, duration=4.0, step=60.0)
+    assert lay_out(frames=5, spacings=(0.04,), rate=25.0, duration=4.0, step=4.0).count == 1
+
+
 class Filmed:
     """A film of numbered frames at a rate."""
 

@@ -113,3 +113,11 @@ def test_a_recording_of_the_lowest_rate_is_left_as_it_is() -> None:
 def test_rates_beyond_those_that_can_be_predicted_are_refused(rate: float) -> None:
     with pytest.raises(InputError, match="frames a second"):
         observe([recording("odd", rate=rate, seconds=10.0 if rate < 10 else 2.2)], FEW)
+
+
+def test_a_marker_left_out_is_named_by_its_place_on_the_cloth() -> None:
+    positions = flutter(REST, np.arange(50) / 25.0)
+    positions[:, 9] = np.nan
+    (finding,) = fill_positions(positions, REST, period=0.04, where="here").findings
+    u, v = REST[9]
+    assert finding.where == f"here, marker at (u, v) = ({u:.4g}, {v:.4g}) m"

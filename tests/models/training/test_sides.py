@@ -10,7 +10,7 @@ import pyarrow as pa
 import pytest
 
 from flagdata.dataset import clips_on_side
-from flagdata.errors import InputError, RefusedError, UnknownNameError
+from flagdata.errors import InputError, NotFoundError, RefusedError, UnknownNameError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind, catalog_schema
 from models.evaluation.command import refuse_learned
@@ -113,6 +113,12 @@ def test_a_data_set_that_the_lake_lacks_is_named_with_the_nearest(tmp_path: Path
     with pytest.raises(UnknownNameError, match="unknown data set 'flag'; did you mean 'flags'"):
         DataSpec(datasets=("flags", "flag")).check(lake, at=None)
     DataSpec(datasets=("flags",)).check(lake, at=None)
+
+
+def test_a_lake_without_a_data_set_names_the_command_that_builds_it(tmp_path: Path) -> None:
+    with pytest.raises(NotFoundError, match=r"no clips of a data set, .* 'flags'") as refused:
+        DataSpec(datasets=("flags",)).check(Lake.create(tmp_path / "lake"), at=None)
+    assert refused.value.fix == "build it first: flagdata build flags"
 
 
 @pytest.mark.parametrize("name", ["o'brien", "100%", "my set", 'a "b"', "été"])

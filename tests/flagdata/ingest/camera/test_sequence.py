@@ -228,6 +228,10 @@ def test_images_of_other_formats_are_named_in_the_refusal(tmp_path: Path, option
     with pytest.raises(InputError, match=r"3 of \.heic") as refused:
         open_camera(tmp_path, options)
     assert "PNG" in refused.value.fix
+    (tmp_path / "flag.MP4").write_bytes(b"film")
+    with pytest.raises(InputError, match=r"1 of \.mp4") as refused:
+        open_camera(tmp_path, options)
+    assert "one video by its own path" in refused.value.fix
     folder = save(tmp_path / "mixed", {0: "0.png", 1: "1.jpeg"}, numbered)
     with pytest.raises(InputError, match=r"several kinds \(JPEG, PNG\)"):
         open_camera(folder, options)
