@@ -15,8 +15,9 @@ import torch
 from torch import Tensor
 
 from flagdata.arrays import FloatArray
-from flagdata.errors import ErrorKind, FlagdataError
+from flagdata.errors import ErrorKind, FlagdataError, UsageError
 from sim.integrate import Integrator
+from sim.remeshing.adapting import remeshed
 from sim.state import SPEED_LIMIT, State
 from sim.system import System
 
@@ -59,7 +60,8 @@ class Batch:
     """Flags that are simulated together.
 
     Attributes:
-        system, state: the flags and where they are; the state moves on with the run.
+        system, state: the flags and where they are; the state moves on with the run, and so does the system where its
+            mesh follows the cloth (`System.remeshing`): at the start, and after each call of the integrator.
         integrator: advances them.
         divergence: what a member that diverges leads to.
         speed_limit: of any vertex [m/s]: beyond it a member has diverged; infinite to wait for positions that are not
@@ -75,7 +77,8 @@ class Batch:
     diverged: dict[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._start = self.state
+        self.system, self.state = remeshed(self.system, self.state)
+        self._start = self.system, self.state
 
     def states(self, numbers: Iterable[int], rate: float) -> Iterator[State]:
         """Yields the states at these numbers of periods after the start, ascending; number 0 is the start itself.
@@ -87,6 +90,7 @@ class Batch:
 
         Raises:
             DivergedError: a member diverged, where the policy is to refuse.
+            UsageError: remeshing that cannot act: see `sim.remeshing.adapting.check`.
         """
         now = 0
         for number in numbers:
@@ -96,6 +100,7 @@ class Batch:
                 now = number
                 if self.divergence is not Divergence.KEEP:
                     self._check()
+                self.system, self.state = remeshed(self.system, self.state)
             yield self.state
 
     def positions(self, numbers: range, rate: float, *, look: Callable[[State], object] | None = None) -> FloatArray:
@@ -105,7 +110,16 @@ class Batch:
 
         Args:
             look: called with each state that is kept.
+
+        Raises:
+            UsageError: a mesh that changes on the way.
         """
+        if self.system.remeshing is not None:
+            raise UsageError(
+                "the mesh changes from frame to frame, so that positions are no single array",
+                where="remeshing",
+                fix="leave out remeshing, or take the states one by one",
+            )
         frames: list[FloatArray] = []
         for number, state in enumerate(self.states(range(numbers.stop), rate)):
             if number >= numbers.start:
@@ -123,7 +137,11 @@ class Batch:
             raise DivergedError(members[0], self.state.time)
         for member in members:
             self.diverged.setdefault(member, self.state.time)
-        self.state = _restarted(self.state, self._start, failed)
+        start = self._start[1]
+        if self.system.remeshing is not None:
+            self.system, self.state = self._start[0], replace(start, time=self.state.time)
+            return
+        self.state = _restarted(self.state, start, failed)
 
 
 def after(settle: float, duration: float, rate: float) -> range:

@@ -19,6 +19,7 @@ from sim.handles import Handles
 from sim.limits import StrainLimits
 from sim.material import Material
 from sim.mesh import Mesh, grid
+from sim.remeshing.sizing import Remeshing
 from sim.state import State
 from sim.system import System
 from sim.tables import Evaluation
@@ -42,6 +43,7 @@ class Scene:
         evaluation: how the material's tables are read.
         contact: how layers keep apart; None lets them pass through each other.
         limits: of strain; None lets faces stretch as their stiffness allows.
+        remeshing: how finely the cloth is divided after each frame; None keeps the mesh.
 
     Raises:
         InputError: a shape that does not fit, a value that is not finite, a held vertex that is not there, or a
@@ -58,6 +60,7 @@ class Scene:
     evaluation: Evaluation = Evaluation.ARCSIM
     contact: Contact | None = None
     limits: StrainLimits | None = None
+    remeshing: Remeshing | None = None
 
     def __post_init__(self) -> None:
         position = np.array(self.position, dtype=np.float64)
@@ -165,7 +168,8 @@ def assemble(
     gravity.
 
     Raises:
-        UsageError: no scenes, or scenes with different meshes, handles, wind forces, evaluations or contacts.
+        UsageError: no scenes, or scenes with different meshes, handles, wind forces, evaluations, contacts, limits or
+            remeshing.
     """
     if not scenes:
         raise UsageError("there are no scenes to simulate", fix="give at least one")
@@ -174,7 +178,7 @@ def assemble(
         same = scene.mesh is first.mesh or (
             np.array_equal(scene.mesh.rest, first.mesh.rest) and np.array_equal(scene.mesh.faces, first.mesh.faces)
         )
-        shared = ("handles", "air", "evaluation", "contact", "limits")
+        shared = ("handles", "air", "evaluation", "contact", "limits", "remeshing")
         if not same or any(getattr(scene, name) != getattr(first, name) for name in shared):
             raise UsageError(
                 f"scene {index} differs from scene 0 in mesh or one of: {', '.join(shared)}",
@@ -200,5 +204,6 @@ def assemble(
         anchors=position[vertices].clone(),
         contact=first.contact,
         limits=first.limits,
+        remeshing=first.remeshing,
     )
     return system, State(position=position, velocity=torch.zeros_like(position))

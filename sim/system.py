@@ -20,6 +20,7 @@ from sim.cloth import Cloth
 from sim.contact import Contact
 from sim.handles import Handles
 from sim.limits import StrainLimits, limited
+from sim.remeshing.sizing import Remeshing
 from sim.state import State
 from sim.wind import Wind
 
@@ -179,6 +180,7 @@ class System:
         remembering: forces that remember.
         contact: how layers keep apart; None lets them pass through each other.
         limits: of strain; None lets faces stretch as their stiffness allows.
+        remeshing: how the mesh follows shape and motion (see `sim.batch.Batch`); None keeps it.
     """
 
     cloth: Cloth
@@ -196,6 +198,7 @@ class System:
     remembering: tuple[Remembering, ...] = ()
     contact: Contact | None = None
     limits: StrainLimits | None = None
+    remeshing: Remeshing | None = None
 
     def __post_init__(self) -> None:
         if self.motion is not None and self.ties:

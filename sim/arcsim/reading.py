@@ -3,8 +3,9 @@
 A scene file names one cloth with one material, its handles, gravity and wind. ArcSim's step has stages, which all act
 unless the scene disables them, strain limiting and plasticity only where a material has settings for them, separation
 and the pop filter only after remeshing. Of these, *proximity* becomes `Scene.contact` (`magic.repulsion_thickness`,
-1 mm; `magic.collision_stiffness`, 1e9 N/m³; `friction`, 0.6) and *strainlimiting* `Scene.limits`. The others are not
-simulated: they are an error unless the scene disables them or the caller accepts to leave them out.
+1 mm; `magic.collision_stiffness`, 1e9 N/m³; `friction`, 0.6), *strainlimiting* `Scene.limits`, and *remeshing*, where
+the cloth has settings for it, `Scene.remeshing`. The others are not simulated: they are an error unless the scene
+disables them or the caller accepts to leave them out.
 
 Two deviations: ArcSim reads `duration` only beside `timestep` and runs without end beside `frame_time`, here it ends
 the run in both; ArcSim meets strain limits by an optimisation, here the faces are corrected in `SWEEPS` sweeps.
@@ -31,11 +32,12 @@ from sim.handles import ARCSIM_STIFFNESS, Handles
 from sim.limits import StrainLimits
 from sim.material import Material
 from sim.mesh import Mesh
+from sim.remeshing.sizing import Remeshing
 from sim.scene import Scene
 
 STAGES = ("strainlimiting", "remeshing", "proximity", "collision", "separation", "popfilter", "plasticity")
 """Stages of ArcSim's step that a scene may disable."""
-SIMULATED = ("strainlimiting", "proximity")
+SIMULATED = ("strainlimiting", "remeshing", "proximity")
 """Those of them that are simulated here."""
 SWEEPS = 50
 """Corrections a step for strain limits, as ArcSim's steps of 5 ms want them."""
@@ -66,7 +68,7 @@ _KEYS: Mapping[str, Any] = {
                     )
                 )
             ],
-            "remeshing": None,
+            "remeshing": dict.fromkeys(("refine_angle", "refine_compression", "refine_velocity", "size", "aspect_min")),
         }
     ],
     "handles": [dict.fromkeys(("nodes", "type"))],
@@ -84,7 +86,7 @@ _KEYS: Mapping[str, Any] = {
     ),
     **dict.fromkeys(("motions", "obstacles", "morphs", "obs_friction")),
 }
-# `remeshing`, `projection_thickness` to `combine_tensors`, `weakening` and `obs_friction` belong to stages that are not
+# `projection_thickness` to `combine_tensors`, `weakening` and `obs_friction` belong to stages that are not
 # simulated and to obstacles: they say nothing once those are left out.
 _EMPTY = ("motions", "obstacles", "morphs")  # known, and only supported empty
 
@@ -192,6 +194,7 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
         ),
         contact=_contact(content, magic, where) if "proximity" in simulated else None,
         limits=_limits(entry, where) if "strainlimiting" in simulated else None,
+        remeshing=_remeshing(cloth["remeshing"], f"{where}, remeshing") if "remeshing" in simulated else None,
     )
     frame_time = _number(content, "frame_time", math.nan, where)
     frame_steps = _number(content, "frame_steps", math.nan, where)
@@ -227,7 +230,9 @@ def _supported(content: Mapping[str, Any], where: str, accept: frozenset[str]) -
     filled = [key for key in _EMPTY if content.get(key)]
     acting = tuple(stage for stage in STAGES if stage in _acting(content, where))
     left_out = tuple(stage for stage in acting if stage in accept)
-    refused = [stage for stage in acting if stage not in (*accept, *SIMULATED)]
+    set_up = all("remeshing" in cloth for cloth in _cloths(content, where))
+    simulated = SIMULATED if set_up else tuple(stage for stage in SIMULATED if stage != "remeshing")
+    refused = [stage for stage in acting if stage not in (*accept, *simulated)]
     reasons = [
         f"{kind} {', '.join(names)}"
         for kind, names in (("the keys", keys), ("the contents of", filled), ("the stages", refused))
@@ -243,12 +248,17 @@ def _supported(content: Mapping[str, Any], where: str, accept: frozenset[str]) -
 def _acting(content: Mapping[str, Any], where: str) -> set[str]:
     """Stages that act in a scene."""
     acting: set[str] = {*STAGES} - set(_list(content, "disable", where))
-    cloths = [cloth for cloth in _list(content, "cloths", where) if isinstance(cloth, Mapping)]
-    entries = [entry for c in cloths for entry in _list(c, "materials", where) if isinstance(entry, Mapping)]
+    entries = [
+        entry for c in _cloths(content, where) for entry in _list(c, "materials", where) if isinstance(entry, Mapping)
+    ]
     for stage, key in (("strainlimiting", "strain_limits"), ("plasticity", "yield_curv")):
         if not any(key in entry for entry in entries):
             acting.discard(stage)
     return acting if "remeshing" in acting else acting - {"separation", "popfilter"}
+
+
+def _cloths(content: Mapping[str, Any], where: str) -> list[Mapping[str, Any]]:
+    return [cloth for cloth in _list(content, "cloths", where) if isinstance(cloth, Mapping)]
 
 
 def _contact(content: Mapping[str, Any], magic: Mapping[str, Any], where: str) -> Contact:
@@ -265,6 +275,22 @@ def _limits(entry: Mapping[str, Any], where: str) -> StrainLimits:
         raise InputError(f"strain_limits is {limits!r}", where=where, fix="give [low, high]")
     low, high = (_number({"strain_limits": value}, "strain_limits", 0.0, where) for value in limits)
     return StrainLimits(low=low, high=high, sweeps=SWEEPS)
+
+
+def _remeshing(settings: Mapping[str, Any], where: str) -> Remeshing:
+    size = settings.get("size")
+    if not isinstance(size, list) or len(size) != 2:
+        raise InputError(f"size is {size!r}", where=where, fix="give [smallest, largest] in metres")
+    smallest, largest = (_number({"size": value}, "size", 0.0, where) for value in size)
+    # A criterion without a value asks for nothing.
+    return Remeshing(
+        refine_angle=_number(settings, "refine_angle", math.inf, where),
+        refine_compression=_number(settings, "refine_compression", math.inf, where),
+        refine_velocity=_number(settings, "refine_velocity", math.inf, where),
+        size_min=smallest,
+        size_max=largest,
+        aspect_min=_number(settings, "aspect_min", 0.0, where),
+    )
 
 
 def _strange(content: Any, schema: Mapping[str, Any], path: str, where: str) -> list[str]:

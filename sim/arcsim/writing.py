@@ -18,6 +18,7 @@ from flagdata.outputs import write_files
 from sim.air import QuadraticNormal
 from sim.arcsim.reading import SIMULATED, STAGES, ArcsimScene
 from sim.material import Material
+from sim.remeshing.sizing import Remeshing
 from sim.scene import Scene
 from sim.tables import Evaluation
 
@@ -100,8 +101,21 @@ def _content(file: ArcsimScene, air: QuadraticNormal, *, mesh: str, material: st
         simulated.remove("strainlimiting")
     else:
         entry["strain_limits"] = [scene.limits.low, scene.limits.high]
+    if scene.remeshing is None:
+        simulated.remove("remeshing")
+    else:
+        content["cloths"][0]["remeshing"] = _remeshing(scene.remeshing)
     content["disable"] = [stage for stage in STAGES if stage not in simulated]
     return content
+
+
+def _remeshing(criteria: Remeshing) -> dict[str, Any]:
+    entries: dict[str, Any] = {
+        name: value
+        for name in ("refine_angle", "refine_compression", "refine_velocity", "aspect_min")
+        if math.isfinite(value := getattr(criteria, name))
+    }
+    return {**entries, "size": [criteria.size_min, criteria.size_max]}
 
 
 def _material(material: Material) -> dict[str, Any]:

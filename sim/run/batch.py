@@ -14,9 +14,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray
+from flagdata.arrays import Float32Array, FloatArray, IntArray
 from flagdata.errors import LimitError
-from flagdata.lake.meshes import MeshSequence
+from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
 from flagdata.timebase import NANOSECONDS
 from sim import membrane
 from sim.batch import Batch, Divergence
@@ -27,6 +27,7 @@ from sim.integrate.implicit import BackwardEuler
 from sim.integrate.stability import stiffest
 from sim.integrate.symplectic import Symplectic, advance
 from sim.kernel_warp.batch import WarpKernel
+from sim.mesh import Mesh
 from sim.run.members import Crew, Member, Parameter
 from sim.run.recipe import Recipe
 from sim.state import State
@@ -134,7 +135,7 @@ class BatchOutcome:
     """
 
     member: Member
-    sequence: MeshSequence | None
+    sequence: MeshSequence | RaggedMeshSequence | None
     wind: FloatArray
     diagnosis: Diagnosis
     failure: tuple[str, str] | None = None
@@ -226,12 +227,14 @@ def run(
     system, state = crew.assemble(filled, device=device)
     batch = Batch(system=system, state=state, integrator=stepper, divergence=Divergence.RESTART)
     monitor, frames, winds = Monitor(), [], []
+    meshes: list[Mesh] = []
     with torch.no_grad():
         unstable = torch.nonzero(stepper.unstable(system)).flatten().tolist()
         for frame, state in enumerate(batch.states(range(time.total), time.rate)):
             if frame >= time.settling:
-                monitor.look(system, state)
-                frames.append(state.position.to("cpu", torch.float32))
+                monitor.look(batch.system, state)
+                meshes.append(batch.system.cloth.mesh)
+                frames.append(state.position.to("cpu", torch.float32).numpy())
                 winds.append(system.wind.velocity(state.time).expand(3, size).double().cpu().numpy())
             if progress is not None:
                 progress(1)
@@ -242,20 +245,19 @@ def run(
     failures |= {
         index: ("diverged", f"it diverged before {last_good:.3f} s") for index, last_good in batch.diverged.items()
     }
-    positions, velocities = torch.stack(frames).numpy(), np.stack(winds)
-    first = [round((time.settling + i) / time.rate * NANOSECONDS) for i in range(time.frames)]
+    velocities = np.stack(winds)
+    instants = [round((time.settling + i) / time.rate * NANOSECONDS) for i in range(time.frames)]
     outcomes: list[BatchOutcome] = []
     for index, member in enumerate(members):
         diagnosis = monitor.of(index)
         failure = failures.get(index) or _crumpled(diagnosis)
         sequence = None
         if failure is None:
-            sequence = MeshSequence(
-                time=np.array(first, dtype=np.int64),
-                positions=np.ascontiguousarray(positions[..., index]),
-                faces=crew.mesh.faces.astype(np.int32),
-                rest=crew.mesh.rest.astype(np.float32),
-                attributes=_attributes(crew, stepper, member, diagnosis, velocities[..., index]),
+            sequence = _sequence(
+                np.array(instants, dtype=np.int64),
+                meshes,
+                [frame[..., index] for frame in frames],
+                _attributes(crew, stepper, member, diagnosis, velocities[..., index]),
             )
         outcomes.append(
             BatchOutcome(
@@ -263,6 +265,29 @@ def run(
             )
         )
     return outcomes
+
+
+def _sequence(
+    time: IntArray, meshes: Sequence[Mesh], positions: Sequence[Float32Array], attributes: Mapping[str, Any]
+) -> MeshSequence | RaggedMeshSequence:
+    """Puts frames together at their times [ns], with the mesh and the positions (vertex, 3) [m] of each."""
+    if all(mesh is meshes[0] for mesh in meshes):
+        return MeshSequence(
+            time=time,
+            positions=np.stack(positions),
+            faces=meshes[0].faces.astype(np.int32),
+            rest=meshes[0].rest.astype(np.float32),
+            attributes=attributes,
+        )
+    return RaggedMeshSequence(
+        time=time,
+        positions=np.concatenate(positions),
+        faces=np.concatenate([mesh.faces for mesh in meshes]).astype(np.int32),
+        rest=np.concatenate([mesh.rest for mesh in meshes]).astype(np.float32),
+        vertex_offset=np.cumsum([0, *(mesh.vertex_count for mesh in meshes)]),
+        face_offset=np.cumsum([0, *(len(mesh.faces) for mesh in meshes)]),
+        attributes=attributes,
+    )
 
 
 def _crumpled(diagnosis: Diagnosis) -> tuple[str, str] | None:

@@ -135,6 +135,7 @@ class Crew:
             evaluation=self.recipe.scene.evaluation,
             contact=self.recipe.contact,
             limits=self.recipe.limits,
+            remeshing=self.recipe.remeshing,
         )
         parameters: dict[str, Parameter] = {
             "material": base.name,

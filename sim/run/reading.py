@@ -19,13 +19,15 @@ which each member draws its own value.
                  force = "quadratic-normal" | "stokes"; density, drag | viscosity
     [contact]    thickness, stiffness, friction; without the table, layers pass through each other
     [limits]     low, high, sweeps; without the table, strain has no limits
+    [remeshing]  refine-angle, refine-compression, refine-velocity, size-min, size-max, aspect-min; without the table,
+                 the mesh stays as it is; with it, [integrator] is implicit and members are simulated one by one
     [integrator] name = "symplectic" | "implicit"; step; air-shape (of the implicit); backend = "auto" | "torch" |
                  "kernel" | "warp"
     [time]       settle, frames, rate
     [effects.NAME]  parameters of an effect (quantities, or "prior" for its prior range)
 
-Without [material], [wind], [contact] or [limits] an ArcSim scene's own are taken. `count`, `batch` and `title` do not
-change what a member is; everything else does.
+Without [material], [wind], [contact], [limits] or [remeshing] an ArcSim scene's own are taken. `count`, `batch` and
+`title` do not change what a member is; everything else does.
 """
 
 from __future__ import annotations
@@ -70,6 +72,7 @@ from sim.integrate.backend import Backend
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
+from sim.remeshing.sizing import Remeshing
 from sim.run import blowing
 from sim.run.blowing import Logs, WindSamples
 from sim.run.recipe import (
@@ -131,13 +134,14 @@ class _SimulationTables:
     title: str = ""
     seed: Seed = 0
     count: Count = 1
-    batch: Count = 16
+    batch: Count | None = None
     precision: Annotated[str, Named("precision", DTYPES)] = "float32"
     scene: Mapping[str, Any]
     material: _Cloth
     wind: Mapping[str, Any]
     contact: Contact | None = None
     limits: Mapping[str, Any] | None = None
+    remeshing: Remeshing | None = None
     integrator: IntegratorSpec
     time: TimeSpec
     effects: Mapping[Annotated[str, Named("effect", EFFECTS)], Mapping[str, Any]]
@@ -212,6 +216,8 @@ _STEADY: Mapping[str, Any] = {
     "vertical": float,
 }
 """Keys of a steady wind."""
+_BATCH = 16
+"""Members a batch where a recipe does not say."""
 _LIMITS = {"low": float, "high": float, "sweeps": Count}
 
 
@@ -233,18 +239,20 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
         # Small steps need one sweep.
         base = replace(limits or StrainLimits(), sweeps=SWEEPS if form.integrator.name == "implicit" else 1)
         limits = replace(base, **entries(_LIMITS, form.limits or {}, where=f"{where} [limits]"))
+    remeshing = form.remeshing or (arcsim and arcsim.remeshing)
     return Recipe(
         name=name,
         title=form.title or name,
         seed=form.seed,
         count=form.count,
-        batch=form.batch,
+        batch=form.batch or (_BATCH if remeshing is None else 1),
         precision=form.precision,
         scene=scene,
         material=_material(form.material, folder, scene, where=f"{where} [material]"),
         wind=_wind(form.wind, scene, form.time, logs, where=f"{where} [wind]"),
         contact=form.contact or (arcsim and arcsim.contact),
         limits=limits,
+        remeshing=remeshing,
         integrator=_integrator(form.integrator, content.get("integrator", {}), where=f"{where} [integrator]"),
         time=form.time,
         effects={key: _effect(key, effect, where=f"{where} [effects] [{key}]") for key, effect in form.effects.items()},
@@ -466,6 +474,7 @@ def _of_scene_file(path: Path) -> Recipe:
         wind=_wind({}, scene, time, where=where),
         contact=file.scene.contact,
         limits=file.scene.limits,
+        remeshing=file.scene.remeshing,
         integrator=IntegratorSpec(name="implicit", step=file.step, air_shape=AirShape.PREVIOUS),
         time=time,
         effects={},

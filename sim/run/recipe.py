@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import torch
 
-from flagdata.errors import LimitError
+from flagdata.errors import LimitError, UsageError
 from flagdata.provenance import canonical, digest
 from flagdata.retired_names import hashed_name
 from flagdata.tables import Count, Named, NotNegative, Positive, Quantity, plain
@@ -26,6 +26,7 @@ from sim.integrate.backend import Backend
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
+from sim.remeshing.sizing import Remeshing
 from sim.run.blowing import WindSamples
 from sim.tables import Evaluation
 
@@ -223,11 +224,13 @@ class Recipe:
         batch: members that are simulated together.
         contact: as of `sim.scene.Scene`.
         limits: as of `sim.scene.Scene`.
+        remeshing: as of `sim.scene.Scene`; its members are simulated one by one.
         precision: of the arithmetic, a name of `DTYPES`.
         model: artifact of the lake that the recipe was read from; empty for none.
 
     Raises:
         LimitError: more than one of this module's limits.
+        UsageError: remeshing of several members in a batch, or with steps that depend on the mesh.
     """
 
     name: str
@@ -241,6 +244,7 @@ class Recipe:
     wind: WindSpec
     contact: Contact | None
     limits: StrainLimits | None
+    remeshing: Remeshing | None
     integrator: IntegratorSpec
     time: TimeSpec
     effects: Mapping[str, EffectSpec]
@@ -253,6 +257,9 @@ class Recipe:
                     f"the recipe has {number} {counted}", where=self.name, fix=f"have at most {MEMBERS_LIMIT}"
                 )
         vertices = self.scene.vertices
+        if self.remeshing is not None:
+            self._check_remeshing()
+            vertices = max(vertices, self.remeshing.vertices(self.scene.width * self.scene.height))
         if vertices > VERTICES_LIMIT:
             raise LimitError(
                 f"the mesh has {vertices:.3g} vertices",
@@ -265,6 +272,20 @@ class Recipe:
                 f"a batch keeps {size:.3g} bytes of positions",
                 where=self.name,
                 fix=f"have at most {BATCH_BYTES_LIMIT}: fewer members a batch, frames or columns",
+            )
+
+    def _check_remeshing(self) -> None:
+        if self.integrator.name != "implicit":
+            raise UsageError(
+                f"the integrator {self.integrator.name} takes steps that suit one mesh, and remeshing changes it",
+                where=f"{self.name} [remeshing]",
+                fix='put name = "implicit" into [integrator]',
+            )
+        if self.batch != 1:
+            raise UsageError(
+                f"batches of {self.batch} members are asked for, and with remeshing each has a mesh of its own",
+                where=f"{self.name} [remeshing]",
+                fix="leave out batch: such members are simulated one by one",
             )
 
     @property
@@ -315,6 +336,7 @@ class Recipe:
             },
             "contact": None if self.contact is None else vars(self.contact).copy(),
             **({} if self.limits is None else {"limits": vars(self.limits).copy()}),
+            **({} if self.remeshing is None else {"remeshing": vars(self.remeshing).copy()}),
             "integrator": {
                 "name": self.integrator.name,
                 "step": self.integrator.step,
