@@ -19,7 +19,7 @@ from sim.air import AirForce
 from sim.cloth import Cloth
 from sim.contact import Contact
 from sim.handles import Handles
-from sim.limits import StrainLimits, limited
+from sim.limits import StrainLimits, limited, limited_among_slivers
 from sim.remeshing.sizing import Remeshing
 from sim.state import State
 from sim.wind import Wind
@@ -225,7 +225,8 @@ class System:
         """Positions and velocities after a step [s], brought within the strain limits."""
         if self.limits is None:
             return position, velocity
-        return limited(self.cloth, self.limits, position, velocity, step, self.loose)
+        bring_within = limited if self.remeshing is None else limited_among_slivers
+        return bring_within(self.cloth, self.limits, position, velocity, step, self.loose)
 
     def effective(self, position: Tensor, force: Tensor) -> Tensor:
         """Computes the force that gives the cloth's own mass its acceleration (see `sim.inertia`): (vertex, 3, batch)

@@ -3,7 +3,7 @@
 Which of its stages are simulated, and with which defaults, is in `sim.arcsim.reading`.
 """
 
-from sim.arcsim.reading import STAGES, SWEEPS, ArcsimScene, read_material, read_scene
+from sim.arcsim.reading import REMESHED_SWEEPS, STAGES, SWEEPS, ArcsimScene, read_material, read_scene
 from sim.arcsim.writing import write_scene
 
-__all__ = ["STAGES", "SWEEPS", "ArcsimScene", "read_material", "read_scene", "write_scene"]
+__all__ = ["REMESHED_SWEEPS", "STAGES", "SWEEPS", "ArcsimScene", "read_material", "read_scene", "write_scene"]

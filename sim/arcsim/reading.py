@@ -8,7 +8,7 @@ the cloth has settings for it, `Scene.remeshing`. The others are not simulated: 
 disables them or the caller accepts to leave them out.
 
 Two deviations: ArcSim reads `duration` only beside `timestep` and runs without end beside `frame_time`, here it ends
-the run in both; ArcSim meets strain limits by an optimisation, here the faces are corrected in `SWEEPS` sweeps.
+the run in both; ArcSim meets strain limits by an optimisation, here the faces are corrected in sweeps.
 """
 
 from __future__ import annotations
@@ -41,6 +41,8 @@ SIMULATED = ("strainlimiting", "remeshing", "proximity")
 """Those of them that are simulated here."""
 SWEEPS = 50
 """Corrections a step for strain limits, as ArcSim's steps of 5 ms want them."""
+REMESHED_SWEEPS = 500
+"""The same with remeshing (`sim.limits.RADIUS_AMONG_SLIVERS`)."""
 THICKNESS, STIFFNESS, FRICTION = 1e-3, 1e9, 0.6
 """ArcSim's defaults of proximity: repulsion thickness [m], collision stiffness [N/m³], friction of cloth on cloth."""
 
@@ -173,6 +175,7 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
     mesh = Mesh(rest=shape.rest * _number(transform, "scale", 1.0, where), faces=shape.faces)
     wind, magic = content.get("wind", {}), content.get("magic", {})
     simulated = _acting(content, where) - set(left_out)
+    sweeps = REMESHED_SWEEPS if "remeshing" in simulated else SWEEPS
     nodes: list[int] = []
     for handle in _list(content, "handles", where):
         if handle.get("type", "node") != "node":
@@ -193,7 +196,7 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
             density=_number(wind, "density", 1.0, f"{where}, wind"), drag=_number(wind, "drag", 0.0, f"{where}, wind")
         ),
         contact=_contact(content, magic, where) if "proximity" in simulated else None,
-        limits=_limits(entry, where) if "strainlimiting" in simulated else None,
+        limits=_limits(entry, sweeps, where) if "strainlimiting" in simulated else None,
         remeshing=_remeshing(cloth["remeshing"], f"{where}, remeshing") if "remeshing" in simulated else None,
     )
     frame_time = _number(content, "frame_time", math.nan, where)
@@ -269,12 +272,12 @@ def _contact(content: Mapping[str, Any], magic: Mapping[str, Any], where: str) -
     )
 
 
-def _limits(entry: Mapping[str, Any], where: str) -> StrainLimits:
+def _limits(entry: Mapping[str, Any], sweeps: int, where: str) -> StrainLimits:
     limits = entry["strain_limits"]
     if not isinstance(limits, list) or len(limits) != 2:
         raise InputError(f"strain_limits is {limits!r}", where=where, fix="give [low, high]")
     low, high = (_number({"strain_limits": value}, "strain_limits", 0.0, where) for value in limits)
-    return StrainLimits(low=low, high=high, sweeps=SWEEPS)
+    return StrainLimits(low=low, high=high, sweeps=sweeps)
 
 
 def _remeshing(settings: Mapping[str, Any], where: str) -> Remeshing:

@@ -31,7 +31,7 @@ from sim.remeshing.triangles import Triangles
 from sim.state import State
 from sim.system import System
 
-SHORT = 0.9
+SHORT = 0.8
 """Length in the metric that a collapse may make an edge: below 1, so that it is not split again at once."""
 _FLIPPED = 0.01
 """Excess, of the sum of both triangles' areas, by which an edge is not Delaunay before it is flipped."""

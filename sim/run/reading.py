@@ -64,7 +64,7 @@ from flagdata.tables import (
 )
 from sim import material
 from sim.air import AIR_FORCES, AirForce
-from sim.arcsim import SWEEPS, ArcsimScene, read_material, read_scene
+from sim.arcsim import REMESHED_SWEEPS, SWEEPS, ArcsimScene, read_material, read_scene
 from sim.contact import Contact
 from sim.effects import EFFECTS
 from sim.handles import ARCSIM_STIFFNESS
@@ -234,12 +234,14 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
     form = read(_SimulationTables, content, where=where)
     scene = _scene(form.scene, folder, where=f"{where} [scene]")
     arcsim = None if scene.arcsim is None else scene.arcsim.scene
+    remeshing = form.remeshing or (arcsim and arcsim.remeshing)
     limits = arcsim and arcsim.limits
     if form.limits is not None or limits is not None:
-        # Small steps need one sweep.
-        base = replace(limits or StrainLimits(), sweeps=SWEEPS if form.integrator.name == "implicit" else 1)
+        sweeps = 1  # of small steps
+        if form.integrator.name == "implicit":
+            sweeps = SWEEPS if remeshing is None else REMESHED_SWEEPS
+        base = replace(limits or StrainLimits(), sweeps=sweeps)
         limits = replace(base, **entries(_LIMITS, form.limits or {}, where=f"{where} [limits]"))
-    remeshing = form.remeshing or (arcsim and arcsim.remeshing)
     return Recipe(
         name=name,
         title=form.title or name,

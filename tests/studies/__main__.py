@@ -64,6 +64,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "real-flag": ("tests.studies.validation.real_flag", "A real flag, of which nobody knows the wind."),
             "real-flags": ("tests.studies.validation.real_flags.validate", "Published measurements of real flags."),
             "refinement": ("tests.studies.validation.refinement", "Refinement beside its peers."),
+            "remeshing": ("tests.studies.validation.remeshing", "The paper's flag remeshed, beside ArcSim."),
             "renderers": ("tests.studies.validation.renderers", "Whether Cycles and the rasteriser agree."),
             "robot-cloth": ("tests.studies.validation.robot_cloth", "Cloth that a robot carries, beside tracks."),
             "stressors": ("tests.studies.validation.stressors", "Null experiments as a field brings them."),
