@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.arrays import Float32Array, FloatArray
+from flagdata.errors import UsageError
 from flagdata.html import table
-from flagdata.lake.meshes import MeshSequence
+from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
 from flagdata.timebase import NANOSECONDS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Simulated:
-    """The members of a recipe that were simulated to the end, on one mesh.
+    """The members of a recipe that were simulated to the end, on one mesh but where the recipe remeshes them.
 
     Attributes:
         name: of the recipe.
@@ -27,7 +28,7 @@ class Simulated:
     """
 
     name: str
-    members: tuple[MeshSequence, ...]
+    members: tuple[MeshSequence | RaggedMeshSequence, ...]
     parameters: Mapping[str, FloatArray]
     wind: FloatArray
     failed: Mapping[int, str]
@@ -35,16 +36,32 @@ class Simulated:
     def __len__(self) -> int:
         return len(self.members)
 
-    def __getitem__(self, member: int) -> MeshSequence:
+    def __getitem__(self, member: int) -> MeshSequence | RaggedMeshSequence:
         return self.members[member]
 
-    def __iter__(self) -> Iterator[MeshSequence]:
+    def __iter__(self) -> Iterator[MeshSequence | RaggedMeshSequence]:
         return iter(self.members)
+
+    @property
+    def _fixed(self) -> list[MeshSequence]:
+        """The members, where each has one mesh.
+
+        Raises:
+            UsageError: a mesh that changes from frame to frame.
+        """
+        fixed = [member for member in self.members if isinstance(member, MeshSequence)]
+        if len(fixed) < len(self.members):
+            raise UsageError(
+                "the mesh changes from frame to frame, so that no single array has all of them",
+                where=self.name,
+                fix="take the meshes one by one: simulated[0].frame(0).positions",
+            )
+        return fixed
 
     @property
     def positions(self) -> Float32Array:
         """(member, frame, vertex, 3) [m], z up."""
-        return np.stack([member.positions for member in self.members])
+        return np.stack([member.positions for member in self._fixed])
 
     @property
     def time(self) -> FloatArray:
@@ -55,15 +72,16 @@ class Simulated:
     @property
     def rest(self) -> Float32Array:
         """(vertex, 2) material coordinates [m]."""
-        return self.members[0].rest
+        return self._fixed[0].rest
 
     @property
     def faces(self) -> NDArray[np.int32]:
         """(face, 3) vertices of each, counter-clockwise seen from the front."""
-        return self.members[0].faces
+        return self._fixed[0].faces
 
     def _rows(self) -> dict[str, str]:
-        frames, vertices, _ = self.members[0].positions.shape
+        first = self.members[0]
+        frames, vertices = len(first), len(first.frame(0).rest)
         wind = self.parameters["wind_speed"]
         blown = f"{wind[0]:g} m/s" if len(self) == 1 else f"{wind.min():.2f} to {wind.max():.2f} m/s"
         rows = {"cloths": str(len(self)), "wind": blown, "frames": f"{frames} in {self.time[-1]:.2f} s"}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
     from flagdata.simulated import Simulated
 
-_TABLES = ("scene", "material", "wind", "contact", "limits", "integrator", "time", "effects")
+_TABLES = ("scene", "material", "wind", "contact", "limits", "remeshing", "integrator", "time", "effects")
 _TABLE = "Entries of the recipe's table [{}], SI and radians; each replaces the recipe's entry of the same key."
 
 
@@ -54,6 +54,7 @@ class Simulating(Members, Computed):
     effects: Mapping[str, Mapping[str, Any]] | None = option(_TABLE.format("effects"), default=None)
     contact: Mapping[str, Any] | None = option(_TABLE.format("contact"), default=None)
     limits: Mapping[str, Any] | None = option(_TABLE.format("limits"), default=None)
+    remeshing: Mapping[str, Any] | None = option(_TABLE.format("remeshing"), default=None)
     integrator: Mapping[str, Any] | None = option(_TABLE.format("integrator"), default=None)
     seed: int | None = option("Seed of all that is drawn.", default=None)
     precision: str | None = option("float32 or float64.", default=None)

@@ -27,6 +27,7 @@ from sim.integrate import AirShape, BackwardEuler
 from sim.limits import StrainLimits
 from sim.material import named
 from sim.mesh import Mesh
+from sim.remeshing.sizing import Remeshing
 from sim.scene import Scene, assemble, flag
 from sim.tables import Evaluation
 from tests.refusals import unrefused
@@ -118,8 +119,8 @@ def test_everything_unsupported_is_reported_at_once(write: Write) -> None:
     what = caught.value.what
     for key in ("camera", "cloths[0].texture", "cloths[0].materials[0].sheen", "wind.gusts", "obstacles"):
         assert key in what
-    assert "the stages remeshing, separation, popfilter" in what
-    for stage in ("strainlimiting", "proximity", "plasticity", "collision"):
+    assert "the stages separation, popfilter" in what
+    for stage in ("strainlimiting", "remeshing", "proximity", "plasticity", "collision"):
         assert stage not in what
 
 
@@ -138,6 +139,25 @@ def test_accepted_stages_are_left_out_and_stated(write: Write) -> None:
 def test_stages_of_remeshing_act_only_with_it(write: Write, disable: list[str], left: tuple[str, ...]) -> None:
     accept = ("remeshing", "collision", "separation", "popfilter")
     assert read_scene(write({"disable": disable}), accept=accept).left_out == left
+
+
+SETTINGS = {"refine_angle": 0.3, "refine_velocity": 1, "size": [0.02, 0.5], "aspect_min": 0.2}
+BESIDE = ("collision", "separation", "popfilter")
+
+
+def test_remeshing_is_the_scenes_where_the_cloth_has_settings_for_it(write: Write) -> None:
+    read = read_scene(write({**cloth(remeshing=SETTINGS), "disable": []}), accept=BESIDE)
+    # ArcSim's null value of a criterion that is not given is infinite: it asks for nothing.
+    assert read.scene.remeshing == Remeshing(
+        refine_angle=0.3, refine_velocity=1, refine_compression=math.inf, size_min=0.02, size_max=0.5, aspect_min=0.2
+    )
+    assert read.left_out == BESIDE
+    written = write_scene(read, write({}).parent / "out")
+    assert read_scene(written).scene.remeshing == read.scene.remeshing
+    with pytest.raises(InputError, match="the stages remeshing"):
+        read_scene(write({"disable": []}), accept=BESIDE)
+    with pytest.raises(InputError, match=r"size is 0\.02"):
+        read_scene(write({**cloth(remeshing={**SETTINGS, "size": 0.02}), "disable": []}), accept=BESIDE)
 
 
 DISABLED = ["remeshing", "collision"]
