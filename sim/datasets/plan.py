@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from flagdata.checksums import files_of
 from flagdata.errors import FlagdataError
 from flagdata.lake import Lake
-from flagdata.lake.meshes import MeshSequence, write_meshes
+from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, write_meshes
 from flagdata.schema import CLIP_FRAMES
 from flagdata.workload import announced
 from sim.datasets import jobs
@@ -213,7 +213,7 @@ class _Run:
     """A short sequence: its index, its meshes, and the seconds it took of its batch's."""
 
     index: int
-    sequence: MeshSequence
+    sequence: MeshSequence | RaggedMeshSequence
     seconds: float
 
 
@@ -247,7 +247,7 @@ def _timed(function: Callable[[], T]) -> tuple[T, float]:
     return function(), time.perf_counter() - begun
 
 
-def _stored(sequence: MeshSequence) -> float:
+def _stored(sequence: MeshSequence | RaggedMeshSequence) -> float:
     """Measures the size of a sequence in the lake [B]."""
     with tempfile.TemporaryDirectory(prefix="flagdata-plan-") as folder:
         path = Path(folder) / "sequence.zarr"

@@ -12,6 +12,7 @@ import torch
 from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from sim.batch import Batch, Divergence
+from sim.contact import Contact
 from sim.effects import EFFECTS, apply
 from sim.integrate import BackwardEuler
 from sim.limits import StrainLimits, correction, least_correction, stretches
@@ -223,6 +224,20 @@ def test_a_flag_is_remeshed_while_it_flies_and_keeps_its_mass_and_its_pole() -> 
     assert counts[-1] > 2 * counts[0]
     large, small = stretches(batch.system.cloth, batch.state.position)
     assert 0.8 < float(small.min()) < float(large.max()) < 1.3
+
+
+def test_layers_keep_apart_on_a_mesh_that_changes() -> None:
+    # A sheet folded over to 4 mm above itself: contact of 10 mm pushes the layers away from each other.
+    system, state = assemble([replace(FLAG, wind=(0.0, 0.0, 0.0), contact=Contact(friction=0.0))], dtype=torch.float64)
+    rest = system.cloth.mesh.rest
+    folded = np.column_stack([np.where(rest[:, 0] > 0.45, 0.004, 0), 0.45 - np.abs(rest[:, 0] - 0.45), rest[:, 1]])
+    state = replace(state, position=torch.tensor(folded)[..., None])
+    system = replace(system, anchors=state.position[system.held].clone(), gravity=0 * system.gravity)
+    batch = Batch(system=system, state=state, integrator=BackwardEuler(tolerance=1e-4), divergence=Divergence.REFUSE)
+    meshes = [batch.system.cloth.mesh for _ in batch.states(range(3), 100.0)]
+    assert meshes[0] is not meshes[-1]
+    upper = torch.tensor(meshes[-1].rest[:, 0] > 0.7)
+    assert float(batch.state.position[upper, 0].mean()) > 0.0045
 
 
 @pytest.mark.parametrize("name", ["hem-mass", "full-hoist", "hysteresis"])
