@@ -19,7 +19,7 @@ from sim.handles import Handles
 from sim.limits import StrainLimits
 from sim.material import Material
 from sim.mesh import Mesh, grid
-from sim.remeshing.sizing import Remeshing
+from sim.sizing import Remeshing
 from sim.state import State
 from sim.system import System
 from sim.tables import Evaluation

@@ -20,7 +20,7 @@ from sim.cloth import Cloth
 from sim.contact import Contact
 from sim.handles import Handles
 from sim.limits import StrainLimits, limited, limited_among_slivers
-from sim.remeshing.sizing import Remeshing
+from sim.sizing import Remeshing
 from sim.state import State
 from sim.wind import Wind
 

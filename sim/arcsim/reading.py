@@ -32,8 +32,8 @@ from sim.handles import ARCSIM_STIFFNESS, Handles
 from sim.limits import StrainLimits
 from sim.material import Material
 from sim.mesh import Mesh
-from sim.remeshing.sizing import Remeshing
 from sim.scene import Scene
+from sim.sizing import Remeshing
 
 STAGES = ("strainlimiting", "remeshing", "proximity", "collision", "separation", "popfilter", "plasticity")
 """Stages of ArcSim's step that a scene may disable."""

@@ -18,8 +18,8 @@ from flagdata.outputs import write_files
 from sim.air import QuadraticNormal
 from sim.arcsim.reading import SIMULATED, STAGES, ArcsimScene
 from sim.material import Material
-from sim.remeshing.sizing import Remeshing
 from sim.scene import Scene
+from sim.sizing import Remeshing
 from sim.tables import Evaluation
 
 

@@ -26,8 +26,8 @@ from flagdata.errors import UsageError
 from sim.cloth import Cloth
 from sim.effects.effect import ForceEffect
 from sim.mesh import Mesh
-from sim.remeshing.sizing import Remeshing, vertex_metrics
 from sim.remeshing.triangles import Triangles
+from sim.sizing import Remeshing, vertex_metrics
 from sim.state import State
 from sim.system import System
 

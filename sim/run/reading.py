@@ -72,7 +72,6 @@ from sim.integrate.backend import Backend
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
-from sim.remeshing.sizing import Remeshing
 from sim.run import blowing
 from sim.run.blowing import Logs, WindSamples
 from sim.run.recipe import (
@@ -89,6 +88,7 @@ from sim.run.recipe import (
     WindSpec,
 )
 from sim.scene import GRAVITY
+from sim.sizing import Remeshing
 from sim.tables import Evaluation
 
 _GUST_LENGTH = 60.0  # m, integral length scale near the ground; see sim.wind.spectral

@@ -26,8 +26,8 @@ from sim.integrate.backend import Backend
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
-from sim.remeshing.sizing import Remeshing
 from sim.run.blowing import WindSamples
+from sim.sizing import Remeshing
 from sim.tables import Evaluation
 
 MEMBERS_LIMIT = 1_000_000

@@ -27,8 +27,8 @@ from sim.integrate import AirShape, BackwardEuler
 from sim.limits import StrainLimits
 from sim.material import named
 from sim.mesh import Mesh
-from sim.remeshing.sizing import Remeshing
 from sim.scene import Scene, assemble, flag
+from sim.sizing import Remeshing
 from sim.tables import Evaluation
 from tests.refusals import unrefused
 

@@ -19,9 +19,9 @@ from sim.limits import StrainLimits, correction, least_correction, stretches
 from sim.material import named
 from sim.mesh import Mesh, grid
 from sim.remeshing.adapting import Adapted, adapted
-from sim.remeshing.sizing import Remeshing, bounded, face_metrics, larger, vertex_metrics
 from sim.remeshing.triangles import Triangles
 from sim.scene import Scene, assemble, flag
+from sim.sizing import Remeshing, bounded, face_metrics, larger, vertex_metrics
 from tests.sim.conftest import make_system
 
 NOTHING = Remeshing(refine_angle=1e6, refine_compression=1e6, refine_velocity=1e6, size_min=0.01, size_max=0.3)
