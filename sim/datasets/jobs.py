@@ -19,7 +19,7 @@ from flagdata.dataset.clips import clip_rows
 from flagdata.errors import NotFoundError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.deposit import Deposit, deposit
-from flagdata.lake.meshes import MeshSequence, read_meshes
+from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, read_meshes
 from flagdata.provenance import canonical
 from flagdata.record import Record
 from flagdata.timebase import NANOSECONDS
@@ -107,7 +107,7 @@ def simulate(simulation: Simulation, base: int, indices: Sequence[int], device: 
     return Simulated(name=simulation.name, outcomes=tuple(outcomes), step=steppers[base].step)
 
 
-def film(recipe: DatasetRecipe, job: PlannedFilm, sequence: MeshSequence, device: str) -> Filmed:
+def film(recipe: DatasetRecipe, job: PlannedFilm, sequence: MeshSequence | RaggedMeshSequence, device: str) -> Filmed:
     """Films a sequence.
 
     Raises:
@@ -170,8 +170,6 @@ def put_film(lake: str, recipe: DatasetRecipe, job: PlannedFilm, meshes: str, de
     """
     opened = _lake(lake)
     sequence = read_meshes(opened.whole_object(meshes))
-    if not isinstance(sequence, MeshSequence):
-        raise TypeError("a simulated sequence has one mesh")
     done = film(recipe, job, sequence, device)
     put = deposit(opened, ".mcap", lambda path: path.write_bytes(done.data))
     record = Record.open(opened.record_place(put.name))
@@ -205,7 +203,7 @@ def _lake(address: str) -> Lake:
 def shot(
     recipe: DatasetRecipe,
     job: PlannedFilm,
-    sequence: MeshSequence,
+    sequence: MeshSequence | RaggedMeshSequence,
     zeta: RenderParameters,
     assets: Assets,
     *,
