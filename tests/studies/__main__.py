@@ -51,6 +51,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "gate-clips": ("tests.studies.validation.gate", "How often the gate refuses 60 strange clips."),
             "gate-films": ("tests.studies.validation.gate_films", "What measure says of 78 films with a defect."),
             "hanging-cloth": ("tests.studies.validation.hanging_cloth", "Area weight of hanging cloths."),
+            "hanging-weight": ("tests.studies.validation.hanging_weight", "Whether a film tells a cloth's weight."),
             "hostile": ("tests.studies.validation.hostile", "Hostile recipes, models, inputs, files and lakes."),
             "lake-in-a-bucket": ("tests.studies.validation.lake_in_a_bucket", "The lake's tests, in a bucket."),
             "looks": ("tests.studies.validation.looks", "What lasts of the errors of films' observables."),
