@@ -169,8 +169,9 @@ class _Job:
         from measure.estimate.series import beside
 
         estimator = self.network.estimator
-        with _advancing("search", "frame") as subject.film.searched, _advancing("measure", "window") as advance:
+        with _advancing(("search", "frame"), ("measure", "window")) as (subject.film.searched, advance):
             measured = run(subject, self.network, self.request.options, advance=advance)
+        subject.film.searched = None
         wind = None if subject.record is None else subject.record.wind()
         series = beside(measured, start=subject.film.start, wind=wind)
         _warn(measured.noticed(anyway=self.chosen.anyway))
@@ -264,7 +265,7 @@ class _Job:
         model = self.network.estimator
         neighbours, compared = (), 0
         if self.lake is not None:
-            with _advancing("simulated clips", "clip") as advance:
+            with _advancing(("simulated clips", "clip")) as (advance,):
                 neighbours, compared = nearest(
                     self.lake,
                     model,
@@ -365,14 +366,20 @@ def _report(done: _Done, *, series: bool) -> None:
 
 
 @contextmanager
-def _advancing(label: str, unit: str) -> Iterator[Callable[[int, int], None]]:
-    """Shows a progress bar whose length is given with the first step."""
+def _advancing(*bars: tuple[str, str]) -> Iterator[list[Callable[[int, int], None]]]:
+    """Shows progress bars, each a label and a unit, one after another: each begins with its first step, which gives its
+    length, and ends the one before."""
     with ExitStack() as stack:
-        steps: list[Callable[[int], None]] = []
+        current: dict[str, Callable[[int], None]] = {}
 
-        def advance(total: int, count: int) -> None:
-            if not steps:
-                steps.append(stack.enter_context(progress(total, label=label, unit=unit)))
-            steps[0](count)
+        def stepping(label: str, unit: str) -> Callable[[int, int], None]:
+            def advance(total: int, count: int) -> None:
+                if label not in current:
+                    stack.close()
+                    current.clear()
+                    current[label] = stack.enter_context(progress(total, label=label, unit=unit))
+                current[label](count)
 
-        yield advance
+            return advance
+
+        yield [stepping(label, unit) for label, unit in bars]
