@@ -145,7 +145,7 @@ def test_series_that_share_a_slow_part_are_coherent_there_and_not_elsewhere() ->
         ((0.3, 0.2, 0.9, 0.9, 0.9), "nothing in common at any frequency"),
     ],
 )
-def test_the_frequency_up_to_which_film_and_anemometer_agree_is_said(
+def test_the_frequency_up_to_which_film_and_anemometer_agree_is_reported(
     coherence: tuple[float, ...], sentence: str
 ) -> None:
     frequency = np.linspace(0.1, 0.5, 5)
