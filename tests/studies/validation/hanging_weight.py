@@ -177,7 +177,7 @@ def grade(films: Sequence[Film], *, seed: int) -> dict[str, Any]:
         "criteria": {
             "refused": len(films) - len(shown) <= FALSELY * len(films),
             "weight covered": least <= covered <= most,
-            "tells the weight": tells,
+            "constrains the weight": tells,
             "says so": claimed >= len(shown) / 2 if tells else claimed <= FALSELY * len(shown),
             "wind covered, weight stated": least <= winds[1] <= most,
             "a stated weight lowers the wind's error": bool(change[1] < 0),
@@ -200,17 +200,20 @@ def page(sheet: dict[str, Any]) -> str:
         "",
         "| | |",
         "|---|---|",
-        f"| films whose 90 % interval of the weight holds the truth | {sheet['covered']} of {of} |",
+        f"| films on which the weight's 90 % interval contains the truth | {sheet['covered']} of {of} |",
         f"| median width of that interval over the prior's | {sheet['median_width_over_prior']:.2f} |",
         (
             f"| the same with the true wind stated | {sheet['median_width_over_prior_wind_known']:.2f}, "
-            f"holds the truth on {sheet['covered_wind_known']} |"
+            f"contains the truth on {sheet['covered_wind_known']} |"
         ),
         f"| films on which a weight or a bound is given | {sheet['claimed']} |",
-        f"| wind RMSE, weight not stated | {sheet['wind_rmse']:.2f} m/s, interval holds on {sheet['wind_covered']} |",
         (
-            f"| wind RMSE, true weight stated | {sheet['wind_rmse_weight_stated']:.2f} m/s, interval holds on "
-            f"{sheet['wind_covered_weight_stated']} |"
+            f"| wind RMSE, weight not stated | {sheet['wind_rmse']:.2f} m/s, its interval contains the truth on "
+            f"{sheet['wind_covered']} |"
+        ),
+        (
+            f"| wind RMSE, true weight stated | {sheet['wind_rmse_weight_stated']:.2f} m/s, its interval contains the "
+            f"truth on {sheet['wind_covered_weight_stated']} |"
         ),
         f"| change of the RMSE by the stated weight, 90 % | [{low:+.2f}, {high:+.2f}] m/s |",
         "",

@@ -37,7 +37,7 @@ def test_films_that_tell_nothing_hold_what_can_hold() -> None:
     assert sheet["criteria"] == {
         "refused": True,
         "weight covered": True,
-        "tells the weight": False,
+        "constrains the weight": False,
         "says so": True,
         "wind covered, weight stated": True,
         "a stated weight lowers the wind's error": False,
@@ -58,7 +58,7 @@ def test_a_weight_given_though_films_tell_none_is_counted() -> None:
 
 def test_narrow_intervals_tell_and_must_be_given() -> None:
     narrow = [replace(_PLAIN, width=0.5)] * FILMS
-    assert grade(narrow, seed=1)["criteria"]["tells the weight"]
+    assert grade(narrow, seed=1)["criteria"]["constrains the weight"]
     assert not grade(narrow, seed=1)["criteria"]["says so"]
     assert grade([replace(film, constrained=True) for film in narrow], seed=1)["criteria"]["says so"]
 
