@@ -1,4 +1,4 @@
-"""Whether a film of hanging cloth tells the cloth's area weight, and what a stated weight is worth.
+"""Whether a film of hanging cloth constrains its area weight, and what a stated weight is worth.
 
 Films of one window are simulated of cloths as the shipped network was trained on, from a seed of their own
 (`tests.studies.long_films`), and measured as `flagdata measure --model wave-cloth --flag-size 1x1` does, once without
@@ -53,9 +53,9 @@ class Film:
         low, high: of the interval of the weight [kg/m²]; of a bound one end is that of the range or infinite.
         width: of the weight's central 90 %, over that of the prior.
         width_wind_known: the same with the true wind stated.
-        covered_wind_known: whether that interval holds the weight.
+        covered_wind_known: whether that interval contains the weight.
         wind_error, wind_error_stated: without and with the true weight stated, mean less truth [m/s].
-        wind_covered, wind_covered_stated: whether the wind's interval holds the truth.
+        wind_covered, wind_covered_stated: whether the wind's interval contains the truth.
     """
 
     weight: float

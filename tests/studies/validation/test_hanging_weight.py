@@ -31,7 +31,7 @@ def films(*others: Film) -> list[Film]:
     return [*others, *[_PLAIN] * (FILMS - len(others))]
 
 
-def test_films_that_tell_nothing_hold_what_can_hold() -> None:
+def test_films_that_constrain_nothing_meet_what_can_be_met() -> None:
     sheet = grade(films(*[replace(_PLAIN, low=0.3, wind_covered_stated=False)] * 4), seed=1)
     assert sheet["covered"] == sheet["wind_covered_weight_stated"] == 36
     assert sheet["criteria"] == {
@@ -45,18 +45,18 @@ def test_films_that_tell_nothing_hold_what_can_hold() -> None:
 
 
 @pytest.mark.parametrize("missed", [0, 9])
-def test_intervals_that_hold_too_often_or_too_rarely_fail(missed: int) -> None:
+def test_intervals_that_contain_too_often_or_too_rarely_fail(missed: int) -> None:
     sheet = grade(films(*[replace(_PLAIN, low=0.3)] * missed), seed=1)
     assert not sheet["criteria"]["weight covered"]
 
 
-def test_a_weight_given_though_films_tell_none_is_counted() -> None:
+def test_a_weight_given_though_films_constrain_none_is_counted() -> None:
     sheet = grade(films(*[replace(_PLAIN, constrained=True)] * 5), seed=1)
     assert sheet["claimed"] == 5
     assert not sheet["criteria"]["says so"]
 
 
-def test_narrow_intervals_tell_and_must_be_given() -> None:
+def test_narrow_intervals_constrain_and_must_be_given() -> None:
     narrow = [replace(_PLAIN, width=0.5)] * FILMS
     assert grade(narrow, seed=1)["criteria"]["constrains the weight"]
     assert not grade(narrow, seed=1)["criteria"]["says so"]
