@@ -14,7 +14,7 @@ import numpy as np
 from av.video.frame import VideoFrame
 
 from flagdata.arrays import UInt8Array
-from flagdata.lake.meshes import MeshSequence
+from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
 from flagdata.rng import stream
 from sim.datasets.picture import noisy
 from sim.render import Meshes, RenderParameters
@@ -31,7 +31,7 @@ _CHUNK = 240
 
 def write_film(
     path: Path,
-    sequence: MeshSequence,
+    sequence: MeshSequence | RaggedMeshSequence,
     zeta: RenderParameters,
     *,
     rate: int,
@@ -65,7 +65,9 @@ def write_film(
         container.mux(video.encode())
 
 
-def _rendered(sequence: MeshSequence, zeta: RenderParameters, *, seed: int, workers: int) -> Iterator[UInt8Array]:
+def _rendered(
+    sequence: MeshSequence | RaggedMeshSequence, zeta: RenderParameters, *, seed: int, workers: int
+) -> Iterator[UInt8Array]:
     """Pictures (n, 1.5 height, width) in YUV 4:2:0 with noise, in order, a chunk at a time."""
     firsts = range(0, len(sequence), _CHUNK)
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=single_threaded) as pool:
@@ -79,7 +81,7 @@ def _rendered(sequence: MeshSequence, zeta: RenderParameters, *, seed: int, work
             yield future.result()
 
 
-def _chunk(sequence: MeshSequence, zeta: RenderParameters, first: int, seed: int) -> UInt8Array:
+def _chunk(sequence: MeshSequence | RaggedMeshSequence, zeta: RenderParameters, first: int, seed: int) -> UInt8Array:
     meshes = Meshes.flag(sequence, heading=0.0)
     pictures = Raster().part(meshes, zeta, first, min(first + _CHUNK, len(meshes))).numpy()
     rng = stream(seed, "demo", "camera", first)
