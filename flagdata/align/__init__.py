@@ -10,6 +10,7 @@ from flagdata.verb_package import VerbPackage
 
 if TYPE_CHECKING:
     from flagdata.align.apart import by_spans
+    from flagdata.align.cloth import ClothFilm
     from flagdata.align.declared import given
     from flagdata.align.drift import clock_line
     from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from flagdata.ingest.markers.table import MarkerOptions, is_marker_table, read_table
     from flagdata.ingest.mcap.topics import messages, topics
     from flagdata.ingest.meshes.folder import frame_files, read_folder, read_json, write_folder
-    from flagdata.ingest.meshes.obj import Obj, obj_text, read_obj
+    from flagdata.ingest.meshes.obj import Obj, obj_text, read_obj, write_obj
     from flagdata.ingest.meshes.store import MeshIngest, findings, ingest_meshes, scene_wind
     from flagdata.ingest.records import ingest_record
     from flagdata.ingest.store import CameraIngest, IngestResult, Labels, WindIngest, ingest_camera, ingest_wind

@@ -8,7 +8,7 @@ from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.cloth.arrays import folder_of, options_of, sources_of, weighed_by_name
-    from measure.cloth.calibration import Calibration, Quantity, quantity
+    from measure.cloth.calibration import Calibration, Quantity, calibrate, quantity
     from measure.cloth.command import simulations_of
     from measure.cloth.design import (
         TOGETHER,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from measure.cloth.recording import LEAST_WINDOWS, Observed, Projection, constant_wind, usable
     from measure.cloth.score_test import Judged, directions, judge, score
     from measure.cloth.sight import Sight
-    from measure.cloth.simulation import COLUMNS, OBSERVED, Discretisation, Flag, FlagBatch, mean_bending
+    from measure.cloth.simulation import COLUMNS, OBSERVED, RATE, Discretisation, Flag, FlagBatch, mean_bending
     from measure.cloth.simulations import Simulations, of_base, of_nulls, sights_of
     from measure.cloth.sources import Part, films_among
     from measure.cloth.tables import of_table

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.estimate.answer import Quantity, information
+    from measure.estimate.answer import SHORT, Quantity, information
     from measure.estimate.combine import CARD_KEY, OWN, UNKNOWN, Dependence, combined, of_model
+    from measure.estimate.joint import DRAWS
     from measure.estimate.material import weight_of
     from measure.estimate.measuring import Measurement, measure
     from measure.estimate.options import Options

@@ -1,1 +1,12 @@
 """Remeshing while simulating: triangles small where cloth bends, moves unevenly or is compressed, large elsewhere."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flagdata.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from sim.remeshing.adapting import remeshed
+
+__getattr__ = lazy_exports(__name__, __file__)

@@ -11,11 +11,11 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from flagdata.align.cloth import ClothFilm, _recipe
+from flagdata.align import ClothFilm
+from flagdata.align.cloth import _recipe
 from flagdata.documents import column_json
 from flagdata.errors import UsageError
-from flagdata.lake import View, select
-from flagdata.lake.refs import Slice
+from flagdata.lake import Slice, View, select
 from flagdata.provenance import canonical, digest, recipe_hash
 from flagdata.record import Record, RecordWriter
 from flagdata.retired_names import hashed_names, present_names, present_query, present_recipe

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from flagdata.commands.query import VIEWS
 from flagdata.errors import UnknownNameError, UsageError
-from flagdata.lake import Request, Selection, View, select, selection
-from flagdata.lake.refs import Slice
+from flagdata.lake import Request, Selection, Slice, View, select, selection
 from flagdata.lake.selection import COLUMNS
 from flagdata.schema import CATALOG, Kind, catalog_schema
 from tests.refusals import unrefused

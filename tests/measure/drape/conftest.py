@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.arrays import FloatArray
-from flagdata.ingest.meshes import Obj, write_obj
+from flagdata.ingest import Obj, write_obj
 from measure.cloth import draws
 from measure.drape import CLOTH, answer
 from sim.drape import DISC, PEDESTAL, disc

@@ -13,8 +13,7 @@ from markupsafe import Markup
 from flagdata.film_array import Frames
 from flagdata.stated import Stated
 from flagdata.wind_elsewhere import WindComparison
-from measure.estimate import Context, Measurement, Section, beside
-from measure.estimate.answer import SHORT
+from measure.estimate import SHORT, Context, Measurement, Section, beside
 from measure.estimate.nearest import Neighbour
 from measure.estimate.page import page
 from models.estimator import Estimator

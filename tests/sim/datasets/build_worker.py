@@ -10,8 +10,7 @@ import sys
 import sim.datasets.build
 import sim.workers.scheduled
 from flagdata.cli import main
-from flagdata.lake import Transaction
-from flagdata.lake.deposit import Deposit
+from flagdata.lake import Deposit, Transaction
 from tests.pausing import pause
 
 

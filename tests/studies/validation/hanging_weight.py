@@ -21,12 +21,10 @@ from flagdata.arrays import FloatArray
 from flagdata.film_array import Frames
 from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
-from measure.anemometer.networks import gate_beside, network
-from measure.estimate.combine import of_model
-from measure.estimate.joint import DRAWS, WEIGHT, WIND, FilmAnswer
-from measure.estimate.measuring import Measurement, measure
-from measure.estimate.options import Options
-from measure.film.similarity import FlagSize
+from measure.anemometer import gate_beside, network
+from measure.estimate import DRAWS, Measurement, Options, measure, of_model
+from measure.estimate.joint import WEIGHT, WIND, FilmAnswer
+from measure.film import FlagSize
 from models.estimator import Estimator
 from models.restriction import Known
 from tests.studies.long_films import LongFilm, simulated

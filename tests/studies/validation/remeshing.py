@@ -24,7 +24,7 @@ from flagdata.ingest import read_folder
 from sim.arcsim import SWEEPS, read_scene
 from sim.batch import Batch, Divergence
 from sim.integrate import AirShape, BackwardEuler
-from sim.remeshing.adapting import remeshed
+from sim.remeshing import remeshed
 from sim.scene import Scene, assemble, flag
 from tests.evidence import ABSENT, REFERENCE
 

@@ -45,6 +45,7 @@ from flagdata.rng import stream
 from measure.cloth import (
     MEASURED,
     OBSERVED,
+    RATE,
     TABLES,
     CalibrationOptions,
     Design,
@@ -56,7 +57,7 @@ from measure.cloth import (
     simulated,
 )
 from measure.cloth.calibration import answered
-from measure.cloth.simulation import BATCH, RATE, windows
+from measure.cloth.simulation import BATCH, windows
 from measure.observables import View
 from sim import handles
 from sim.batch import Batch, Divergence, after

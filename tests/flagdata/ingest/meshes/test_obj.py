@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, LimitError, NotFoundError
-from flagdata.ingest import Obj, read_obj
-from flagdata.ingest.meshes import obj, write_obj
+from flagdata.ingest import Obj, read_obj, write_obj
+from flagdata.ingest.meshes import obj
 from tests.refusals import unrefused
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 2 0\nvt 0 3\n"

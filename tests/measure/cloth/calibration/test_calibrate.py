@@ -26,12 +26,12 @@ from measure.cloth import (
     Normal,
     Observed,
     Uncertain,
+    calibrate,
     designs_of,
     draws,
 )
 from measure.cloth import calibration as module
 from measure.cloth import recording as observed
-from measure.cloth.calibration import calibrate
 from measure.cloth.calibration_page import calibration_page as written
 from measure.ends import Bound
 from tests.measure.cloth.calibration.conftest import readings

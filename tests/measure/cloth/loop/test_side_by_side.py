@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from measure.cloth import LEAST_WINDOWS, Observed, solve, verdict_of
+from measure.cloth import LEAST_WINDOWS, RATE, Observed, solve, verdict_of
 from measure.cloth.recording import Excerpt
-from measure.cloth.simulation import RATE
 from measure.cloth.verdict_page import drawn, side_by_side
 from measure.cloth.verdict_page import verdict_page as page
 from measure.observables import WINDOW, ClothWindow, FilmWindow
