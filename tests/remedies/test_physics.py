@@ -76,8 +76,8 @@ CASES = [
         "give a name, and the fol",
         "evaluate shipped --name out/table",
         ("evaluate shipped --name table --out out",),
-        shows="unknown data set",
-        code=2,
+        shows="no clips of a data set",
+        code=1,
     ),
     Case(
         "training/checkpoint.py",
@@ -85,8 +85,8 @@ CASES = [
         "train wave --run run",
         ("train wave --run new",),
         files={"run/notes.txt": "mine"},
-        shows="unknown data set",
-        code=2,
+        shows="no clips of a data set",
+        code=1,
     ),
     Case(
         "sim/blender/command.py",
