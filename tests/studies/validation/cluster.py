@@ -22,10 +22,9 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-from flagdata.errors import FlagdataError
 from flagdata.lake import Lake, doctor
 from tests.s3 import BUCKET, SECRETS, moto
-from tests.studies.validation.datasets import compare
+from tests.studies.validation.datasets import artifacts, compare
 
 RECIPE = "flagsim-small"
 SEQUENCES, FILMS, WORKERS = 12, 40, 4
@@ -160,10 +159,7 @@ def _end(
 ) -> int:
     """Ends a worker once a share of the work is in the lake; how many artifacts that were."""
     while build.poll() is None:
-        found = 0
-        with suppress(FlagdataError, OSError):
-            found = Lake.open(lake).rows("kind in ('meshes', 'recording')", columns=["artifact"]).num_rows
-        if found >= share * (SEQUENCES + FILMS):
+        if (found := artifacts(lake)) >= share * (SEQUENCES + FILMS):
             worker.send_signal(signal_)
             return found
         time.sleep(1.0)

@@ -65,12 +65,12 @@ def build(lake: Path, *, kills: Sequence[float]) -> Built:
     found: list[int] = []
     for share in kills:
         process = _start(lake)
-        while process.poll() is None and _artifacts(lake) < share * work:
+        while process.poll() is None and artifacts(lake) < share * work:
             time.sleep(0.5)
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        found.append(_artifacts(lake))
+        found.append(artifacts(lake))
     begun = time.perf_counter()
     process = _start(lake)
     if process.wait() != 0:
@@ -83,8 +83,8 @@ def _start(lake: Path) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, start_new_session=True)
 
 
-def _artifacts(lake: Path) -> int:
-    """Sequences and films in the lake; 0 while there is none."""
+def artifacts(lake: Path | str) -> int:
+    """Counts the sequences and films in the lake; 0 while there is none."""
     with suppress(FlagdataError, OSError):
         return Lake.open(lake).rows("kind in ('meshes', 'recording')", columns=["artifact"]).num_rows
     return 0
