@@ -151,8 +151,8 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
         for doubt in guess["doubts"]:
             echo(f"    to answer: {doubt}")
         if guess["draft"]:
-            gaps = "complete it where it says ?" if "?" in guess["draft"] else "nothing is missing"
-            state = "what is asked above is missing" if guess["doubts"] else gaps
+            asked = "what is asked above is missing" if guess["doubts"] else "nothing is missing"
+            state = "complete it where it says ?" if '"?"' in guess["draft"] else asked
             echo(f"    the recipe ({state}; name it by --recipe FILE.toml to change anything):")
             echo_lines("\n".join(f"      {line}" for line in guess["draft"].splitlines()))
     if "problem" in entry:
