@@ -20,7 +20,7 @@ Definitions, in the words of the sheet:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -74,7 +74,7 @@ class Coefficients:
     """Strengths against the truth, where the effect was named.
 
     Attributes:
-        errors: relative, (estimate − true)/|true|.
+        errors: relative, (estimate − true)/|true|, of strengths that are no bounds.
         covered: of the intervals.
         levels: at which these were stated.
     """
@@ -192,8 +192,9 @@ class Sheet:
             for acting in outcome.key.effects:
                 strength = outcome.strength(acting)
                 if acting.effect in outcome.named and strength is not None:
-                    errors.append((strength["value"] - acting.value) / abs(acting.value))
-                    covered.append(strength["low"] <= acting.value <= strength["high"])
+                    if strength["bound"] is None:
+                        errors.append((strength["value"] - acting.value) / abs(acting.value))
+                    covered.append(_within(acting.value, strength))
                     levels.append(strength["level"])
         return Coefficients(errors=tuple(errors), covered=Share.of(covered), levels=tuple(sorted(set(levels))))
 
@@ -341,6 +342,12 @@ def graded(title: str, outcomes: Sequence[Outcome]) -> Sheet:
         by_noise=_power(acted, lambda o: f"{1e3 * o.key.noise:g}"),
         by_rate=_power(acted, lambda o: str(o.key.rate)),
     )
+
+
+def _within(value: float, interval: Mapping[str, Any]) -> bool:
+    """Decides whether an interval contains a value; a filed end that is None is infinite (`filing`)."""
+    low, high = interval["low"], interval["high"]
+    return (low is None or low <= value) and (high is None or value <= high)
 
 
 def _class(outcome: Outcome) -> str:

@@ -11,7 +11,7 @@ import pytest
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.shares import Share
-from measure.verdict import Conclusion, Verdict
+from measure.verdict import Candidate, Conclusion, Estimate, Verdict
 from sim.effects import EFFECTS
 from tests.studies.challenge import sheet as sheets
 from tests.studies.challenge.answer_key import AnswerKey
@@ -238,6 +238,24 @@ def test_coefficient_errors_and_coverage_are_those_of_the_named_effect() -> None
         [key("a", Kind.ONE, acting("lift")), key("b", Kind.ONE, acting("lift"))],
     )
     assert result.coefficients.errors == pytest.approx((0.05, 0.5))
+    assert (result.coefficients.covered.hits, result.coefficients.covered.count) == (1, 2)
+
+
+def test_a_strength_that_is_a_bound_contains_the_truth_on_its_side_and_has_no_error() -> None:
+    """At least 0.8 contains a true 1, at least 1.3 does not; neither is an estimate that could err."""
+    bounds = iter((0.8, 1.3))
+
+    def bounded() -> Candidate:
+        bound = next(bounds)
+        return replace(
+            candidate("lift"), strength=Estimate(value=bound, low=bound, high=math.inf, unit="1", bound="at-least")
+        )
+
+    result = sheet(
+        lambda k: verdict(Conclusion.EFFECT, "lift", ranking=(bounded(),)),
+        [key("a", Kind.ONE, acting("lift")), key("b", Kind.ONE, acting("lift"))],
+    )
+    assert result.coefficients.errors == ()
     assert (result.coefficients.covered.hits, result.coefficients.covered.count) == (1, 2)
 
 

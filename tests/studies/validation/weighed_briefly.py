@@ -142,6 +142,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
                 "value": middle[place],
                 "low": low[place],
                 "high": high[place],
+                "bounded": False,
                 "misfit": None,
                 "withheld": None,
                 "damping": truth["damping"],
