@@ -101,7 +101,7 @@ class Discretisation:
 
 COLUMNS = 12
 RATE = 12.5
-"""Frames of a simulation [Hz]: a flag of a metre flutters at 1 to 3 Hz, and drawing silhouettes costs as much as they
+"""Frames of a simulation [Hz]: a flag of a metre flutters at 1 to 3 Hz, and to observe flags costs a third of what they
 do to simulate. Higher shows faster motion and costs drawing in proportion; lower misses the second harmonic of the
 flutter."""
 SETTLE = 4.0
@@ -109,7 +109,7 @@ SETTLE = 4.0
 the start in the film; longer costs time in proportion."""
 BATCH = 16
 """Flags that are simulated together: what a vector register holds in single precision."""
-VERSION = 5
+VERSION = 6
 """Raised where the same batch gives other numbers."""
 OBSERVED = (
     "droop",

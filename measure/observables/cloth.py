@@ -6,20 +6,16 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
+from measure.observables.drawing import drawn
 from measure.observables.silhouettes import Silhouettes
 
 _DRAWN = 120.0
 """Pixels of the flag's length in silhouettes that are drawn of geometry."""
-_FINER = 3
-"""Pixels drawn in one: OpenCV draws all that a triangle touches, which would widen a silhouette by half a pixel."""
-_SUBPIXEL = 6
-"""Binary digits of a drawn pixel in which triangles are given to OpenCV."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,14 +115,7 @@ class ClothWindow:
         turned = (self.points - self.middle_of_hoist.mean(axis=0)) * np.array([self.side, -1.0]) * scale
         low = np.floor(turned.min(axis=(0, 1))) - 2
         width, high = (np.ceil(turned.max(axis=(0, 1))) - low + 3).astype(int).tolist()
-        masks = np.zeros((len(turned), high, width), bool)
-        # The first pixel's middle is at 0.5 here and at 0 in OpenCV.
-        fixed = np.rint(((turned - low) * _FINER - 0.5) * 2**_SUBPIXEL).astype(np.int32)
-        for mask, places in zip(masks, fixed, strict=True):
-            drawn = np.zeros((high * _FINER, width * _FINER), np.uint8)
-            for triangle in places[self.faces]:
-                cv2.fillConvexPoly(drawn, triangle, 1, shift=_SUBPIXEL)
-            mask[:] = drawn[_FINER // 2 :: _FINER, _FINER // 2 :: _FINER]
+        masks = drawn(turned - low, self.faces, width=width, height=high)
         return Silhouettes(
             times=self.times, masks=masks, scale=scale, hoist=-low, length=self.length, height=self.height
         )
