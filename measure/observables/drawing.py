@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.arrays import BoolArray, FloatArray, IntArray
-from sim.compiler import compiled
 
 STEPS = 192
 """Of a pixel, in which places are rounded."""
@@ -34,6 +33,8 @@ class _Drawing(ctypes.Structure):
 @functools.cache
 def library() -> ctypes.CDLL | None:
     """Compiles the kernel; None, with one warning, where it cannot be built."""
+    from sim.compiler import compiled  # a film is measured without the simulator, and loads nothing of it
+
     return compiled(
         "measure.observables", ("drawing.cpp",), without="silhouettes are drawn by numpy, many times slower"
     )
