@@ -16,6 +16,7 @@ from av.video.frame import VideoFrame
 from flagdata.arrays import UInt8Array
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
 from flagdata.rng import stream
+from sim.assets import Assets
 from sim.datasets.picture import noisy
 from sim.render import Meshes, RenderParameters
 from sim.render.raster import Raster
@@ -39,6 +40,7 @@ def write_film(
     seed: int,
     workers: int,
     advance: Callable[[int], object],
+    assets: Assets | None = None,
 ) -> None:
     """Films a flag in a wind along +x.
 
@@ -47,6 +49,7 @@ def write_film(
         start: that the file states as its creation time.
         seed: of the camera's noise.
         advance: called with the number of frames done.
+        assets: where texture and background come from; None for those of the package.
     """
     with av.open(str(path), "w") as container:
         container.metadata["creation_time"] = start.isoformat()
@@ -55,7 +58,7 @@ def write_film(
         video.codec_context.time_base = Fraction(1, rate)
         video.codec_context.thread_count = 1  # the same bytes on every machine
         number = 0
-        for planes in _rendered(sequence, zeta, seed=seed, workers=workers):
+        for planes in _rendered(sequence, zeta, Assets() if assets is None else assets, seed=seed, workers=workers):
             for picture in planes:
                 frame = VideoFrame.from_ndarray(picture, format="yuv420p")
                 frame.pts = number
@@ -66,7 +69,7 @@ def write_film(
 
 
 def _rendered(
-    sequence: MeshSequence | RaggedMeshSequence, zeta: RenderParameters, *, seed: int, workers: int
+    sequence: MeshSequence | RaggedMeshSequence, zeta: RenderParameters, assets: Assets, *, seed: int, workers: int
 ) -> Iterator[UInt8Array]:
     """Pictures (n, 1.5 height, width) in YUV 4:2:0 with noise, in order, a chunk at a time."""
     firsts = range(0, len(sequence), _CHUNK)
@@ -76,14 +79,16 @@ def _rendered(
         for first in firsts:
             if len(waiting) >= 2 * workers:
                 yield waiting.pop(0).result()
-            waiting.append(pool.submit(_chunk, sequence, zeta, first, seed))
+            waiting.append(pool.submit(_chunk, sequence, zeta, assets, first, seed))
         for future in waiting:
             yield future.result()
 
 
-def _chunk(sequence: MeshSequence | RaggedMeshSequence, zeta: RenderParameters, first: int, seed: int) -> UInt8Array:
+def _chunk(
+    sequence: MeshSequence | RaggedMeshSequence, zeta: RenderParameters, assets: Assets, first: int, seed: int
+) -> UInt8Array:
     meshes = Meshes.flag(sequence, heading=0.0)
-    pictures = Raster().part(meshes, zeta, first, min(first + _CHUNK, len(meshes))).numpy()
+    pictures = Raster(assets=assets).part(meshes, zeta, first, min(first + _CHUNK, len(meshes))).numpy()
     rng = stream(seed, "demo", "camera", first)
     out = []
     for picture in pictures:

@@ -45,6 +45,9 @@ LEARNED: Mapping[tuple[str, str], Learned] = {
     ("outdoor_wind", "fabric_area_weight"): Learned(
         scenes=("flag-outdoor", "flag-outdoor-damped"), films={"flag-outdoor": 960, "flag-outdoor-damped": 1856}
     ),
+    ("outdoor_wind", "world_area_weight"): Learned(
+        scenes=("flag-world", "flag-world-damped"), films={"flag-world": 3360, "flag-world-damped": 6720}
+    ),
 }
 """By the wind and the area weight that a model estimates."""
 RENDERS = "flags"

@@ -42,6 +42,7 @@ TEXTURES = Registry(
     "texture",
     {
         "flag": "sim.assets.flags:NATIONAL",
+        "banner": "sim.assets.banners:BANNER",
         "weave": "sim.assets.cloths:WEAVE",
         "stripes": "sim.assets.cloths:STRIPES",
         "checks": "sim.assets.cloths:CHECKS",
@@ -52,6 +53,7 @@ BACKGROUNDS = Registry(
     "background",
     {
         "sky": "sim.assets.backgrounds:SKY",
+        "clouds": "sim.assets.backgrounds:CLOUDS",
         "hills": "sim.assets.backgrounds:HILLS",
         "foliage": "sim.assets.backgrounds:FOLIAGE",
         "buildings": "sim.assets.backgrounds:BUILDINGS",

@@ -1,4 +1,4 @@
-"""Procedural backgrounds: skies, hills, foliage, buildings, each with its own weather, light, colours and focus.
+"""Procedural backgrounds: skies, clouds, hills, foliage, buildings; weather, light, colours and focus of their own.
 
 They are no likenesses. They vary in what a picture's statistics have (brightness, colour, contrast, spectral slope,
 edges, horizons), so that the background carries no information about a scene.
@@ -67,6 +67,23 @@ def _ground(rng: np.random.Generator) -> Picture:
 
 def _sky(rng: np.random.Generator) -> Picture:
     return _weather(rng)
+
+
+def _clouds(rng: np.random.Generator) -> Picture:
+    """Paints broken clouds before a clear sky: bright towards the sun, gray beneath, some with a thin veil above."""
+    above, below = _SKIES["clear"]
+    zenith, horizon = hue(rng, *above), hue(rng, *below)
+    sky = over(np.broadcast_to(horizon, (_ROWS, _COLUMNS, 3)), zenith, _HEIGHT ** rng.uniform(0.5, 1.6))
+    veil = fractal(rng, _ROWS, _COLUMNS, slope=1.3, stretch=rng.uniform(2.0, 5.0))
+    sky = over(sky, np.ones(3), smoothstep(-1.0, 2.5, veil) * rng.uniform(0.0, 0.4))
+    form = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(1.3, 1.7), stretch=rng.uniform(1.2, 2.5))
+    cover, edge = rng.uniform(-0.9, 0.5), rng.uniform(0.15, 0.7)
+    reach, side = int(rng.integers(6, 24)), int(rng.integers(-16, 17))
+    thicker_towards_sun = np.roll(form, (reach, side), axis=(0, 1)) - form
+    depth = smoothstep(cover, cover + rng.uniform(1.0, 2.5), form)
+    lit = 0.96 - rng.uniform(0.1, 0.35) * thicker_towards_sun - rng.uniform(0.05, 0.45) * depth
+    cloud = np.clip(lit, 0.3, 1.05)[:, :, None] * hue(rng, (0.0, 1.0), (0.0, 0.04), (0.92, 1.0))
+    return over(sky, cloud, smoothstep(cover, cover + edge, form) * rng.uniform(0.85, 1.0))
 
 
 def _hills(rng: np.random.Generator) -> Picture:
@@ -165,6 +182,7 @@ def _photographed(paint: Callable[[np.random.Generator], Picture]) -> Callable[[
 
 
 SKY = Seeded(kind="sky", paint=_photographed(_sky))
+CLOUDS = Seeded(kind="clouds", paint=_photographed(_clouds))
 HILLS = Seeded(kind="hills", paint=_photographed(_hills))
 FOLIAGE = Seeded(kind="foliage", paint=_photographed(_foliage))
 BUILDINGS = Seeded(kind="buildings", paint=_photographed(_buildings))

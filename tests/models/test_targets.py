@@ -117,7 +117,7 @@ def test_a_target_of_the_same_cloth_whose_range_is_wide_enough_is_offered() -> N
     with pytest.raises(InputError, match=r"0\.1 to 0\.17 kg/m²: they reach from 0\.2 to 0\.3") as caught:
         Scaling(names=("area_weight",)).check(heavy, where="the training side")
     assert caught.value.where == "the training side"
-    assert caught.value.fix.startswith("name the target fabric_area_weight in [loss] targets")
+    assert caught.value.fix.startswith("name the target fabric_area_weight or world_area_weight in [loss] targets")
     with pytest.raises(InputError) as caught:
         Scaling(names=("area_weight",)).check(10 * heavy, where="the training side")
     assert caught.value.fix.startswith("leave that target out, or train on a data set")
@@ -133,16 +133,24 @@ def test_the_aspect_is_the_logarithm_of_length_over_height() -> None:
         truth({"width": np.array([1.5])}, ("log_aspect",))
 
 
-def test_the_ranges_of_flags_outdoors_hold_all_that_their_data_sets_can_draw() -> None:
+@pytest.mark.parametrize(
+    ("dataset", "weight"),
+    [
+        ("outdoor", "fabric_area_weight"),
+        ("outdoor-damped", "fabric_area_weight"),
+        ("world", "world_area_weight"),
+        ("world-damped", "world_area_weight"),
+    ],
+)
+def test_the_ranges_of_flags_outdoors_hold_all_that_their_data_sets_can_draw(dataset, weight) -> None:
     from sim.datasets import load
 
-    for name in ("outdoor", "outdoor-damped"):
-        recipe = load(name)
-        assert recipe.groups is not None
-        scene, material = recipe.simulation.scene, recipe.simulation.material
-        assert ends(recipe.simulation.wind.speed) == (TARGETS["outdoor_wind"].low, TARGETS["outdoor_wind"].high)
-        assert material.area_weight is not None
-        assert ends(material.area_weight) == (TARGETS["fabric_area_weight"].low, TARGETS["fabric_area_weight"].high)
-        aspects = [math.log(scene.width / height) for height in ends(recipe.groups.height)]
-        assert TARGETS["log_aspect"].low < min(aspects)
-        assert max(aspects) < TARGETS["log_aspect"].high
+    recipe = load(dataset)
+    assert recipe.groups is not None
+    scene, material = recipe.simulation.scene, recipe.simulation.material
+    assert ends(recipe.simulation.wind.speed) == (TARGETS["outdoor_wind"].low, TARGETS["outdoor_wind"].high)
+    assert material.area_weight is not None
+    assert ends(material.area_weight) == (TARGETS[weight].low, TARGETS[weight].high)
+    aspects = [math.log(scene.width / height) for height in ends(recipe.groups.height)]
+    assert TARGETS["log_aspect"].low < min(aspects)
+    assert max(aspects) < TARGETS["log_aspect"].high

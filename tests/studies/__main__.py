@@ -69,6 +69,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "renderers": ("tests.studies.validation.renderers", "Whether Cycles and the rasteriser agree."),
             "robot-cloth": ("tests.studies.validation.robot_cloth", "Cloth that a robot carries, beside tracks."),
             "stressors": ("tests.studies.validation.stressors", "Null experiments as a field brings them."),
+            "ten-looks": ("tests.studies.validation.ten_looks", "One flag's motion filmed in ten looks."),
             "transfer": ("tests.studies.validation.transfer", "Estimates on clips that differ from training."),
             "weighed": ("tests.studies.validation.weighed", "The cloth of twenty flags weighed."),
             "weighed-briefly": ("tests.studies.validation.weighed_briefly", "The same from half a minute."),
