@@ -197,8 +197,10 @@ def _emblem(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) ->
 
 
 def _quarters(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) -> None:
-    for x, y, colour in ((_WIDTH / 2, 0.0, parts[0]), (0.0, 0.5, parts[1 if rng.random() < 0.5 else 0])):
-        sheet.box(x, y, _WIDTH / 2, 0.5, colour)
+    """Paints the upper quarter at the fly and the lower one at the hoist, half of them in one colour."""
+    x, y = rng.uniform(0.4, 0.6) * _WIDTH, rng.uniform(0.45, 0.55)
+    sheet.box(x, 0.0, _WIDTH - x, y, parts[0])
+    sheet.box(0.0, y, x, 1.0 - y, parts[1 if rng.random() < 0.5 else 0])
 
 
 LAYOUTS: Mapping[str, _Layout] = {

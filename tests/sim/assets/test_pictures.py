@@ -37,6 +37,16 @@ def test_backgrounds_vary_in_brightness_colour_and_detail() -> None:
     assert detail.max() / detail.min() > 5
 
 
+def test_clouds_are_broken_bright_and_gray_before_a_sky_that_is_blue() -> None:
+    pictures = [Assets().background(f"clouds/{seed}").astype(float) / 255 for seed in range(24)]
+    coloured = np.array([(np.ptp(picture, axis=2) > 0.15).mean() for picture in pictures])
+    assert ((coloured > 0.02) & (coloured < 0.98)).mean() > 0.8  # sky is seen between clouds
+    assert np.ptp(coloured) > 0.4
+    gray = np.array([np.quantile(picture.mean(axis=2), [0.02, 0.98]) for picture in pictures])
+    assert (gray[:, 1] > 0.9).mean() > 0.3  # as bright as a white flag
+    assert np.ptp(gray, axis=1).mean() > 0.3
+
+
 def test_a_fractal_field_has_the_spectrum_it_is_asked_for() -> None:
     field = np.mean([np.abs(np.fft.fft2(fractal(stream(s, "f"), 256, 256, slope=1.5))) ** 2 for s in range(8)], axis=0)
     f = np.hypot(*np.meshgrid(np.fft.fftfreq(256), np.fft.fftfreq(256)))
