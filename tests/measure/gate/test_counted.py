@@ -293,7 +293,7 @@ def test_a_film_on_its_side_has_a_level_pole(turns: int, kind: str) -> None:
     assert "its side" in fault.what
 
 
-FOREIGN = {
+FOREIGN: dict[Callable[[UInt8Array], UInt8Array], tuple[str, ...]] = {
     foreign.wall: ("too-dark", "no-motion"),
     foreign.scroll: ("cut-off",),
     foreign.fire: ("no-pole",),
