@@ -41,6 +41,10 @@ WIDTH, HEIGHT, COUNT, RATE = 240, 180, 50, 25.0
 _SKY = np.array([176, 184, 190], np.uint8)
 _CLOTH = (slice(30, 120), slice(84, 180))
 """Rows and columns that the cloth visits."""
+_POLE = np.array([(179, 36), (186, 36), (193, HEIGHT), (185, HEIGHT)], np.int32)
+"""Corners of the pole [px]."""
+_ASIDE = 50
+"""Distance of the poles of two flags that overlap [px]."""
 _LOOP = 13
 """Frames."""
 _WIDE, _GAP = 304, 4
@@ -138,6 +142,34 @@ def hung(film: Film) -> Film:
     return np.ascontiguousarray(np.rot90(film, axes=(1, 2))[:, 20:176])
 
 
+def upside_down(film: Film) -> Film:
+    """The flag before the sky, drooping and swinging as in less wind, turned by half a turn."""
+    behind = film[0].copy()
+    behind[: _CLOTH[0].stop + 20] = _SKY
+    cv2.fillConvexPoly(behind, _POLE, (120, 120, 125))
+    shown = []
+    for k, (one, own) in enumerate(zip(film, _cloth(film), strict=True)):
+        slope = 0.25 + 0.1 * np.sin(5 * k / RATE)
+        shear = np.array([[1.0, 0, 0], [-slope, 1, slope * _POLE[0, 0]]])
+        moved, at = (cv2.warpAffine(part, shear, (WIDTH, HEIGHT)) for part in (one, own.astype(np.uint8)))
+        shown.append(np.where(at[..., None] > 0, moved, behind))
+    return _noisy(np.stack(shown)[:, ::-1, ::-1])
+
+
+def on_its_side(film: Film) -> Film:
+    """The picture turned, so that the pole lies below the cloth."""
+    return np.ascontiguousarray(np.rot90(film, -1, axes=(1, 2))[:, 64:220])
+
+
+def overlapping(film: Film) -> Film:
+    """A second flag, half a second late, whose pole is before the first one's cloth."""
+    pole = np.zeros((HEIGHT, WIDTH), np.uint8)
+    cv2.fillConvexPoly(pole, _POLE, 1)
+    other = np.roll(film, _LOOP, axis=0)
+    own, other = (np.roll(one, -_ASIDE, axis=2) for one in (_cloth(other) | (pole > 0), other))
+    return np.where(own[..., None], other, film)
+
+
 def without_background(film: Film) -> Film:
     """A long flag and little else."""
     return _noisy(_resized(film, 2 * WIDTH, HEIGHT)[:, 10:134, 136:392])
@@ -198,6 +230,9 @@ FAULTS: Mapping[str, Fault] = {
     "too-dark": Fault(made=dark),
     "no-motion": Fault(made=still, shown=(0, COUNT - 1)),
     "unlike-cloth": Fault(made=tree),
+    "upside-down": Fault(made=upside_down),
+    "on-its-side": Fault(made=on_its_side),
+    "second-pole": Fault(made=overlapping),
     "no-pole": Fault(made=water),
     "hangs-from-above": Fault(made=hung),
     "moving-camera": Fault(made=moving_camera, shown=(10, 35)),

@@ -92,7 +92,8 @@ _KINDS = {
         markers-missing markers-not-tracked markers-shared messages-undefined narrow-intervals non-data-lines
         not-a-date nul-bytes odd-rotation one-time order-by-name order-by-time orientation-changed pins-move
         pins-not-observed positions-stuck rate-not-as-described rate-unlike-names recording-cut
-        recordings-taken-apart repeated-frames report-absent rest-upside-down sensor-fault several-anemometers
+        recordings-taken-apart repeated-frames report-absent rest-upside-down second-pole-suspected sensor-fault
+        several-anemometers
         several-flags-found several-sheets short-calibration sigma-below-frame size-assumed sizes-excluded-by-weight
         sizes-left-out small-sizes-left-out staging-left stamps-synthetic start-unknown start-unsure
         still-away-from-pins strange-windows stray-file stream-appeared t-joints time-backwards timing-uneven

@@ -19,7 +19,7 @@ from flagdata.film import Film
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CropBox
 from flagdata.schema import FRAME_SIZE
-from measure.gate.counted import reasons
+from measure.gate.counted import SECOND, reasons
 from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower, conditioning_of
@@ -231,6 +231,8 @@ class ConditionedFilm:
         ]
         if all(fault.kind != "another-shape" for fault in faults):
             of_conditioning += _of_aspect(conditioning, self._aspect)
+        if all(fault.kind != "second-pole" for fault in faults):
+            of_conditioning += _of_second_pole(conditioning)
         if all(fault.kind != "cut-off" for fault in faults):
             of_conditioning += cut.findings()
         return (*self._film.findings(), *of_conditioning, *faults)
@@ -362,6 +364,23 @@ def _of_flag(conditioning: Conditioning, reference: UInt8Array | None, *, number
             )
         )
     return notes
+
+
+def _of_second_pole(conditioning: Conditioning) -> list[Finding]:
+    if conditioning.region is None:
+        return []
+    height = conditioning.standing.inside(conditioning.framed_box(conditioning.region), conditioning.places).height
+    if height < SECOND:
+        return []
+    return [
+        Finding.of(
+            "second-pole-suspected",
+            f"an upright edge stands still inside what moves, along {height:.0%} of its height: a stripe of the cloth, "
+            "or the pole of a second flag",
+            value=height,
+            fix="look whether two flags overlap in the picture; if so, film from where they do not",
+        )
+    ]
 
 
 def _of_aspect(conditioning: Conditioning, stated_aspect: float | None) -> list[Finding]:

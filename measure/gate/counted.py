@@ -14,6 +14,7 @@ from flagdata.findings import Finding, Severity
 from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower
+from models.conditioning.standing import Inside
 
 COUNTED = frozenset({"scene-cut", "low-frame-rate", "repeated-frames", "too-dark", "moving-camera", "cut-off", "scale"})
 """Kinds of faults that are counted here, and while the frames are read: no statistic of a window need look for them."""
@@ -42,8 +43,16 @@ pole: a hoist is as long as its flag is high, and a flag visits places of twice 
 the least was 0.67, of water 0.46, of wind turbines 0.27."""
 _BAR, _OVER = 1.0, 1.5
 """Length of a level line along the cloth's top, in widths of its places, and the same over the height of the pole, from
-both of which on it hangs from a bar. Of these films none had more than 1.0 and more than 0.71 together, a flag that
-hangs from a line had 1.23 and 2.4."""
+both of which on it hangs from a bar; along its bottom, from which on the film lies on its side. Of these films none had
+more than 1.0 and more than 0.71 together, a flag that hangs from a line had 1.23 and 2.4."""
+SECOND = 0.5
+"""Height of what moves along which an upright line inside it is at rest, in heights of it, from which on it may be a
+second pole. It is one where it goes on below what moves."""
+_UP = math.radians(2.0)
+"""Angle by which the free end is higher than the hoist, from which on the cloth droops upwards."""
+_REACHES, _ENDS = 0.15, 0.15
+"""How far the pole of a film that is upside down reaches above what moves at least, and below it at most, in heights of
+it."""
 _PADDED = 1 / 3
 """Share of the square about the cloth that lies beyond the picture, above which too little but cloth is shown. Of films
 of whole flags the most was 0.2."""
@@ -65,7 +74,15 @@ class _Film:
     def pole(self) -> float:
         """Returns the height of an upright edge at rest beside the cloth's places, in heights of them; see `_POLE`."""
         region, standing = self.conditioning.region, self.conditioning.standing
-        return 0.0 if region is None else standing.beside(self.conditioning.framed_box(region))
+        return 0.0 if region is None else standing.beside(self.conditioning.framed_box(region)).length
+
+    @cached_property
+    def inside(self) -> Inside:
+        """Returns upright edges at rest inside what moves; see `SECOND`."""
+        region, standing = self.conditioning.region, self.conditioning.standing
+        if region is None:
+            return Inside(height=0.0, going_on=0.0)
+        return standing.inside(self.conditioning.framed_box(region), self.conditioning.places)
 
     @property
     def box(self) -> tuple[float, float, float, float]:
@@ -169,13 +186,44 @@ def _hung(film: _Film) -> Figure | None:
     region = film.conditioning.region
     if region is None:
         return None
-    bar = film.conditioning.standing.above(film.conditioning.framed_box(region))
+    bar = film.conditioning.standing.above(film.conditioning.framed_box(region)).length
     if not bar >= max(_BAR, _OVER * film.pole):
         return None
     return (
         bar,
         f"it is {bar:.2f} times as long as what moves is wide, the longest beside it {film.pole:.2f} times as high",
     )
+
+
+def _upside_down(film: _Film) -> Figure | None:
+    region = film.conditioning.region
+    if region is None or region.hoist == "top" or not region.droop < -_UP:
+        return None
+    box = film.conditioning.framed_box(region)
+    pole = film.conditioning.standing.beside(box, (region.hoist,))
+    room = (film.conditioning.size - box[3]) / (box[3] - box[1])
+    if not (pole.length >= _POLE and pole.above >= _REACHES and pole.below <= _ENDS and room >= _REACHES):
+        return None
+    up = -math.degrees(region.droop)
+    return up, f"by {up:.1f}°, and the edge reaches {pole.above:.2f} of the height of what moves above it"
+
+
+def _on_its_side(film: _Film) -> Figure | None:
+    region = film.conditioning.region
+    if region is None:
+        return None
+    edge = film.conditioning.standing.below(film.conditioning.framed_box(region)).length
+    if not edge >= max(_BAR, _OVER * film.pole):
+        return None
+    words = f"it is {edge:.2f} times as long as what moves is wide, the longest upright one beside it {film.pole:.2f} "
+    return edge, words + "times as high"
+
+
+def _second(film: _Film) -> Figure | None:
+    found = film.inside
+    if not found.going_on >= SECOND:
+        return None
+    return found.going_on, f"it runs along {found.going_on:.0%} of its height, in one flag along less than {SECOND:.0%}"
 
 
 def _padded(film: _Film) -> Figure | None:
@@ -203,15 +251,18 @@ def _below(share: float) -> str:
 _UNLIT: tuple[Rule, ...] = (("too-dark", _dark), ("too-dark", _noisy))
 OF_PICTURES: tuple[tuple[Rule, ...], ...] = ((("scene-cut", _cuts),), _UNLIT)
 """Rules for every film. Of each row the first that finds its fault holds, since that hides or brings about the next."""
+_HIDING: tuple[Rule, ...] = (("scene-cut", _cuts), *_UNLIT, ("moving-camera", _lost), ("scale", _small))
+"""Each of these hides what stands still."""
 WITHOUT_CLOTH: tuple[tuple[Rule, ...], ...] = ((("scale", _spot), ("no-motion", _still)),)
 """The same for films in which no cloth was found."""
 OF_CLOTH: tuple[tuple[Rule, ...], ...] = (
     (("repeated-frames", _twins),),
     (("cut-off", _cut_off), ("moving-camera", _restless)),  # cloth that is cut off hides what stands still
     (
-        *(("scene-cut", _cuts), *_UNLIT, ("moving-camera", _lost), ("scale", _small)),  # each hides what stands still
-        *(("no-pole", _no_pole), ("hangs-from-above", _hung)),
+        *_HIDING,
+        *(("on-its-side", _on_its_side), ("no-pole", _no_pole), ("hangs-from-above", _hung), ("second-pole", _second)),
     ),
+    (*_HIDING, ("upside-down", _upside_down)),
     (("no-background", _padded),),
     (("another-shape", _stretched),),
     (("scale", _small), ("unlike-cloth", _fine)),

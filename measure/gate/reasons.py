@@ -32,7 +32,7 @@ REASONS: dict[str, Fault] = {
         fix="give a film whose frames are all different, as the camera wrote it",
     ),
     "too-dark": Fault(
-        sentence="the cloth may not stand out from darkness, haze or noise",
+        sentence="the picture may be too dark, too even or too noisy to show cloth",
         fix="film by daylight, or expose longer",
     ),
     "no-motion": Fault(
@@ -40,9 +40,30 @@ REASONS: dict[str, Fault] = {
         fix="crop to the flag, or choose a part of the film in which it flies",
     ),
     "unlike-cloth": Fault(
-        sentence="the motion is finer than cloth's, as of leaves or water",
+        sentence="what changes is finer than cloth's folds, and may be another thing, as leaves or water",
         fix="make sure that the crop shows a flag on a pole and little else that moves",
         of_motion=True,
+    ),
+    "upside-down": Fault(
+        sentence="the film may be upside down: the free end of what moves is higher than its hoist, and the edge that "
+        "stands still there ends at what moves instead of going on below it",
+        fix="turn the film: ffmpeg -i FILM -vf hflip,vflip TURNED; or correct the rotation that its file states",
+        of_motion=True,
+        of_flags=True,
+    ),
+    "on-its-side": Fault(
+        sentence="the film may lie on its side, as a level edge stands still along the bottom of what moves",
+        fix="if so, turn the film: ffmpeg -i FILM -vf transpose=1 TURNED, with transpose=2 where it then is upside "
+        "down; or correct the rotation that its file states",
+        of_motion=True,
+        of_flags=True,
+    ),
+    "second-pole": Fault(
+        sentence="two flags may overlap in the picture, as a second upright edge stands still inside what moves and "
+        "goes on below it",
+        fix="film from where no other flag or post is before or behind the flag",
+        of_motion=True,
+        of_flags=True,
     ),
     "no-pole": Fault(
         sentence="what moves may be no flag on a pole, as no upright edge stands still beside it",
@@ -51,9 +72,10 @@ REASONS: dict[str, Fault] = {
         of_flags=True,
     ),
     "hangs-from-above": Fault(
-        sentence="the cloth may hang from a bar or a line rather than fly from a pole: a level edge stands still along "
-        "its top",
-        fix="film a flag whose one side is at a pole",
+        sentence="what moves may hang from a bar or a line, or the film may lie on its side: a level edge stands still "
+        "along its top",
+        fix="film a flag whose one side is at a pole; turn a film that lies on its side: ffmpeg -i FILM -vf "
+        "transpose=1 TURNED, with transpose=2 where it then is upside down",
         of_motion=True,
         of_flags=True,
     ),
@@ -62,7 +84,7 @@ REASONS: dict[str, Fault] = {
         fix="film from a tripod, with something that stands still in the picture",
     ),
     "cut-off": Fault(
-        sentence="motion reaches the picture's edge, so that a part of the flag may lie outside",
+        sentence="motion reaches the picture's edge, so that a part of what moves may lie outside",
         of_motion=True,
         fix="film so that the whole flag is in the picture, or choose another by --flag",
     ),
@@ -77,7 +99,7 @@ REASONS: dict[str, Fault] = {
         fix="check --flag-size: length along the wind times height along the pole",
     ),
     "scale": Fault(
-        sentence="the flag fills less or more of the picture than in the training clips",
+        sentence="what moves fills less or more of the picture than the flags of the training",
         fix="film from nearer, so that the flag spans 100 pixels or more",
         of_motion=True,
     ),

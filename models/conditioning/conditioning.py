@@ -67,6 +67,7 @@ class Conditioning:
         path: (n, 2) of the square's centre over the sample [px of the film].
         cut: (n, 4) length at which the cloth moves along each of `whole.SIDES` of the picture, in sizes of the cloth.
         standing: edges that stand still in the square.
+        places: (size, size) all places in the square that the cloth visits.
     """
 
     size: int
@@ -82,6 +83,7 @@ class Conditioning:
     path: FloatArray
     cut: FloatArray
     standing: Standing
+    places: BoolArray
 
     @property
     def region(self) -> Region | None:
@@ -254,9 +256,11 @@ def conditioning_of(
         for frame, transform in zip(sample[::step], transforms[::step], strict=True)
     ]
     weight, cut = np.ones((size, size), np.float32), np.zeros((len(small), len(SIDES)))
+    places = np.zeros((size, size), np.bool_)
     if regions:
         cut = at_edges(registered, instants, transforms, regions[chosen].mask)
         weight = _weight(regions[chosen].mask, square, size, scale)
+        places = _in_square(regions[chosen].mask.astype(np.uint8), square, size, scale) > 0
     stack = np.stack(framed)
     level = _noise(stack, weight)
     spread = np.maximum(stack.std(axis=0, dtype=np.float32), 1e-3)
@@ -274,6 +278,7 @@ def conditioning_of(
         path=np.stack([_centre(square, transform, scale) for transform in transforms]),
         cut=cut,
         standing=Standing.of(stack, _shown(square, size, width=width, height=height), enlarged=size / square.side),
+        places=places,
     )
 
 
@@ -362,14 +367,19 @@ def _widened(mask: BoolArray, share: float) -> UInt8Array:
 def _weight(mask: BoolArray, square: Square, size: int, scale: float) -> Float32Array:
     """Weighs pixels (size, size): 1 on and about the cloth, falling to 0 across the feather."""
     extent = max(np.ptp(np.flatnonzero(mask.any(axis=1))), np.ptp(np.flatnonzero(mask.any(axis=0)))) + 1
-    widened = _widened(mask, _AROUND + _FEATHER)
+    near = _in_square(_widened(mask, _AROUND + _FEATHER), square, size, scale)
+    feather = max(_FEATHER * extent / scale / (square.side / size), 1.0)
+    away = cv2.distanceTransform(near, cv2.DIST_L2, 5)
+    return np.clip(away / feather, 0.0, 1.0).astype(np.float32)
+
+
+def _in_square(mask: UInt8Array, square: Square, size: int, scale: float) -> UInt8Array:
+    """Brings a mask of the pictures in which regions are sought into the square (size, size)."""
     step = square.side / size
     to_reference = np.array([[step, 0.0, square.x + step / 2 - 0.5], [0.0, step, square.y + step / 2 - 0.5]])
     to_reference = np.column_stack([to_reference[:, :2] * scale, (to_reference[:, 2] + 0.5) * scale - 0.5])
-    out = cv2.warpAffine(widened, to_reference, (size, size), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
-    feather = max(_FEATHER * extent / scale / step, 1.0)
-    away = cv2.distanceTransform(np.asarray(out, dtype=np.uint8), cv2.DIST_L2, 5)
-    return np.clip(away / feather, 0.0, 1.0).astype(np.float32)
+    out = cv2.warpAffine(mask, to_reference, (size, size), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
+    return np.asarray(out, dtype=np.uint8)
 
 
 def _noise(stack: UInt8Array, weight: Float32Array) -> float:

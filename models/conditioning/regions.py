@@ -69,6 +69,21 @@ class Region:
         rows, columns = np.flatnonzero(self.mask.any(axis=1)), np.flatnonzero(self.mask.any(axis=0))
         return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
+    @property
+    def droop(self) -> float:
+        """Angle below the level of the line from the middle of the places at the hoist to that of the places at the
+        free end [rad]; negative where the free end is higher, 0 where the cloth hangs from its top."""
+        if self.hoist == "top":
+            return 0.0
+        left, _, right, _ = self.box
+        columns = np.flatnonzero(self.mask.any(axis=0))
+        middles = np.array([np.flatnonzero(self.mask[:, column]).mean() for column in columns])
+        away = (columns + 0.5 - left) / (right - left)
+        away = away if self.hoist == "left" else 1 - away
+        at_hoist, at_end = away < _HOIST, away > 1 - _HOIST
+        across = (away[at_end].mean() - away[at_hoist].mean()) * (right - left)
+        return float(np.arctan2(middles[at_end].mean() - middles[at_hoist].mean(), across))
+
 
 def regions_of(pictures: UInt8Array, times: FloatArray, *, within: BoolArray | None = None) -> tuple[Region, ...]:
     """Finds the regions of a film that move like cloth, the strongest motion first; none where nothing moves.

@@ -1,4 +1,4 @@
-"""Edges that stand still about the cloth: of the pole beside a flag, or of a bar that cloth hangs from.
+"""Edges that stand still about the cloth: of the pole beside a flag, of a second one in it, or of a bar along its side.
 
 An edge stands still where the slope of the picture keeps its direction and strength for most of the film. A straight
 line of such edges is looked for in each direction near the upright, and near the level: pixels count whose slope is
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from flagdata.arrays import BoolArray, Float32Array, UInt8Array
+from flagdata.arrays import BoolArray, Float32Array, IntArray, UInt8Array
 
 _PICTURES = 24
 """Pictures at most that are looked at."""
@@ -32,11 +32,46 @@ _GAP = 0.03
 _OUTSIDE, _INSIDE = 0.25, 0.1
 """How far outside and inside a box's side a line is looked for, in sizes of the box: plain cloth at its hoist moves
 too little to be found, and a slack rope keeps it from the pole. More takes what stands in the background for a pole."""
+_BESIDE = 0.22
+"""Distance from the sides of a box from which on a line stands inside it, in widths: nearer, it may be the hoist."""
+_STEEP = 8
+"""Degrees by which a second pole may differ from the upright."""
+_BELOW, _GOES_ON = 0.25, 0.8
+"""A line goes on below the cloth where it is seen on this share of so long a stretch, in heights of the box: a pole
+does, a stripe of the cloth ends with it."""
 _UNITS = 64
 """Steps of a slope of one gray level a pixel, as whole numbers."""
 
 Box = tuple[float, float, float, float]
 """Left, top, right and bottom [px]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """A line of edges.
+
+    Attributes:
+        length: from its first row to its last, in heights of the box that it is compared with; 0 where there is none.
+        above, below: how far it reaches beyond the upper and the lower side of that box, in heights of it; negative
+            where it ends inside.
+    """
+
+    length: float
+    above: float
+    below: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inside:
+    """Upright lines inside what moves.
+
+    Attributes:
+        height: of what moves along which the longest one stands, in heights of the box; 0 where there is none.
+        going_on: the same of the longest one that goes on below what moves, as a pole does.
+    """
+
+    height: float
+    going_on: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,18 +106,52 @@ class Standing:
         angle = np.degrees(np.arctan2(np.abs(mean[1]), np.abs(mean[0])))
         return cls(upright=edges & (angle < _ACROSS), level=edges & (angle > 90 - _ACROSS))
 
-    def beside(self, box: Box) -> float:
-        """Measures the longest upright line at the left or right side of a box, in heights of the box: 0 without one
-        that reaches its rows."""
+    def beside(self, box: Box, sides: tuple[str, ...] = ("left", "right")) -> Line:
+        """Finds the longest upright line at the left or right side of a box that reaches its rows.
+
+        Args:
+            sides: at which of them, of "left" and "right".
+        """
         left, top, right, bottom = box
         out, within = (share * max(right - left, bottom - top) for share in (_OUTSIDE, _INSIDE))
-        return _longest(self.upright, (top, bottom), ((left - out, left + within), (right - within, right + out)))
+        places = {"left": (left - out, left + within), "right": (right - within, right + out)}
+        return _longest(self.upright, (top, bottom), tuple(places[side] for side in sides))
 
-    def above(self, box: Box) -> float:
-        """Measures the longest level line at the top of a box, in widths of the box; see `beside`."""
+    def above(self, box: Box) -> Line:
+        """Finds the longest level line at the top of a box, compared with its width; see `beside`."""
+        return self._level(box, box[1])
+
+    def below(self, box: Box) -> Line:
+        """Finds the longest level line at the bottom of a box, compared with its width; see `beside`."""
+        return self._level(box, box[3])
+
+    def inside(self, box: Box, places: BoolArray) -> Inside:
+        """Finds upright lines inside what moves, away from the left and right side of a box.
+
+        Args:
+            box: of what moves.
+            places: (height, width) all places that it visits.
+        """
+        left, top, right, bottom = box
+        columns = np.arange(round(left + _BESIDE * (right - left)), round(right - _BESIDE * (right - left)) + 1)
+        columns = columns[(columns >= 0) & (columns < places.shape[1])]
+        high, middle = bottom - top, (top + bottom) / 2
+        within = np.asarray(cv2.erode(places.astype(np.uint8), np.ones((3, 3), np.uint8)), np.uint8)
+        lines = _lines(_widened(self.upright), middle, columns, _STEEP) > 0
+        moving = _lines(within, middle, columns, _STEEP) > 0
+        heights = (lines & moving).sum(axis=1) / high
+        if not heights.size:
+            return Inside(height=0.0, going_on=0.0)
+        rows = np.arange(len(places))[:, None]
+        last = np.where(moving, rows, -1).max(axis=1, keepdims=True)
+        beneath = (rows > last) & (rows <= last + _BELOW * high)
+        seen = (lines & beneath).sum(axis=1) >= _GOES_ON * _BELOW * high
+        return Inside(height=float(heights.max()), going_on=float((heights * seen).max()))
+
+    def _level(self, box: Box, row: float) -> Line:
         left, top, right, bottom = box
         near = _INSIDE * max(right - left, bottom - top)
-        return _longest(self.level.T, (left, right), ((top - near, top + near),))
+        return _longest(self.level.T, (left, right), ((row - near, row + near),))
 
 
 def _slopes(picture: UInt8Array) -> Float32Array:
@@ -91,26 +160,43 @@ def _slopes(picture: UInt8Array) -> Float32Array:
     return np.stack([cv2.Sobel(smooth, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)]).astype(np.float32)
 
 
-def _longest(edges: BoolArray, ends: tuple[float, float], places: tuple[tuple[float, float], ...]) -> float:
-    """Measures the longest line down the rows of edges (height, width), over the distance of `ends`.
+def _widened(edges: BoolArray) -> UInt8Array:
+    """Widens edges (height, width) by a pixel to each side."""
+    return np.asarray(cv2.dilate(edges.astype(np.uint8), np.ones((1, 3), np.uint8)), np.uint8)
+
+
+def _lines(picture: UInt8Array, middle: float, columns: IntArray, tilt: int) -> UInt8Array:
+    """Returns what a picture (height, width) shows along lines: (tilt, row, column), 0 beyond its sides.
+
+    Args:
+        middle: row at which a line has its column.
+        columns: (n,) of the lines.
+        tilt: up to which lines differ from the upright [degrees].
+    """
+    height, width = picture.shape
+    rows = np.arange(height)
+    tilts = np.tan(np.radians(np.arange(-tilt, tilt + 1)))
+    moved = np.rint(tilts[:, None] * (rows - middle)).astype(int)[..., None] + columns
+    shown = picture[rows[:, None], moved.clip(0, width - 1)]
+    return np.where((moved >= 0) & (moved < width), shown, 0).astype(np.uint8)
+
+
+def _longest(edges: BoolArray, ends: tuple[float, float], places: tuple[tuple[float, float], ...]) -> Line:
+    """Finds the longest line down the rows of edges (height, width), and compares it with the distance of `ends`.
 
     Args:
         ends: rows between which a part of the line is.
         places: ranges of columns in one of which it lies at the middle of `ends`.
     """
     height, width = edges.shape
-    extent, middle = ends[1] - ends[0], (ends[0] + ends[1]) / 2
-    tilts = np.tan(np.radians(np.arange(-_TILT, _TILT + 1)))
+    extent = ends[1] - ends[0]
     columns = np.arange(width)
     wanted = np.any([(columns >= low) & (columns <= high) for low, high in places], axis=0)
     if not wanted.any():
-        return 0.0
-    rows = np.arange(height)
-    wide = np.asarray(cv2.dilate(edges.astype(np.uint8), np.ones((1, 3), np.uint8)), np.uint8)
-    moved = np.rint(tilts[:, None] * (rows - middle)).astype(int)[..., None] + columns[wanted]
-    lines = np.where((moved >= 0) & (moved < width), wide[rows[:, None], moved.clip(0, width - 1)], 0)
+        return Line(length=0.0, above=0.0, below=0.0)
+    lines = _lines(_widened(edges), (ends[0] + ends[1]) / 2, columns[wanted], _TILT)
     gap = 2 * round(_GAP * extent / 2) + 1
-    longest = 0
+    longest, last = 0, 0
     run, reaches = np.zeros(lines.shape[::2], int), np.zeros(lines.shape[::2], bool)
     absent = np.full(lines.shape[::2], gap + 1)
     for row in range(height):
@@ -119,5 +205,9 @@ def _longest(edges: BoolArray, ends: tuple[float, float], places: tuple[tuple[fl
         ended = absent > gap
         run = np.where(ended, 0, run + 1)
         reaches = ~ended & (reaches | (present & (ends[0] <= row <= ends[1])))
-        longest = max(longest, int(np.where(present & reaches, run, 0).max()))
-    return longest / extent
+        if (now := int(np.where(present & reaches, run, 0).max())) > longest:
+            longest, last = now, row
+    if not longest:
+        return Line(length=0.0, above=0.0, below=0.0)
+    first = last - longest + 1
+    return Line(length=longest / extent, above=(ends[0] - first) / extent, below=(last + 1 - ends[1]) / extent)

@@ -112,6 +112,7 @@ def test_what_a_reason_advises_can_be_done() -> None:
     "kind",
     [
         *("scene-cut", "repeated-frames", "too-dark", "moving-camera", "cut-off", "unlike-cloth"),
+        *("upside-down", "on-its-side", "second-pole"),
         *("no-pole", "hangs-from-above", "no-background", "another-shape"),
     ],
 )

@@ -15,6 +15,7 @@ from flagdata.rng import stream
 from measure.gate import REASONS, FilmWatch
 from measure.gate.counted import reasons
 from models.conditioning import Follower, conditioning_of
+from tests.measure.gate import foreign
 
 RATE, COUNT, HEIGHT, WIDTH = 25.0, 60, 180, 240
 FLAG = (70, 50, 90, 60)
@@ -29,12 +30,14 @@ def drawn(
     noise: float = 1.0,
     pole: bool = True,
     bar: bool = False,
+    droop: float = 0.0,
 ) -> UInt8Array:
     """(COUNT, HEIGHT, WIDTH): striped cloth on a pole, whose waves grow towards its free end and never come again.
 
     Args:
         scenery: whether the background has features.
         pole, bar: whether there is a pole at the cloth's side, a bar along its top.
+        droop: of the cloth, as a slope.
         shift: (COUNT, 2) of all that is shown, to the right and down [px].
     """
     rng = stream(5, "drawn")
@@ -53,7 +56,7 @@ def drawn(
     for k in range(COUNT):
         time = k / RATE
         phases = [2 * np.pi * (a * along - b * time) for a, b in ((1.4, 2.3), (0.9, 1.31), (2.1, 3.77))]
-        down = (rows - y - 0.07 * height * along * np.sum(np.sin(phases), axis=0)) / height
+        down = (rows - y - droop * width * along - 0.07 * height * along * np.sum(np.sin(phases), axis=0)) / height
         cloth = np.where((down * 4).astype(int) % 2, 200.0, 60.0) + 15 * np.sum(np.cos(phases), axis=0)
         picture = np.where((along >= 0) & (along < 1) & (down >= 0) & (down < 1), cloth, behind)
         dx, dy = (0.0, 0.0) if shift is None else shift[k]
@@ -250,3 +253,63 @@ def test_an_outline_longer_than_the_flag_that_was_given_is_another_thing() -> No
     (fault,) = counted(wide, aspect=1.0)
     assert fault.kind == "another-shape"
     assert fault.value == pytest.approx(150 / 65, rel=0.15)  # the waves at the free end reach beyond the hoist's 50 px
+
+
+def test_a_second_pole_before_the_cloth_is_another_flag_s_and_a_stripe_is_none(plain: UInt8Array) -> None:
+    x, y, width, height = FLAG
+    middle = slice(x + width // 2 - 3, x + width // 2 + 3)
+    two, striped = plain.copy(), plain.copy()
+    two[:, y - 8 :, middle] = 20
+    striped[:, y + 4 : y + height - 6, middle] = 20
+    (fault,) = counted(two)
+    assert fault.kind == "second-pole"
+    assert fault.value is not None
+    assert 0.5 < fault.value < 0.9  # the cloth is 60 px high, its places 74 or more; its dark stripes are like the pole
+    assert f"along {fault.value:.0%} of its height" in fault.what
+    assert kinds(striped) == []
+
+
+def test_a_film_upside_down_has_its_pole_above_and_droops_upwards() -> None:
+    """Slopes of 0.25 and 0.12: 14° and 7°."""
+    for droop in (0.25, 0.12):
+        film = drawn(box=(70, 50, 90, 60), droop=droop)
+        assert kinds(film) == []
+        (fault,) = counted(np.ascontiguousarray(film[:, ::-1, ::-1]))
+        assert fault.kind == "upside-down"
+        assert fault.value == pytest.approx(np.degrees(np.arctan(droop)), abs=3)
+
+
+def test_a_flag_in_a_strong_wind_or_in_an_updraft_is_not_upside_down() -> None:
+    assert kinds(drawn(droop=-0.2)) == []
+    level = drawn()
+    assert "upside-down" not in kinds(np.ascontiguousarray(level[:, ::-1, ::-1]))
+
+
+@pytest.mark.parametrize(("turns", "kind"), [(1, "on-its-side"), (-1, "hangs-from-above")])
+def test_a_film_on_its_side_has_a_level_pole(turns: int, kind: str) -> None:
+    film = drawn(box=(70, 50, 90, 60), droop=0.1)
+    fault = counted(np.ascontiguousarray(np.rot90(film, turns, axes=(1, 2))))[0]
+    assert fault.kind == kind
+    assert "its side" in fault.what
+
+
+FOREIGN: dict[Callable[[UInt8Array], UInt8Array], tuple[str, ...]] = {
+    foreign.wall: ("too-dark", "no-motion"),
+    foreign.scroll: ("cut-off",),
+    foreign.fire: ("no-pole",),
+    foreign.birds: ("no-pole", "no-background"),
+    foreign.curtain: ("no-pole", "hangs-from-above"),
+    foreign.umbrellas: ("no-background", "no-pole", "cut-off"),
+    foreign.leaves: ("no-pole", "unlike-cloth"),
+}
+"""A film without a flag → reasons that are true of it."""
+
+
+@pytest.mark.parametrize("film", FOREIGN)
+def test_what_is_no_flag_is_refused_for_reasons_that_are_true_of_it(
+    film: Callable[[UInt8Array], UInt8Array],
+) -> None:
+    faults = counted(film(scenery()))
+    assert faults
+    assert {fault.kind for fault in faults} <= set(FOREIGN[film])
+    assert all(" flag " not in fault.what.split(":")[0] or "may" in fault.what for fault in faults)
