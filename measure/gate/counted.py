@@ -47,8 +47,8 @@ both of which on it hangs from a bar; along its bottom, from which on the film l
 more than 1.0 and more than 0.71 together, a flag that hangs from a line had 1.23 and 2.4."""
 _SECOND, SUSPECTED = 0.5, 1 / 3
 """Height of what moves along which an upright line inside it is at rest, in heights of it: of one that goes on below
-what moves, from which on it is a second pole, and of any, from which on it may be one. Of 38 films of one flag the
-first was 0.26 at most; the second was 0.28 at most but for upright stripes. Lower refuses flags that now and then sink
+what moves, from which on it is a second pole, and of any, from which on it may be one. Of 37 films of one flag the
+first was 0.26 at most; the second was 0.30 at most but for upright stripes. Lower refuses flags that now and then sink
 before an upright edge of the background."""
 _UP = math.radians(2.0)
 """Angle by which the free end is higher than the hoist, from which on the cloth droops upwards."""
