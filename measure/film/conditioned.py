@@ -19,7 +19,7 @@ from flagdata.film import Film
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CropBox
 from flagdata.schema import FRAME_SIZE
-from measure.gate.counted import SECOND, reasons
+from measure.gate.counted import SUSPECTED, reasons
 from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower, conditioning_of
@@ -370,7 +370,7 @@ def _of_second_pole(conditioning: Conditioning) -> list[Finding]:
     if conditioning.region is None:
         return []
     height = conditioning.standing.inside(conditioning.framed_box(conditioning.region), conditioning.places).height
-    if height < SECOND:
+    if height < SUSPECTED:
         return []
     return [
         Finding.of(

@@ -1,6 +1,6 @@
 """Which films of one flag, of two that overlap, upside down and on their side are refused, and with which reason.
 
-Constants of the rules were fixed on the films of seed `FIXED`; those of another seed judge (decision 081).
+Constants of the rules were fixed on the films of the seeds `FIXED`; those of another seed judge (decision 081).
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from tests.studies.validation.kinds_films import (
     upside_down,
 )
 
-FIXED = 81
-"""Seed of the films on which constants were fixed."""
+FIXED = (81, 82)
+"""Seeds of the films on which constants were fixed."""
 SINGLES, PAIRS = 24, 14
 """Films of one flag, and of two."""
 _WARNED = "second-pole-suspected"
@@ -40,7 +40,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Judges films of a seed, and writes the sheet as JSON and as `validate-kinds.md`."""
     torch.set_num_threads(1)
     rows = [{"film": name, "kinds": found(pictures)} for name, pictures in films(seed)]
-    sheet = {"seed": seed, "fixed_on": FIXED, "counts": counts(rows), "films": rows}
+    sheet = {"seed": seed, "fixed_on": " and ".join(map(str, FIXED)), "counts": counts(rows), "films": rows}
     (out / "validate-kinds.md").write_text(page(sheet), encoding="utf-8")
     return sheet
 
@@ -89,7 +89,7 @@ def page(sheet: Mapping[str, Any]) -> str:
         "# Films that must not be answered",
         "",
         (
-            f"Films of seed {sheet['seed']}; constants were fixed on those of seed {sheet['fixed_on']} "
+            f"Films of seed {sheet['seed']}; constants were fixed on those of the seeds {sheet['fixed_on']} "
             "(`python -m tests.studies kinds`)."
         ),
         "",
