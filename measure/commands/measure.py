@@ -76,8 +76,9 @@ def measure(chosen: MeasureCommand) -> None:
 
     SOURCE is a video file, a folder of images, a recording, clip or camera of --lake by its name or id, or the film
     that comes with the package, example:flag, whose truth is printed beside. A gate looks first: a film unlike
-    those the network was trained on is refused with the reason, exit code 3, and nothing estimated is shown. With
-    --lake the measurement becomes an artifact; the same one by the same code again adds nothing.
+    those the network was trained on is refused with the reason, exit code 3, and nothing estimated is shown. The
+    windows of a longer film count as one gusty wind: the answer states the gusts' intensity, standard deviation over
+    mean, too. With --lake the measurement becomes an artifact; the same one by the same code again adds nothing.
 
     \b
       flagdata measure example:flag
@@ -344,6 +345,8 @@ def _report(done: _Done, *, series: bool) -> None:
         f"{SHORT[q.name]} {truths[q.name]:.3g} {q.unit}" for q in measured.quantities if q.name in truths
     ]:
         say(f"  simulated with {', '.join(simulated_with)}")
+    if measured.gusts is not None:
+        echo(f"  {measured.gusts.sentence}")
     for finding in measured.bounds:
         if finding.severity is Severity.NOTE:
             say(f"  {finding.what}; {finding.fix}")

@@ -26,9 +26,10 @@ from measure.estimate.series import WIND, Beside
 from measure.film.source import FilmReading, Subject
 
 _FORMAT = 1
-_ANSWER = 3
+_ANSWER = 4
 """Raised when the same film, network and options get another answer, which is then another measurement. 2: bounds at
-the ends of the range, and sizes that are judged one by one. 3: a stated weight is conditioned on exactly."""
+the ends of the range, and sizes that are judged one by one. 3: a stated weight is conditioned on exactly. 4: windows
+of a film are one gusty series."""
 _HEAD = "flagdata_estimate"
 REFUSED = "refused-by-gate"
 """Quality flag of what was kept although the gate refused it."""
