@@ -1,7 +1,8 @@
 """The windows of one film as one gusty series: each window's wind, the film's mean and how strong the gusts are.
 
-What the network says of window w is its posterior of the wind there, of which m_w and s_w are the mean and the standard
-deviation of the logarithm. With u_w the logarithm of the window's true wind,
+What the network says of window w is its posterior of the wind there. m_w and s_w are the mean and the standard
+deviation of the logarithm of a log-normal distribution of the same moments (`log_moments`): a draw near calm air, or
+the little below it that a network's outputs reach, has no say of its own. With u_w the logarithm of the true wind,
 
     m_w = u_w + b + e_w,     u_w = μ + g_w.
 
@@ -266,6 +267,20 @@ class Gusts:
             "constrained": self.narrowed <= LEAST_NARROWED,
             "sentence": self.sentence,
         }
+
+
+def log_moments(winds: FloatArray) -> tuple[float, float]:
+    """Computes mean and standard deviation of the logarithm of a log-normal distribution with the mean M and the
+    standard deviation S of draws (n,) of a wind [m/s]: s² = ln(1 + S²/M²), ln M − s²/2.
+
+    Raises:
+        InputError: a mean that is not above 0.
+    """
+    mean = float(winds.mean())
+    if not mean > 0:
+        raise InputError(f"winds of a mean of {mean:g} m/s", fix="give draws of a wind above calm air")
+    variance = math.log1p(float(winds.var()) / mean**2)
+    return math.log(mean) - variance / 2, math.sqrt(variance)
 
 
 def gust_covariance(starts: FloatArray, *, window: float, intensity: float, time: float) -> FloatArray:

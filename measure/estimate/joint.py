@@ -19,7 +19,7 @@ from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
 from measure.estimate.answer import Quantity, quantities
 from measure.estimate.combine import OWN, Dependence, combined, effective
-from measure.estimate.gusts import Course, GustPrior, Gusty, SeriesErrors
+from measure.estimate.gusts import Course, GustPrior, Gusty, SeriesErrors, log_moments
 from measure.estimate.options import Options
 from measure.film.similarity import POWERS, Sizes, scaled_back
 from measure.film.windows import WindowLayout
@@ -328,10 +328,10 @@ class FilmAnswer:
         pair = errors.stated if area_weight is not None and area_weight.exact else errors.opened
         winds, intensity = [], []
         for stratum, scale in enumerate(self.sizes.scale.tolist()):
-            logs = [np.log(self._winds(look.logits[stratum])) for look in looks]
+            moments = [log_moments(self._winds(look.logits[stratum])) for look in looks]
             course = Course(
-                logs=np.array([one.mean() for one in logs]),
-                sigmas=np.array([one.std() for one in logs]),
+                logs=np.array([mean for mean, _ in moments]),
+                sigmas=np.array([sigma for _, sigma in moments]),
                 starts=np.array([look.start for look in looks]) / math.sqrt(scale),
                 window=layout.frames * max(layout.spacings) / math.sqrt(scale),
                 apart=apart,

@@ -1,7 +1,7 @@
 """How a model errs in the windows of a gusty film: what its card states for `measure.estimate.gusts`.
 
-Each window's error is d, the mean of the logarithm of the wind less the logarithm of the true mean wind of the window,
-and s the posterior's standard deviation of the same. Over films of 10 windows, and the 9 that share halves with two:
+Each window's error is d, m_w of `measure.estimate.gusts` less the logarithm of the true mean wind of the window, and s
+is s_w. Over films of 10 windows, and the 9 that share halves with two:
 
 - *own*: σ_e² is the mean of (d_v − d_w)²/(s_v² + s_w²) over pairs of windows of a film that begin two lengths apart or
   more. What is common to a film drops out of the difference.
@@ -33,7 +33,7 @@ from flagdata.errors import InputError
 from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
 from measure.estimate import DRAWS, SERIES_KEY, FilmAnswer, Options, Pair, SeriesErrors
-from measure.estimate.gusts import error_correlation
+from measure.estimate.gusts import error_correlation, log_moments
 from measure.film.similarity import FlagSize, sizes, trained_on
 from models.estimator import SHIPPED, Estimator
 from models.storage import CARD, card_bytes, read_card, renew
@@ -100,8 +100,10 @@ def errors_of_film(film: LongFilm, model: Estimator, *, stated: bool, seed: int)
     for number, window in enumerate(windows):
         posterior = model.posterior(model.embeddings(model.inputs(window[None])))
         logits, _ = answer.given(posterior, seed=child_seed(seed, "window", number))
-        logs = np.log(model.learners[0].scaling.values(torch.from_numpy(logits[0])).numpy()[:, column])
-        off[number], sigma[number] = logs.mean() - np.log(winds[number]), logs.std()
+        mean, sigma[number] = log_moments(
+            model.learners[0].scaling.values(torch.from_numpy(logits[0])).numpy()[:, column]
+        )
+        off[number] = mean - np.log(winds[number])
     return FilmErrors(off=off, sigma=sigma)
 
 

@@ -13,7 +13,7 @@ from flagdata.arrays import FloatArray
 from flagdata.errors import CorruptError, InputError
 from flagdata.rng import stream
 from measure.estimate import SERIES_KEY, Gusts, Pair, SeriesErrors, errors_of_model
-from measure.estimate.gusts import Course, GustPrior, error_correlation, gust_covariance
+from measure.estimate.gusts import Course, GustPrior, error_correlation, gust_covariance, log_moments
 from models.estimator import Estimator
 
 WINDOW = 1.2
@@ -178,6 +178,15 @@ def test_an_intensity_as_wide_as_its_prior_has_no_value_in_words() -> None:
     assert even.sentence == "gusts: 2 windows do not constrain how strong they are"
     assert not even.as_dict()["constrained"]
     assert even.as_dict()["interval"] == pytest.approx([0.025, 0.475])
+
+
+def test_moments_are_those_of_a_log_normal_wind_and_draws_below_calm_air_are_borne() -> None:
+    winds = stream(7, "log-normal").lognormal(1.5, 0.3, 400_000)
+    assert log_moments(winds) == pytest.approx((1.5, 0.3), abs=3e-3)
+    mean, sigma = log_moments(np.array([-0.01, 3.0, 5.0, 4.0]))
+    assert np.exp(mean + sigma**2 / 2) == pytest.approx(11.99 / 4)
+    with pytest.raises(InputError, match="above calm air"):
+        log_moments(np.array([-1.0, 0.5]))
 
 
 def test_a_larger_flag_counts_lengths_in_its_own() -> None:
