@@ -338,6 +338,8 @@ def _report(done: _Done, *, series: bool) -> None:
     measured = done.measured
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
     echo(mark + measured.sentence)
+    if measured.gusts is not None:
+        echo(f"  {measured.gusts.sentence}")
     left_out = "" if measured.combined == len(measured.verdict.window_p) else "; the others look unfamiliar or overlap"
     say(f"  {measured.verdict.sentence}; the answer combines {measured.combined}{left_out}")
     truths = done.subject.known or {}
@@ -345,8 +347,6 @@ def _report(done: _Done, *, series: bool) -> None:
         f"{SHORT[q.name]} {truths[q.name]:.3g} {q.unit}" for q in measured.quantities if q.name in truths
     ]:
         say(f"  simulated with {', '.join(simulated_with)}")
-    if measured.gusts is not None:
-        echo(f"  {measured.gusts.sentence}")
     for finding in measured.bounds:
         if finding.severity is Severity.NOTE:
             say(f"  {finding.what}; {finding.fix}")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +14,11 @@ from scipy.stats import multivariate_normal
 from flagdata.arrays import FloatArray
 from flagdata.errors import CorruptError, InputError
 from flagdata.rng import stream
+from measure.anemometer import network
 from measure.estimate import SERIES_KEY, Gusts, Pair, SeriesErrors, errors_of_model
 from measure.estimate.gusts import Course, GustPrior, error_correlation, gust_covariance, log_moments
 from models.estimator import Estimator
+from models.storage import CARD, card_bytes, read_card, renew
 
 WINDOW = 1.2
 ERRORS = SeriesErrors(
@@ -207,6 +211,19 @@ def test_a_damaged_entry_is_refused_with_what_makes_it_anew(model: Estimator, ch
     card = {**model.card, SERIES_KEY: {**ERRORS.entry(), **change}}
     with pytest.raises(CorruptError, match="series-errors"):
         errors_of_model(replace(model, card=card))
+
+
+def test_a_card_that_states_the_errors_since_is_one_of_the_same_network(model_folder: Path, tmp_path: Path) -> None:
+    folder = tmp_path / model_folder.name
+    shutil.copytree(model_folder, folder)
+    before = network(str(folder), lake=None, at=None)
+    card = {key: value for key, value in read_card(folder).items() if key != "format"}
+    renew(folder, CARD, card_bytes({**card, SERIES_KEY: ERRORS.entry()}))
+    after = network(str(folder), lake=None, at=None)
+    assert after.identity == before.identity
+    assert errors_of_model(after.estimator) == ERRORS
+    renew(folder, CARD, card_bytes({**card, "seed": 2, SERIES_KEY: ERRORS.entry()}))
+    assert network(str(folder), lake=None, at=None).identity != before.identity
 
 
 def test_constants_that_no_errors_have_are_refused() -> None:

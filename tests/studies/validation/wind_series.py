@@ -188,6 +188,7 @@ def page(sheet: Mapping[str, Any]) -> str:
                 f"errs by {100 * strength['rmse']:.0f} % of the wind (RMSE), its intervals are "
                 f"{100 * strength['width']:.0f} % wide and contain it in {strength['covered']:.0%} of the films."
             )
+            gusts.append("")
     refused = max(of["refused"] for of in sheet["results"].values())
     low, high = sheet["aims"]["covered"]
     about = (
@@ -209,4 +210,4 @@ def page(sheet: Mapping[str, Any]) -> str:
     )
     lines = ["# Winds of gusty films by window", "", about, "", f"Aims: {aims}.", ""]
     lines += [f"| {' | '.join(names)} |", "|---" * len(names) + "|", *rows, "", *gusts]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines).rstrip() + "\n"
