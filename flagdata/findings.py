@@ -75,8 +75,8 @@ _KINDS = {
         recording-resampled resampled rows-sorted short-rows simulated-with-numerical-damping
         simulated-with-other-stages speed-from-components stamps-at-start start-by-gps start-passed-over steady-wind
         telemetry-without-time topic-read topics-not-read topology-changes true-rate units-repaired uploads-unlisted
-        variable-rate vertices-merged view-drawn weight-open wind-kinds wind-samples-left-out windows-combined
-        withdrawn-collected zero-offset-given zone-not-needed
+        variable-rate vertices-merged view-drawn weight-open wind-kinds wind-samples-left-out windows-apart
+        windows-combined withdrawn-collected zero-offset-given zone-not-needed
     """,
     Severity.WARNING: """
         above-noise-floor alpha-ignored anemometer-left-out another-size area-weight-contradicted aspect-ratio

@@ -114,6 +114,7 @@ def measured_from(
         windows=windows,
         combined=len(read),
         dependence=_dependence(errors, model, len(read)),
+        gusts=None,
         verdict=verdict,
         sizes=Sizes(given=model.size, scale=np.array([scale]), draws=np.full((1, DRAWS), scale), findings=()),
         summary=features.summaries[middle],

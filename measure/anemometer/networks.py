@@ -15,11 +15,12 @@ from flagdata.provenance import digest, file_hash
 from flagdata.schema import Kind
 from measure.anemometer.reading import ReadingModel
 from measure.anemometer.storage import read as read_reading_model
+from measure.estimate.gusts import SERIES_KEY
 from measure.gate import storage
 from measure.gate.window import CheckedGate, WindowGate, gate_of
 from models import estimator
 from models.estimator import Estimator
-from models.storage import CARD, WEIGHTS
+from models.storage import CARD, WEIGHTS, card_bytes, read_card
 
 CALIBRATED = "anemometer"
 """Key of the recipes of reading models (`measure.anemometer`)."""
@@ -44,7 +45,8 @@ class Network:
 
     Attributes:
         estimator: at work.
-        identity: SHA-256 of its card and weights; of a reading model the id of its artifact.
+        identity: SHA-256 of its card, without how it errs in a series, and its weights; of a reading model the id of
+            its artifact.
         artifact: of the lake; None of a folder or of a model that comes with the package.
         folder: of its files, where what belongs to it may lie beside them.
         reading: the reading model that uses its summary; None where the network itself measures.
@@ -113,10 +115,14 @@ def _calibrated(folder: Path, artifact: Artifact, lake: Lake, at: str | None) ->
 
 
 def _loaded(folder: Path, artifact: Artifact | None) -> Network:
-    loaded = estimator.load(folder)
-    return Network(
-        estimator=loaded,
-        identity=digest(f"{file_hash(folder / CARD)} {file_hash(folder / WEIGHTS)}"),
-        artifact=artifact,
-        folder=folder,
-    )
+    return Network(estimator=estimator.load(folder), identity=_identity(folder), artifact=artifact, folder=folder)
+
+
+def _identity(folder: Path) -> str:
+    """Hashes the card and the weights of a network. How it errs in a series of windows is no part of what it is: where
+    its card states that later, a reading model that was made before is still one of the same network."""
+    card = read_card(folder)
+    hashed = file_hash(folder / CARD)
+    if SERIES_KEY in card:
+        hashed = digest(card_bytes({key: card[key] for key in card if key not in ("format", SERIES_KEY)}).decode())
+    return digest(f"{hashed} {file_hash(folder / WEIGHTS)}")

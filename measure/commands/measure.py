@@ -76,8 +76,9 @@ def measure(chosen: MeasureCommand) -> None:
 
     SOURCE is a video file, a folder of images, a recording, clip or camera of --lake by its name or id, or the film
     that comes with the package, example:flag, whose truth is printed beside. A gate looks first: a film unlike
-    those the network was trained on is refused with the reason, exit code 3, and nothing estimated is shown. With
-    --lake the measurement becomes an artifact; the same one by the same code again adds nothing.
+    those the network was trained on is refused with the reason, exit code 3, and nothing estimated is shown. The
+    windows of a longer film count as one gusty wind: the answer states the gusts' intensity, standard deviation over
+    mean, too. With --lake the measurement becomes an artifact; the same one by the same code again adds nothing.
 
     \b
       flagdata measure example:flag
@@ -337,6 +338,8 @@ def _report(done: _Done, *, series: bool) -> None:
     measured = done.measured
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
     echo(mark + measured.sentence)
+    if measured.gusts is not None:
+        echo(f"  {measured.gusts.sentence}")
     left_out = "" if measured.combined == len(measured.verdict.window_p) else "; the others look unfamiliar or overlap"
     say(f"  {measured.verdict.sentence}; the answer combines {measured.combined}{left_out}")
     truths = done.subject.known or {}

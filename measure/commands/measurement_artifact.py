@@ -21,14 +21,16 @@ from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 from measure.anemometer.networks import Network
+from measure.estimate.gusts import SERIES_KEY
 from measure.estimate.measuring import Measurement
 from measure.estimate.series import WIND, Beside
 from measure.film.source import FilmReading, Subject
 
 _FORMAT = 1
-_ANSWER = 3
+_ANSWER = 4
 """Raised when the same film, network and options get another answer, which is then another measurement. 2: bounds at
-the ends of the range, and sizes that are judged one by one. 3: a stated weight is conditioned on exactly."""
+the ends of the range, and sizes that are judged one by one. 3: a stated weight is conditioned on exactly. 4: windows
+of a film are one gusty series."""
 _HEAD = "flagdata_estimate"
 REFUSED = "refused-by-gate"
 """Quality flag of what was kept although the gate refused it."""
@@ -54,6 +56,7 @@ def artifact(measured: Measurement, subject: Subject, network: Network, reading:
         recipe={
             "measure": _ANSWER,
             "network": network.identity,
+            **_series(network),
             **measured.options.recipe(),
             **reading.recipe(),
         },
@@ -65,6 +68,12 @@ def artifact(measured: Measurement, subject: Subject, network: Network, reading:
         quality=sorted({*flags, REFUSED}) if measured.verdict.refused else flags,
         report=canonical(report(measured)),
     )
+
+
+def _series(network: Network) -> Mapping[str, Any]:
+    """Returns how the network errs in a series of windows; nothing of one whose card does not say."""
+    entry = network.estimator.card.get(SERIES_KEY)
+    return {} if entry is None or network.reading is not None else {SERIES_KEY: entry}
 
 
 def report(measured: Measurement) -> Mapping[str, Any]:

@@ -9,7 +9,8 @@ from flagdata.lazy import lazy_exports
 if TYPE_CHECKING:
     from measure.estimate.answer import SHORT, Quantity, information
     from measure.estimate.combine import CARD_KEY, OWN, UNKNOWN, Dependence, combined, of_model
-    from measure.estimate.joint import DRAWS
+    from measure.estimate.gusts import SERIES_KEY, Gusts, Pair, SeriesErrors, errors_of_model
+    from measure.estimate.joint import DRAWS, FilmAnswer
     from measure.estimate.material import weight_of
     from measure.estimate.measuring import Measurement, measure
     from measure.estimate.options import Options

@@ -3,7 +3,8 @@ over the flag sizes considered."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,6 +19,7 @@ from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
 from measure.estimate.answer import Quantity, quantities
 from measure.estimate.combine import OWN, Dependence, combined, effective
+from measure.estimate.gusts import Course, GustPrior, Gusty, SeriesErrors, log_moments
 from measure.estimate.options import Options
 from measure.film.similarity import POWERS, Sizes, scaled_back
 from measure.film.windows import WindowLayout
@@ -105,6 +107,58 @@ class Look:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Among:
+    """Windows among those of a gusty series.
+
+    Attributes:
+        series: of the film.
+        places: of the windows in it.
+    """
+
+    series: Gusty
+    places: Sequence[int]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointDraws:
+    """The joint posterior of several windows.
+
+    Attributes:
+        draws: (n, target), the wind the mean of the windows'.
+        places: (m, target) the windows' own values as shares, 0 to 1, of the network's range.
+        rows: (n,) of the draws at all sizes in a row, that these are.
+        series: the gusty series, its draws in the order of these; None without one.
+    """
+
+    draws: FloatArray
+    places: FloatArray
+    rows: NDArray[np.intp]
+    series: Gusty | None
+
+    def wind(self, place: int) -> WindowWind | None:
+        """Returns the wind of the window at a place in the series; None without one."""
+        return None if self.series is None else WindowWind(winds=self.series.winds[:, place], rows=self.rows)
+
+    @property
+    def intensity(self) -> FloatArray | None:
+        """(n,) intensity of the gusts, draw by draw; None without a series."""
+        return None if self.series is None else self.series.intensity.ravel()[self.rows]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WindowWind:
+    """A window's wind in a gusty series.
+
+    Attributes:
+        winds: (i, n) draws at each size considered, of a flag of the network's own size [m/s].
+        rows: of these in a row, the film's answer.
+    """
+
+    winds: FloatArray
+    rows: NDArray[np.intp]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class FilmAnswer:
     """Combines the windows' draws into the film's answer, and gives each window's own answer."""
 
@@ -135,7 +189,12 @@ class FilmAnswer:
         return restricted.logits.cpu().numpy(), factor.cpu().numpy()
 
     def by_weight(
-        self, looks: Sequence[Look], dependence: Dependence, quantities: Sequence[Quantity], draws: FloatArray
+        self,
+        looks: Sequence[Look],
+        dependence: Dependence,
+        quantities: Sequence[Quantity],
+        draws: FloatArray,
+        series: Callable[[FilmAnswer, Sequence[Look]], Gusty] | None = None,
     ) -> Finding | None:
         """Reports how the wind would change with the area weight, where that is open and matters: the answers for a
         light and a heavy cloth of those that the answer leaves possible; None where it does not.
@@ -143,6 +202,7 @@ class FilmAnswer:
         Args:
             quantities: the answer's quantities.
             draws: (n, target) of the answer.
+            series: makes the gusty series of windows; None where the answer has none.
         """
         wind = next(quantity for quantity in quantities if quantity.name == WIND)
         if (
@@ -161,7 +221,11 @@ class FilmAnswer:
             for number, look in enumerate(looks):
                 logits, log_factor = at_weight.given(look.posterior, seed=child_seed(self.options.seed, WEIGHT, number))
                 reweighted.append(replace(look, logits=logits, log_factor=log_factor))
-            winds.append(float(at_weight.joint(reweighted, dependence)[0][:, self.names.index(WIND)].mean()))
+            among = None
+            if series is not None:
+                among = Among(series=series(at_weight, reweighted), places=range(len(reweighted)))
+            found = at_weight.joint(reweighted, dependence, among)
+            winds.append(float(found.draws[:, self.names.index(WIND)].mean()))
         if abs(winds[1] - winds[0]) < _MATTERS * (wind.span.high - wind.span.low):
             return None
         light, heavy = (
@@ -174,12 +238,15 @@ class FilmAnswer:
             fix="weigh the cloth and give --area-weight",
         )
 
-    def joint(self, looks: Sequence[Look], dependence: Dependence) -> tuple[FloatArray, FloatArray]:
-        """Combines all windows: draws (n, target), the wind their mean, and (m, target) the windows' own values as
-        shares, 0 to 1, of the network's range."""
+    def joint(self, looks: Sequence[Look], dependence: Dependence, among: Among | None = None) -> JointDraws:
+        """Combines all windows.
+
+        Args:
+            among: the gusty series that the windows belong to; None where each has the wind that it says by itself.
+        """
         wind_columns = [column for column, name in enumerate(self.names) if name in OWN]
         cloth_columns = [column for column, name in enumerate(self.names) if name not in OWN]
-        parts, places = [], []
+        parts, places, orders = [], [], []
         for stratum in range(len(self.sizes.scale)):
             prior = self.prior_logits[stratum]
             winds, shared = combined(
@@ -195,28 +262,92 @@ class FilmAnswer:
             logits[..., wind_columns] = winds
             logits[..., cloth_columns] = shared
             values = self._values(logits)
+            if among is not None:
+                # The series has no cloth: its draws go with the cloth's in the order of the winds that have one.
+                column, of_windows = self.names.index(WIND), among.series.winds[stratum][list(among.places)]
+                order = np.empty(len(shared), dtype=np.intp)
+                order[np.argsort(values[..., column].mean(axis=0))] = np.argsort(of_windows.mean(axis=0))
+                values[..., column] = of_windows[:, order]
+                orders.append(order)
             parts.append(scaled_back(values.mean(axis=0), self.names, self.sizes.draws[stratum]))
             places.append(self._places(values))
-        tempered = effective(len(looks), dependence.cloth) / len(looks)
-        rows = self._rows(tempered * np.sum([look.log_factor for look in looks], axis=0), "answer")
+        rows = self._film_rows(looks, dependence)
         draws = np.concatenate(parts)[rows]
         for name, stated_value in self.options.stated(self.model).items():
             if not stated_value.sigma:  # combining windows moves draws a little, some out of the range
                 column = self.names.index(name)
                 draws[:, column] = np.clip(draws[:, column], stated_value.low, stated_value.high)
-        return draws, np.concatenate(places, axis=1)[:, rows].reshape(-1, len(self.names))
-
-    def window(self, look: Look, layout: WindowLayout, p: float) -> WindowAnswer:
-        values = [self._values(logits) for logits in look.logits]
-        draws = [scaled_back(v, self.names, s) for v, s in zip(values, self.sizes.draws, strict=True)]
-        places = np.concatenate([self._places(v) for v in values])
-        rows = self._rows(look.log_factor, "window")
-        return WindowAnswer(
-            start=look.start,
-            end=look.start + layout.length,
-            quantities=self.quantities(np.concatenate(draws)[rows], places[rows]),
-            p=p,
+        return JointDraws(
+            draws=draws,
+            places=np.concatenate(places, axis=1)[:, rows].reshape(-1, len(self.names)),
+            rows=rows,
+            series=None if among is None else among.series.reordered(orders),
         )
+
+    def _film_rows(self, looks: Sequence[Look], dependence: Dependence) -> NDArray[np.intp]:
+        """Selects the draws, those of all sizes in a row, that make the film's answer."""
+        tempered = effective(len(looks), dependence.cloth) / len(looks)
+        return self._rows(tempered * np.sum([look.log_factor for look in looks], axis=0), "answer")
+
+    def window(self, look: Look, layout: WindowLayout, p: float, wind: WindowWind | None = None) -> WindowAnswer:
+        """Gives a window's own answer.
+
+        Args:
+            wind: of the window in the film's gusty series; None for what the window says by itself.
+        """
+        values = [self._values(logits) for logits in look.logits]
+        draws, places = self._placed(values)
+        rows = self._rows(look.log_factor, "window")
+        draws, places = draws[rows], places[rows]
+        if wind is not None:
+            column = self.names.index(WIND)
+            for of_size, winds in zip(values, wind.winds, strict=True):
+                of_size[:, column] = winds
+            series_draws, series_places = self._placed(values)
+            draws[:, column], places[:, column] = series_draws[wind.rows, column], series_places[wind.rows, column]
+        return WindowAnswer(
+            start=look.start, end=look.start + layout.length, quantities=self.quantities(draws, places), p=p
+        )
+
+    def _placed(self, values: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Returns draws of all sizes in a row, at the flag's own size [SI], and their places in the network's range."""
+        draws = [scaled_back(v, self.names, s) for v, s in zip(values, self.sizes.draws, strict=True)]
+        return np.concatenate(draws), np.concatenate([self._places(v) for v in values])
+
+    def series(
+        self, looks: Sequence[Look], layout: WindowLayout, errors: SeriesErrors, *, apart: Sequence[int]
+    ) -> Gusty:
+        """Takes the windows as one gusty series, at each size considered.
+
+        Args:
+            looks: two or more, in the order of their starts.
+            errors: of the model in windows of one film.
+            apart: places of windows that do not overlap.
+        """
+        area_weight = self.options.area_weight
+        pair = errors.stated if area_weight is not None and area_weight.exact else errors.opened
+        winds, intensity = [], []
+        for stratum, scale in enumerate(self.sizes.scale.tolist()):
+            moments = [log_moments(self._winds(look.logits[stratum])) for look in looks]
+            course = Course(
+                logs=np.array([mean for mean, _ in moments]),
+                sigmas=np.array([sigma for _, sigma in moments]),
+                starts=np.array([look.start for look in looks]) / math.sqrt(scale),
+                window=layout.frames * max(layout.spacings) / math.sqrt(scale),
+                apart=apart,
+                pair=pair,
+                halves=errors.halves,
+                neighbours=errors.neighbours,
+                prior=GustPrior.standard(size=scale),
+            )
+            drawn = course.draws(DRAWS, stream(self.options.seed, "gusts", stratum))
+            winds.append(drawn[0])
+            intensity.append(drawn[1])
+        return Gusty(winds=np.array(winds), intensity=np.array(intensity))
+
+    def _winds(self, logits: FloatArray) -> FloatArray:
+        """Returns winds (n,) of draws of logits (n, target), of a flag of the network's own size [m/s]."""
+        return self._values(logits)[:, self.names.index(WIND)]
 
     def _rows(self, log_factor: FloatArray, *names: str) -> NDArray[np.intp]:
         """Selects the draws, those of all sizes in a row, that make the answer: each as often as the Bayes factor (i,

@@ -17,7 +17,8 @@ from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
 from measure.estimate.answer import Quantity, sentence
 from measure.estimate.combine import OWN, Dependence
-from measure.estimate.joint import DRAWS, FilmAnswer, Look, WindowAnswer
+from measure.estimate.gusts import Gusts, SeriesErrors, errors_of_model
+from measure.estimate.joint import DRAWS, WIND, Among, FilmAnswer, Look, WindowAnswer
 from measure.estimate.options import Options
 from measure.film.similarity import RATE_SLACK, Sizes, Trained, length_first, sizes, trained_on
 from measure.film.windows import Window, WindowLayout, WindowReader, findings_of
@@ -60,6 +61,7 @@ class Measurement:
         windows: each by itself, in order; those without anything to measure are left out.
         combined: how many of them the answer rests on.
         dependence: of their errors.
+        gusts: how strong they are; None where the windows are not taken as one series.
         verdict: of the gate.
         sizes: of flags at which the gate does not refuse it; all that were considered where it is refused.
         summary: (dimension,) of the window of median p.
@@ -80,6 +82,7 @@ class Measurement:
     windows: tuple[WindowAnswer, ...]
     combined: int
     dependence: Dependence
+    gusts: Gusts | None
     verdict: Verdict
     sizes: Sizes
     summary: Float32Array
@@ -119,6 +122,7 @@ class Measurement:
                 "cloth": self.dependence.cloth,
                 "source": self.dependence.source,
             },
+            "gusts": None if self.gusts is None or not reported else self.gusts.as_dict(),
             "findings": [finding.as_dict() for finding in self.noticed(anyway=anyway)],
         }
 
@@ -186,21 +190,41 @@ def measure(
     sizes_kept = considered.only(gate_verdict.sizes)
     answer = FilmAnswer(model=model, sizes=sizes_kept, options=options)
     kept_looks = [look.only(gate_verdict.sizes) for look in looks]
-    # One answer of the windows that count, its draws shared by cloth.
-    used = _used(kept_looks, gate_verdict, layout)
-    draws, places = answer.joint([kept_looks[k] for k in used], dependence)
+    # One answer of the windows that count, its draws shared by cloth, its winds one gusty series.
+    alone = [answer.window(look, layout, p) for look, p in zip(kept_looks, gate_verdict.window_p, strict=True)]
+    counted = _counted(gate_verdict)
+    errors = errors_of_model(model)
+    apart = _why_apart([alone[k] for k in counted], errors, model.name)
+    used = _used(kept_looks, counted, layout)
+    among = None
+    if errors is not None and apart is None and len(used) > 1:
+        places = [counted.index(k) for k in used]
+        series = answer.series([kept_looks[k] for k in counted], layout, errors, apart=places)
+        among = Among(series=series, places=places)
+    found = answer.joint([kept_looks[k] for k in used], dependence, among)
     middle = looks[int(np.argsort(gate_verdict.window_p, kind="stable")[len(looks) // 2])]
     of_reading = findings_of(
         layout, windows_read=len(looks), interpolated=interpolated, frames=distinct.frames, repeated=distinct.repeated
     )
     windows = tuple(
-        answer.window(look, layout, p)
-        for look, p, blank in zip(kept_looks, gate_verdict.window_p, gate_verdict.blank, strict=True)
+        answer.window(look, layout, p, found.wind(counted.index(k))) if k in counted and among is not None else own
+        for k, (look, own, p, blank) in enumerate(
+            zip(kept_looks, alone, gate_verdict.window_p, gate_verdict.blank, strict=True)
+        )
         if not (blank and gate_verdict.measurable)
     )
     # What is reported.
-    quantities = answer.quantities(draws, places)
-    open_weight = answer.by_weight([kept_looks[k] for k in used], dependence, quantities, draws)
+    quantities = answer.quantities(found.draws, found.places)
+    open_weight = answer.by_weight(
+        [kept_looks[k] for k in used],
+        dependence,
+        quantities,
+        found.draws,
+        series=None
+        if errors is None or among is None
+        else lambda at_weight, looks_at: at_weight.series(looks_at, layout, errors, apart=range(len(looks_at))),
+    )
+    intensity = found.intensity
     return Measurement(
         film=film.name,
         rate=film.rate,
@@ -208,11 +232,12 @@ def measure(
         model=model.name,
         options=options,
         names=tuple(answer.names),
-        draws=draws,
+        draws=found.draws,
         quantities=quantities,
         windows=windows,
         combined=len(used),
         dependence=dependence,
+        gusts=None if intensity is None else Gusts.of(intensity, level=options.level, windows=len(counted)),
         verdict=gate_verdict,
         sizes=sizes_kept,
         summary=middle.summaries[gate_verdict.size],
@@ -221,7 +246,8 @@ def measure(
             *of_film,
             *sizes_kept.findings,
             *of_reading,
-            *_about_windows(kept_looks, gate_verdict, used, dependence),
+            *_about_windows(kept_looks, gate_verdict, used, dependence, errors=None if among is None else errors),
+            *([] if apart is None or len(used) < 2 else [apart]),
         ),
         bounds=(*_at_ends(quantities, windows), *([] if open_weight is None else [open_weight])),
     )
@@ -306,23 +332,56 @@ def _without_windows(
     )
 
 
-def _used(looks: Sequence[Look], gate_verdict: Verdict, layout: WindowLayout) -> list[int]:
-    """Selects windows that the answer rests on: none that overlap, none without anything to measure where others have
-    it; of a familiar recording none that are strange."""
-    length = layout.frames * max(layout.spacings)
+def _counted(gate_verdict: Verdict) -> list[int]:
+    """Selects windows that show something to measure where others do, of a familiar recording none that are strange."""
     left_out = np.array(gate_verdict.blank) & gate_verdict.measurable
     if not gate_verdict.refused:
         left_out |= gate_verdict.strange
+    return np.flatnonzero(~left_out).tolist()
+
+
+def _why_apart(windows: Sequence[WindowAnswer], errors: SeriesErrors | None, model: str) -> Finding | None:
+    """Reports why the windows are not taken as one gusty series; None where nothing speaks against it."""
+    if errors is None:
+        return Finding.of(
+            "windows-apart",
+            f"each window has the interval that it gives by itself: how the model {model} errs in windows of one film "
+            "was not measured",
+        )
+    bounded = sum(window.quantity(WIND).span.bound is not None for window in windows)
+    if bounded:
+        return Finding.of(
+            "windows-apart",
+            f"each window has the interval that it gives by itself: {bounded} of {len(windows)} bound the wind on one "
+            "side only, and a series of gusts needs values",
+            count=bounded,
+        )
+    return None
+
+
+def _used(looks: Sequence[Look], counted: Sequence[int], layout: WindowLayout) -> list[int]:
+    """Selects windows that the answer rests on: of those that count none that overlap."""
+    length = layout.frames * max(layout.spacings)
     chosen: list[int] = []
-    for k in np.flatnonzero(~left_out).tolist():
+    for k in counted:
         if not chosen or looks[k].start - looks[chosen[-1]].start >= length - layout.period:
             chosen.append(k)
     return chosen
 
 
 def _about_windows(
-    looks: Sequence[Look], gate_verdict: Verdict, used: Sequence[int], dependence: Dependence
+    looks: Sequence[Look],
+    gate_verdict: Verdict,
+    used: Sequence[int],
+    dependence: Dependence,
+    *,
+    errors: SeriesErrors | None,
 ) -> list[Finding]:
+    """Reports what is to be said of the windows.
+
+    Args:
+        errors: of the model in the series of windows; None where they are not one.
+    """
     findings = []
     factor = float(np.median([np.exp(look.log_factor).mean() for look in looks]))
     if factor < CONTRADICTION:
@@ -358,7 +417,17 @@ def _about_windows(
                 fix="choose a part of the film without them by --start and --end",
             )
         )
-    if len(used) > 1:
+    if len(used) > 1 and errors is not None:
+        findings.append(
+            Finding.of(
+                "windows-combined",
+                f"the answer combines {len(used)} windows of one cloth and one gusty wind; their errors count as those "
+                f"of {errors.source} in wind, and as correlated by {dependence.cloth:.2f} in cloth "
+                f"({dependence.source})",
+                count=len(used),
+            )
+        )
+    elif len(used) > 1:
         findings.append(
             Finding.of(
                 "windows-combined",

@@ -102,6 +102,7 @@ def page(
         "windows": len(measured.verdict.window_p),
         "combined": measured.combined,
         "dependence": measured.dependence,
+        "gusts": None if measured.gusts is None or not shown else measured.gusts.sentence,
         "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in noticed],
         "sections": list(sections),
         "provenance": {**context.provenance, "code": code_version()},

@@ -18,6 +18,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         {
             "challenge": ("tests.studies.challenge.command:challenge", "Grade close-loop on blind data sets."),
             "dependence": ("tests.studies.dependence:main", "Measure how alike windows of one film err, for a card."),
+            "series-errors": ("tests.studies.series_errors:main", "Measure how a series of windows errs, for a card."),
             "validate": ("tests.studies.validation", "Run all slow evidence, one study after another."),
             "bench": ("tests.studies.benchmarks", "Run all benchmarks, one after another."),
         },
@@ -74,6 +75,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "transfer": ("tests.studies.validation.transfer", "Estimates on clips that differ from training."),
             "weighed": ("tests.studies.validation.weighed", "The cloth of twenty flags weighed."),
             "weighed-briefly": ("tests.studies.validation.weighed_briefly", "The same from half a minute."),
+            "wind-series": ("tests.studies.validation.wind_series", "Winds of gusty films by window, and gusts."),
             "verification": ("tests.studies.validation.verification", "Curves of theory and observed orders."),
         },
     ),

@@ -11,21 +11,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import UInt8Array
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
 from flagdata.record import decode
 from flagdata.rng import child_seed
+from flagdata.tables import Range
 from models.estimator import Estimator
 from models.training import DataSpec, FitFilm
 from sim.assets import Assets
-from sim.datasets import EPOCH, Cast, DatasetRecipe, PlannedFilm, jobs, load, picture
+from sim.datasets import EPOCH, Cast, DatasetRecipe, PlannedFilm, jobs, load, picture, velocities
 from sim.datasets.cast import of_group
 from sim.datasets.record import parameters_of
-from sim.run import Crew, Recipe
+from sim.run import Crew, Recipe, recipe_of
+from sim.run.members import Member
 
 _SIDE = "train"
 _BATCH = 8
 """Cloths that are simulated together; a long sequence of one takes 2 MB."""
+_GUSTY_BATCH = 4
+"""The same of films in gusts: cloths of one height and one attachment."""
+_AIR_RATE = 25.0
+"""Hz, at which the air is sampled."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,11 +42,13 @@ class LongFilm:
         dataset: whose scene, light and camera it was drawn from.
         windows: (k, frames, height, width) uint8, gray, one right after the other.
         parameters: name → value, SI, as simulated records state them.
+        winds: (k, 2) mean horizontal speed of the undisturbed air over both halves of each window [m/s].
     """
 
     dataset: str
     windows: UInt8Array
     parameters: dict[str, float]
+    winds: FloatArray
 
 
 def simulated(model: Estimator, *, count: int, windows: int, seed: int) -> Iterator[LongFilm]:
@@ -61,6 +69,40 @@ def simulated(model: Estimator, *, count: int, windows: int, seed: int) -> Itera
         yield from _of_dataset(load(name), share, model, windows=windows, seed=child_seed(seed, "long-films", name))
 
 
+def gusty(
+    model: Estimator,
+    *,
+    dataset: str,
+    count: int,
+    windows: int,
+    seed: int,
+    speed: tuple[float, float],
+    intensity: tuple[float, float],
+) -> Iterator[LongFilm]:
+    """Films of the cloths of one data set in gusts of the von Kármán spectrum (`sim.effects.gusts`).
+
+    Args:
+        dataset: whose cloths, light and cameras are drawn.
+        count: of films.
+        windows: of each.
+        seed: of all of them.
+        speed: least and largest mean wind [m/s].
+        intensity: least and largest standard deviation along the wind over its mean.
+    """
+    recipe = load(dataset)
+    low, high = intensity
+    overrides = {"effects": {"gusts": {"intensity": {"low": low, "high": high}}}}
+    simulation = replace(
+        recipe.simulation,
+        wind=replace(recipe.simulation.wind, speed=Range(low=speed[0], high=speed[1])),
+        effects=recipe_of("flag-outdoor-damped", overrides).effects,
+    )
+    blown = replace(recipe, simulation=simulation)
+    yield from _of_dataset(
+        blown, count, model, windows=windows, seed=child_seed(seed, "gusty-films", dataset), batch=_GUSTY_BATCH
+    )
+
+
 def _shares(model: Estimator, count: int) -> dict[str, int]:
     """Data set → films, in proportion to its training sequences."""
     recipe = model.card.get("recipe")
@@ -76,18 +118,20 @@ def _shares(model: Estimator, count: int) -> dict[str, int]:
     return dict(zip(names, np.diff(ends, prepend=0).tolist(), strict=True))
 
 
-def _of_dataset(recipe: DatasetRecipe, count: int, model: Estimator, *, windows: int, seed: int) -> Iterator[LongFilm]:
+def _of_dataset(
+    recipe: DatasetRecipe, count: int, model: Estimator, *, windows: int, seed: int, batch: int = _BATCH
+) -> Iterator[LongFilm]:
     frames = model.front_end.frames
     time = replace(recipe.simulation.time, frames=windows * frames, rate=model.front_end.rate)
-    simulation = replace(recipe.simulation, name=f"{recipe.name}-long", seed=seed, count=count, batch=_BATCH, time=time)
+    simulation = replace(recipe.simulation, name=f"{recipe.name}-long", seed=seed, count=count, batch=batch, time=time)
     for cast in _casts(recipe, simulation):
         crew = Crew(cast.simulation)
         bases: dict[int, list[int]] = {}
         for index in range(cast.simulation.count):
             bases.setdefault(crew.member(index).base, []).append(index)
         for base, indices in bases.items():
-            for first in range(0, len(indices), _BATCH):
-                yield from _batch(recipe, cast, base, indices[first : first + _BATCH], model, windows)
+            for first in range(0, len(indices), batch):
+                yield from _batch(recipe, cast, base, indices[first : first + batch], model, windows)
 
 
 def _casts(recipe: DatasetRecipe, simulation: Recipe) -> Iterator[Cast]:
@@ -97,8 +141,8 @@ def _casts(recipe: DatasetRecipe, simulation: Recipe) -> Iterator[Cast]:
         yield Cast(side=side, session=None, simulation=simulation)
         return
     groups = replace(recipe.groups, rates=(simulation.time.rate,))
-    for first in range(0, simulation.count, _BATCH):
-        few = replace(simulation, count=min(_BATCH, simulation.count - first))
+    for first in range(0, simulation.count, simulation.batch):
+        few = replace(simulation, count=min(simulation.batch, simulation.count - first))
         yield of_group(few, groups, side, seed=child_seed(simulation.seed, "group", first))
 
 
@@ -132,4 +176,15 @@ def _batch(
             dataset=recipe.name,
             windows=film.reshape(windows, -1, *film.shape[1:]),
             parameters=parameters_of(member, zeta, {**cast.stated, **drawn}, recipe.anemometer.truth),
+            winds=_winds(Crew(simulation), member, windows),
         )
+
+
+def _winds(crew: Crew, member: Member, windows: int) -> FloatArray:
+    """Mean horizontal speed of the undisturbed air at the flag over both halves of each window (k, 2) [m/s]."""
+    time = crew.recipe.time
+    half = time.frames / time.rate / windows / 2
+    count = round(half * _AIR_RATE)
+    times = time.first + (np.arange(2 * windows * count) + 0.5) / count * half
+    velocity = velocities(crew.assemble([member])[0], times)
+    return np.hypot(velocity[:, 0], velocity[:, 1]).reshape(windows, 2, count).mean(axis=2)

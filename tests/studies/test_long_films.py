@@ -13,7 +13,7 @@ from models.estimator import Estimator
 from models.targets import truth
 from sim.datasets import load
 from tests.studies.dependence import columns_of, errors
-from tests.studies.long_films import LongFilm, _casts, _shares, simulated
+from tests.studies.long_films import LongFilm, _casts, _shares, gusty, simulated
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +62,24 @@ def test_what_cannot_be_measured_is_refused(films: list[LongFilm], shipped: Esti
     bare = replace(shipped, card={"name": "bare"})
     with pytest.raises(InputError, match="what it was trained on"):
         next(simulated(bare, count=10, windows=2, seed=0))
+
+
+def test_films_in_gusts_state_the_wind_of_each_half_of_a_window() -> None:
+    model = estimator.shipped()
+    (film,) = gusty(
+        model, dataset="outdoor-damped", count=1, windows=2, seed=5, speed=(6.0, 7.0), intensity=(0.2, 0.25)
+    )
+    assert film.windows.shape[:2] == (2, model.front_end.frames)
+    assert film.winds.shape == (2, 2)
+    assert 0.2 <= film.parameters["gusts.intensity"] <= 0.25
+    assert 6.0 <= film.parameters["wind_speed"] <= 7.0
+    assert np.ptp(film.winds) > 0
+    np.testing.assert_allclose(film.winds, film.parameters["wind_speed"], rtol=0.8)
+
+
+def test_steady_films_have_one_wind(films: list[LongFilm]) -> None:
+    for film in films:
+        np.testing.assert_allclose(film.winds, film.parameters["wind_speed"], rtol=1e-6)
 
 
 def test_cloths_that_are_drawn_by_batches_are_so_in_long_films_too_at_the_models_rate() -> None:
