@@ -188,7 +188,14 @@ def test_the_refusals_counted_are_those_of_the_sheet() -> None:
     assert found == (
         f"{refused['hits']} of {refused['count']} refused, {right['hits']} of them with the true reason first"
     )
-    assert not any(film["refused"] for film in result["films"] if film["kind"] == "overlapping flags")
+
+
+def test_the_overlapping_flags_counted_are_those_of_the_decision() -> None:
+    page = (ROOT / "docs" / "decisions" / "081-a-second-pole-and-turned-films.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"^\| two flags \|.*\|$", page, flags=re.MULTILINE)
+    refused, pairs = row.split("|")[4].split(" of ")
+    said = " ".join(README.split())
+    assert f"Of {pairs.strip()} pairs of overlapping flags {refused.strip()} were refused" in said
 
 
 def test_the_forces_counted_are_those_of_the_sheet() -> None:
