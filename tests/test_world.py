@@ -18,7 +18,7 @@ from models.training.recipe import TRAININGS
 from sim.assets import Assets
 from sim.datasets import DATASETS
 from sim.datasets import load as load_dataset
-from sim.render.prior import named
+from sim.render import named
 from sim.run.reading import SCENES
 
 SIDE = 96

@@ -1,7 +1,7 @@
 """Prints as on national flags: bands, crosses, discs, cantons, in colours and with a contrast that are drawn.
 
-They are no flag's likeness. They vary what a flag's look tells of its motion: where its edges run, how far its parts
-differ, from one plain colour, white among them, to black on white.
+They are no flag's likeness. They vary how much of a flag's motion its look shows: where its edges run and how far its
+parts differ, from one plain colour, white among them, to black on white.
 """
 
 from __future__ import annotations

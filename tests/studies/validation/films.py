@@ -113,7 +113,8 @@ def _quantities(measured: Measurement) -> dict[str, Any]:
     return found
 
 
-def _holds(interval: Mapping[str, float | None], true: float) -> bool:
+def contains(interval: Mapping[str, float | None], true: float) -> bool:
+    """Returns whether an interval, whose ends may be open, contains the true value."""
     low, high = interval["low"], interval["high"]
     return (low is None or low <= true) and (high is None or true <= high)
 
@@ -149,7 +150,7 @@ def _errors(rows: Sequence[Mapping[str, Any]], name: str) -> dict[str, Any]:
         "median_error": float(np.median(np.abs(error))),
         "rmse": float(np.sqrt(np.square(error).mean())),
         "too_low": int((error < 0).sum()),
-        "covered": Share.of(_holds(found, wind) for wind, found in answered).as_dict(),
+        "covered": Share.of(contains(found, wind) for wind, found in answered).as_dict(),
         "width": float(np.mean(width)) if width else None,
     }
 
@@ -282,7 +283,7 @@ def _cell(said: Mapping[str, Any], name: str, true: float) -> str:
         return ""
     own = said[name]
     interval = f"[{_number(own['low'])}, {_number(own['high'])}]"
-    return f"{own['value']:.2f} {interval if _holds(own, true) else f'**{interval}**'}"
+    return f"{own['value']:.2f} {interval if contains(own, true) else f'**{interval}**'}"
 
 
 def _number(value: float | None) -> str:

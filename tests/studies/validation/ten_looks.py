@@ -23,7 +23,7 @@ import numpy as np
 import torch
 
 from flagdata.arrays import UInt8Array
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
+from flagdata.lake import MeshSequence, RaggedMeshSequence
 from flagdata.rng import child_seed
 from flagdata.stated import Stated
 from measure.anemometer import Network, gate_beside, network
@@ -36,7 +36,7 @@ from sim.assets.flags import ROWS, FlagSheet
 from sim.render import RenderParameters
 from sim.run import Crew, Stepper, recipe_of
 from sim.run import run as simulate
-from tests.studies.validation.films import answer
+from tests.studies.validation.films import answer, contains
 
 WINDS = (3.0, 5.0, 8.0)
 """[m/s]"""
@@ -255,13 +255,8 @@ def _at_wind(said: Sequence[Mapping[str, Any]], wind: float) -> dict[str, Any]:
         "spread": float(np.ptp(values)),
         "mean": float(values.mean()),
         "largest_error": float(errors[np.abs(errors).argmax()]),
-        "contained": sum(_holds(one, wind) for one in answered),
+        "contained": sum(contains(one, wind) for one in answered),
     }
-
-
-def _holds(interval: Mapping[str, float | None], true: float) -> bool:
-    low, high = interval["low"], interval["high"]
-    return (low is None or low <= true) and (high is None or true <= high)
 
 
 def page(sheet: Mapping[str, Any]) -> str:
@@ -277,7 +272,7 @@ def page(sheet: Mapping[str, Any]) -> str:
             "look's (`python -m tests.studies ten-looks`)."
         ),
         "",
-        "| wind [m/s] | weight | refused | lowest | highest | spread | mean | largest error | 90 % intervals hold it |",
+        "| wind [m/s] | weight | refused | lowest | highest | spread | mean | largest error | intervals contain it |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, winds in sheet["summary"].items():
@@ -318,7 +313,7 @@ def _cell(said: Mapping[str, Any], true: float) -> str:
         return f"refused: {', '.join(said['reasons'])}"
     own = said["wind"]
     ends = f"[{_end(own['low'])}, {_end(own['high'])}]"
-    text = f"{own['value']:.2f} {ends if _holds(own, true) else f'**{ends}**'}"
+    text = f"{own['value']:.2f} {ends if contains(own, true) else f'**{ends}**'}"
     return f"{text}, refused: {', '.join(said['reasons'][:2])}" if said["refused"] else text
 
 
