@@ -189,7 +189,7 @@ class GustPrior:
         """
         cell = MOST_INTENSE / _INTENSITIES
         return cls(
-            intensity=(np.arange(_INTENSITIES) + 0.5) * cell,
+            intensity=np.linspace(cell / 2, MOST_INTENSE - cell / 2, _INTENSITIES),
             length=np.geomspace(*LENGTHS, _LENGTHS) / size,
             cell=cell,
         )
