@@ -75,12 +75,15 @@ class Answer:
         quantities: name → estimate: "wind_speed", "area_weight" (area weight) and what else the network estimates.
         draws: name → (n,) draws of the joint posterior, in the same order for all names.
         windows: each by itself.
+        gusts: intensity of the gusts, standard deviation over mean wind [1]; None where the windows are not taken as
+            one series, as of a film of one window.
     """
 
     sentence: str
     quantities: Mapping[str, Estimate]
     draws: Mapping[str, FloatArray]
     windows: Windows
+    gusts: Estimate | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -153,6 +156,11 @@ class Measured:
     def windows(self) -> Windows:
         """The windows, each by itself. Raises as `answer`."""
         return self.answer.windows
+
+    @property
+    def gusts(self) -> Estimate | None:
+        """How strong the gusts are; None of a film whose windows are not taken as one series. Raises as `answer`."""
+        return self.answer.gusts
 
     def __repr__(self) -> str:
         if self.given is None:

@@ -21,6 +21,7 @@ from measure.anemometer.measuring import measure_by
 from measure.anemometer.networks import Network, gate_beside, network
 from measure.estimate.answer import Quantity
 from measure.estimate.combine import of_model
+from measure.estimate.gusts import MOST_INTENSE, Gusts
 from measure.estimate.material import weight_of
 from measure.estimate.measuring import Measurement, Options, measure
 from measure.film.source import FilmReading, Subject, size_of, subjects
@@ -138,7 +139,7 @@ def measured(chosen: Measuring) -> Measured:
         ),
         findings=measurement.noticed(anyway=chosen.anyway),
         figures=subject.film.as_dict(),
-        given=_answer(measurement) if measurement.shown(anyway=chosen.anyway) else None,
+        given=answered(measurement) if measurement.shown(anyway=chosen.anyway) else None,
         elsewhere=wind_elsewhere(measurement, chosen),
     )
 
@@ -167,7 +168,8 @@ def _subjects(source: Path | str | Frames, *, lake: Lake | None, at: str | None,
     return [Subject(film=reading.conditioned(source))]
 
 
-def _answer(measurement: Measurement) -> Answer:
+def answered(measurement: Measurement) -> Answer:
+    """Returns what a film says, as arrays."""
     quantities = {quantity.name: _estimate(quantity) for quantity in measurement.quantities}
     rows = {name: [window.quantity(name) for window in measurement.windows] for name in measurement.names}
     nan = float("nan")
@@ -182,7 +184,27 @@ def _answer(measurement: Measurement) -> Answer:
         high={name: np.array([q.span.high for q in by_window]) for name, by_window in rows.items()},
     )
     draws = {name: measurement.draws[:, column] for column, name in enumerate(measurement.names)}
-    return Answer(sentence=measurement.sentence, quantities=quantities, draws=draws, windows=windows)
+    return Answer(
+        sentence=measurement.sentence,
+        quantities=quantities,
+        draws=draws,
+        windows=windows,
+        gusts=None if measurement.gusts is None else _gusts(measurement.gusts),
+    )
+
+
+def _gusts(gusts: Gusts) -> Estimate:
+    return Estimate(
+        unit="1",
+        value=gusts.value,
+        sigma=gusts.sigma,
+        interval=(gusts.low, gusts.high),
+        level=gusts.level,
+        bound=None,
+        constrained=gusts.constrained,
+        assumed=(0.0, MOST_INTENSE),
+        given=False,
+    )
 
 
 def _estimate(quantity: Quantity) -> Estimate:

@@ -223,16 +223,16 @@ class Gusts:
         value: mean of the posterior of their intensity, standard deviation over mean wind.
         low, high: its central interval.
         level: of it.
+        sigma: standard deviation of the posterior.
         windows: that it rests on.
-        narrowed: standard deviation of the posterior over that of the prior.
     """
 
     value: float
     low: float
     high: float
     level: float
+    sigma: float
     windows: int
-    narrowed: float
 
     @classmethod
     def of(cls, intensity: FloatArray, *, level: float, windows: int) -> Gusts:
@@ -243,14 +243,19 @@ class Gusts:
             low=low,
             high=high,
             level=level,
+            sigma=float(intensity.std()),
             windows=windows,
-            narrowed=float(intensity.std()) / (MOST_INTENSE / math.sqrt(12)),
         )
+
+    @property
+    def constrained(self) -> bool:
+        """Decides whether the film says anything of them: the posterior is narrower than the uniform prior."""
+        return self.sigma <= LEAST_NARROWED * MOST_INTENSE / math.sqrt(12)
 
     @property
     def sentence(self) -> str:
         """Phrases them, "gusts of 14 % [9, 21]" with the level; without a value where the film narrows nothing."""
-        if self.narrowed > LEAST_NARROWED:
+        if not self.constrained:
             return f"gusts: {self.windows} windows do not constrain how strong they are"
         return (
             f"gusts of {100 * self.value:.0f} % [{100 * self.low:.0f}, {100 * self.high:.0f}] of the wind, "
@@ -264,7 +269,7 @@ class Gusts:
             "interval": [self.low, self.high],
             "level": self.level,
             "windows": self.windows,
-            "constrained": self.narrowed <= LEAST_NARROWED,
+            "constrained": self.constrained,
             "sentence": self.sentence,
         }
 

@@ -34,7 +34,8 @@ from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
 from measure.estimate import DRAWS, SERIES_KEY, FilmAnswer, Options, Pair, SeriesErrors
 from measure.estimate.gusts import error_correlation, log_moments
-from measure.film.similarity import FlagSize, sizes, trained_on
+from measure.film import FlagSize, sizes
+from measure.film.similarity import trained_on
 from models.estimator import SHIPPED, Estimator
 from models.storage import CARD, card_bytes, read_card, renew
 from tests.studies.long_films import LongFilm

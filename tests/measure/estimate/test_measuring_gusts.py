@@ -12,6 +12,7 @@ import pytest
 from flagdata.film_array import Frames
 from flagdata.stated import Stated
 from measure.commands.measure import _Done, _report
+from measure.commands.measure_film import answered
 from measure.estimate import SERIES_KEY, Measurement, Options, Pair, SeriesErrors, beside, measure
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, even
@@ -159,3 +160,14 @@ def test_the_gusts_are_in_the_json_and_in_the_terminal(
     (note,) = [finding for finding in found.findings if finding.kind == "windows-combined"]
     assert "one gusty wind" in note.what
     assert "films that were made up" in note.what
+
+
+def test_python_has_the_gusts_with_their_interval(model: Estimator, series_model: Estimator) -> None:
+    film = even(6 * FRAMES)
+    found = measured(film, series_model)
+    assert found.gusts is not None
+    gusts = answered(found).gusts
+    assert gusts is not None
+    assert (gusts.value, gusts.interval) == (found.gusts.value, (found.gusts.low, found.gusts.high))
+    assert gusts.constrained == found.gusts.as_dict()["constrained"]
+    assert answered(measured(film, model)).gusts is None

@@ -22,8 +22,8 @@ from flagdata.film_array import Frames
 from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
 from measure.anemometer import gate_beside, network
-from measure.estimate import DRAWS, Measurement, Options, measure, of_model
-from measure.estimate.joint import WEIGHT, WIND, FilmAnswer
+from measure.estimate import DRAWS, FilmAnswer, Measurement, Options, measure, of_model
+from measure.estimate.joint import WEIGHT, WIND
 from measure.film import FlagSize
 from models.estimator import Estimator
 from models.restriction import Known

@@ -23,8 +23,7 @@ from flagdata.console import progress
 from flagdata.film_array import Frames
 from flagdata.rng import child_seed
 from flagdata.stated import Stated
-from measure.anemometer import Network, network
-from measure.anemometer.networks import gate_beside
+from measure.anemometer import Network, gate_beside, network
 from measure.estimate import SERIES_KEY, Measurement, Options, measure, of_model
 from tests.studies.long_films import LongFilm
 from tests.studies.series_errors import size_of
