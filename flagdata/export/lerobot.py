@@ -28,6 +28,7 @@ from PIL import Image
 from flagdata.arrays import AnyArray, Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.export.source import FILMED, Entry, ExportRows, label_units
+from flagdata.scheduling import kept_scheduling
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 
@@ -367,7 +368,8 @@ class _Films:
             frame = av.VideoFrame.from_ndarray(np.repeat(image[..., None], 3, axis=2), format="rgb24")
             frame = frame.reformat(format="yuv420p")
             frame.pts, frame.time_base = self._frames, 1 / self._rate
-            packets = stream.encode(frame)
+            with kept_scheduling():
+                packets = stream.encode(frame)
             self._size += sum(packet.size for packet in packets)
             container.mux(packets)
             self._frames += 1
@@ -402,7 +404,8 @@ class _Films:
     def _finish(self) -> None:
         if self._writing is not None:
             container, stream = self._writing
-            container.mux(stream.encode(None))
+            with kept_scheduling():
+                container.mux(stream.encode(None))
             self._open.close()
             self._writing = None
 

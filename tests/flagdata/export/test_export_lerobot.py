@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,12 @@ def test_lerobot_reads_back_every_frame_and_number(known: Any, tmp_path: Path, f
         assert found["sha"] == [hashlib.sha256(image.tobytes()).hexdigest() for image in images]
     else:  # crf 30: a smooth slope keeps its mean to a level
         np.testing.assert_allclose(found["mean"], images.mean(axis=(1, 2)), atol=1.5)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only as root SVT-AV1 takes real-time priority")
+def test_an_export_of_films_leaves_the_process_the_priority_that_it_had(known: Any, tmp_path: Path) -> None:
+    export(known.lake, Export(format="lerobot", where=CLIPS, options={"frames": "av1"}), tmp_path / "out")
+    assert {os.sched_getscheduler(int(thread.name)) for thread in Path("/proc/self/task").iterdir()} == {os.SCHED_OTHER}
 
 
 def test_identity_truth_and_clock_stand_in_the_table_of_episodes(known: Any, tmp_path: Path) -> None:

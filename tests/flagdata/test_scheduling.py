@@ -1,0 +1,46 @@
+"""What raises the priority of threads is undone."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import pytest
+
+from flagdata.scheduling import kept_scheduling
+
+
+def policies() -> set[int]:
+    return {os.sched_getscheduler(thread.native_id) for thread in threading.enumerate() if thread.native_id}
+
+
+def test_threads_that_were_begun_with_real_time_priority_and_the_one_that_began_them_lose_it() -> None:
+    before, done = policies(), threading.Event()
+    assert before == {os.SCHED_OTHER}
+    thread = threading.Thread(target=done.wait)
+    try:
+        with kept_scheduling():
+            try:
+                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+            except PermissionError:
+                pytest.skip("only a privileged process may take real-time priority")
+            thread.start()
+            assert policies() >= {os.SCHED_FIFO}
+        assert policies() == before
+    finally:
+        done.set()
+    thread.join()
+
+
+def test_it_is_undone_after_an_error_too() -> None:
+    @kept_scheduling()
+    def failing() -> None:
+        try:
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+        except PermissionError:
+            pytest.skip("only a privileged process may take real-time priority")
+        raise KeyError
+
+    with pytest.raises(KeyError):
+        failing()
+    assert policies() == {os.SCHED_OTHER}
