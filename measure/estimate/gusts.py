@@ -323,7 +323,7 @@ class Course:
         sigmas: (k,) its standard deviations, s_w.
         starts: (k,) of the windows, ascending [s].
         window: their length [s].
-        apart: places of windows that do not overlap, on which what is said of the gusts rests.
+        apart: places of windows that do not overlap, on which the gusts rest.
         pair: the errors' standard deviations.
         halves, neighbours: correlations of own errors, see `SeriesErrors`.
         prior: of the gusts.

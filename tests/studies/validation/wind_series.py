@@ -195,7 +195,7 @@ def page(sheet: Mapping[str, Any]) -> str:
         f"seed {sheet['seed']} (`python -m tests.studies wind-series`). The constants in its card are of "
         f"{sheet['constants']['source']}. Intervals are of 90 %. The gate refuses {refused} of the films; all count."
     )
-    aims = f"RMSE of windows at most {sheet['aims']['rmse']:g} m/s, {low:.0%} to {high:.0%} of the intervals hold"
+    aims = f"RMSE of windows at most {sheet['aims']['rmse']:g} m/s, {low:.0%} to {high:.0%} of the intervals contain it"
     names = (
         "weight, windows",
         "RMSE [m/s]",
