@@ -54,7 +54,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "hanging-cloth": ("tests.studies.validation.hanging_cloth", "Area weight of hanging cloths."),
             "hanging-weight": ("tests.studies.validation.hanging_weight", "Whether a film tells a cloth's weight."),
             "hostile": ("tests.studies.validation.hostile", "Hostile recipes, models, inputs, files and lakes."),
-            "kinds": ("tests.studies.validation.kinds", "Two flags, films upside down and on their side: refused?"),
+            "kinds": ("tests.studies.validation.kinds", "Two flags, and films upside down or on their side."),
             "lake-in-a-bucket": ("tests.studies.validation.lake_in_a_bucket", "The lake's tests, in a bucket."),
             "looks": ("tests.studies.validation.looks", "What lasts of the errors of films' observables."),
             "loop-on-films": ("tests.studies.validation.loop_on_films", "Verdicts on films of other numerics."),
