@@ -26,7 +26,7 @@ One window is left as it is.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +35,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from flagdata.arrays import FloatArray
-from flagdata.errors import CorruptError, InputError
+from flagdata.errors import InputError
+from measure.estimate.cards import card_entry
 
 if TYPE_CHECKING:
     from models.estimator import Estimator
@@ -64,6 +65,15 @@ class Dependence:
         if not (0 <= self.wind <= 1 and 0 <= self.cloth <= 1):
             raise InputError(f"correlations {self.wind:g} and {self.cloth:g}", fix="give numbers from 0 to 1")
 
+    @classmethod
+    def of_entry(cls, entry: Mapping[str, Any]) -> Dependence:
+        """Reads what a card says.
+
+        Raises:
+            KeyError, TypeError, ValueError, InputError: it is damaged.
+        """
+        return cls(wind=float(entry["wind"]), cloth=float(entry["cloth"]), source=str(entry["source"]))
+
 
 UNKNOWN = Dependence(
     wind=1.0,
@@ -75,22 +85,13 @@ CARD_KEY = "window_correlation"
 
 
 def of_model(model: Estimator) -> Dependence:
-    """Read how alike windows err from a model's card; `UNKNOWN` where it does not say.
+    """Reads how alike windows err from a model's card; `UNKNOWN` where it does not say.
 
     Raises:
         CorruptError: the entry is damaged.
     """
-    entry: Any = model.card.get(CARD_KEY)
-    if entry is None:
-        return UNKNOWN
-    try:
-        return Dependence(wind=float(entry["wind"]), cloth=float(entry["cloth"]), source=str(entry["source"]))
-    except (KeyError, TypeError, ValueError, InputError) as error:
-        raise CorruptError(
-            f"the card's {CARD_KEY} cannot be used: {error}",
-            where=f"model {model.name!r}",
-            fix="measure it anew, in a checkout of flagdata: python -m tests.studies dependence",
-        ) from None
+    measured = card_entry(model, CARD_KEY, Dependence.of_entry, study="dependence")
+    return UNKNOWN if measured is None else measured
 
 
 def effective(count: int, correlation: float) -> float:

@@ -41,7 +41,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cholesky
 
 from flagdata.arrays import FloatArray
-from flagdata.errors import CorruptError, InputError
+from flagdata.errors import InputError
+from measure.estimate.cards import card_entry
 from models.estimator import Estimator
 
 SERIES_KEY = "wind_series"
@@ -153,17 +154,7 @@ def errors_of_model(model: Estimator) -> SeriesErrors | None:
     Raises:
         CorruptError: the entry is damaged.
     """
-    entry: Any = model.card.get(SERIES_KEY)
-    if entry is None:
-        return None
-    try:
-        return SeriesErrors.of_entry(entry)
-    except (KeyError, TypeError, ValueError, InputError) as error:
-        raise CorruptError(
-            f"the card's {SERIES_KEY} cannot be used: {error}",
-            where=f"model {model.name!r}",
-            fix="measure it anew, in a checkout of flagdata: python -m tests.studies series-errors",
-        ) from None
+    return card_entry(model, SERIES_KEY, SeriesErrors.of_entry, study="series-errors")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

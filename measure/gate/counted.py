@@ -14,7 +14,7 @@ from flagdata.findings import Finding, Severity
 from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower
-from models.conditioning.standing import Inside
+from models.conditioning.standing import Box, Inside, Line
 
 COUNTED = frozenset({"scene-cut", "low-frame-rate", "repeated-frames", "too-dark", "moving-camera", "cut-off", "scale"})
 """Kinds of faults that are counted here, and while the frames are read: no statistic of a window need look for them."""
@@ -184,17 +184,24 @@ def _no_pole(film: _Film) -> Figure | None:
     return film.pole, f"the longest is {_below(film.pole)} as high as what moves, of flags {_POLE:.0%} or more"
 
 
-def _hung(film: _Film) -> Figure | None:
+def _level(film: _Film, longest: Callable[[Box], Line]) -> Figure | None:
+    """Compares a level edge at rest with what moves and with the pole, by `_BAR` and `_OVER`."""
     region = film.conditioning.region
     if region is None:
         return None
-    bar = film.conditioning.standing.above(film.conditioning.framed_box(region)).length
-    if not bar >= max(_BAR, _OVER * film.pole):
+    length = longest(film.conditioning.framed_box(region)).length
+    if not length >= max(_BAR, _OVER * film.pole):
         return None
-    return (
-        bar,
-        f"it is {bar:.2f} times as long as what moves is wide, the longest beside it {film.pole:.2f} times as high",
-    )
+    upright = f"the longest upright one beside it {film.pole:.2f} times as high"
+    return length, f"it is {length:.2f} times as long as what moves is wide, {upright}"
+
+
+def _hung(film: _Film) -> Figure | None:
+    return _level(film, film.conditioning.standing.above)
+
+
+def _on_its_side(film: _Film) -> Figure | None:
+    return _level(film, film.conditioning.standing.below)
 
 
 def _upside_down(film: _Film) -> Figure | None:
@@ -208,17 +215,6 @@ def _upside_down(film: _Film) -> Figure | None:
         return None
     up = -math.degrees(region.droop)
     return up, f"by {up:.1f}°, and the edge reaches {pole.above:.2f} of the height of what moves above it"
-
-
-def _on_its_side(film: _Film) -> Figure | None:
-    region = film.conditioning.region
-    if region is None:
-        return None
-    edge = film.conditioning.standing.below(film.conditioning.framed_box(region)).length
-    if not edge >= max(_BAR, _OVER * film.pole):
-        return None
-    words = f"it is {edge:.2f} times as long as what moves is wide, the longest upright one beside it {film.pole:.2f} "
-    return edge, words + "times as high"
 
 
 def _second(film: _Film) -> Figure | None:
