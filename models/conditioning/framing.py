@@ -86,15 +86,24 @@ def _begin(low: float, high: float, side: int, length: int) -> int:
 
 def cut(picture: UInt8Array, square: Square, size: int) -> UInt8Array:
     """Crops a square of an unmoved picture (height, width) to (size, size)."""
-    height, width = picture.shape
-    rows = np.arange(square.y, square.y + square.side).clip(0, height - 1)
-    columns = np.arange(square.x, square.x + square.side).clip(0, width - 1)
-    inside = 0 <= square.x <= width - square.side and 0 <= square.y <= height - square.side
-    part = picture[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if inside else picture[np.ix_(rows, columns)]
+    part = _continued(picture, square)
     if square.side == size:
         return np.ascontiguousarray(part)
     image = Image.fromarray(np.ascontiguousarray(part))
     return np.asarray(image.resize((size, size), Image.Resampling.HAMMING))
+
+
+def _continued(picture: UInt8Array, square: Square) -> UInt8Array:
+    """Returns a square of a picture (height, width), its edges continued where the square reaches beyond."""
+    height, width = picture.shape
+    left, top = min(max(square.x, 0), width - 1), min(max(square.y, 0), height - 1)
+    right, bottom = (min(max(begin + square.side, 1), end) for begin, end in ((square.x, width), (square.y, height)))
+    part = picture[top : max(bottom, top + 1), left : max(right, left + 1)]
+    above, before = (min(max(-begin, 0), square.side - 1) for begin in (square.y, square.x))
+    below, after = square.side - above - part.shape[0], square.side - before - part.shape[1]
+    if not any((above, below, before, after)):
+        return part
+    return np.asarray(cv2.copyMakeBorder(part, above, below, before, after, cv2.BORDER_REPLICATE), dtype=np.uint8)
 
 
 def warp(picture: UInt8Array, square: Square, size: int, transform: Transform) -> UInt8Array:
