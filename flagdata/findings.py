@@ -87,8 +87,8 @@ _KINDS = {
         damping-assumed depth-by-content direction-mean-of-numbers doubtful-numbers draft-unconfirmed
         edges-stretched edit-list-passed-over encoding-assumed failed-simulations few-effective-draws
         fewer-components files-missing flag-cut-off flag-size-contradicted flies-aside frames-lost frames-missing
-        frames-not-shown frames-repeated frames-undecoded gaps gif-delays hdr-transfer hours-off index-damaged
-        inertia-does-not-fit interlaced leans-on-prior log-disordered markers-astray markers-left-out
+        frames-not-shown frames-repeated frames-undecoded gaps gif-delays half-without-readings hdr-transfer hours-off
+        index-damaged inertia-does-not-fit interlaced leans-on-prior log-disordered markers-astray markers-left-out
         markers-missing markers-not-tracked markers-shared messages-undefined narrow-intervals non-data-lines
         not-a-date nul-bytes odd-rotation one-time order-by-name order-by-time orientation-changed pins-move
         pins-not-observed positions-stuck rate-not-as-described rate-unlike-names recording-cut

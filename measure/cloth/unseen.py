@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
 
 from flagdata.arrays import FloatArray
+from flagdata.errors import RefusedError
+from flagdata.findings import Finding
 from flagdata.rng import stream
 from measure.cloth.design import Weighable
 from measure.cloth.evidence import Sight, fitted, hypothesis
@@ -55,9 +58,23 @@ class _Task:
     predicted: tuple[tuple[int | None, Sight, Observed], ...]
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Halves:
+    """The two halves of a recording, each with the model that is fitted to simulations of it.
+
+    Attributes:
+        number: of the recording.
+        first, second: model and windows.
+    """
+
+    number: int
+    first: tuple[Sight, Observed]
+    second: tuple[Sight, Observed]
+
+
 def compared(
     recordings: Sequence[Observed],
-    simulations: Simulations,
+    halves: Sequence[Halves],
     sights: Sequence[Sight],
     *,
     effect: Weighable | None,
@@ -68,6 +85,7 @@ def compared(
     """Comparisons for each observable: on other halves, and on recordings left out.
 
     Args:
+        halves: of the recordings that have them, see `halved`.
         sights: of whole recordings.
         effect: that is named; None for none.
         control: the best wrong effect; None for none.
@@ -75,7 +93,7 @@ def compared(
     """
     comparisons: list[Comparison] = []
     for words, tasks in (
-        ("other halves", _halves(recordings, simulations)),
+        ("other halves", _other_halves(halves)),
         ("recordings left out", _left_out(recordings, sights)),
     ):
         predictions = [
@@ -94,29 +112,50 @@ def compared(
     return tuple(comparisons)
 
 
-def _halves(recordings: Sequence[Observed], simulations: Simulations) -> list[_Task]:
-    """Pairs the halves of each recording, one fitted and the other predicted, both ways; none where `halved` gives
-    none."""
+def _other_halves(halves: Sequence[Halves]) -> list[_Task]:
+    """Fits all first halves and predicts all second ones, and the other way round."""
+    sides = [tuple(pair.first for pair in halves), tuple(pair.second for pair in halves)]
     return [
-        _Task(fitted=a, predicted=tuple((number, s, o) for number, (s, o) in enumerate(b)))
-        for a, b in permutations(halved(recordings, simulations), 2)
+        _Task(fitted=a, predicted=tuple((place, s, o) for place, (s, o) in enumerate(b)))
+        for a, b in permutations(sides, 2)
+        if halves
     ]
 
 
-def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[tuple[tuple[Sight, Observed], ...], ...]:
-    """Returns the models and windows of all first halves, and those of all second halves; nothing of recordings that
-    are too short, or that are rows of a table against wind, whose windows are the same."""
-    if min(len(recording.readings) for recording in recordings) < 2 * LEAST_WINDOWS or any(
-        recording.place for recording in recordings
-    ):
-        return ()
-    middles = [len(recording.readings) // 2 for recording in recordings]
-    sides = []
-    for halves in ([slice(0, middle) for middle in middles], [slice(middle, None) for middle in middles]):
-        models = sights_of(recordings, simulations, windows=halves)
-        parts = [part_of(recording, windows) for recording, windows in zip(recordings, halves, strict=True)]
-        sides.append(tuple(zip(models, parts, strict=True)))
-    return tuple(sides)
+def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[Halves, ...]:
+    """Returns the halves of the recordings that have two: nothing of those that are too short, that are rows of a
+    table against wind, whose windows are the same, or that show nothing in one half."""
+    result = []
+    for number, recording in enumerate(recordings):
+        if not _long_enough(recording):
+            continue
+        middle = len(recording.readings) // 2
+        with suppress(RefusedError):  # reported by `kept_whole`
+            first, second = (
+                (*sights_of([recording], simulations.of([number]), windows=[windows]), part_of(recording, windows))
+                for windows in (slice(0, middle), slice(middle, None))
+            )
+            result.append(Halves(number=number, first=first, second=second))
+    return tuple(result)
+
+
+def kept_whole(recordings: Sequence[Observed], halves: Sequence[Halves]) -> tuple[Finding, ...]:
+    """Warns of each recording that is long enough for two halves, and shows nothing in one of them."""
+    numbers = {pair.number for pair in halves}
+    return tuple(
+        Finding.of(
+            "half-without-readings",
+            f"{recording.name}: one half of it shows no observable in enough of its windows, so that no half of it "
+            "predicts the other",
+            fix="give more of the film in which the flag is seen whole",
+        )
+        for number, recording in enumerate(recordings)
+        if _long_enough(recording) and number not in numbers
+    )
+
+
+def _long_enough(recording: Observed) -> bool:
+    return len(recording.readings) >= 2 * LEAST_WINDOWS and not recording.place
 
 
 def _left_out(recordings: Sequence[Observed], sights: Sequence[Sight]) -> list[_Task]:

@@ -78,7 +78,7 @@ class SideBySide:
 
 
 def side_by_side(outcome: SolvedLoop, index: int, *, after: str) -> SideBySide | None:
-    """Returns a recording's window beside what was simulated; None without a film, or where it is too short for halves.
+    """Returns a recording's window beside what was simulated; None without a film, or where it has no two halves.
 
     Args:
         index: of the recording.
@@ -86,10 +86,11 @@ def side_by_side(outcome: SolvedLoop, index: int, *, after: str) -> SideBySide |
     """
     observed = outcome.recordings[index]
     excerpt, halves = observed.excerpt, halved(outcome.recordings, outcome.simulations)
-    if excerpt is None or not halves:
+    place = next((place for place, pair in enumerate(halves) if pair.number == index), None)
+    if excerpt is None or place is None:
         return None
-    sights = [sight for sight, _ in halves[0]]
-    experiment = of_recordings(sights, [half for _, half in halves[0]], outcome.options.area_weight)
+    sights = [pair.first[0] for pair in halves]
+    experiment = of_recordings(sights, [pair.first[1] for pair in halves], outcome.options.area_weight)
     film = excerpt.window
     instants = np.arange(round(WINDOW * RATE)) / RATE
     drawings = [
@@ -102,7 +103,7 @@ def side_by_side(outcome: SolvedLoop, index: int, *, after: str) -> SideBySide |
         model_fitted = hypothesis(sights, effect)
         fit = fitted(sights, experiment, effect, seed=outcome.options.calibration.seed)
         cloth, places, strength = model_fitted.values(fit.weights[:1] @ fit.scores[0])
-        window, depth = _flown(outcome, index, excerpt.number, {**cloth, **places[index]}, effect, strength)
+        window, depth = _flown(outcome, index, excerpt.number, {**cloth, **places[place]}, effect, strength)
         drawings.append(_moving(label, drawn(window, depth, film, colour)))
     return SideBySide(
         start=observed.first + excerpt.number * WINDOW,

@@ -78,6 +78,19 @@ def test_the_effect_lowers_the_error_on_unseen_windows_in_the_observables_own_un
         assert one.control.value > 0.08
 
 
+def test_a_recording_that_shows_nothing_in_one_half_is_judged_as_a_whole(cheap: list[int], tmp_path: Path) -> None:
+    first, second = both(DRAG)
+    lost = first.readings.copy()
+    lost[:6] = np.nan  # of ten windows of its first half, and of twenty in all
+    found = close_loop([replace(first, readings=lost), second], options(), folder=tmp_path)
+    assert found.named == ("tangential-linear-drag",)
+    (said,) = (what for kind, what in found.findings if kind == "half-without-readings")
+    assert said.startswith(f"{first.name}: one half of it shows no observable")
+    moved = {one.what: one for one in found.comparisons if one.what.startswith("amplitude-across")}
+    assert set(moved) == {"amplitude-across, other halves", "amplitude-across, recordings left out"}
+    assert all(one.reduction.low > 0 for one in moved.values())
+
+
 def test_two_effects_that_act_alike_are_named_together(cheap: list[int], tmp_path: Path) -> None:
     found = close_loop(both({"air-density.change": 0.5}), options(only=(*EFFECTS, *ALIKE)), folder=tmp_path)
     assert found.conclusion is Conclusion.ONE_OF
