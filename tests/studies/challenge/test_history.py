@@ -50,9 +50,9 @@ def test_the_results_say_whether_the_newest_challenge_was_judged_by_todays_crite
     assert ("The newest challenge was judged by other criteria than today's." in text) is not today
 
 
-def test_the_sheets_that_are_kept_are_the_first_and_the_newest_of_markers_and_of_films() -> None:
+def test_the_sheets_that_are_kept_are_the_first_and_the_newest_of_markers_and_of_films_of_each_length() -> None:
     rows = history.rows(RESULTS / "challenge-history.csv")
-    newest = {row["title"].split(" of ")[0]: row["challenge"] for row in rows}
-    assert set(newest) == {"Tracked markers", "Films"}
+    newest = {(row["title"].split(" of ")[0], "three minutes" in row["title"]): row["challenge"] for row in rows}
+    assert set(newest) == {("Tracked markers", False), ("Films", False), ("Films", True)}
     kept = {path.name for path in RESULTS.iterdir() if path.is_dir() and path.name.startswith("challenge-")}
     assert kept == {rows[0]["challenge"], *newest.values()}
