@@ -130,13 +130,16 @@ def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[Ha
         if not _long_enough(recording):
             continue
         middle = len(recording.readings) // 2
+        own = simulations.of([number])
         with suppress(RefusedError):  # reported by `kept_whole`
-            first, second = (
-                (*sights_of([recording], simulations.of([number]), windows=[windows]), part_of(recording, windows))
-                for windows in (slice(0, middle), slice(middle, None))
-            )
+            first, second = (_half(recording, own, part) for part in (slice(0, middle), slice(middle, None)))
             result.append(Halves(number=number, first=first, second=second))
     return tuple(result)
+
+
+def _half(recording: Observed, simulations: Simulations, windows: slice) -> tuple[Sight, Observed]:
+    (model,) = sights_of([recording], simulations, windows=[windows])
+    return model, part_of(recording, windows)
 
 
 def kept_whole(recordings: Sequence[Observed], halves: Sequence[Halves]) -> tuple[Finding, ...]:
