@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from measure.cloth.recording import Observed, constant_wind
 from measure.cloth.score_test import Judged, directions, judge, score
 from measure.cloth.simulation import OBSERVED
 from measure.cloth.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, shown_by
+from measure.cloth.unseen import Halves, halved
 from measure.forecasting.setting import Stage
 from measure.forecasting.strengths import Suspicion
 from measure.verdict.criteria import CRITERIA
@@ -189,11 +191,20 @@ class SolvedLoop:
     left_out: tuple[Finding, ...] = ()
 
     @property
+    def halves(self) -> tuple[Halves, ...]:
+        """Returns the halves of the recordings that have two, which predict each other."""
+        return self._halved[0]
+
+    @cached_property
+    def _halved(self) -> tuple[tuple[Halves, ...], tuple[Finding, ...]]:
+        return halved(self.recordings, self.simulations)
+
+    @property
     def findings(self) -> tuple[Finding, ...]:
         """Returns the findings on the recordings."""
         of_recordings = (finding for recording in self.recordings for finding in recording.findings)
         of_scatter = [] if self.together else [TAKEN_APART]
-        return (*self.left_out, *constant_wind(self.recordings), *of_recordings, *of_scatter)
+        return (*self.left_out, *self._halved[1], *constant_wind(self.recordings), *of_recordings, *of_scatter)
 
 
 def solve(

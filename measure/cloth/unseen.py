@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -114,51 +113,42 @@ def compared(
 
 def _other_halves(halves: Sequence[Halves]) -> list[_Task]:
     """Fits all first halves and predicts all second ones, and the other way round."""
+    if not halves:
+        return []
     sides = [tuple(pair.first for pair in halves), tuple(pair.second for pair in halves)]
     return [
         _Task(fitted=a, predicted=tuple((place, s, o) for place, (s, o) in enumerate(b)))
         for a, b in permutations(sides, 2)
-        if halves
     ]
 
 
-def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[Halves, ...]:
-    """Returns the halves of the recordings that have two: nothing of those that are too short, that are rows of a
-    table against wind, whose windows are the same, or that show nothing in one half."""
-    result = []
+def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[tuple[Halves, ...], tuple[Finding, ...]]:
+    """Returns the halves of the recordings that have two, and a warning for each of which one cannot be fitted.
+
+    Recordings that are too short have none, nor have rows of a table against wind, whose windows are the same.
+    """
+    halves: list[Halves] = []
+    whole: list[Finding] = []
     for number, recording in enumerate(recordings):
-        if not _long_enough(recording):
+        if len(recording.readings) < 2 * LEAST_WINDOWS or recording.place:
             continue
-        middle = len(recording.readings) // 2
-        own = simulations.of([number])
-        with suppress(RefusedError):  # reported by `kept_whole`
+        middle, own = len(recording.readings) // 2, simulations.of([number])
+        try:
             first, second = (_half(recording, own, part) for part in (slice(0, middle), slice(middle, None)))
-            result.append(Halves(number=number, first=first, second=second))
-    return tuple(result)
+        except RefusedError as error:
+            what = (
+                f"{recording.name}: one half of it shows no observable that a model can be fitted to, so that no half "
+                f"of it predicts the other: {error.what}"
+            )
+            whole.append(Finding.of("half-without-readings", what, fix=error.fix))
+        else:
+            halves.append(Halves(number=number, first=first, second=second))
+    return tuple(halves), tuple(whole)
 
 
 def _half(recording: Observed, simulations: Simulations, windows: slice) -> tuple[Sight, Observed]:
     (model,) = sights_of([recording], simulations, windows=[windows])
     return model, part_of(recording, windows)
-
-
-def kept_whole(recordings: Sequence[Observed], halves: Sequence[Halves]) -> tuple[Finding, ...]:
-    """Warns of each recording that is long enough for two halves, and shows nothing in one of them."""
-    numbers = {pair.number for pair in halves}
-    return tuple(
-        Finding.of(
-            "half-without-readings",
-            f"{recording.name}: one half of it shows no observable in enough of its windows, so that no half of it "
-            "predicts the other",
-            fix="give more of the film in which the flag is seen whole",
-        )
-        for number, recording in enumerate(recordings)
-        if _long_enough(recording) and number not in numbers
-    )
-
-
-def _long_enough(recording: Observed) -> bool:
-    return len(recording.readings) >= 2 * LEAST_WINDOWS and not recording.place
 
 
 def _left_out(recordings: Sequence[Observed], sights: Sequence[Sight]) -> list[_Task]:

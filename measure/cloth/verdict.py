@@ -33,7 +33,7 @@ from measure.cloth.prior import CLOTH
 from measure.cloth.recording import Observed
 from measure.cloth.simulations import of_recordings
 from measure.cloth.statement import stated
-from measure.cloth.unseen import compared, halved, kept_whole
+from measure.cloth.unseen import compared
 from measure.ends import Bound, span
 from measure.forecasting.setting import Stage
 from measure.verdict.criteria import CRITERIA
@@ -78,10 +78,9 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
     names = tuple(dict.fromkeys(effects[number].column.effect for number in decision.named))
     acting = outcome.best if decision.named else None
     rest = [number for number in np.argsort(-decision.probability) if number not in decision.confident]
-    halves = halved(outcome.recordings, outcome.simulations)
     comparisons = compared(
         outcome.recordings,
-        halves,
+        outcome.halves,
         outcome.sights,
         effect=None if acting is None else acting[0],
         control=effects[rest[0]] if rest and acting is not None else None,
@@ -105,11 +104,7 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
         },
         power=_power(outcome),
         open=decision.open,
-        findings=tuple(
-            (f.kind, f.what)
-            for f in (*outcome.findings, *kept_whole(outcome.recordings, halves))
-            if f.severity is not Severity.NOTE
-        ),
+        findings=tuple((f.kind, f.what) for f in outcome.findings if f.severity is not Severity.NOTE),
     )
     unseen = [
         effect.column.effect

@@ -27,7 +27,6 @@ from measure.cloth.recording import Observed
 from measure.cloth.simulation import OBSERVED, RATE, FlagBatch
 from measure.cloth.simulations import of_recordings
 from measure.cloth.statement import level_of
-from measure.cloth.unseen import halved
 from measure.observables import View
 from measure.observables.cloth import ClothWindow, edges_of, seen_from
 from measure.observables.film import FilmWindow
@@ -85,7 +84,7 @@ def side_by_side(outcome: SolvedLoop, index: int, *, after: str) -> SideBySide |
         after: what the model with the effect is called; empty where no effect is named.
     """
     observed = outcome.recordings[index]
-    excerpt, halves = observed.excerpt, halved(outcome.recordings, outcome.simulations)
+    excerpt, halves = observed.excerpt, outcome.halves
     place = next((place for place, pair in enumerate(halves) if pair.number == index), None)
     if excerpt is None or place is None:
         return None
