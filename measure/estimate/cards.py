@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from flagdata.errors import CorruptError, InputError
-from models.estimator import Estimator
+
+if TYPE_CHECKING:
+    from models.estimator import Estimator
 
 Entry = TypeVar("Entry")
 
