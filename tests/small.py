@@ -65,6 +65,13 @@ distance = { low = 1.0, high = 3.0 }
 gain = { low = 0.95, high = 1.05 }
 """
 """Five sequences of a coarse flag, ten films of 32 × 32 pixels."""
+GROUPS = """
+[groups]
+height = { low = 0.2, high = 0.4 }
+rates = [20.0, 40.0]
+attachments = ["corners", "hoist"]
+"""
+"""For a data set, before its sides: batches of one height, rate and attachment each."""
 TRAINING = """
 title = "small"
 seed = 1

@@ -85,7 +85,7 @@ class Build:
 
         Raises:
             ConflictError: the branch has films of this name by another recipe, or these films under another name.
-            RefusedError: too many sequences fail, or one of a shard.
+            RefusedError: too many sequences fail, or one of a cast that shards share.
             WorkerError: workers kept dying, or all of them are gone.
             FlagdataError: a renderer, an asset or the disk failed.
         """
@@ -123,8 +123,8 @@ class Build:
         return total
 
     def _refuse_replacing(self, rolls: Sequence[Roll]) -> None:
-        """Refuses a shard in which a sequence failed: the one that takes its place would move films to other shards."""
-        failed = [(roll, index) for roll in rolls for index in roll.failed]
+        """Refuses a shard in which a sequence of a cast that other shards share failed: their films would change."""
+        failed = [(roll, index) for roll in rolls if not roll.in_one_batch for index in roll.failed]
         if self.shard is not None and failed:
             (roll, index), *_ = failed
             raise RefusedError(
@@ -191,10 +191,13 @@ class Build:
             for film in Sequences(recipe=self.recipe, side=side, members=tuple(side_members)).films()
         ]
 
-    def _film(self, rolls: Iterable[Roll], in_shard: Collection[str] | None) -> list[PlannedFilm]:
+    def _film(self, rolls: Sequence[Roll], in_shard: Collection[str] | None) -> list[PlannedFilm]:
         films = self.films(rolls)
         self._refuse_other_names(films)
-        self._refuse_mixture({film.artifact().id for film in films})
+        others = (
+            {roll.id(i) for roll in rolls for i in roll.candidates} - set(in_shard) if in_shard is not None else set()
+        )
+        self._refuse_mixture({film.artifact().id for film in films}, others)
         films = [film for film in films if in_shard is None or film.sequence in in_shard]
         film_ids = {film.artifact().id for film in films}
         in_lake = whole(self.lake, film_ids, branch=self.branch)
@@ -206,10 +209,11 @@ class Build:
             self._commit_each(self._shots(missing), self._commit_films, advance)
         return films
 
-    def _refuse_mixture(self, film_ids: set[str]) -> None:
-        """Make sure that all films of the data set's name are of this recipe."""
+    def _refuse_mixture(self, film_ids: set[str], others: set[str]) -> None:
+        """Make sure that all films of the data set's name are of this recipe; those of other shards' sequences are."""
         films = {"kind": Kind.RECORDING, "dataset": self.recipe.name}
-        foreign = set(self.lake.rows(films, at=self.branch, columns=["artifact"])["artifact"].to_pylist()) - film_ids
+        rows = self.lake.rows(films, at=self.branch, columns=["artifact", "parents"]).to_pylist()
+        foreign = {row["artifact"] for row in rows if others.isdisjoint(row["parents"])} - film_ids
         if foreign:
             raise ConflictError(
                 f"{len(foreign)} recordings of the data set {self.recipe.name!r} are of another recipe",

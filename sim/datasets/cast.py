@@ -142,6 +142,11 @@ class Roll:
         return chosen
 
     @property
+    def in_one_batch(self) -> bool:
+        """Whether all of its sequences are simulated together, those in place of any that fail too."""
+        return self.cast.simulation.count <= self.cast.simulation.batch
+
+    @property
     def candidates(self) -> range:
         """Indices among which sequences are chosen: some may fail."""
         count = self.cast.simulation.count

@@ -16,7 +16,8 @@ _WRITTEN = re.compile(r"(\d{1,6})/(\d{1,6})")
 
 @dataclass(frozen=True, kw_only=True)
 class Shard:
-    """The sequences, with their films, that one of `of` builds makes: those simulated together stay together.
+    """The sequences, with their films, that one of `of` builds makes: those simulated together stay together, and so do
+    those of their cast that take the place of any that fail.
 
     Attributes:
         number: which build, from 1.
@@ -48,8 +49,8 @@ class Shard:
         shard: set[str] = set()
         before = 0
         for roll in rolls:
-            batch = roll.cast.simulation.batch
-            indices = (index for index in roll.candidates if (before + index // batch) % self.of == self.number - 1)
-            shard |= {roll.id(index) for index in indices}
-            before += math.ceil(roll.cast.simulation.count / batch)
+            count, batch = roll.cast.simulation.count, roll.cast.simulation.batch
+            batches = {index: min(index, count - 1) // batch for index in roll.candidates}
+            shard |= {roll.id(i) for i, number in batches.items() if (before + number) % self.of == self.number - 1}
+            before += math.ceil(count / batch)
         return frozenset(shard)

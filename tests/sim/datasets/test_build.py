@@ -6,6 +6,8 @@ import json
 import pickle
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +16,17 @@ import pytest
 
 import flagdata
 from flagdata.dataset import ExplicitSplit
-from flagdata.errors import FlagdataError
+from flagdata.errors import FlagdataError, RefusedError
 from flagdata.lake import Lake, doctor, object_names, verify
 from flagdata.record import Record
 from sim.datasets import DatasetRecipe
+from sim.datasets.build import Build, BuildReport
+from sim.datasets.jobs import PutSequences
+from sim.datasets.shard import Shard
 from sim.workers import Job, Scheduled
 from tests.clusters import Cluster
 from tests.program import invoke
+from tests.small import GROUPS
 
 SIDES = {side: {"dataset": "tiny", "side": side} for side in ("train", "test")}
 SEQUENCES, FILMS = 5, 10
@@ -152,6 +158,55 @@ def test_shards_on_branches_merged_are_the_whole_build(
     assert (whole["new_sequences"], whole["new_films"]) == (0, 0)
     assert whole["card"]
     assert builds.rows(lake.path) == builds.rows(built)
+
+
+def without_bars(*_: object) -> AbstractContextManager[Callable[[int], None]]:
+    return nullcontext(lambda _: None)
+
+
+class FirstFails:
+    """Work in this process, of which the first sequence of every cast comes to nothing."""
+
+    def results(self, jobs: Iterable[Job]) -> Iterator[Any]:
+        for function, arguments in jobs:
+            done = function(*arguments)
+            if isinstance(done, PutSequences) and 0 in done.stored:
+                others = {index: stored for index, stored in done.stored.items() if index != 0}
+                done = replace(done, stored=others, failed={0: "it crumpled"})
+            yield done
+
+
+def test_shards_of_which_each_replaces_a_sequence_that_failed_are_the_whole_build(
+    make: Callable[..., DatasetRecipe], builds: Any, tmp_path: Path
+) -> None:
+    recipe = make({"[sides.train]": GROUPS + "[sides.train]"})
+
+    def build(lake: Lake, branch: str = "main", shard: Shard | None = None) -> BuildReport:
+        return Build(
+            lake=lake, recipe=recipe, workers=FirstFails(), bars=without_bars, branch=branch, shard=shard
+        ).run()
+
+    parts, together, whole = (Lake.create(tmp_path / name) for name in ("parts", "together", "whole"))
+    for number in (1, 2):
+        parts.branch(f"part-{number}")
+        assert build(parts, f"part-{number}", Shard(number=number, of=2)).failed
+        build(together, shard=Shard(number=number, of=2))
+    for number in (1, 2):
+        assert invoke("merge", f"part-{number}", "--lake", parts.path).code == 0
+    for lake in (parts, together):
+        assert (build(lake).new_sequences, build(lake).new_films) == (0, 0)
+    report = build(whole)
+    assert (report.new_sequences, report.new_films) == (SEQUENCES, FILMS)
+    assert len(report.failed) == 3
+    assert builds.rows(parts.path) == builds.rows(together.path) == builds.rows(whole.path)
+
+
+def test_a_shard_refuses_to_replace_a_sequence_where_that_changes_films_of_other_shards(
+    make: Callable[..., DatasetRecipe], tmp_path: Path
+) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    with pytest.raises(RefusedError, match="sequence 0 failed, and a shard cannot choose another: it crumpled"):
+        Build(lake=lake, recipe=make(), workers=FirstFails(), bars=without_bars, shard=Shard(number=1, of=2)).run()
 
 
 def test_the_card_says_what_was_built(built: Path, make: Callable[..., DatasetRecipe]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from flagdata.timebase import iso
 from sim.datasets import DatasetRecipe, PlannedFilm, Roll, Sequences, casts, load
+from tests.small import GROUPS
 
 
 def films(recipe: DatasetRecipe, side: str) -> list[PlannedFilm]:
@@ -75,9 +76,6 @@ def test_a_sequence_that_fails_is_replaced_by_the_next_index(make: Callable[...,
     assert roll.pending({roll.id(0), roll.id(2)}) == [3]
     other = Roll(cast=replace(roll.cast, simulation=replace(roll.cast.simulation, count=2)))
     assert other.id(0) == roll.id(0)  # how many are wanted changes no sequence
-
-
-GROUPS = '[groups]\nheight = { low = 0.2, high = 0.4 }\nrates = [20.0, 40.0]\nattachments = ["corners", "hoist"]\n'
 
 
 def test_batches_draw_height_rate_and_attachment_and_their_films_are_equally_long(
