@@ -14,8 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from flagdata.documents import column_json
 from flagdata.errors import ConflictError, RefusedError
 from flagdata.lake import Lake
+from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from sim.datasets import jobs
 from sim.datasets.cast import Cast, Roll, casts
@@ -194,9 +196,8 @@ class Build:
     def _film(self, rolls: Sequence[Roll], in_shard: Collection[str] | None) -> list[PlannedFilm]:
         films = self.films(rolls)
         self._refuse_other_names(films)
-        others = (
-            {roll.id(i) for roll in rolls for i in roll.candidates} - set(in_shard) if in_shard is not None else set()
-        )
+        candidates = {roll.id(index) for roll in rolls for index in roll.candidates}
+        others = candidates.difference(candidates if in_shard is None else in_shard)
         self._refuse_mixture({film.artifact().id for film in films}, others)
         films = [film for film in films if in_shard is None or film.sequence in in_shard]
         film_ids = {film.artifact().id for film in films}
@@ -210,16 +211,27 @@ class Build:
         return films
 
     def _refuse_mixture(self, film_ids: set[str], others: set[str]) -> None:
-        """Make sure that all films of the data set's name are of this recipe; those of other shards' sequences are."""
+        """Make sure that all films of the data set's name are of this recipe.
+
+        Another shard may have replaced a sequence that failed: films of `others` are judged by how they are filmed.
+        """
         films = {"kind": Kind.RECORDING, "dataset": self.recipe.name}
         rows = self.lake.rows(films, at=self.branch, columns=["artifact", "parents"]).to_pylist()
-        foreign = {row["artifact"] for row in rows if others.isdisjoint(row["parents"])} - film_ids
+        foreign = {row["artifact"] for row in rows} - film_ids
+        replaced = {row["artifact"] for row in rows if not others.isdisjoint(row["parents"])} & foreign
+        foreign -= {artifact for artifact in replaced if self._films_alike(artifact)}
         if foreign:
             raise ConflictError(
                 f"{len(foreign)} recordings of the data set {self.recipe.name!r} are of another recipe",
                 where=f"branch {self.branch}",
                 fix="give the recipe another name, or build on another branch",
             )
+
+    def _films_alike(self, recording: str) -> bool:
+        """Whether a recording of the branch is filmed as this recipe films."""
+        (row,) = self.lake.rows({"artifact": recording}, at=self.branch, columns=["recipe"]).to_pylist()
+        recipe = column_json(row["recipe"], "recipe", artifact=recording)
+        return canonical({**recipe, **self.recipe.filming()}) == canonical(recipe)
 
     def _refuse_other_names(self, films: Sequence[PlannedFilm]) -> None:
         """Make sure that no film of this recipe is there under another data set's name, where it would stay."""

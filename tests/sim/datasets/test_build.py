@@ -16,7 +16,7 @@ import pytest
 
 import flagdata
 from flagdata.dataset import ExplicitSplit
-from flagdata.errors import FlagdataError, RefusedError
+from flagdata.errors import ConflictError, FlagdataError, RefusedError
 from flagdata.lake import Lake, doctor, object_names, verify
 from flagdata.record import Record
 from sim.datasets import DatasetRecipe
@@ -167,6 +167,8 @@ def without_bars(*_: object) -> AbstractContextManager[Callable[[int], None]]:
 class FirstFails:
     """Work in this process, of which the first sequence of every cast comes to nothing."""
 
+    count = 1
+
     def results(self, jobs: Iterable[Job]) -> Iterator[Any]:
         for function, arguments in jobs:
             done = function(*arguments)
@@ -199,6 +201,17 @@ def test_shards_of_which_each_replaces_a_sequence_that_failed_are_the_whole_buil
     assert (report.new_sequences, report.new_films) == (SEQUENCES, FILMS)
     assert len(report.failed) == 3
     assert builds.rows(parts.path) == builds.rows(together.path) == builds.rows(whole.path)
+
+
+def test_shards_of_two_recipes_of_one_name_are_not_mixed_where_they_film_one_flag(
+    make: Callable[..., DatasetRecipe], tmp_path: Path
+) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    grouped = {"[sides.train]": GROUPS + "[sides.train]"}
+    first, second = make(grouped), make({**grouped, "read-noise = 1.0": "read-noise = 2.0"})
+    Build(lake=lake, recipe=first, workers=FirstFails(), bars=without_bars, shard=Shard(number=1, of=2)).run()
+    with pytest.raises(ConflictError, match="are of another recipe"):
+        Build(lake=lake, recipe=second, workers=FirstFails(), bars=without_bars, shard=Shard(number=2, of=2)).run()
 
 
 def test_a_shard_refuses_to_replace_a_sequence_where_that_changes_films_of_other_shards(
