@@ -28,7 +28,7 @@ from flagdata.signals import Sensor, WindSeries
 from flagdata.stated import Stated
 from flagdata.timebase import NANOSECONDS
 from measure.commands import read
-from measure.estimate import weight_of
+from measure.estimate import DRAWS, weight_of
 from measure.estimate.nearest import nearest
 from models.conditioning import conditioned
 from models.estimator import DEFAULT, Estimator
@@ -125,7 +125,7 @@ def test_python_gives_the_answer_of_the_command_as_arrays(film: Path, model_fold
         ends = [None if np.isinf(end) else end for end in estimate.interval]
         assert (estimate.value, ends, estimate.unit) == (own["value"], own["interval"], own["unit"])
     assert found.wind is found.quantities["wind_speed"]
-    assert {values.shape for values in found.draws.values()} == {(400,)}
+    assert {values.shape for values in found.draws.values()} == {(DRAWS,)}
     assert found.draws["wind_speed"].mean() == pytest.approx(found.wind.value)
     windows = said["windows"]
     np.testing.assert_array_equal(found.windows.start, [window["start"] for window in windows])  # type: ignore[attr-defined]

@@ -24,7 +24,7 @@ from flagdata.rng import child_seed
 from flagdata.stated import parse
 from measure.commands.measure import _Done, _report
 from measure.ends import Bound
-from measure.estimate import Dependence, Measurement, Options, beside, measure
+from measure.estimate import DRAWS, Dependence, Measurement, Options, beside, measure
 from measure.film import FlagSize
 from measure.gate import Reason, gate_of
 from models import estimator
@@ -129,11 +129,11 @@ def test_an_area_weight_is_a_value_or_has_a_deviation_and_the_wind_is_that_of_a_
     narrow = found["0.1599:0.1601"].quantities
     for text, one in found.items():
         wind, area_weight, bending, _ = one.quantities
-        for own, other in ((wind, narrow[0]), (bending, narrow[2])):  # of 400 draws each: four standard errors
+        for own, other in ((wind, narrow[0]), (bending, narrow[2])):  # four standard errors of both means
             assert own.value is not None
             assert other.value is not None
             assert other.sigma is not None
-            assert own.value == pytest.approx(other.value, abs=4 * 1.5 * other.sigma / 20), text
+            assert own.value == pytest.approx(other.value, abs=4 * 1.5 * other.sigma / math.sqrt(DRAWS)), text
             assert own.sigma == pytest.approx(other.sigma, rel=0.2), text
         assert area_weight.value == pytest.approx(0.16, abs=1e-4)
     exact = found["0.16"].quantities[1]
@@ -226,7 +226,7 @@ def test_a_weight_that_is_open_is_answered_with_the_winds_of_a_light_and_a_heavy
         draws = base[0] + z + np.sqrt(1 - 0.81) * np.random.default_rng(0).standard_normal(20_000)
         low, high = (float(bound[0]) for bound in scaling.bounds)
         expected = low + (high - low) / (1 + np.exp(-draws))
-        assert float(wind) == pytest.approx(expected.mean(), abs=0.05 + 4 * expected.std() / 20)  # of 400 draws
+        assert float(wind) == pytest.approx(expected.mean(), abs=0.05 + 4 * expected.std() / math.sqrt(DRAWS))
     assert float(light[0]) < 0.12 < float(heavy[0])
     assert finding.fix == "weigh the cloth and give --area-weight"
     assert finding.severity is Severity.NOTE
