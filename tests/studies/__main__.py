@@ -53,6 +53,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "gate-films": ("tests.studies.validation.gate_films", "What measure says of 78 films with a defect."),
             "hanging-cloth": ("tests.studies.validation.hanging_cloth", "Area weight of hanging cloths."),
             "hanging-weight": ("tests.studies.validation.hanging_weight", "Whether a film tells a cloth's weight."),
+            "heavy-cloth": ("tests.studies.validation.heavy_cloth", "A flag of heavy cloth in ten looks."),
             "hostile": ("tests.studies.validation.hostile", "Hostile recipes, models, inputs, files and lakes."),
             "kinds": ("tests.studies.validation.kinds", "Two flags, and films upside down or on their side."),
             "lake-in-a-bucket": ("tests.studies.validation.lake_in_a_bucket", "The lake's tests, in a bucket."),

@@ -1,6 +1,6 @@
 """One flag's motion filmed in ten looks: what `flagdata measure` answers must not depend on the print or the sky.
 
-A flag of `AREA_WEIGHT` is simulated once at each of three winds, from one seed, by the scene `flag-outdoor-damped`.
+A flag is simulated once at each of three winds, from one seed, by the scene `flag-outdoor-damped`.
 Each motion is filmed ten times by one camera, with the same noise and coding; only the cloth's print, what is behind it
 and, for the silhouette, the light differ. Each film is a file, which is measured as `flagdata measure` does by default,
 with the flag's size, once with its area weight open and once stated. Prints are drawn here, not by what networks learn
@@ -38,12 +38,6 @@ from sim.run import Crew, Stepper, recipe_of
 from sim.run import run as simulate
 from tests.studies.validation.films import answer, contains
 
-WINDS = (3.0, 5.0, 8.0)
-"""[m/s]"""
-AREA_WEIGHT = 0.12
-"""[kg/m²], of nylon or polyester, as most flags."""
-STATED = Stated(low=0.114, high=0.126)
-"""Range of the area weight that is stated."""
 LENGTH, HEIGHT = 1.5, 1.0
 """[m]"""
 RATE, SECONDS = 25, 12
@@ -90,6 +84,39 @@ PRINTS: Mapping[str, Callable[[FlagSheet], None]] = {
     "dark": _dark,
 }
 """Drawn on a white sheet of 3:2."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cloth:
+    """A flag's cloth, and the winds that it is filmed in.
+
+    Attributes:
+        study: whose flag it is; it names the random streams and the files.
+        title: of the sheet.
+        area_weight: of the cloth [kg/m²].
+        stated: range of it that is stated.
+        winds: [m/s].
+    """
+
+    study: str
+    title: str
+    area_weight: float
+    stated: Stated
+    winds: tuple[float, ...]
+
+    @property
+    def stream(self) -> str:
+        """The name of its random streams."""
+        return self.study.replace("-", " ")
+
+
+USUAL = Cloth(
+    study="ten-looks",
+    title="One flag in ten looks",
+    area_weight=0.12,  # nylon or polyester, as most flags
+    stated=Stated(low=0.114, high=0.126),
+    winds=(3.0, 5.0, 8.0),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,27 +192,34 @@ LOOKS = (
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Answers on all films, their spread over the looks and their largest errors at each wind."""
+    """Answers on the films of the usual cloth."""
+    return graded(USUAL, seed=seed, out=out)
+
+
+def graded(cloth: Cloth, *, seed: int, out: Path) -> dict[str, Any]:
+    """Answers on all films of a cloth, their spread over the looks and their largest errors at each wind."""
     torch.set_num_threads(1)
     found = network(None, lake=None, at=None)
     gate = gate_beside(found, false_alarm=Options().false_alarm)
     rows: list[dict[str, Any]] = []
-    for wind in WINDS:
-        motion = flown(wind, seed=seed)
-        rows += [{"wind": wind, "look": look.name, **answers(motion, look, found, gate, seed=seed)} for look in LOOKS]
+    for wind in cloth.winds:
+        motion = flown(cloth, wind, seed=seed)
+        rows += [
+            {"wind": wind, "look": look.name, **answers(cloth, motion, look, found, gate, seed=seed)} for look in LOOKS
+        ]
     sheet = {"model": found.estimator.name, "summary": summary(rows), "films": rows}
-    (out / "validate-ten-looks.md").write_text(page(sheet), encoding="utf-8")
+    (out / f"validate-{cloth.study}.md").write_text(page(cloth, sheet), encoding="utf-8")
     return sheet
 
 
-def flown(wind: float, *, seed: int) -> MeshSequence | RaggedMeshSequence:
+def flown(cloth: Cloth, wind: float, *, seed: int) -> MeshSequence | RaggedMeshSequence:
     """Simulates the flag in a wind [m/s]; its cloth and its start are those of the seed, whatever the wind."""
     given = {
-        "seed": child_seed(seed, "ten looks"),
+        "seed": child_seed(seed, cloth.stream),
         "count": 1,
         "batch": 1,
         "scene": {"width": LENGTH, "height": HEIGHT},
-        "material": {"area-weight": AREA_WEIGHT},
+        "material": {"area-weight": cloth.area_weight},
         "wind": {"speed": wind},
         "time": {"settle": 3.0, "frames": RATE * SECONDS, "rate": float(RATE)},
     }
@@ -197,14 +231,14 @@ def flown(wind: float, *, seed: int) -> MeshSequence | RaggedMeshSequence:
 
 
 def answers(
-    motion: MeshSequence | RaggedMeshSequence, look: Look, found: Network, gate: WindowGate, *, seed: int
+    cloth: Cloth, motion: MeshSequence | RaggedMeshSequence, look: Look, found: Network, gate: WindowGate, *, seed: int
 ) -> dict[str, Any]:
     """Films a motion in a look, and measures the file with its weight open and stated."""
-    asked = {"open": None, "stated": STATED}
+    asked = {"open": None, "stated": cloth.stated}
     size = FlagSize(length=LENGTH, height=HEIGHT)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "flag.mp4"
-        filmed(path, motion, look, seed=seed)
+        filmed(path, motion, look, seed=child_seed(seed, cloth.stream, "camera"))
         return {
             name: answer(path, found, gate, Options(size=size, area_weight=weight)) for name, weight in asked.items()
         }
@@ -218,7 +252,7 @@ def filmed(path: Path, motion: MeshSequence | RaggedMeshSequence, look: Look, *,
         look.zeta(),
         rate=RATE,
         start=_START,
-        seed=child_seed(seed, "ten looks", "camera"),
+        seed=seed,
         workers=1,
         advance=lambda _: None,
         assets=StudyAssets(),
@@ -259,17 +293,17 @@ def _at_wind(said: Sequence[Mapping[str, Any]], wind: float) -> dict[str, Any]:
     }
 
 
-def page(sheet: Mapping[str, Any]) -> str:
+def page(cloth: Cloth, sheet: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
     lines = [
-        "# One flag in ten looks",
+        f"# {cloth.title}",
         "",
         (
-            f"Model {sheet['model']}. One simulated flag of {AREA_WEIGHT:g} kg/m² and {LENGTH:g} m by {HEIGHT:g} m at "
-            f"{', '.join(f'{wind:g}' for wind in WINDS)} m/s, each motion filmed in {len(LOOKS)} looks by one camera "
-            f"({SECONDS} s at {RATE} Hz) and measured with the flag's size: with the area weight open, and stated as "
-            f"{STATED.low:g} to {STATED.high:g} kg/m². What differs between the answers on one motion is the "
-            "look's (`python -m tests.studies ten-looks`)."
+            f"Model {sheet['model']}. One simulated flag of {cloth.area_weight:g} kg/m² and {LENGTH:g} m by "
+            f"{HEIGHT:g} m at {', '.join(f'{wind:g}' for wind in cloth.winds)} m/s, each motion filmed in "
+            f"{len(LOOKS)} looks by one camera ({SECONDS} s at {RATE} Hz) and measured with the flag's size: with the "
+            f"area weight open, and stated as {cloth.stated.low:g} to {cloth.stated.high:g} kg/m². What differs "
+            f"between the answers on one motion is the look's (`python -m tests.studies {cloth.study}`)."
         ),
         "",
         "| wind [m/s] | weight | refused | lowest | highest | spread | mean | largest error | intervals contain it |",
@@ -281,12 +315,12 @@ def page(sheet: Mapping[str, Any]) -> str:
         "",
         "## All films",
         "",
-        "| look | " + " | ".join(f"{wind:g} m/s, {name}" for wind in WINDS for name in ("open", "stated")) + " |",
-        "|---" * (1 + 2 * len(WINDS)) + "|",
+        "| look | " + " | ".join(f"{wind:g} m/s, {name}" for wind in cloth.winds for name in ("open", "stated")) + " |",
+        "|---" * (1 + 2 * len(cloth.winds)) + "|",
     ]
     for look in dict.fromkeys(row["look"] for row in sheet["films"]):
         own = {row["wind"]: row for row in sheet["films"] if row["look"] == look}
-        cells = [_cell(own[wind][name], wind) for wind in WINDS for name in ("open", "stated")]
+        cells = [_cell(own[wind][name], wind) for wind in cloth.winds for name in ("open", "stated")]
         lines.append(f"| {look} | " + " | ".join(cells) + " |")
     lines += [
         "",
