@@ -30,6 +30,7 @@ from flagdata.rng import stream
 from measure.estimate.pictures import steps
 from measure.film.conditioned import ConditionedFilm
 from measure.film.similarity import FlagSize, sizes
+from tests.drawn import no_flag
 
 Film = NDArray[np.uint8]
 """(n, HEIGHT, WIDTH, 3), or of another height and width."""
@@ -122,6 +123,16 @@ def tree(film: Film) -> Film:
         leaves = np.where(light[..., None], (125, 165, 80), (60, 110, 45))
         frame[crown] = leaves[crown]
     return _noisy(shown)
+
+
+def palm(film: Film) -> Film:
+    """A palm in a storm, before a house."""
+    shown = np.repeat(film[:1], COUNT, axis=0)
+    shown[:, :, 70:] = _SKY
+    shown[:, 50:, 150:] = (196, 178, 150)
+    drawn = no_flag.palms(np.zeros(shown.shape[:3], np.uint8), stream(1, "refusals", "palm"))
+    green = np.stack([drawn // 2, drawn, drawn // 3], axis=-1)
+    return _noisy(np.where(drawn[..., None] > 0, green, shown))
 
 
 def water(film: Film) -> Film:
@@ -235,6 +246,7 @@ FAULTS: Mapping[str, Fault] = {
     "second-pole": Fault(made=overlapping),
     "no-pole": Fault(made=water),
     "hangs-from-above": Fault(made=hung),
+    "no-hoist": Fault(made=palm),
     "moving-camera": Fault(made=moving_camera, shown=(10, 35)),
     "cut-off": Fault(made=cut_off),
     "no-background": Fault(made=without_background),

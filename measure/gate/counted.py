@@ -14,6 +14,7 @@ from flagdata.findings import Finding, Severity
 from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower
+from models.conditioning.outline import CERTAIN, UPRIGHT
 from models.conditioning.standing import Box, Inside, Line
 
 COUNTED = frozenset({"scene-cut", "low-frame-rate", "repeated-frames", "too-dark", "moving-camera", "cut-off", "scale"})
@@ -227,6 +228,25 @@ def _second(film: _Film) -> Figure | None:
     )
 
 
+def _without_hoist(film: _Film) -> Figure | None:
+    hoist = film.conditioning.hoist
+    if hoist is None:
+        return None
+    if hoist.certainty < CERTAIN:
+        certainty = _below(hoist.certainty)
+        return (
+            hoist.certainty,
+            f"one of its ends is placed with a certainty of {certainty}, of flags {CERTAIN:.0%} or more",
+        )
+    if not hoist.upright:
+        most = math.atan(UPRIGHT)
+        return (
+            hoist.lean,
+            f"what is most like one leans by {math.degrees(hoist.lean):.0f}°, {math.degrees(most):.0f}° at most",
+        )
+    return None
+
+
 def _padded(film: _Film) -> Figure | None:
     height, width = film.watch.shape
     beyond = film.conditioning.square.beyond(width, height)
@@ -262,6 +282,7 @@ OF_CLOTH: tuple[tuple[Rule, ...], ...] = (
     (
         *_HIDING,
         *(("on-its-side", _on_its_side), ("no-pole", _no_pole), ("hangs-from-above", _hung), ("second-pole", _second)),
+        ("no-hoist", _without_hoist),
     ),
     (*_HIDING, ("upside-down", _upside_down)),
     (("no-background", _padded),),

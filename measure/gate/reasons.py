@@ -107,6 +107,12 @@ REASONS: dict[str, Fault] = {
         sentence="an answer would rest on a small part of the film",
         fix="give the part in which the whole flag flies and no frame is missing, by --start and --end",
     ),
+    "no-hoist": Fault(
+        sentence="what moves may be no flag on a pole, as no hoist was found, the upright edge that it is attached to",
+        fix="film a flag and its pole from the side, so that the whole hoist is in the picture",
+        of_motion=True,
+        of_flags=True,
+    ),
     "several-flags": Fault(
         sentence="more than one region moves", fix="choose one by --flag, or crop to it", of_motion=True
     ),

@@ -14,8 +14,10 @@ from flagdata.errors import InputError, UsageError
 from models.conditioning import framing, noise
 from models.conditioning.camera import STILL, WORK, Camera, Transform, by_edges, camera_of, path
 from models.conditioning.framing import Square
+from models.conditioning.outline import Hoist, hoist_of
 from models.conditioning.regions import Region, regions_of
 from models.conditioning.standing import Box, Standing
+from models.conditioning.stills import halved
 from models.conditioning.whole import CUT, SIDES, at_edges
 
 VERSION = 2
@@ -45,6 +47,8 @@ _NEARBY = 6
 """Frames of the sample about the middle one over which a camera without known motion counts as still."""
 _BORDER = 2
 """Pixels at the picture's edge in which no edge is looked for: what is padded beyond begins there."""
+_LEAST_SIZE = 150
+"""Size of the pictures from which on a hoist is sought, half of the 300 px of the network that places it [px]."""
 _AHEAD = 0.1
 """Width of the band about cloth in which no feature of the background is sought, in sizes of the region."""
 
@@ -61,6 +65,7 @@ class Conditioning:
         chosen: place of the flag among them.
         square: that is judged, in the reference picture [px of the film].
         weight: (size, size) float32, 1 where the film is shown, 0 where it is frozen.
+        framed: (n, size, size) the frames of the sample whose median the background is, nothing frozen in them.
         background: (size, size) what is shown there, the median in time.
         noise: deviation of the camera's [gray levels], which is left where the film is frozen.
         kept: (size, size) float32 share of each pixel's changes that is noise, 0 to 1.
@@ -77,6 +82,7 @@ class Conditioning:
     chosen: int
     square: Square
     weight: Float32Array
+    framed: UInt8Array
     background: UInt8Array
     noise: float
     kept: Float32Array
@@ -115,7 +121,20 @@ class Conditioning:
 
     def show(self, frame: UInt8Array, transform: Transform) -> UInt8Array:
         """Returns the (size, size) picture of the flag: registered, cropped, scaled, all else frozen."""
-        drawn = _framed(frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves)
+        return self._frozen(
+            _framed(frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves)
+        )
+
+    @cached_property
+    def hoist(self) -> Hoist | None:
+        """The edge that the cloth is attached to; None in a film of fewer than ten frames, and in pictures too small
+        for the network that places it."""
+        if self.size < _LEAST_SIZE:
+            return None
+        return hoist_of(np.stack([halved(self._frozen(picture)) for picture in self.framed]))
+
+    def _frozen(self, drawn: UInt8Array) -> UInt8Array:
+        """Freezes a framed picture (size, size) away from the flag."""
         away = drawn - self._still
         residual = np.clip(self.kept * away, -_NOISES * self.noise, _NOISES * self.noise)
         return np.rint(self._still + residual + self.weight * (away - residual)).astype(np.uint8)
@@ -272,6 +291,7 @@ def conditioning_of(
         chosen=chosen,
         square=square,
         weight=weight,
+        framed=stack,
         background=np.median(stack, axis=0).astype(np.uint8),
         noise=level,
         kept=np.minimum(_USUAL * level / spread, 1.0).astype(np.float32),

@@ -29,7 +29,7 @@ _TOGETHER = 16
 """Pictures that the network takes at once; bounds the memory."""
 _NEAR = 4
 """Reach about its most likely place over which the place of an end is averaged [px]."""
-_CERTAIN = 0.5
+CERTAIN = 0.5
 """Least probability that an end is within `_NEAR` of its most likely place."""
 _BESIDE = (0.05, 0.3)
 """Part of the cloth, in lengths of the hoist from it, whose upper edge is extended to the hoist."""
@@ -39,10 +39,51 @@ _LEAST = 0.1
 """Least area of the cloth over the square of its hoist."""
 _MOVES = 5.0
 """Gray levels over which the twentieth part of the cloth that changes most changes at least."""
-_UPRIGHT = 0.35
+UPRIGHT = 0.35
 """Greatest offset of the hoist's ends along the picture's rows, over their distance along its columns."""
 
 Masks = BoolArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hoist:
+    """The edge that cloth is attached to, as the network places it in pictures of one film.
+
+    Attributes:
+        stills: what the pictures show all the time.
+        logits: (n, 3, rows, columns) of cloth, of the hoist's upper end and of its lower end.
+        ends: (2, 2) upper and lower end: column and row in the halved picture, the first pixel's middle at 0.5 [px].
+        certainty: probability that an end is within `_NEAR` of where it is placed; of the less certain one.
+    """
+
+    stills: Stills
+    logits: Tensor
+    ends: FloatArray
+    certainty: float
+
+    @property
+    def lean(self) -> float:
+        """The angle between the hoist, from its upper to its lower end, and the downright [rad], 0 to π."""
+        across, down = self.ends[1] - self.ends[0]
+        return float(np.arctan2(abs(across), down))
+
+    @property
+    def upright(self) -> bool:
+        """Whether the lower end is below the upper one, by `UPRIGHT`."""
+        across, down = self.ends[1] - self.ends[0]
+        return bool(abs(across) <= UPRIGHT * down)
+
+
+def hoist_of(pictures: UInt8Array) -> Hoist | None:
+    """Places the hoist in pictures (n, size / 2, size / 2) as `Conditioning.show` gives them, `halved`, spread over the
+    film; None where they are fewer than ten."""
+    if len(pictures) < _FEWEST:
+        return None
+    small = pictures[:: -(-len(pictures) // SAMPLE)]
+    stills = Stills.of(small)
+    logits = torch.cat(list(_maps(shipped(), small[:: -(-len(small) // _LOOKED_AT)], stills)))
+    ends, certainties = zip(*(_end(of_end) for of_end in logits[:, 1:].mean(dim=0).double()), strict=True)
+    return Hoist(stills=stills, logits=logits, ends=np.stack(ends), certainty=min(certainties))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,24 +108,18 @@ class Outliner:
         """Finds the hoist in pictures (n, size / 2, size / 2) as `Conditioning.show` gives them, `halved`, spread over
         the film. Returns None where they are fewer than ten or show no upright hoist with cloth beside it.
         """
-        if len(pictures) < _FEWEST:
+        hoist = hoist_of(pictures)
+        if hoist is None or hoist.certainty < CERTAIN or not hoist.upright:
             return None
-        small = pictures[:: -(-len(pictures) // SAMPLE)]
-        network, stills = shipped(), Stills.of(small)
-        maps = torch.cat(list(_maps(network, small[:: -(-len(small) // _LOOKED_AT)], stills)))
-        ends = [_end(logits) for logits in maps[:, 1:].mean(dim=0).double()]
-        if any(end is None for end in ends):
-            return None
-        places = np.stack([end for end in ends if end is not None])
-        across, down = places[1] - places[0]
-        cloth = np.stack([_largest_filled(mask) for mask in (maps[:, 0].sigmoid() > _CLOTH).numpy()])
-        if abs(across) > _UPRIGHT * down or cloth.sum(axis=(1, 2)).mean() < _LEAST * down**2:
+        stills, places = hoist.stills, hoist.ends
+        cloth = np.stack([_largest_filled(mask) for mask in (hoist.logits[:, 0].sigmoid() > _CLOTH).numpy()])
+        if cloth.sum(axis=(1, 2)).mean() < _LEAST * (places[1, 1] - places[0, 1]) ** 2:
             return None
         usual = cloth.mean(axis=0)
         if np.quantile(stills.greatest[usual > 0].astype(int) - stills.least[usual > 0], 0.95) < _MOVES:
             return None
         side = 1.0 if usual.sum(axis=0) @ (np.arange(usual.shape[1]) + 0.5 - places[:, 0].mean()) >= 0 else -1.0
-        return cls(stills=stills, hoist=_lowered(usual > 0.5, places, side), side=side, network=network)
+        return cls(stills=stills, hoist=_lowered(usual > 0.5, places, side), side=side, network=shipped())
 
     def masks(self, pictures: UInt8Array) -> tuple[Masks, FloatArray]:
         """Segments the cloth in pictures (n, size / 2, size / 2), `halved`, that follow one another in the film: the
@@ -116,8 +151,8 @@ def _maps(network: MaskNetwork, small: UInt8Array, stills: Stills) -> Iterator[T
         yield maps
 
 
-def _end(logits: Tensor) -> FloatArray | None:
-    """Locates an end of the hoist: (2,) column and row; None where its position is not certain."""
+def _end(logits: Tensor) -> tuple[FloatArray, float]:
+    """Locates an end of the hoist: (2,) column and row, and the probability that it is near there."""
     shares = logits.flatten().softmax(dim=0).reshape(logits.shape).numpy()
     row, column = np.unravel_index(int(shares.argmax()), shares.shape)
     rows, columns = (
@@ -126,9 +161,8 @@ def _end(logits: Tensor) -> FloatArray | None:
     )
     neighbourhood = shares[np.ix_(rows, columns)]
     total = float(neighbourhood.sum())
-    if total < _CERTAIN:
-        return None
-    return np.array([neighbourhood.sum(axis=0) @ columns, neighbourhood.sum(axis=1) @ rows]) / total + 0.5
+    place = np.array([neighbourhood.sum(axis=0) @ columns, neighbourhood.sum(axis=1) @ rows]) / total + 0.5
+    return place, total
 
 
 def _lowered(usual: Masks, places: FloatArray, side: float) -> FloatArray:

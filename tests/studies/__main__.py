@@ -60,6 +60,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "looks": ("tests.studies.validation.looks", "What lasts of the errors of films' observables."),
             "loop-on-films": ("tests.studies.validation.loop_on_films", "Verdicts on films of other numerics."),
             "measure-windows": ("tests.studies.validation.measure_windows", "Coverage of windows and films."),
+            "no-flag": ("tests.studies.validation.no_flag", "Films of ten kinds without a flag on a pole."),
             "numerics": ("tests.studies.validation.numerics", "What meshes and steps do to a calibration."),
             "object-storage": ("tests.studies.validation.object_storage", "A bucket under kills and faults."),
             "observables": ("tests.studies.validation.observables", "What observables of films are off by."),
