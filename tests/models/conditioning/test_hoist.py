@@ -1,0 +1,56 @@
+"""The edge that cloth is attached to, as the mask network places it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from models.conditioning import conditioning_of, halved
+from models.conditioning.outline import UPRIGHT, Hoist, hoist_of
+from models.conditioning.stills import Stills
+from tests.measure.gate.test_counted import FLAG, drawn
+
+
+def hoist(upper: tuple[float, float], lower: tuple[float, float]) -> Hoist:
+    still = np.zeros((4, 4), np.uint8)
+    return Hoist(
+        stills=Stills(usual=still, least=still, greatest=still),
+        logits=torch.zeros(1, 3, 4, 4),
+        ends=np.array([upper, lower]),
+        certainty=1.0,
+    )
+
+
+def test_a_hoist_stands_where_its_lower_end_is_below_the_upper_one() -> None:
+    leaning = math.degrees(math.atan(UPRIGHT))
+    for angle, upright in ((0.0, True), (leaning - 0.1, True), (leaning + 0.1, False), (90.0, False), (180.0, False)):
+        across, down = math.sin(math.radians(angle)), math.cos(math.radians(angle))
+        for side in (-1, 1):
+            found = hoist((5.0, 5.0), (5.0 + side * 20 * across, 5.0 + 20 * down))
+            assert math.degrees(found.lean) == pytest.approx(angle, abs=1e-6)
+            assert found.upright is upright
+
+
+def test_both_ends_of_a_drawn_flag_s_hoist_are_placed_and_turned_with_the_film() -> None:
+    film = drawn()
+    found = conditioning_of(film, size=300)
+    placed = found.hoist
+    assert placed is not None
+    assert placed.certainty > 0.5
+    x, y, _, height = FLAG
+    step = found.square.side / found.size
+    ends = 2 * step * placed.ends + (found.square.x, found.square.y)
+    np.testing.assert_allclose(ends, [(x, y), (x, y + height)], atol=6)
+    mirrored = conditioning_of(np.ascontiguousarray(film[:, :, ::-1]), size=300).hoist
+    assert mirrored is not None
+    np.testing.assert_allclose(150 - mirrored.ends[:, 0], placed.ends[:, 0], atol=3)
+
+
+def test_few_and_small_pictures_show_no_hoist() -> None:
+    film = drawn()
+    assert conditioning_of(film[:9], size=300).hoist is None
+    assert conditioning_of(film, size=120).hoist is None
+    assert hoist_of(np.stack([halved(frame) for frame in film[:9]])) is None
