@@ -190,6 +190,24 @@ def test_the_refusals_counted_are_those_of_the_sheet() -> None:
     )
 
 
+def test_the_films_in_gusts_counted_are_those_of_the_sheets() -> None:
+    sheets = [sheet(f"validate-wind-series{seed}") for seed in ("", "-seed-3", "-seed-4")]
+    films = sum(one["films"] for one in sheets)
+    opened, stated = (
+        round(sum(one["films"] * one["results"][f"{weight}, series"]["mean_covered"] for one in sheets))
+        for weight in ("open", "stated")
+    )
+    said = " ".join(README.split())
+    assert f"the film's mean in {opened} of {films} films, with the area weight given in {stated}" in said
+
+
+def test_the_films_without_a_flag_counted_are_those_of_the_sheet() -> None:
+    films = sheet("validate-no-flag")["films"]
+    answered = sum(not film["kinds"] for film in films)
+    said = " ".join(README.split())
+    assert f"Of {len(films)} drawn films without a flag on a pole {answered} were answered" in said
+
+
 def test_the_overlapping_flags_counted_are_those_of_the_decision() -> None:
     page = (ROOT / "docs" / "decisions" / "081-a-second-pole-and-turned-films.md").read_text(encoding="utf-8")
     (row,) = re.findall(r"^\| two flags \|.*\|$", page, flags=re.MULTILINE)
