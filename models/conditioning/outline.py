@@ -7,8 +7,10 @@ Both are found by a small network that sees each picture beside what the film sh
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -35,6 +37,8 @@ _BESIDE = (0.05, 0.3)
 """Part of the cloth, in lengths of the hoist from it, whose upper edge is extended to the hoist."""
 _APART = 0.1
 """Greatest distance of where that edge leads from the network's place, in lengths of the hoist."""
+_OFF = 6
+"""Distance from the hoist at which cloth is beside it [px]: nearer, the pole hides it."""
 _LEAST = 0.1
 """Least area of the cloth over the square of its hoist."""
 _MOVES = 5.0
@@ -72,6 +76,33 @@ class Hoist:
         """Whether the lower end is below the upper one, by `UPRIGHT`."""
         across, down = self.ends[1] - self.ends[0]
         return bool(abs(across) <= UPRIGHT * down)
+
+    @property
+    def length(self) -> float:
+        """The distance of its ends down the picture [px]."""
+        return float(self.ends[1, 1] - self.ends[0, 1])
+
+    @cached_property
+    def cloth(self) -> Masks:
+        """(n, rows, columns) where cloth is."""
+        return (self.logits[:, 0].sigmoid() > _CLOTH).numpy()
+
+    @property
+    def side(self) -> float:
+        """1 where the cloth is to the right of it, −1 where it is to the left."""
+        profile = self.cloth.mean(axis=0).sum(axis=0)
+        return 1.0 if profile @ (np.arange(len(profile)) + 0.5 - self.ends[:, 0].mean()) >= 0 else -1.0
+
+    @property
+    def held(self) -> float:
+        """The share of it, over the pictures, that has cloth beside it; 0 where it is less than a pixel long."""
+        (x, y), (across, down) = self.ends[0], self.ends[1] - self.ends[0]
+        rows = np.arange(math.ceil(y), math.floor(y + down))
+        if not len(rows):
+            return 0.0
+        columns = np.floor(x + (rows + 0.5 - y) * across / down + self.side * _OFF).astype(int)
+        inside = (rows >= 0) & (rows < self.cloth.shape[1]) & (columns >= 0) & (columns < self.cloth.shape[2])
+        return float(self.cloth[:, rows[inside], columns[inside]].mean(axis=0).sum() / len(rows))
 
 
 def hoist_of(pictures: UInt8Array) -> Hoist | None:
@@ -112,7 +143,7 @@ class Outliner:
         if hoist is None or hoist.certainty < CERTAIN or not hoist.upright:
             return None
         stills, places = hoist.stills, hoist.ends
-        cloth = np.stack([_largest_filled(mask) for mask in (hoist.logits[:, 0].sigmoid() > _CLOTH).numpy()])
+        cloth = np.stack([_largest_filled(mask) for mask in hoist.cloth])
         if cloth.sum(axis=(1, 2)).mean() < _LEAST * (places[1, 1] - places[0, 1]) ** 2:
             return None
         usual = cloth.mean(axis=0)

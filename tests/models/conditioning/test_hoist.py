@@ -54,3 +54,20 @@ def test_few_and_small_pictures_show_no_hoist() -> None:
     assert conditioning_of(film[:9], size=300).hoist is None
     assert conditioning_of(film, size=120).hoist is None
     assert hoist_of(np.stack([halved(frame) for frame in film[:9]])) is None
+
+
+def test_a_hoist_has_cloth_beside_it_where_the_network_sees_some() -> None:
+    """Of 40 rows of the hoist 30 have cloth to the right of it in one of two pictures, all 40 in the other."""
+    still = np.zeros((60, 60), np.uint8)
+    logits = torch.full((2, 3, 60, 60), -9.0)
+    logits[0, 0, 10:40, 22:50] = logits[1, 0, 10:50, 22:50] = 9.0
+    found = Hoist(
+        stills=Stills(usual=still, least=still, greatest=still),
+        logits=logits,
+        ends=np.array([(20.0, 10.0), (20.0, 50.0)]),
+        certainty=1.0,
+    )
+    assert found.side == 1.0
+    assert found.length == 40.0
+    assert found.held == pytest.approx((30 / 40 + 1) / 2)
+    assert hoist((20.0, 50.0), (20.0, 50.0)).held == 0.0
