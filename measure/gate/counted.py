@@ -53,8 +53,8 @@ what moves, from which on it is a second pole, and of any, from which on it may 
 first was 0.26 at most; the second was 0.30 at most but for upright stripes. Lower refuses flags that now and then sink
 before an upright edge of the background."""
 _HELD = 0.7
-"""Share of the hoist that has cloth beside it, below which nothing is attached to it. Of 69 films of flags the least was
-0.82, of fire, birds and cars beside a post 0.41 to 0.57."""
+"""Share of the hoist that has cloth beside it, below which nothing is attached to it. Of 69 films of flags the least
+was 0.82, of fire, birds and cars beside a post 0.41 to 0.57."""
 _SHORT, _LONG = 0.35, 1.1
 """Heights of the hoist over that of what moves: the places of a flag are as high as its hoist at least, and a limp one
 of 2:1 hangs down by its length too. Of these films it was 0.38 to 0.89, of palms 0.31 and 0.33, of crowds 1.28 and
