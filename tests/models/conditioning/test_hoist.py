@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from models.conditioning import conditioning_of, halved
+from models.conditioning import Stills, conditioning_of, halved
 from models.conditioning.outline import UPRIGHT, Hoist, hoist_of
-from models.conditioning.stills import Stills
 from tests.measure.gate.test_counted import FLAG, drawn
 
 
