@@ -6,17 +6,15 @@ from itertools import islice
 
 import numpy as np
 
-from tests.studies.validation.no_flag import COUNT, HEIGHT, OF_EACH, WIDTH, counts, films, page
+from tests.studies.validation.no_flag import COUNT, HEIGHT, WIDTH, counts, films, page
 
 
 def test_films_follow_from_the_seed_and_half_of_a_kind_have_a_post() -> None:
-    first = list(islice(films(3), OF_EACH))
-    again = next(films(3))
-    other = next(films(4))
-    assert [(kind, post) for kind, post, _ in first] == [("leaves", bool(k % 2)) for k in range(OF_EACH)]
-    assert all(film.shape == (COUNT, HEIGHT, WIDTH) for _, _, film in first)
-    np.testing.assert_array_equal(again[2], first[0][2])
-    assert not np.array_equal(other[2], first[0][2])
+    (kind, post, film), (_, beside, _) = islice(films(3), 2)
+    assert (kind, post, beside) == ("leaves", False, True)
+    assert film.shape == (COUNT, HEIGHT, WIDTH)
+    np.testing.assert_array_equal(next(films(3))[2], film)
+    assert not np.array_equal(next(films(4))[2], film)
 
 
 def test_the_sheet_counts_what_is_refused_and_the_reasons_that_come_first() -> None:
