@@ -14,7 +14,7 @@ from flagdata.findings import Finding, Severity
 from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower
-from models.conditioning.outline import CERTAIN, UPRIGHT
+from models.conditioning.outline import CERTAIN, UPRIGHT, Hoist
 from models.conditioning.standing import Box, Inside, Line
 from models.conditioning.stills import HALVED
 
@@ -237,15 +237,21 @@ def _second(film: _Film) -> Figure | None:
 
 
 def _without_hoist(film: _Film) -> Figure | None:
-    region, hoist = film.conditioning.region, film.conditioning.hoist
-    if region is None or hoist is None:
+    """States what is wrong in the whole film, where nothing is right in a part of it either."""
+    region = film.conditioning.region
+    if region is None:
         return None
+    _, top, _, bottom = film.conditioning.framed_box(region)
+    figures = (_no_flags_hoist(hoist, height=bottom - top) for hoist in film.conditioning.hoists())
+    whole = next(figures, None)
+    return None if whole is None or any(figure is None for figure in figures) else whole
+
+
+def _no_flags_hoist(hoist: Hoist, *, height: float) -> Figure | None:
+    """States what is wrong with a hoist for what moves through so much of the picture [px]."""
     if hoist.certainty < CERTAIN:
-        certainty = _below(hoist.certainty)
-        return (
-            hoist.certainty,
-            f"one of its ends is placed with a certainty of {certainty}, of flags {CERTAIN:.0%} or more",
-        )
+        limits = f"of flags {CERTAIN:.0%} or more"
+        return hoist.certainty, f"one of its ends is placed with a certainty of {_below(hoist.certainty)}, {limits}"
     if not hoist.upright:
         lean, most = math.degrees(hoist.lean), math.degrees(math.atan(UPRIGHT))
         return lean, f"what is most like one leans by {lean:.0f}°, of flags by {most:.0f}° at most"
@@ -254,11 +260,10 @@ def _without_hoist(film: _Film) -> Figure | None:
             hoist.held,
             f"cloth is beside {_below(hoist.held)} of what is most like one, of flags {_HELD:.0%} or more",
         )
-    _, top, _, bottom = film.conditioning.framed_box(region)
-    height = HALVED * hoist.length / (bottom - top)
-    if not _SHORT <= height <= _LONG:
+    share = HALVED * hoist.length / height
+    if not _SHORT <= share <= _LONG:
         limits = f"of flags {_SHORT:g} to {_LONG:g} times"
-        return height, f"what is most like one is {height:.2f} times as high as what moves, {limits}"
+        return share, f"what is most like one is {share:.2f} times as high as what moves, {limits}"
     return None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from flagdata.errors import InputError, UsageError
 from models.conditioning import framing, noise
 from models.conditioning.camera import STILL, WORK, Camera, Transform, by_edges, camera_of, path
 from models.conditioning.framing import Square
-from models.conditioning.outline import Hoist, hoist_of
+from models.conditioning.outline import FEWEST, Hoist, hoist_of
 from models.conditioning.regions import Region, regions_of
 from models.conditioning.standing import Box, Standing
 from models.conditioning.stills import halved
@@ -49,6 +49,8 @@ _BORDER = 2
 """Pixels at the picture's edge in which no edge is looked for: what is padded beyond begins there."""
 _LEAST_SIZE = 150
 """Size of the pictures from which on a hoist is sought, half of the 300 px of the network that places it [px]."""
+_PART, _PARTS = 5.0, 4
+"""Length of the parts of a film in which a hoist is sought at least [s], and their number at most."""
 _AHEAD = 0.1
 """Width of the band about cloth in which no feature of the background is sought, in sizes of the region."""
 
@@ -71,6 +73,7 @@ class Conditioning:
         kept: (size, size) float32 share of each pixel's changes that is noise, 0 to 1.
         path: (n, 2) of the square's centre over the sample [px of the film].
         cut: (n, 4) length at which the cloth moves along each of `whole.SIDES` of the picture, in sizes of the cloth.
+        seconds: between the first and the last frame of the sample; 0 where their times are not known.
         standing: edges that stand still in the square.
         places: (size, size) all places in the square that the cloth visits.
     """
@@ -88,6 +91,7 @@ class Conditioning:
     kept: Float32Array
     path: FloatArray
     cut: FloatArray
+    seconds: float
     standing: Standing
     places: BoolArray
 
@@ -125,13 +129,17 @@ class Conditioning:
             _framed(frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves)
         )
 
-    @cached_property
-    def hoist(self) -> Hoist | None:
-        """The edge that the cloth is attached to; None in a film of fewer than ten frames, and in pictures too small
-        for the network that places it."""
+    def hoists(self) -> Iterator[Hoist]:
+        """Places the edge that the cloth is attached to: in the whole film, and then in each of its parts of `_PART` or
+        more, four at most. None in a film of fewer than ten frames, and in pictures too small for the network that
+        places it. Light, camera and the wind's direction may change in a long film."""
         if self.size < _LEAST_SIZE:
-            return None
-        return hoist_of(np.stack([halved(self._frozen(picture)) for picture in self.framed]))
+            return
+        pictures = np.stack([halved(self._frozen(picture)) for picture in self.framed])
+        parts = min(int(self.seconds / _PART), _PARTS, len(pictures) // FEWEST)
+        for part in (pictures, *(np.array_split(pictures, parts) if parts > 1 else ())):
+            if (hoist := hoist_of(part)) is not None:
+                yield hoist
 
     def _frozen(self, drawn: UInt8Array) -> UInt8Array:
         """Freezes a framed picture (size, size) away from the flag."""
@@ -297,6 +305,7 @@ def conditioning_of(
         kept=np.minimum(_USUAL * level / spread, 1.0).astype(np.float32),
         path=np.stack([_centre(square, transform, scale) for transform in transforms]),
         cut=cut,
+        seconds=0.0 if times is None else float(times[-1] - times[0]),
         standing=Standing.of(stack, _shown(square, size, width=width, height=height), enlarged=size / square.side),
         places=places,
     )

@@ -23,7 +23,7 @@ from models.conditioning.stills import SAMPLE, Stills
 
 _CLOTH = 0.45
 """Probability from which on a place is cloth: on films that were not learned from, the masks' area is then right."""
-_FEWEST = 10
+FEWEST = 10
 """Pictures below which a film shows nothing all the time."""
 _LOOKED_AT = 40
 """Pictures at most in which the hoist is sought."""
@@ -108,7 +108,7 @@ class Hoist:
 def hoist_of(pictures: UInt8Array) -> Hoist | None:
     """Places the hoist in pictures (n, size / 2, size / 2) as `Conditioning.show` gives them, `halved`, spread over the
     film; None where they are fewer than ten."""
-    if len(pictures) < _FEWEST:
+    if len(pictures) < FEWEST:
         return None
     small = pictures[:: -(-len(pictures) // SAMPLE)]
     stills = Stills.of(small)

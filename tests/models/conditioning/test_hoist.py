@@ -36,22 +36,20 @@ def test_a_hoist_stands_where_its_lower_end_is_below_the_upper_one() -> None:
 def test_both_ends_of_a_drawn_flag_s_hoist_are_placed_and_turned_with_the_film() -> None:
     film = drawn()
     found = conditioning_of(film, size=300)
-    placed = found.hoist
-    assert placed is not None
+    (placed,) = found.hoists()
     assert placed.certainty > 0.5
     x, y, _, height = FLAG
     step = found.square.side / found.size
     ends = 2 * step * placed.ends + (found.square.x, found.square.y)
     np.testing.assert_allclose(ends, [(x, y), (x, y + height)], atol=6)
-    mirrored = conditioning_of(np.ascontiguousarray(film[:, :, ::-1]), size=300).hoist
-    assert mirrored is not None
+    (mirrored,) = conditioning_of(np.ascontiguousarray(film[:, :, ::-1]), size=300).hoists()
     np.testing.assert_allclose(150 - mirrored.ends[:, 0], placed.ends[:, 0], atol=3)
 
 
 def test_few_and_small_pictures_show_no_hoist() -> None:
     film = drawn()
-    assert conditioning_of(film[:9], size=300).hoist is None
-    assert conditioning_of(film, size=120).hoist is None
+    assert list(conditioning_of(film[:9], size=300).hoists()) == []
+    assert list(conditioning_of(film, size=120).hoists()) == []
     assert hoist_of(np.stack([halved(frame) for frame in film[:9]])) is None
 
 
@@ -70,3 +68,12 @@ def test_a_hoist_has_cloth_beside_it_where_the_network_sees_some() -> None:
     assert found.length == 40.0
     assert found.held == pytest.approx((30 / 40 + 1) / 2)
     assert hoist((20.0, 50.0), (20.0, 50.0)).held == 0.0
+
+
+def test_a_long_film_is_looked_at_in_parts_too() -> None:
+    film = np.concatenate([drawn(), drawn()])
+    for seconds, hoists in ((9.0, 1), (10.5, 3), (60.0, 5)):
+        times = np.linspace(0, seconds, len(film))
+        assert len(list(conditioning_of(film, size=300, times=times).hoists())) == hoists
+    few = conditioning_of(film[::4], size=300, times=np.linspace(0, 60, 30))
+    assert len(list(few.hoists())) == 1 + 3
