@@ -90,8 +90,7 @@ class Hoist:
     @property
     def side(self) -> float:
         """1 where the cloth is to the right of it, −1 where it is to the left."""
-        profile = self.cloth.mean(axis=0).sum(axis=0)
-        return 1.0 if profile @ (np.arange(len(profile)) + 0.5 - self.ends[:, 0].mean()) >= 0 else -1.0
+        return _side(self.cloth.mean(axis=0), self.ends)
 
     @property
     def held(self) -> float:
@@ -149,7 +148,7 @@ class Outliner:
         usual = cloth.mean(axis=0)
         if np.quantile(stills.greatest[usual > 0].astype(int) - stills.least[usual > 0], 0.95) < _MOVES:
             return None
-        side = 1.0 if usual.sum(axis=0) @ (np.arange(usual.shape[1]) + 0.5 - places[:, 0].mean()) >= 0 else -1.0
+        side = _side(usual, places)
         return cls(stills=stills, hoist=_lowered(usual > 0.5, places, side), side=side, network=shipped())
 
     def masks(self, pictures: UInt8Array) -> tuple[Masks, FloatArray]:
@@ -194,6 +193,11 @@ def _end(logits: Tensor) -> tuple[FloatArray, float]:
     total = float(neighbourhood.sum())
     place = np.array([neighbourhood.sum(axis=0) @ columns, neighbourhood.sum(axis=1) @ rows]) / total + 0.5
     return place, total
+
+
+def _side(usual: FloatArray, ends: FloatArray) -> float:
+    """Returns 1 where cloth (rows, columns), a share of the time, is to the right of a hoist, −1 where to the left."""
+    return 1.0 if usual.sum(axis=0) @ (np.arange(usual.shape[1]) + 0.5 - ends[:, 0].mean()) >= 0 else -1.0
 
 
 def _lowered(usual: Masks, places: FloatArray, side: float) -> FloatArray:

@@ -90,9 +90,13 @@ def answer(path: Path, found: Network, gate: WindowGate, options: Options) -> di
             subject.film, found.estimator, gate=gate, dependence=of_model(found.estimator), options=options
         )
     except FlagdataError as error:
-        kind = next((kind for kind, one in REASONS.items() if error.what.startswith(f"{one.sentence}: ")), error.kind)
-        return {"refused": True, "reasons": [kind], "why": error.what}
+        return {"refused": True, "reasons": [kind_of(error)], "why": error.what}
     return {"refused": measured.verdict.refused, **_reasons(measured), **_quantities(measured)}
+
+
+def kind_of(error: FlagdataError) -> str:
+    """Returns the kind of the reason that an error states, and of any other error its own."""
+    return next((kind for kind, one in REASONS.items() if error.what.startswith(f"{one.sentence}: ")), error.kind)
 
 
 def _reasons(measured: Measurement) -> dict[str, Any]:

@@ -24,10 +24,11 @@ from flagdata.rng import stream
 from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options, measure, of_model
 from measure.film import ConditionedFilm, FlagSize
-from measure.gate import REASONS, WindowGate
+from measure.gate import WindowGate
 from sim.assets import Assets
 from sim.datasets.picture import noisy
 from tests.drawn import no_flag
+from tests.studies.validation.films import kind_of
 
 FIXED = (85, 86)
 """Seeds of the films on which constants were fixed."""
@@ -107,8 +108,7 @@ def judged(pictures: UInt8Array, model: Network, gate: WindowGate) -> dict[str, 
             film, model.estimator, gate=gate, dependence=of_model(model.estimator), options=Options(size=SIZE)
         )
     except RefusedError as error:
-        kinds = [kind for kind, fault in REASONS.items() if error.what.startswith(f"{fault.sentence}: ")]
-        return {"kinds": kinds or [error.kind], "wind": None}
+        return {"kinds": [kind_of(error)], "wind": None}
     if measured.verdict.refused:
         return {"kinds": [reason.kind for reason in measured.verdict.reasons], "wind": None}
     return {"kinds": [], "wind": float(measured.draws[:, measured.names.index("wind_speed")].mean())}
