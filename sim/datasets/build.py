@@ -7,20 +7,21 @@ artifacts and objects as an unbroken one.
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from flagdata.documents import column_json
 from flagdata.errors import ConflictError, RefusedError
-from flagdata.lake import Lake
+from flagdata.lake import Artifact, Lake
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from sim.datasets import jobs
-from sim.datasets.cast import Cast, Roll, casts
+from sim.datasets.cast import IN_PLACE_OF, Cast, Roll, casts, recall_failures
 from sim.datasets.films import PlannedFilm, Sequences
 from sim.datasets.jobs import PutFilm, PutSequences
 from sim.datasets.recipe import DatasetRecipe
@@ -94,6 +95,7 @@ class Build:
         begun = time.perf_counter()
         self._refuse_other_names(self.films(Roll(cast=cast) for cast in casts(self.recipe)))
         rolls = [Roll(cast=cast) for cast in casts(self.recipe)]
+        recall_failures(self.lake, rolls, branch=self.branch)
         in_shard = None if self.shard is None else self.shard.sequences(rolls)
         sequences = self._simulate(rolls, in_shard)
         films = self._film(rolls, in_shard)
@@ -138,18 +140,25 @@ class Build:
     def _simulate_once(self, todo: Sequence[tuple[Roll, list[int]]], advance: Advance) -> None:
         """Simulates all pending members of the rolls once; those that fail are noted on their roll."""
         by_name = {roll.cast.simulation.name: roll for roll, _ in todo}
+        replaced = {name: dict(roll.failed) for name, roll in by_name.items()}
 
         def commit_sequences(results: Sequence[PutSequences]) -> int:
             stored: dict[str, dict[int, Deposited]] = {}
             for done in results:
                 by_name[done.name].failed |= done.failed
                 stored.setdefault(done.name, {}).update(done.stored)
-            return sum(self._commit_sequences(by_name[name], members) for name, members in stored.items() if members)
+            return sum(
+                self._commit_sequences(by_name[name], members, replaced[name])
+                for name, members in stored.items()
+                if members
+            )
 
         self._commit_each(self._batches(todo), commit_sequences, advance)
 
-    def _commit_sequences(self, roll: Roll, stored: Mapping[int, Deposited]) -> int:
-        """Commits sequences that are in the store and returns how many."""
+    def _commit_sequences(self, roll: Roll, stored: Mapping[int, Deposited], replaced: Mapping[int, str]) -> int:
+        """Commits sequences that are in the store and returns how many; their reports name the members `replaced`."""
+        if replaced:
+            stored = {index: (_in_place_of(replaced, row), put) for index, (row, put) in stored.items()}
         committed = commit(self.lake, roll.cast.simulation, stored, branch=self.branch)
         roll.done |= set(stored)
         self._new_sequences += len(committed.added)
@@ -273,3 +282,8 @@ class Build:
         self._new_films += len(films.intersection(transaction.result.added))
         self._healed += len(films.intersection(transaction.result.healed))
         return len(filmed)
+
+
+def _in_place_of(replaced: Mapping[int, str], row: Artifact) -> Artifact:
+    report = column_json(row.report or "{}", "report", artifact=row.id)
+    return replace(row, report=json.dumps({**report, IN_PLACE_OF: replaced}))

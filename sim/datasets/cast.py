@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from flagdata.documents import column_json
 from flagdata.errors import RefusedError
+from flagdata.lake import Lake
 from flagdata.rng import child_seed, stream
 from flagdata.tables import Range
 from sim.datasets.recipe import DatasetRecipe, GroupSpec, SessionSpec, Side
@@ -14,6 +16,9 @@ from sim.run.members import Crew
 from sim.run.publish import member_artifact
 from sim.run.recipe import MaterialSpec
 from sim.run.recipe import Recipe as Simulation
+
+IN_PLACE_OF = "in_place_of"
+"""Entry in the report of a sequence that others failed before: index → why, of the members whose place it takes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,3 +178,19 @@ class Roll:
     def crew(self) -> Crew:
         """The members."""
         return self._crew
+
+
+def recall_failures(lake: Lake, rolls: Sequence[Roll], *, branch: str) -> None:
+    """Notes the members that failed in earlier builds, so that they are not simulated again to fail again.
+
+    The reports of the sequences that took their places name them (`IN_PLACE_OF`).
+
+    Raises:
+        CorruptError: a report that cannot be read.
+    """
+    of = {roll.id(index): roll for roll in rolls for index in roll.candidates}
+    rows = lake.rows({"artifact": list(of)}, at=branch, columns=["artifact", "report"])
+    for artifact, report in zip(rows["artifact"].to_pylist(), rows["report"].to_pylist(), strict=True):
+        if report is not None:
+            failed = column_json(report, "report", artifact=artifact).get(IN_PLACE_OF, {})
+            of[artifact].failed |= {int(index): why for index, why in failed.items()}

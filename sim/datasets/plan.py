@@ -19,7 +19,7 @@ from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, write_meshes
 from flagdata.schema import CLIP_FRAMES
 from flagdata.workload import announced
 from sim.datasets import jobs
-from sim.datasets.cast import Cast, Roll, casts
+from sim.datasets.cast import Cast, Roll, casts, recall_failures
 from sim.datasets.films import Sequences
 from sim.datasets.recipe import DatasetRecipe
 from sim.datasets.shard import Shard
@@ -116,9 +116,10 @@ def plan(
         FlagdataError: the measurement failed, as the build would.
     """
     in_lake: set[str] = set()
+    rolls = [Roll(cast=cast) for cast in casts(recipe)]
     if lake is not None:
         in_lake = set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
-    rolls = [Roll(cast=cast) for cast in casts(recipe)]
+        recall_failures(lake, rolls, branch=branch)
     in_shard = None if shard is None else shard.sequences(rolls)
     films = 0
     frames: dict[str, list[int]] = {side.name: [] for side in recipe.sides}

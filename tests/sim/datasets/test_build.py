@@ -22,6 +22,7 @@ from flagdata.record import Record
 from sim.datasets import DatasetRecipe
 from sim.datasets.build import Build, BuildReport
 from sim.datasets.jobs import PutSequences
+from sim.datasets.plan import length
 from sim.datasets.shard import Shard
 from sim.workers import Job, Scheduled
 from tests.clusters import Cluster
@@ -169,8 +170,12 @@ class FirstFails:
 
     count = 1
 
+    def __init__(self) -> None:
+        self.jobs = 0
+
     def results(self, jobs: Iterable[Job]) -> Iterator[Any]:
         for function, arguments in jobs:
+            self.jobs += 1
             done = function(*arguments)
             if isinstance(done, PutSequences) and 0 in done.stored:
                 others = {index: stored for index, stored in done.stored.items() if index != 0}
@@ -201,6 +206,19 @@ def test_shards_of_which_each_replaces_a_sequence_that_failed_are_the_whole_buil
     assert (report.new_sequences, report.new_films) == (SEQUENCES, FILMS)
     assert len(report.failed) == 3
     assert builds.rows(parts.path) == builds.rows(together.path) == builds.rows(whole.path)
+
+
+def test_a_build_given_again_knows_what_failed_and_simulates_nothing(
+    make: Callable[..., DatasetRecipe], tmp_path: Path
+) -> None:
+    recipe, lake = make(), Lake.create(tmp_path / "lake")
+    first = Build(lake=lake, recipe=recipe, workers=FirstFails(), bars=without_bars).run()
+    assert length(recipe, lake, workers=1) is None
+    workers = FirstFails()
+    again = Build(lake=lake, recipe=recipe, workers=workers, bars=without_bars).run()
+    assert workers.jobs == 0
+    assert again.failed == first.failed
+    assert len(first.failed) == 2
 
 
 def test_shards_of_two_recipes_of_one_name_are_not_mixed_where_they_film_one_flag(
