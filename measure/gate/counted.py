@@ -252,8 +252,8 @@ def _no_flags_hoist(hoist: Hoist, *, height: float) -> Figure | None:
     if hoist.certainty < CERTAIN:
         limits = f"of flags {CERTAIN:.0%} or more"
         return hoist.certainty, f"one of its ends is placed with a certainty of {_below(hoist.certainty)}, {limits}"
-    if not hoist.upright:
-        lean, most = math.degrees(hoist.lean), math.degrees(math.atan(UPRIGHT))
+    if hoist.lean > UPRIGHT:
+        lean, most = math.degrees(hoist.lean), math.degrees(UPRIGHT)
         return lean, f"what is most like one leans by {lean:.0f}°, of flags by {most:.0f}° at most"
     if hoist.held < _HELD:
         return (

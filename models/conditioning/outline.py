@@ -43,8 +43,8 @@ _LEAST = 0.1
 """Least area of the cloth over the square of its hoist."""
 _MOVES = 5.0
 """Gray levels over which the twentieth part of the cloth that changes most changes at least."""
-UPRIGHT = 0.35
-"""Greatest offset of the hoist's ends along the picture's rows, over their distance along its columns."""
+UPRIGHT = math.atan(0.35)
+"""Greatest lean of an upright hoist [rad]."""
 
 Masks = BoolArray
 
@@ -70,12 +70,6 @@ class Hoist:
         """The angle between the hoist, from its upper to its lower end, and the downright [rad], 0 to π."""
         across, down = self.ends[1] - self.ends[0]
         return float(np.arctan2(abs(across), down))
-
-    @property
-    def upright(self) -> bool:
-        """Whether the lower end is below the upper one, by `UPRIGHT`."""
-        across, down = self.ends[1] - self.ends[0]
-        return bool(abs(across) <= UPRIGHT * down)
 
     @property
     def length(self) -> float:
@@ -139,7 +133,7 @@ class Outliner:
         the film. Returns None where they are fewer than ten or show no upright hoist with cloth beside it.
         """
         hoist = hoist_of(pictures)
-        if hoist is None or hoist.certainty < CERTAIN or not hoist.upright:
+        if hoist is None or hoist.certainty < CERTAIN or hoist.lean > UPRIGHT:
             return None
         stills, places = hoist.stills, hoist.ends
         cloth = np.stack([_largest_filled(mask) for mask in hoist.cloth])
