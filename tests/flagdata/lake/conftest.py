@@ -14,16 +14,24 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, locks
 from flagdata.schema import Kind
 from flagdata.storage import Place
 
 AGES = "it sets the age of files, which a store gives them itself"
 LINKS = "a bucket has no links, pipes and permissions of files"
-LOCKS = "a bucket has no locks of the kernel; `test_object_storage.py` has those that it has instead"
+LOCKS = "a bucket has no locks of the kernel; `test_leases_in_a_bucket.py` has those that it has instead"
 """Why a test is marked `disk`."""
 _WORKER = Path(__file__).with_name("ingest_worker.py")
 _ENDS = {"done", "failed", "killed"}
+
+
+def dead_owner() -> dict[str, object]:
+    """What a process of this machine noted that has ended."""
+    with subprocess.Popen(["sleep", "60"]) as process:
+        started = locks._started(process.pid)
+        process.kill()
+    return {**locks.owner(), "pid": process.pid, "started": started}
 
 
 def put_text(lake: Lake, text: str, *, branch: str = "main", parents: tuple[str, ...] = ()) -> Artifact:
