@@ -213,8 +213,9 @@ class FilmAnswer:
             or self.options.area_weight is not None
         ):
             return None
-        ends = np.quantile(draws[:, self.names.index(WEIGHT)], _LIGHT_AND_HEAVY)
-        weights = [float(f"{end:.2g}") for end in ends]
+        column = self.names.index(WEIGHT)
+        ends = np.quantile(draws[:, column], _LIGHT_AND_HEAVY)
+        weights = [float(np.clip(float(f"{end:.2g}"), *self.assumed[column])) for end in ends]
         winds = []
         for weight in weights:
             at_weight = replace(self, options=replace(self.options, area_weight=Stated.of(weight)))
@@ -230,7 +231,7 @@ class FilmAnswer:
         if abs(winds[1] - winds[0]) < _MATTERS * (wind.span.high - wind.span.low):
             return None
         light, heavy = (
-            f"at {weight:g} kg/m² {wind_speed:.1f} m/s" for weight, wind_speed in zip(weights, winds, strict=True)
+            f"at {weight:.2g} kg/m² {wind_speed:.1f} m/s" for weight, wind_speed in zip(weights, winds, strict=True)
         )
         return Finding.of(
             "weight-open",

@@ -18,7 +18,7 @@ from flagdata.rng import child_seed, stream
 from measure.estimate.answer import Quantity, sentence
 from measure.estimate.combine import OWN, Dependence
 from measure.estimate.gusts import Gusts, SeriesErrors, errors_of_model
-from measure.estimate.joint import DRAWS, WIND, Among, FilmAnswer, Look, WindowAnswer
+from measure.estimate.joint import DRAWS, WEIGHT, WIND, Among, FilmAnswer, Look, WindowAnswer
 from measure.estimate.options import Options
 from measure.film.similarity import RATE_SLACK, Sizes, Trained, length_first, sizes, trained_on
 from measure.film.windows import Window, WindowLayout, WindowReader, findings_of
@@ -27,7 +27,7 @@ from measure.gate.verdict import Reason, Verdict, verdict
 from measure.gate.window import WindowGate
 from models.estimator import Estimator
 from models.learner import Loss
-from models.targets import Cloth
+from models.targets import ASPECT, Cloth
 
 CONTRADICTION = 1 / 150
 """Bayes factor of the area weight that was stated, below which a warning is due: very strong evidence against it (Kass
@@ -237,7 +237,7 @@ def measure(
         windows=windows,
         combined=len(used),
         dependence=dependence,
-        gusts=None if intensity is None else Gusts.of(intensity, level=options.level, windows=len(counted)),
+        gusts=None if intensity is None else Gusts.of(intensity, level=options.level, windows=len(used)),
         verdict=gate_verdict,
         sizes=sizes_kept,
         summary=middle.summaries[gate_verdict.size],
@@ -246,7 +246,14 @@ def measure(
             *of_film,
             *sizes_kept.findings,
             *of_reading,
-            *_about_windows(kept_looks, gate_verdict, used, dependence, errors=None if among is None else errors),
+            *_about_windows(
+                kept_looks,
+                gate_verdict,
+                used,
+                dependence,
+                errors=None if among is None else errors,
+                stated=tuple(options.stated(model)),
+            ),
             *([] if apart is None or len(used) < 2 else [apart]),
         ),
         bounds=(*_at_ends(quantities, windows), *([] if open_weight is None else [open_weight])),
@@ -278,6 +285,26 @@ def _look(window: Window, gate: WindowGate, joint: FilmAnswer) -> Look:
 def _of_flags(finding: Finding) -> bool:
     """Returns whether it is a fault of flags only."""
     return finding.kind in REASONS and REASONS[finding.kind].of_flags
+
+
+def _contradicted(stated: Sequence[str], factor: float) -> Finding:
+    """Reports that the film speaks against what the user gave, by this Bayes factor."""
+    shape = "shape of the flag by its size"
+    if WEIGHT not in stated:
+        kind, given, fix = "flag-size-contradicted", f"the {shape}, which was given, makes", "check --flag-size"
+    elif ASPECT in stated:
+        kind, given = "area-weight-contradicted", f"the area weight and the {shape}, which were given, make"
+        fix = "check --area-weight and --flag-size"
+    else:
+        kind, given = "area-weight-contradicted", "the area weight that was given makes"
+        fix = "check --area-weight and --flag-size"
+    return Finding.of(
+        kind,
+        f"{given} the film much less probable (Bayes factor {factor:.2g}): either that is wrong, or the model errs on "
+        "this film",
+        value=factor,
+        fix=fix,
+    )
 
 
 def _few_windows(gate_verdict: Verdict, layout: WindowLayout) -> Reason | None:
@@ -376,24 +403,18 @@ def _about_windows(
     dependence: Dependence,
     *,
     errors: SeriesErrors | None,
+    stated: Sequence[str],
 ) -> list[Finding]:
     """Reports what is to be said of the windows.
 
     Args:
         errors: of the model in the series of windows; None where they are not one.
+        stated: names of the quantities that the user gave.
     """
     findings = []
     factor = float(np.median([np.exp(look.log_factor).mean() for look in looks]))
     if factor < CONTRADICTION:
-        findings.append(
-            Finding.of(
-                "area-weight-contradicted",
-                f"the area weight that was given makes the film much less probable (Bayes factor {factor:.2g}): "
-                "either it is wrong, or the flag's size is, or the model errs on this film",
-                value=factor,
-                fix="check --area-weight and --flag-size",
-            )
-        )
+        findings.append(_contradicted(stated, factor))
     excluded = float(np.isneginf(looks[0].log_factor).mean())
     if excluded > EXCLUDED:
         findings.append(

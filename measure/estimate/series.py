@@ -40,6 +40,10 @@ _SEARCHED = 30.0  # s either way
 _SHORTEST_DELAY = 120.0  # s that film and anemometer must share
 _RESPONSE = (0.0, 0.3)  # s: the network's windows are centred; the flag follows the wind by about L/U, of either sign
 _RESAMPLES = 1000
+_BLOCK = 12.0
+"""Time over which windows are resampled together [s]: ten windows of a flag of 1.5 m. Neighbours err alike."""
+_FEWEST = 5
+"""Blocks below which the RMSE has no interval: resampling two or three says nothing of how it scatters."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +55,7 @@ class Agreement:
         bounded: of these, windows with a bound instead of a value.
         bias: mean difference of the others [m/s]; None where there are none.
         rmse: root mean square of the same [m/s], likewise.
-        interval: 90 % of the RMSE, by resampling blocks of ten windows [m/s], likewise.
+        interval: 90 % of the RMSE, by resampling blocks of `_BLOCK` [m/s]; None where there are fewer than `_FEWEST`.
         covered: share of all windows compared whose interval contains the reference.
     """
 
@@ -68,10 +72,13 @@ class Agreement:
         covered = f"the intervals contain {self.covered:.0%} of it, n = {self.count} windows"
         if self.bounded:
             covered += f", of which {self.bounded} give a bound and no value"
-        if self.bias is None or self.rmse is None or self.interval is None:
+        if self.bias is None or self.rmse is None:
             return covered
+        errors = f"bias {self.bias:+.2f} m/s, RMSE {self.rmse:.2f} m/s"
+        if self.interval is None:
+            return f"{errors} (without an interval: too few windows), {covered}"
         low, high = self.interval
-        return f"bias {self.bias:+.2f} m/s, RMSE {self.rmse:.2f} m/s [{low:.2f}, {high:.2f}] 90 %, {covered}"
+        return f"{errors} [{low:.2f}, {high:.2f}] 90 %, {covered}"
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
@@ -250,7 +257,8 @@ def agreement(series: Beside, reference: FloatArray, *, seed: int) -> Agreement 
     count = int(covered.sum())
     if not count:
         return None
-    off = (series.wind - reference)[covered & np.isfinite(series.wind)]
+    both = covered & np.isfinite(series.wind)
+    off = (series.wind - reference)[both]
     inside = (series.low[covered] <= reference[covered]) & (reference[covered] <= series.high[covered])
     valued = bool(len(off))
     return Agreement(
@@ -258,16 +266,20 @@ def agreement(series: Beside, reference: FloatArray, *, seed: int) -> Agreement 
         bounded=count - len(off),
         bias=float(off.mean()) if valued else None,
         rmse=float(np.sqrt(np.mean(off**2))) if valued else None,
-        interval=_rmse_interval(off, seed) if valued else None,
+        interval=_rmse_interval(off, series.time[both], seed),
         covered=float(inside.mean()),
     )
 
 
-def _rmse_interval(off: FloatArray, seed: int) -> tuple[float, float]:
-    """Computes the RMSE's 90 % interval by resampling blocks of ten windows: neighbours err alike."""
-    blocks = np.array_split(np.square(off), max(1, len(off) // 10))
-    sums, sizes = np.array([block.sum() for block in blocks]), np.array([len(block) for block in blocks])
-    drawn = stream(seed, "agreement").integers(len(blocks), size=(_RESAMPLES, len(blocks)))
+def _rmse_interval(off: FloatArray, time: FloatArray, seed: int) -> tuple[float, float] | None:
+    """Computes the RMSE's 90 % interval by resampling blocks of windows; None of too few."""
+    if not len(off):
+        return None
+    _, block = np.unique(np.floor((time - time[0]) / _BLOCK), return_inverse=True)
+    sums, sizes = np.bincount(block, weights=np.square(off)), np.bincount(block)
+    if len(sums) < _FEWEST:
+        return None
+    drawn = stream(seed, "agreement").integers(len(sums), size=(_RESAMPLES, len(sums)))
     values = np.sqrt(sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1))
     low, high = np.quantile(values, [0.05, 0.95])
     return float(low), float(high)

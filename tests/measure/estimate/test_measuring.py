@@ -21,7 +21,7 @@ from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.film_array import Frames
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed
-from flagdata.stated import parse
+from flagdata.stated import Stated, parse
 from measure.commands.measure import _Done, _report
 from measure.ends import Bound
 from measure.estimate import DRAWS, Dependence, Measurement, Options, beside, measure
@@ -250,6 +250,57 @@ def test_a_flags_aspect_is_known_from_its_size_by_a_model_that_estimates_it(tmp_
     assert weighed.quantities[1].value == 0.12
     assert weighed.quantities[2].span.high <= np.log(1.56) + 0.01
     assert not measured(even(2 * FRAMES), aspects, size=None, first=0.0, last=0.6).quantities[2].given
+
+
+class Light(Ambiguous):
+    """As it, of a cloth near the light end of what the model knows."""
+
+    def posterior(self, embeddings: Sequence[Tensor]) -> Mixture:
+        found = super().posterior(embeddings)
+        location = found.location.clone()
+        location[..., 1] = -4.7
+        return replace(found, location=location)
+
+
+def test_an_open_weight_near_the_light_end_of_the_range_is_answered_within_the_range(model: Estimator) -> None:
+    """Of a flag of 1 m the model knows 0.0667 to 0.1133 kg/m²; the light cloth of two digits would be one of 0.066."""
+    values = {field.name: getattr(model, field.name) for field in fields(model)}
+    light = Light(**{**values, "card": {**model.card, "spread": 1.0}})
+    found = measured(even(4 * FRAMES, rate=2 * RATE), light, size=FlagSize(length=1.0, height=0.667))
+    (finding,) = [one for one in found.bounds if one.kind == "weight-open"]
+    assert "at 0.067 kg/m²" in finding.what
+
+
+class Longer(Estimator):
+    """A model that takes every flag for one twice as long as high."""
+
+    def posterior(self, embeddings: Sequence[Tensor]) -> Mixture:
+        found = super().posterior(embeddings)
+        learned = self.learners[0].scaling.learned(torch.tensor([[4.0, 0.12, math.log(1.95)]], dtype=torch.float64))
+        deviations = torch.full((3,), 0.1, dtype=torch.float64)
+        return Mixture(
+            log_weight=found.log_weight,
+            location=learned.double().expand_as(found.location),
+            factor=torch.diag(deviations).expand_as(found.factor),
+        )
+
+
+def test_what_the_film_speaks_against_is_what_was_given(tmp_path: Path) -> None:
+    aspects = estimator.load(written(tmp_path / "aspects", ("wind_speed", "area_weight", "log_aspect")))
+    longer = Longer(**{field.name: getattr(aspects, field.name) for field in fields(aspects)})
+    film = even(2 * FRAMES)
+
+    def contradicted(area_weight: Stated | None) -> Finding:
+        found = measured(film, longer, size=FlagSize(length=1.5, height=1.5), area_weight=area_weight)
+        (finding,) = [one for one in found.findings if one.kind.endswith("contradicted")]
+        return finding
+
+    shape = contradicted(None)
+    assert shape.kind == "flag-size-contradicted"
+    assert "area weight" not in shape.what
+    both = contradicted(parse("0.12"))
+    assert both.kind == "area-weight-contradicted"
+    assert "the area weight and the shape of the flag by its size, which were given, make the film" in both.what
 
 
 def test_a_weight_that_makes_the_film_improbable_is_called_a_contradiction(model: Estimator) -> None:

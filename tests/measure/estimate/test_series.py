@@ -76,6 +76,24 @@ def test_bias_and_rmse_are_those_that_were_put_in(model: Estimator) -> None:
     assert agreement(found, np.full(100, np.nan), seed=0) is None
 
 
+def test_the_rmse_of_few_windows_has_no_interval_and_that_of_many_has_one_about_it(model: Estimator) -> None:
+    """Windows of 1.2 s without a gap: five blocks of 12 s are 50 of them."""
+    off = np.random.default_rng(2).normal(0.0, 0.5, 200)
+    wind = gusts(200)
+    for count, known in ((15, False), (40, False), (50, True), (200, True)):
+        found = beside(saying(model, (wind + off)[:count], step=1.2), start=START, wind=None)
+        agreed = agreement(found, wind[:count], seed=0)
+        assert agreed is not None
+        assert agreed.rmse is not None
+        assert (agreed.interval is not None) is known
+        assert ("without an interval" in agreed.sentence) is not known
+        if agreed.interval is not None:
+            assert agreed.interval[0] < agreed.rmse < agreed.interval[1]
+    # 200 errors of 0.5 m/s: the RMSE scatters by 0.5 / √400 = 0.025 m/s, its interval is 3.3 times as wide.
+    assert agreed.interval is not None
+    assert agreed.interval[1] - agreed.interval[0] == pytest.approx(3.29 * 0.025, rel=0.4)
+
+
 def test_windows_with_a_bound_count_where_intervals_are_compared_and_among_no_errors(model: Estimator) -> None:
     """Every second wind is 12 m/s, of which the model knows that it is 9.4 m/s or more; the others are read 0.3 m/s too
     high."""
