@@ -19,7 +19,8 @@ from flagdata.rng import stream
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 from models.estimator import Estimator
-from models.training.conditioned import FitFilm
+from models.frontend import FrontEnd
+from models.training.conditioned import LEAST_RATE, FitFilm
 
 COMPARED = 48
 """Clips of the lake that are looked at, drawn at random: each costs a third of a second, most of it conditioning."""
@@ -62,29 +63,39 @@ def nearest(
         without: the recording whose clips are left out, that of the film itself; None for none.
         advance: called after each clip with how many there are and 1.
     """
-    count = model.front_end.frames
-    long_enough = pc.field("seed").is_valid() & (pc.field("frame_count") >= count)
-    clips = lake.rows({"kind": Kind.CLIP}, at=at).filter(long_enough)
+    clips = lake.rows({"kind": Kind.CLIP}, at=at).filter(pc.field("seed").is_valid())
     columns = ["artifact", "name", "object", "frame_first", "recording"]
     rows = [row for row in clips.select(columns).to_pylist() if row["recording"] != without]
     chosen = stream(seed, "nearest").permutation(len(rows))[:COMPARED].tolist()
     whitening = np.eye(len(summary)) if model.cloud is None else model.cloud.whitening
     neighbours: list[Neighbour] = []
+    compared = 0
     for index in chosen:
         row = rows[index]
         record = Record.open(lake.record_place(row["object"]))
-        first = row["frame_first"]
-        times = record.times(first, count)
-        times = (times - times[0]) / NANOSECONDS
-        frames = FitFilm.of(record.frames(first, count), times).frames
-        embedding = model.summaries(model.inputs(frames[None]))[0].cpu().numpy()
-        distance = float(np.linalg.norm(whitening @ (embedding.astype(np.float64) - summary)))
-        neighbours.append(
-            Neighbour(
+        frames = _clip(record, row["frame_first"], model.front_end)
+        if frames is not None:
+            compared += 1
+            embedding = model.summaries(model.inputs(frames[None]))[0].cpu().numpy()
+            distance = float(np.linalg.norm(whitening @ (embedding.astype(np.float64) - summary)))
+            found = Neighbour(
                 artifact=row["artifact"], name=row["name"], frames=frames, distance=distance, known=record.truth or {}
             )
-        )
-        neighbours = sorted(neighbours, key=lambda neighbour: neighbour.distance)[:SHOWN]
+            neighbours = sorted([*neighbours, found], key=lambda neighbour: neighbour.distance)[:SHOWN]
         if advance is not None:
             advance(len(chosen), 1)
-    return tuple(neighbours), len(chosen)
+    return tuple(neighbours), compared
+
+
+def _clip(record: Record, first: int, front_end: FrontEnd) -> UInt8Array | None:
+    """Conditions the clip that a front end takes from a frame of a record on, or from as early as the film has to be
+    entered; None where the film is shorter or slower than that."""
+    times = (record.frame_times - record.frame_times[0]) / NANOSECONDS
+    lasting = (front_end.frames - 1) / front_end.rate
+    latest = int(np.searchsorted(times, times[-1] - lasting + 1e-6, side="right")) - 1
+    if latest < 0 or len(times) - 1 < LEAST_RATE * front_end.rate * times[-1]:
+        return None
+    begin = min(first, latest)
+    end = min(int(np.searchsorted(times, times[begin] + lasting)) + 1, len(times))
+    film = FitFilm.of(record.frames(begin, end - begin), times[begin:end])
+    return film.clip(0, front_end.frames, front_end.rate)[0]

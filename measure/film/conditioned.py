@@ -28,8 +28,6 @@ from models.conditioning.regions import MOMENT
 from models.conditioning.repeats import TimedFrame
 from models.conditioning.whole import CUT, SIDES
 
-_ENOUGH = 1.5
-"""Time [s] with the whole flag, in one piece, that a film must have for the rest to be left out: more than a window."""
 _REPORTED = 0.05
 """Share of the film in which the flag is cut off, from which on it is reported."""
 
@@ -41,15 +39,12 @@ class CutOff:
     Attributes:
         times: (n,) of a sample of the film's frames [s].
         cut: (n, 4) whether the edge on each of `SIDES` cuts the flag off.
+        enough: time with the whole flag, in one piece, that a film must have for the rest to be left out [s].
     """
 
     times: FloatArray
     cut: BoolArray
-
-    @classmethod
-    def of(cls, conditioning: Conditioning, times: FloatArray) -> CutOff:
-        """Builds it from what was found in the sample of frames of these times."""
-        return cls(times=times, cut=conditioning.cut > CUT)
+    enough: float
 
     @cached_property
     def any(self) -> BoolArray:
@@ -59,14 +54,13 @@ class CutOff:
     @cached_property
     def partly(self) -> bool:
         """Whether the film is cut off in a part and whole for long enough in another."""
-        return bool(self.any.any()) and self._longest >= _ENOUGH
+        return bool(self.any.any()) and self._longest >= self.enough
 
     @property
     def _longest(self) -> float:
-        """Longest time between two frames that are cut off [s]."""
-        ends = self.times[self.any]
-        edges = np.concatenate([self.times[:1], ends, self.times[-1:]])
-        return float(np.diff(edges).max())
+        """Longest time from the first to the last of frames in a row that are whole [s]; 0 without any."""
+        whole = np.split(np.arange(len(self.times)), np.flatnonzero(np.diff(self.any)) + 1)
+        return max((float(np.ptp(self.times[run])) for run in whole if not self.any[run[0]]), default=0.0)
 
     def left_out(self, time: float) -> bool:
         """Returns whether the frame of a time [s] is: next to a frame of the sample that is cut off."""
@@ -133,6 +127,8 @@ class ConditionedFilm:
     Attributes:
         found: what the last reading found; None before the first, and of fewer frames than a search takes.
         reference: (height, width) the frame that all others are registered to; None likewise.
+        piece: time with the whole flag, in one piece, that is enough where the rest is cut off [s]: two windows of a
+            flag of 1.5 m, unless a reader of other windows sets it.
         searched: called after each frame in which camera and flag are sought, with about how many there are and 1.
 
     Raises:
@@ -154,6 +150,7 @@ class ConditionedFilm:
         self._cut: CutOff | None = None
         self.found: Conditioning | None = None
         self.reference: UInt8Array | None = None
+        self.piece = 2.4
         self.searched: Callable[[int, int], None] | None = None
 
     @property
@@ -201,7 +198,8 @@ class ConditionedFilm:
             within=self._within(pictures[0].shape),
         )
         self.reference = pictures[len(pictures) // 2]
-        self._cut = cut = CutOff.of(self.found, np.array([time for time, _ in sample]))
+        times = np.array([time for time, _ in sample])
+        self._cut = cut = CutOff(times=times, cut=self.found.cut > CUT, enough=self.piece)
         del sample, pictures
         self._follower, self._watch = follower, watch = Follower(self.found), FilmWatch(rate=self.rate)
         for time, picture in source:

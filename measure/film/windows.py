@@ -18,6 +18,7 @@ from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.film import Film
 from flagdata.findings import Finding
+from measure.film.conditioned import ConditionedFilm
 from measure.film.similarity import spacing
 from models.conditioning.grain import grained
 from models.conditioning.instants import Interpolator, TimedFrame, at_instants
@@ -105,7 +106,8 @@ def lay_out(
         first, last: the part of the film to use [s]; by default all.
 
     Raises:
-        UsageError: a part that the film does not have, or a step that is not above 0 or longer than the part.
+        UsageError: a part that the film does not have, or a step that is not above 0, shorter than the time between two
+            frames or longer than the part.
         InputError: the film is shorter than one window.
     """
     begin, end = first if first is not None else 0.0, last if last is not None else duration
@@ -118,6 +120,12 @@ def lay_out(
     if step is not None and not step > 0:
         raise UsageError(
             f"the time between windows is {step:g} s", where="--windows", fix="give a time above 0, as in 1.2s"
+        )
+    if step is not None and step * rate < 1 - 1e-6:
+        raise UsageError(
+            f"the time between windows is {step:g} s, and that between the film's frames {1 / rate:.3g} s",
+            where="--windows",
+            fix=f"give {1 / rate:.3g} s or more, so that each window begins on a frame of its own",
         )
     if step is not None and step > min(end, duration) - begin:
         raise UsageError(
@@ -180,6 +188,8 @@ class WindowReader:
             first=first,
             last=last,
         )
+        if isinstance(film, ConditionedFilm):
+            film.piece = self.layout.length + self.layout.step  # wherever it begins, a window lies in it
         self.lacks: dict[float, str] = {}
         self.look: Callable[[float, UInt8Array], object] | None = None
         margin = 2 * self.layout.period

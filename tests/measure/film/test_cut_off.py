@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,17 +12,18 @@ from flagdata.arrays import UInt8Array
 from flagdata.film_array import Frames
 from measure.film import ConditionedFilm
 from measure.film.conditioned import CutOff
+from measure.film.windows import WindowReader
 from tests.measure.estimate.conftest import RATE
 from tests.models.conditioning.test_conditioning import WIDTH, Drawn
 
 TIMES = np.arange(40) / 10
 
 
-def cut(*frames: int) -> CutOff:
+def cut(*frames: int, enough: float = 1.5) -> CutOff:
     """A sample at 10 Hz whose right edge cuts the flag off in these frames."""
     found = np.zeros((len(TIMES), 4), bool)
     found[list(frames), 2] = True
-    return CutOff(times=TIMES, cut=found)
+    return CutOff(times=TIMES, cut=found, enough=enough)
 
 
 def test_a_film_is_left_out_where_it_is_cut_off_if_the_rest_is_long_enough() -> None:
@@ -31,6 +35,25 @@ def test_a_film_is_left_out_where_it_is_cut_off_if_the_rest_is_long_enough() -> 
     (finding,) = partly.findings()
     assert "the right edge in 25%" in finding.what
     assert "left out" in finding.what
+
+
+def test_a_piece_that_is_shorter_than_what_is_needed_does_not_leave_the_rest_out() -> None:
+    """Frames 20 to 39 are whole, 1.9 s."""
+    assert cut(*range(10, 20), enough=1.9).partly
+    short = cut(*range(10, 20), enough=2.0)
+    assert not short.partly
+    assert not short.left_out(1.5)
+    assert not cut(*range(40), enough=0.1).partly
+
+
+@pytest.mark.parametrize(("scale", "step"), [(1.0, None), (4.0, None), (1.0, 3.0)])
+def test_the_piece_that_windows_need_holds_one_wherever_it_begins(scale: float, step: float | None) -> None:
+    model: Any = SimpleNamespace(front_end=SimpleNamespace(rate=25.0, frames=30))
+    film = ConditionedFilm(Frames(time=np.arange(500) / RATE, images=np.zeros((500, 8, 8), np.uint8)))
+    layout = WindowReader(film, model, [scale], step=step).layout
+    starts = np.array([layout.start(index) for index in range(layout.count)])
+    for begin in np.linspace(0.0, 2 * layout.step, 50):
+        assert ((starts >= begin) & (starts + layout.length <= begin + film.piece + 1e-9)).any()
 
 
 def test_a_film_that_is_cut_off_all_the_time_keeps_its_frames_and_says_so() -> None:

@@ -151,6 +151,13 @@ def test_windows_further_apart_than_the_film_is_long_are_refused() -> None:
     assert lay_out(frames=5, spacings=(0.04,), rate=25.0, duration=4.0, step=4.0).count == 1
 
 
+def test_windows_nearer_than_the_films_frames_are_refused() -> None:
+    for step in (0.02, 0.039):
+        with pytest.raises(UsageError, match=r"and that between the film's frames 0\.04 s"):
+            lay_out(frames=5, spacings=(0.04,), rate=25.0, duration=4.0, step=step)
+    assert lay_out(frames=5, spacings=(0.04,), rate=25.0, duration=4.0, step=0.04).count > 90
+
+
 class Filmed:
     """A film of numbered frames at a rate."""
 
