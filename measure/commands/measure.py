@@ -44,7 +44,7 @@ class MeasureCommand(AsJson, Measuring, Keeping):
         metavar="EXPR",
     )
     refine: int | None = option(
-        "Refine the first window by N simulated clips, 20 or more; 50 take minutes.",
+        "Refine the first window that counts by N simulated clips, 20 or more; 50 take minutes.",
         default=None,
         section=HOW,
         type=click.IntRange(min=20),

@@ -23,7 +23,7 @@ from measure.estimate.options import Options
 from measure.film.similarity import RATE_SLACK, Sizes, Trained, length_first, sizes, trained_on
 from measure.film.windows import Window, WindowLayout, WindowReader, findings_of
 from measure.gate.reasons import REASONS
-from measure.gate.verdict import Reason, Verdict, verdict
+from measure.gate.verdict import Reason, Verdict, verdict, window_rate
 from measure.gate.window import WindowGate
 from models.estimator import Estimator
 from models.learner import Loss
@@ -65,7 +65,7 @@ class Measurement:
         verdict: of the gate.
         sizes: of flags at which the gate does not refuse it; all that were considered where it is refused.
         summary: (dimension,) of the window of median p.
-        clip: (frames, height, width) of the first window, at the size at which the film is least strange.
+        clip: (frames, height, width) of the first window that counts, at the size at which the film is least strange.
         findings: on film, size and windows.
         bounds: why quantities are bounded on one side only, and how the wind depends on a weight that is open: parts
             of the answer.
@@ -169,12 +169,14 @@ def measure(
     layout, distinct = reader.layout, reader.distinct
     # The network and the gate look at every window, at every size.
     looks: list[Look] = []
-    clips: UInt8Array | None = None  # of the first window, or of the first with something to measure
-    interpolated = 0
+    clips: UInt8Array | None = None  # of the first window that counts, else of the first with something to measure
+    interpolated, best = 0, -1
+    familiar = window_rate(layout.count, options.false_alarm)
     for window in reader.windows(advance):
         look = _look(window, gate, joint)
-        if clips is None or (all(earlier.blank for earlier in looks) and not look.blank):
-            clips = window.clips
+        fitness = 0 if look.blank else 1 + any((reasons[0].p or 0.0) > familiar for reasons in look.reasons)
+        if fitness > best:
+            clips, best = window.clips, fitness
         looks.append(look)
         interpolated += window.interpolated
     # The gate judges the film; sizes at which it is unlike the training are dropped.

@@ -25,7 +25,7 @@ from models.targets import ASPECT, Cloth
 def refined(
     measured: Measurement, subject: Subject, model: Estimator, *, budget: int, cache: Path | None
 ) -> Refinement:
-    """Refines the first window of a film of a flag whose size is known.
+    """Refines the first window that counts of a film of a flag whose size is known.
 
     Where the film's record states how it was simulated and filmed, the simulated clips are filmed likewise. Both are
     conditioned after that, so it does not matter which square of the picture is judged.
@@ -79,6 +79,7 @@ def scaled(refinement: Refinement, s: float) -> Refinement:
         amortised=_all_scaled(refinement.amortised, s),
         bending=refinement.bending * s**4,
         rounds=tuple(replace(round_, intervals=_all_scaled(round_.intervals, s)) for round_ in refinement.rounds),
+        scale=s,
     )
 
 

@@ -113,6 +113,7 @@ class Refinement:
         seconds: by stage: "simulate", "render", "embed", "infer".
         findings: what is to be kept in mind.
         seed: of all random streams.
+        scale: size of the targets' flag over that of the simulated ones, whose winds are √scale times less.
     """
 
     targets: tuple[Target, ...]
@@ -130,6 +131,7 @@ class Refinement:
     seconds: dict[str, float]
     findings: tuple[Finding, ...]
     seed: int
+    scale: float = 1.0
 
     @property
     def evaluations(self) -> int:

@@ -5,6 +5,7 @@ Pictures of a refinement, as in the paper's figures: the trace, and the target b
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -33,7 +34,7 @@ class Shown:
     Attributes:
         step: evaluations before it; the nearest of those so far is shown.
         frame: (height, width) uint8; None where its simulation failed.
-        wind: it was simulated with [m/s].
+        wind: it was simulated with, of a flag of the simulated size [m/s].
         distance: of its clip to the target, squared.
     """
 
@@ -69,16 +70,16 @@ def trace_picture(refinement: Refinement, clip: int = 0) -> str:
     distance_axes.axhline(refinement.floor, color=_TARGET, linewidth=1.0, linestyle="--", label="noise floor")
     distance_axes.set(xlabel="evaluations", ylabel="squared distance to the target")
     distance_axes.legend(fontsize=8)
-    space = refinement.evaluators[clip].simulator.space
-    wind_axes.plot(
-        number, space.values(trace.points)[:, WIND_COLUMN], ".", color=_OTHER, markersize=4, label="evaluated"
-    )
+    space, root = refinement.evaluators[clip].simulator.space, math.sqrt(refinement.scale)
+    least, most = root * space.wind.low, root * space.wind.high
+    evaluated = root * space.values(trace.points)[:, WIND_COLUMN]
+    wind_axes.plot(number, evaluated, ".", color=_OTHER, markersize=4, label="evaluated")
     if clip == 0:
         count = [r.evaluations for r in refinement.rounds]
         winds = [r.intervals[0] for r in refinement.rounds]
         wind_axes.fill_between(
             count,
-            *np.clip([(w.span.low, w.span.high) for w in winds], space.wind.low, space.wind.high).T,
+            *np.clip([(w.span.low, w.span.high) for w in winds], least, most).T,
             color=_OWN,
             alpha=0.25,
             linewidth=0,
@@ -95,7 +96,7 @@ def trace_picture(refinement: Refinement, clip: int = 0) -> str:
         )
     if "wind_speed" in target.truth:
         wind_axes.axhline(target.truth["wind_speed"], color=_TARGET, linewidth=1.0, linestyle="--", label="true wind")
-    wind_axes.set(xlabel="evaluations", ylabel="wind speed [m/s]", ylim=(space.wind.low, space.wind.high))
+    wind_axes.set(xlabel="evaluations", ylabel="wind speed [m/s]", ylim=(least, most))
     wind_axes.legend(fontsize=8)
     return figure_url(figure, dpi=130)
 
@@ -122,7 +123,7 @@ def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
                     {
                         "picture": None if s.frame is None else still(s.frame, side=SIDE),
                         "step": s.step,
-                        "wind": f"{s.wind:.2f}",
+                        "wind": f"{math.sqrt(refinement.scale) * s.wind:.2f}",
                         "distance": f"{s.distance:.3g}",
                     }
                     for s in frames_shown

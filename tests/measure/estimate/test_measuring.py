@@ -453,6 +453,15 @@ def test_a_part_in_which_nothing_moves_is_no_part_of_the_answer_even_anyway(mode
     np.testing.assert_array_equal(found.clip, images[2 * FRAMES : 3 * FRAMES])
 
 
+def test_the_clip_that_is_shown_and_refined_is_of_the_first_window_that_counts(model: Estimator) -> None:
+    film = even(8 * FRAMES)
+    gate = Listed(0.001, *(0.5,) * 7)
+    found = measure(film, model, gate=gate, dependence=APART, options=Options(size=WHOLE))
+    assert not found.verdict.refused
+    assert found.verdict.strange.tolist() == [True, *(False,) * 7]
+    np.testing.assert_array_equal(found.clip, film.images[FRAMES : 2 * FRAMES])
+
+
 def test_a_refused_film_gives_no_estimate_unless_asked_for(model: Estimator) -> None:
     film = even(4 * FRAMES)
     found = measure(film, model, gate=Listed(0.001, 0.002, 0.003, 0.01), dependence=APART, options=Options(size=WHOLE))

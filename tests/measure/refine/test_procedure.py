@@ -3,14 +3,17 @@ not its values."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from flagdata.errors import InputError
 from flagdata.rng import child_seed
+from measure.estimate.refined import scaled
 from measure.refine import (
     QUANTITIES,
     Evaluator,
@@ -108,6 +111,23 @@ def test_the_section_shows_the_answer_the_steps_and_both_in_motion(whole: Refine
     assert page.count("<tr>") == 1 + len(QUANTITIES) + 1 + 15
     for entry in whole.as_dict()["intervals"]:
         assert entry["low"] <= entry["median"] <= entry["high"]
+
+
+def test_pictures_of_a_flag_four_times_as_large_have_twice_the_winds(
+    whole: Refinement, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wind goes with the root of the size at one Froude number: points, axis and captions alike, as the intervals."""
+    drawn: list[Figure] = []
+    monkeypatch.setattr("measure.refine.section.figure_url", lambda figure, dpi: drawn.append(figure) or "")
+    larger = scaled(whole, 4.0)
+    captions = [
+        np.array(re.findall(r"step \d+: ([\d.]+) m/s", section(one, in_motion=False))).astype(float)
+        for one in (whole, larger)
+    ]
+    np.testing.assert_allclose(captions[1], 2 * captions[0], atol=0.015)
+    before, after = (figure.axes[1] for figure in drawn)
+    np.testing.assert_allclose(after.lines[0].get_ydata(), 2 * np.asarray(before.lines[0].get_ydata()))
+    np.testing.assert_allclose(after.get_ylim(), 2 * np.array(before.get_ylim()))
 
 
 def test_a_budget_too_small_for_an_interval_is_refused() -> None:
