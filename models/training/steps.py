@@ -355,12 +355,9 @@ class Training:
         """Computes the mean loss over the validation side; a contrastive one over batches of whole sequences."""
         learner.eval()
         values, sequence = self._values(self.validation, learner), torch.from_numpy(self.validation.sequence)
-        order = np.argsort(self.validation.sequence, kind="stable")
+        whole = learner.objective is Loss.CONTRASTIVE
         total, count = 0.0, 0
-        for first in range(0, len(order), _EVALUATED):
-            entries = order[first : first + _EVALUATED]
-            if len(entries) < 2:
-                continue
+        for entries in validation_batches(self.validation.sequence, whole=whole):
             inputs = self.validation.batch(entries, np.zeros(len(entries), dtype=np.int64)).to(self.device)
             loss = learner.loss(inputs, values[entries.tolist()], sequence[entries].to(self.device))
             total, count = total + float(loss) * len(entries), count + len(entries)
@@ -369,6 +366,33 @@ class Training:
     def _save(self, standing: Standing) -> None:
         if _share()[0] == 0:
             checkpoint.save(self.run, standing, identity=self.identity)
+
+
+def validation_batches(sequence: IntArray, *, whole: bool) -> list[IntArray]:
+    """Parts clips (n,) into batches, in the order of their sequences.
+
+    Args:
+        sequence: (n,) of each clip.
+        whole: whether sequences stay whole and each batch has several, with two clips of one at least, as a contrastive
+            loss needs; where that cannot be had all clips are one batch.
+    """
+    order = np.argsort(sequence, kind="stable")
+    if not whole:
+        return np.split(order, range(_EVALUATED, len(order), _EVALUATED))
+    ends = np.flatnonzero(np.diff(sequence[order], append=sequence[order][-1:] + 1)) + 1
+    cuts, begin = [0], 0
+    for end in ends.tolist():
+        if end - begin >= _EVALUATED and _comparable(sequence[order[begin:end]]):
+            cuts.append(end)
+            begin = end
+    if begin < len(order) and not _comparable(sequence[order[begin:]]) and len(cuts) > 1:
+        cuts.pop()
+    return np.split(order, [cut for cut in cuts[1:] if cut < len(order)])
+
+
+def _comparable(sequence: IntArray) -> bool:
+    """Returns whether clips have a pair of one sequence and a pair of two."""
+    return 1 < len(np.unique(sequence)) < len(sequence)
 
 
 class _Loss(nn.Module):

@@ -21,10 +21,10 @@ from models.crops import Cropping
 from models.estimator import Estimator
 from models.evaluation.predict import predict
 from models.frontend import FrontEnd
-from models.learner import Learner, Loss
+from models.learner import Learner, Loss, contrastive_loss
 from models.training import Augment, DataSpec, Prepared, TrainingRecipe, checkpoint
 from models.training.recipe import LossSpec, NetworkSpec, OptimiserSpec, Precision, Schedule
-from models.training.steps import Batches, Trained, Training, TrainingDivergedError, learning_rate
+from models.training.steps import Batches, Trained, Training, TrainingDivergedError, learning_rate, validation_batches
 
 SIZE = 24
 FRONT_END = FrontEnd(maps="wave-maps", size=SIZE)
@@ -398,6 +398,26 @@ def small_learner(own: TrainingRecipe) -> Learner:
             return self.layer(maps.mean(dim=(2, 3))).tanh()
 
     return Learner(Mean(), loss=own.loss.name, targets=own.loss.targets)
+
+
+@pytest.mark.parametrize("sequences", [2, 3, 20, 200])
+@pytest.mark.parametrize("clips", [2, 24, 38, 76])
+def test_a_contrastive_loss_is_validated_on_batches_of_whole_sequences_that_it_can_compare(
+    sequences: int, clips: int
+) -> None:
+    sequence = np.random.default_rng(0).permutation(np.repeat(np.arange(sequences) * 7, clips))
+    batches = validation_batches(sequence, whole=True)
+    assert sorted(np.concatenate(batches).tolist()) == list(range(len(sequence)))
+    own = [set(sequence[entries].tolist()) for entries in batches]
+    assert sum(map(len, own)) == sequences  # none is in two
+    for entries in batches:
+        loss = contrastive_loss(torch.zeros(len(entries), 2), torch.from_numpy(sequence[entries]))
+        assert torch.isfinite(loss)
+    assert max(map(len, batches)) <= 64 + 3 * clips
+
+
+def test_other_losses_are_validated_on_every_clip() -> None:
+    assert [len(entries) for entries in validation_batches(np.zeros(129, np.int64), whole=False)] == [64, 64, 1]
 
 
 def test_two_ranks_take_the_steps_of_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
