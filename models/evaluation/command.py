@@ -12,6 +12,7 @@ from flagdata.api.learning import Evaluating
 from flagdata.console import echo_lines, progress, say
 from flagdata.errors import InputError
 from flagdata.options import Result, verb
+from flagdata.provenance import canonical
 from flagdata.stated import Stated
 
 if TYPE_CHECKING:
@@ -92,6 +93,25 @@ def refuse_learned(catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: s
         explicit_sides(catalog, ExplicitSplit(where={**evaluated, **before}))
 
 
+def labelled(found: Sequence[tuple[Artifact, Estimator]]) -> list[tuple[Artifact, Estimator]]:
+    """Names networks of one name so that those of one training, which differ by their seeds alone, have one label.
+
+    Where the recipe or the data changed meanwhile, the beginning of an artifact's identity is added.
+    """
+    trainings: dict[str, str] = {}
+    keys = []
+    for row, estimator in found:
+        card = _card(estimator)
+        recipe = {key: value for key, value in card["recipe"].items() if key != "seed"}
+        recipe["data"] = {**recipe["data"], "sequences": None}  # a learning curve is of several
+        data = {side: (card.get("data") or {}).get(side) for side in ("train", "validation")}
+        keys.append(canonical({"recipe": recipe, "data": data}))
+        trainings.setdefault(keys[-1], f"{estimator.name} {row.id[:8]}")
+    if len(trainings) < 2:
+        return list(found)
+    return [(row, replace(model, name=trainings[key])) for (row, model), key in zip(found, keys, strict=True)]
+
+
 class _Desk:
     """Where models are judged: a data set, and what was prepared of it."""
 
@@ -156,6 +176,7 @@ class _Desk:
             frames=triplets,
             reads=self._reads(evaluated, side, data) if linear else (),
             learning=_points([point for point in learned if point[1].label in curves]),
+            unseen=side != "train",
         )
 
     def _models(self, names: Sequence[str]) -> list[tuple[Artifact | None, Estimator]]:
@@ -175,9 +196,8 @@ class _Desk:
             same = [row["artifact"] for row in meant(rows, name)]
             if not same:
                 raise UnknownNameError.of("network", name, sorted({row["name"] for row in rows} | {"shipped"}))
-            for artifact in sorted(same):
-                row = lake.artifact(artifact, at=self._at)
-                chosen.append((row, estimator.load(lake.object_path(str(row.object)))))
+            found = [lake.artifact(artifact, at=self._at) for artifact in sorted(same)]
+            chosen += labelled([(row, estimator.load(lake.object_path(str(row.object)))) for row in found])
         return chosen
 
     def _side(self, side: str) -> Pairs:
@@ -298,7 +318,8 @@ def _note(estimator: Estimator) -> str:
 
 
 def _points(learned: Sequence[tuple[int, Predictions]]) -> list[LearningPoint]:
-    """Computes the RMSE of wind against the number of sequences, of each run."""
+    """Computes the RMSE of wind against the number of sequences, of each run; none where one sequence is judged, since
+    that gives no interval."""
     from flagdata.rng import stream
     from models.evaluation.bootstrap import Resamples, estimate
     from models.evaluation.curves import LearningPoint
@@ -308,6 +329,8 @@ def _points(learned: Sequence[tuple[int, Predictions]]) -> list[LearningPoint]:
     points = []
     for sequences, run in sorted(learned, key=lambda point: (point[1].label, point[0])):
         resamples = Resamples.of(run.group, generator=stream(0, "learning"))
+        if resamples.groups < 2:
+            continue
         rmse = estimate(SCORES["rmse"].values(run, WIND, resamples), clips=len(run.group), groups=resamples.groups)
         points.append(
             LearningPoint(label=run.label, sequences=sequences, rmse=rmse.value, interval=(rmse.low, rmse.high))

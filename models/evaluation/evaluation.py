@@ -76,6 +76,7 @@ class Evaluation:
         wind_errors, calibrations, expected: of the models that have them.
         learning, frames, reads, layout: given, or made of what was given.
         findings: what a reader has to know.
+        unseen: whether no model learned from these sequences.
     """
 
     data: str
@@ -94,6 +95,7 @@ class Evaluation:
     reads: tuple[Read, ...]
     layout: TsneLayout | None
     findings: tuple[Finding, ...]
+    unseen: bool
 
 
 def evaluate(
@@ -107,6 +109,7 @@ def evaluate(
     frames: Sequence[FramesPoint] = (),
     reads: Sequence[Read] = (),
     tsne_of: str | None = None,
+    unseen: bool = True,
 ) -> Evaluation:
     """Scores models that were tested on the same clips.
 
@@ -118,6 +121,7 @@ def evaluate(
         reference: label that the others are compared with.
         learning, frames, reads: scores of models on other data, shown beside these.
         tsne_of: label whose first run's embedding is laid out; needs scikit-learn.
+        unseen: whether no model learned from these sequences.
 
     Raises:
         InputError: predictions that are not of the same clips.
@@ -179,6 +183,7 @@ def evaluate(
             Expected(label=label, curve=tarp(of, resamples, generator=rng.stream(seed, "evaluation", "tarp")))
             for label, of in varied.items()
         ),
+        unseen=unseen,
         learning=tuple(learning),
         frames=tuple(frames),
         reads=tuple(reads),

@@ -364,8 +364,9 @@ def _grid(grid: Grid) -> str:
 
 
 def _counts(evaluation: Evaluation) -> str:
+    learned = "that no model was trained on" if evaluation.unseen else "that models may have learned from"
     return (
-        f"{evaluation.clips:,} clips of {evaluation.groups:,} sequences that no model was trained on; intervals are of "
+        f"{evaluation.clips:,} clips of {evaluation.groups:,} sequences {learned}; intervals are of "
         f"{100 * LEVEL:.0f} % over sequences."
     )
 

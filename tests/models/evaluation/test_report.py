@@ -68,6 +68,12 @@ def test_runs_of_one_model_are_pooled_as_their_mean_and_range_and_each_is_shown(
     assert [row.scores["rmse"].value for row in found.rows[1:3]] == pytest.approx(each)
 
 
+def test_sequences_that_models_learned_from_are_called_that() -> None:
+    known = evaluate([run("SDN", 0.3, 1)], data="made", seed=0, draws=10, unseen=False)
+    assert "that models may have learned from" in markdown(known)
+    assert "no model was trained on" in markdown(dataclasses.replace(known, unseen=True))
+
+
 def test_every_row_keeps_the_bound_between_its_two_columns(found: Evaluation) -> None:
     for row in found.rows:
         assert row.bound is not None
