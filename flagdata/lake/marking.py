@@ -62,7 +62,7 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
         first: and what any version from this one on shows.
     """
     refs: dict[str, pa.Table] = {}
-    recent: list[pa.Table] = []
+    objects: set[str] = set()
     findings: list[Finding] = []
     try:
         lake.catalog.history()
@@ -74,21 +74,25 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
         names = [MAIN, *lake.refs.branches(), *lake.refs.tags()]
     except FlagdataError as error:
         return Marked(refs={}, objects=frozenset(), findings=(_unreadable(error, error.where or "refs"),))
-    tables: list[pa.Table] = []
     for name in names:
         try:
             view = lake.view(name)
             refs[name] = lake.table(view)
-            tables.append(_unerased(lake, refs[name], view))
+            objects |= _objects(_unerased(lake, refs[name], view))
         except FlagdataError as error:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
         findings += _lost(lake.catalog.rows(lake.catalog.head()), names, str(lake.path))
-        recent = list(_withdrawn(lake, since=lake.now() - grace.total_seconds() if grace else inf, first=first))
+        since = lake.now() - grace.total_seconds() if grace else inf
+        for table in _withdrawn(lake, since=since, first=first):  # one at a time: each may be as long as the catalog
+            objects |= _objects(table)
     except FlagdataError as error:
         findings.append(_unreadable(error, "recent versions"))
-    objects = {name for table in (*tables, *recent) for name in table["object"].drop_null().to_pylist()}
     return Marked(refs=refs, objects=frozenset(objects), findings=tuple(findings))
+
+
+def _objects(table: pa.Table) -> set[str]:
+    return set(table["object"].drop_null().to_pylist())
 
 
 def catalog_files(lake: Store) -> tuple[Finding, ...]:

@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import asdict, replace
+from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from flagdata.api.learning import Training
 from flagdata.checksums import write_sums
 from flagdata.console import echo, progress, say
 from flagdata.dataset import Pairs
-from flagdata.errors import ConflictError
+from flagdata.errors import ConflictError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.healing import Healing
 from flagdata.options import Result, verb
@@ -123,6 +124,7 @@ def publish(
     return transaction.result.artifacts[artifact.id], card, transaction.result.healed.get(artifact.id)
 
 
+_LONGEST_WAIT = timedelta(days=7)
 _PREPARED = 0.05
 """s of one core for a crop: its maps take 0.03 to 0.04 (docs/results/bench-models.json), decoding its film the rest."""
 
@@ -218,7 +220,9 @@ def trained(
     torch.set_num_threads(max(1, workers))
     several = "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
     if several:
-        ranks.init_process_group("gloo" if device == "cpu" else "nccl")
+        device = device_of_rank(device)
+        # The others wait while the first prepares the inputs, which takes hours where there are many films.
+        ranks.init_process_group("gloo" if device == "cpu" else "nccl", timeout=_LONGEST_WAIT)
     folder = chosen.run if chosen.run is not None else cache / f"run-{recipe.name}-{digest(wanted)[:12]}"
     locks = ExitStack()
     try:
@@ -290,6 +294,27 @@ def trained(
         if several:
             ranks.destroy_process_group()
     return _report(row, card)
+
+
+def device_of_rank(device: str) -> str:
+    """Chooses where this of several processes computes: each on a GPU of its own.
+
+    Raises:
+        UsageError: one GPU is named for all.
+    """
+    if device == "cpu":
+        return device
+    import torch
+
+    if device != "cuda":
+        raise UsageError(
+            f"all processes of torchrun would compute on {device!r}",
+            where="--device",
+            fix="give cuda, then each takes a GPU of its own",
+        )
+    own = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
+    torch.cuda.set_device(own)
+    return own
 
 
 def _refuse(folder: Path) -> None:

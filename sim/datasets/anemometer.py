@@ -22,7 +22,8 @@ from sim.effects.sensor import AnemometerEffect
 from sim.run.members import Crew, Member
 from sim.system import System
 
-_FINE = 10.0  # Hz, at which the air is sampled and the instrument's response computed
+_FINE = 10.0
+"""Rate [Hz] at which the air is sampled and an instrument's response computed; of a faster one twice its own."""
 _NAME = "simulated"
 
 
@@ -106,8 +107,9 @@ def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[FloatArray, F
     time = crew.recipe.time
     end = (time.total - 1) / time.rate
     begin = 0.0 if changing(crew.recipe) else time.settling / time.rate - spec.before
-    count = math.floor((end - begin) * _FINE + 1e-9) + 1
-    times = np.maximum(end - np.arange(count)[::-1] / _FINE, begin)
+    fine = _FINE if spec.rate <= _FINE else 2 * spec.rate
+    count = math.floor((end - begin) * fine + 1e-9) + 1
+    times = np.maximum(end - np.arange(count)[::-1] / fine, begin)
     if not changing(crew.recipe):
         return times, np.tile(np.array(member.scene.wind, dtype=np.float64), (count, 1))
     system, _ = crew.assemble([member])

@@ -119,16 +119,19 @@ class Build:
         total = sum(len(roll.pending((), in_shard)) for roll in rolls)
         with self.bars(total, f"{self.recipe.name}: simulate", "flag") as advance:
             todo = [(roll, roll.pending(in_lake, in_shard)) for roll in rolls]
+            known = {roll.cast.simulation.name: set(roll.failed) for roll in rolls}
             advance(total - sum(len(pending) for _, pending in todo))
             while any(pending for _, pending in todo):
                 self._simulate_once([entry for entry in todo if entry[1]], advance)
-                self._refuse_replacing(rolls)
+                self._refuse_replacing(rolls, known)
                 todo = [(roll, roll.pending(in_lake, in_shard)) for roll, _ in todo]
         return total
 
-    def _refuse_replacing(self, rolls: Sequence[Roll]) -> None:
-        """Refuses a shard in which a sequence of a cast that other shards share failed: their films would change."""
-        failed = [(roll, index) for roll in rolls if not roll.in_one_batch for index in roll.failed]
+    def _refuse_replacing(self, rolls: Sequence[Roll], known: Mapping[str, set[int]]) -> None:
+        """Refuses a shard in which a sequence of a cast that other shards share failed: their films would change. Those
+        that are `known` to fail were replaced in an earlier build."""
+        shared = [roll for roll in rolls if not roll.in_one_batch]
+        failed = [(roll, i) for roll in shared for i in roll.failed if i not in known[roll.cast.simulation.name]]
         if self.shard is not None and failed:
             (roll, index), *_ = failed
             raise RefusedError(
@@ -156,9 +159,11 @@ class Build:
         self._commit_each(self._batches(todo), commit_sequences, advance)
 
     def _commit_sequences(self, roll: Roll, stored: Mapping[int, Deposited], replaced: Mapping[int, str]) -> int:
-        """Commits sequences that are in the store and returns how many; their reports name the members `replaced`."""
+        """Commits sequences that are in the store and returns how many; the reports of those that take the place of
+        others name the members `replaced`."""
         if replaced:
-            stored = {index: (_in_place_of(replaced, row), put) for index, (row, put) in stored.items()}
+            wanted = roll.cast.simulation.count
+            stored = {i: (_in_place_of(replaced, row) if i >= wanted else row, put) for i, (row, put) in stored.items()}
         committed = commit(self.lake, roll.cast.simulation, stored, branch=self.branch)
         roll.done |= set(stored)
         self._new_sequences += len(committed.added)

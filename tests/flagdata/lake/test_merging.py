@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import weakref
+from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
@@ -292,3 +295,18 @@ def test_a_path_through_many_branches_brings_each_row_once_and_keeps_each_withdr
     assert names(lake) == ["b"]
     lake.merge("main", "back", into="one")
     assert names(lake, "one") == ["b"]
+
+
+def test_of_many_withdrawals_one_catalog_is_held_at_a_time(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+    alive: list[weakref.ref[pa.Table]] = []
+
+    def withdrawn(*_: object, **__: object) -> Iterator[pa.Table]:
+        for number in range(4):
+            table = pa.table({"object": [f"object-{number}", None]})
+            alive.append(weakref.ref(table))
+            yield table
+            del table
+            assert sum(held() is not None for held in alive) <= 1
+
+    monkeypatch.setattr("flagdata.lake.marking._withdrawn", withdrawn)
+    assert mark(lake, grace=DAY).objects >= {f"object-{number}" for number in range(4)}

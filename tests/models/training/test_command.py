@@ -431,3 +431,14 @@ def test_a_data_set_that_is_not_there_is_an_error(lake: Path) -> None:
     recipe = parse((lake.parent / "small.toml").read_text().replace('"made"', '"nothing"'), name="x", where="test")
     with pytest.raises(UnknownNameError, match="unknown data set 'nothing'; known: made"):
         sides_of(flagdata.open(lake), recipe, "train", at="v1")
+
+
+def test_each_of_several_processes_takes_a_gpu_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[str] = []
+    monkeypatch.setattr(torch.cuda, "set_device", taken.append)
+    monkeypatch.setenv("LOCAL_RANK", "3")
+    assert command.device_of_rank("cpu") == "cpu"
+    assert command.device_of_rank("cuda") == "cuda:3"
+    assert taken == ["cuda:3"]
+    with pytest.raises(UsageError, match="all processes of torchrun would compute on 'cuda:1'"):
+        command.device_of_rank("cuda:1")

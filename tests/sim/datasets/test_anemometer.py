@@ -44,6 +44,14 @@ def test_an_ideal_instrument_reads_a_steady_wind_as_it_is(make: Make) -> None:
     assert BEGIN + round(end.settling / end.rate * 1e9) - reading.series.time[0] > 73 * 10**9
 
 
+@pytest.mark.parametrize("rate", [4.0, 10.0, 20.0, 32.0])
+def test_an_instrument_of_any_rate_has_a_reading_each_period(make: Make, rate: float) -> None:
+    team = steady(make, 4.25)
+    reading = anemometer.read(replace(IDEAL, rate=rate), team, team.member(0), instrument=1, seed=1, begin=BEGIN)
+    np.testing.assert_allclose(reading.series.channels["wind_speed"], 4.25, atol=1e-6)
+    np.testing.assert_allclose(np.diff(reading.series.time), 1e9 / rate, atol=1)
+
+
 @pytest.mark.parametrize(
     ("toward", "blowing_from"), [(0.0, 270.0), (math.pi / 2, 180.0), (math.pi, 90.0), (-math.pi / 4, 315.0)]
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import shutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
@@ -219,6 +220,22 @@ def test_a_build_given_again_knows_what_failed_and_simulates_nothing(
     assert workers.jobs == 0
     assert again.failed == first.failed
     assert len(first.failed) == 2
+    meshes = lake.rows("kind = 'meshes'", columns=["name", "report"]).to_pylist()
+    named = {row["name"]: json.loads(row["report"]).get("in_place_of") for row in meshes}
+    assert {name for name, members in named.items() if members} == {"tiny-train-00003", "tiny-test-00002"}
+    assert named["tiny-test-00002"] == {"0": "it crumpled"}
+
+
+def test_a_shard_heals_an_object_beside_a_sequence_that_was_replaced_before(
+    make: Callable[..., DatasetRecipe], tmp_path: Path
+) -> None:
+    recipe, lake = make(), Lake.create(tmp_path / "lake")
+    Build(lake=lake, recipe=recipe, workers=FirstFails(), bars=without_bars).run()
+    for row in lake.rows("kind = 'meshes'", columns=["object"]).to_pylist():
+        shutil.rmtree(lake.object_path(row["object"]))
+    shards = (Shard(number=number, of=2) for number in (1, 2))
+    made = [Build(lake=lake, recipe=recipe, workers=FirstFails(), bars=without_bars, shard=one).run() for one in shards]
+    assert sum(report.healed for report in made) == SEQUENCES
 
 
 def test_shards_of_two_recipes_of_one_name_are_not_mixed_where_they_film_one_flag(
