@@ -87,7 +87,7 @@ def of_group(simulation: Simulation, groups: GroupSpec, side: Side, *, seed: int
 
 def _of_session(simulation: Simulation, spec: SessionSpec) -> Simulation:
     """Returns the recipe of one session: one flag, drawn once, in winds about one mean."""
-    drawn = Crew(simulation).member(0)
+    drawn = Crew(replace(simulation, seed=child_seed(simulation.seed, "session"))).member(0)
     mean = drawn.parameters["wind_speed"]
     if not isinstance(mean, float):
         raise TypeError("a member's wind speed is a number")

@@ -24,6 +24,9 @@ from sim.run.recipe import Recipe as Simulation
 _NOISE = Meta(ge=0.0, le=128.0)
 RECIPE_VERSION = 2
 """Raised whenever the same recipe makes other bytes."""
+_SESSIONS_DRAWN = 2
+"""Raised whenever the same recipe of sessions draws other flags and winds; 1 drew a session's wind from its first
+member's stream."""
 
 
 class Truth(StrEnum):
@@ -197,7 +200,7 @@ class DatasetRecipe:
             "seed": self.seed,
             "simulation": self.simulation.identity(),
             "filming": self.filming(),
-            "sessions": None if self.sessions is None else vars(self.sessions).copy(),
+            "sessions": None if self.sessions is None else {"drawn": _SESSIONS_DRAWN, **vars(self.sessions)},
             "sides": [vars(side).copy() for side in self.sides],
             **_grouped(self.groups, self.simulation.batch),
         }

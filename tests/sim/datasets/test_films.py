@@ -9,8 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from flagdata.tables import Range
 from flagdata.timebase import iso
 from sim.datasets import DatasetRecipe, PlannedFilm, Roll, Sequences, casts, load
+from sim.run import Crew
 from tests.small import GROUPS
 
 
@@ -105,3 +107,19 @@ def test_groups_leave_the_identity_of_data_sets_without_them_alone(make: Callabl
     base = make({"[sides.train]": GROUPS + "[sides.train]"})
     for old, new in (("[20.0, 40.0]", "[20.0, 20.0, 40.0]"), ("high = 0.4", "high = 0.5"), (', "hoist"]', "]")):
         assert make({"[sides.train]": GROUPS.replace(old, new) + "[sides.train]"}).hash != base.hash
+
+
+def test_a_sessions_mean_wind_says_nothing_of_where_its_first_sequence_lies_about_it() -> None:
+    """Both are drawn evenly: their places agree in the mean of 14 days to 1/3, give or take 0.24 / √14."""
+    recipe = load("field")
+    winds = recipe.simulation.wind.speed
+    assert isinstance(winds, Range)
+    apart = []
+    for cast in casts(recipe):
+        own = cast.simulation.wind.speed
+        assert isinstance(own, Range)
+        mean, first = (own.low + own.high) / 2, Crew(cast.simulation).member(0).wind_speed
+        places = (mean - winds.low) / (winds.high - winds.low), (first - own.low) / (own.high - own.low)
+        apart.append(abs(places[0] - places[1]))
+    assert len(apart) == 14
+    assert 0.14 < np.mean(apart) < 0.53
