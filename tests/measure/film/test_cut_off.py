@@ -10,9 +10,8 @@ import pytest
 
 from flagdata.arrays import UInt8Array
 from flagdata.film_array import Frames
-from measure.film import ConditionedFilm
+from measure.film import ConditionedFilm, WindowReader
 from measure.film.conditioned import CutOff
-from measure.film.windows import WindowReader
 from tests.measure.estimate.conftest import RATE
 from tests.models.conditioning.test_conditioning import WIDTH, Drawn
 

@@ -30,6 +30,6 @@ def test_seeds_and_parts_of_one_training_have_its_name() -> None:
     assert labels(trained(1), trained(2, seed=2), trained(3, sequences=100)) == ["wave"] * 3
 
 
-def test_another_recipe_and_other_data_are_told_apart_by_the_first_artifact() -> None:
+def test_another_recipe_and_other_data_have_the_first_artifact_in_their_label() -> None:
     one, same, changed, more = trained(1), trained(2, seed=2), trained(3, rate=1e-2), trained(4, data="b")
     assert labels(one, same, changed, more) == ["wave 00000001", "wave 00000001", "wave 00000003", "wave 00000004"]
