@@ -110,27 +110,6 @@ def pair_clocks(
     return PairedClocks(model=model, delay=delay, worst_delay=worst, findings=_findings(model, delay, worst))
 
 
-def nominal_times(host_time: Instants) -> Instants:
-    """Instants that a device of steady rate without a clock would have stamped: its samples counted, (n,) [UTC ns].
-
-    The period is the line through host stamps against the count of samples, robustly. Given to `pair_clocks` with the
-    host's stamps, every lost sample or gap of the device shows as a step, so that segments hold runs without loss.
-
-    Raises:
-        InputError: fewer than two samples, or all at one instant.
-    """
-    if len(host_time) < 2:
-        raise InputError("one sample gives no rate", fix="give a longer log")
-    count = np.arange(len(host_time), dtype=np.float64)
-    seconds = (host_time - host_time[0]) / NANOSECONDS
-    # Slopes over a tenth of the log, so that jitter averages out; their median, so that gaps do not count.
-    reach = max(1, len(host_time) // 10)
-    period = float(np.median(seconds[reach:] - seconds[:-reach])) / reach
-    if period <= 0:
-        raise InputError("host stamps that do not increase", fix="check how the log was written")
-    return host_time[0] + np.round(count * period * NANOSECONDS).astype(np.int64)
-
-
 @dataclass(frozen=True, kw_only=True)
 class _Line:
     """offset + drift · (time − origin), all in seconds."""

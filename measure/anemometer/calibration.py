@@ -33,7 +33,7 @@ ENOUGH = 240.0
 """s of film from which on intervals rest on enough blocks of time."""
 _OFFSETS = np.linspace(-2.0, 2.0, 9)
 """Errors of the clock that are tried, in its standard uncertainties."""
-_CLOCK = 0.05
+CLOCK = 0.05
 """s below which a clock's uncertainty matters for no window. Lower, and offsets are fitted where they change
 nothing."""
 
@@ -283,7 +283,7 @@ def _best_offset(
     plain: FloatArray, winds: Callable[[float], FloatArray], blocks: NDArray[np.int_], clock: float, is_named: BoolArray
 ) -> float:
     """Fits the error of the clock [s], by windows without their neighbours, which could make up for it."""
-    if clock <= _CLOCK:
+    if clock <= CLOCK:
         return 0.0
     errors = [validated(plain, winds(share * clock), blocks, is_named).rmse for share in _OFFSETS.tolist()]
     misfit = len(plain) * np.log(errors) + np.square(_OFFSETS) / 2

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from flagdata.pages.pictures import figure_url
 from flagdata.pages.render import render
 from flagdata.provenance import code_version
-from measure.anemometer.calibration import Calibrated
+from measure.anemometer.calibration import CLOCK, Calibrated
 from measure.estimate.page import Section
 
 _BLUE, _RUST = "#2b6f8f", "#c4622d"
@@ -57,6 +57,8 @@ def _with_unit(value: float | None, unit: str) -> str:
 def _clock(result: Calibrated) -> str:
     if not result.clock:
         return "The recording states no uncertainty of its clock; none was fitted."
+    if result.clock <= CLOCK:
+        return f"The clock is known to {result.clock:.2f} s, which matters for no window; no error of it was fitted."
     return (
         f"The log fits best {result.offset:+.2f} s later than its stamps, whose standard uncertainty is "
         f"{result.clock:.2f} s."

@@ -68,6 +68,11 @@ def test_fixed_offsets_and_misspelt_zones() -> None:
         timebase.zone("Europe/Amsterdm")
     with pytest.raises(TimeError, match="14:00"):
         timebase.zone("+15:00")
+    for typed in ("+01:75", "0260"):
+        with pytest.raises(UnknownNameError):
+            timebase.zone(typed)
+    with pytest.raises(TimeError):
+        timebase.parse("2026-05-01T12:00:00+02:75")
 
 
 ABBREVIATIONS = {

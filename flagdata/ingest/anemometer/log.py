@@ -98,7 +98,7 @@ def _lines(source: TextFile, wanted: set[int]) -> dict[int, str]:
     return texts
 
 
-READER = 2
+READER = 3
 """Version of the readers of logs: raised with each change of code after which a file that was read gives other times,
 values or flags, or has other channels. What a TOML file says needs no raise: its digest is in the plan.
 

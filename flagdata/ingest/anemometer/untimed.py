@@ -19,7 +19,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.draft.shape import TableShape, shape_of
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.formats.serial_lines import NOTHING, split_stamp
-from flagdata.ingest.anemometer.instants.stamps import ENGLISH
+from flagdata.ingest.anemometer.instants.stamps import ENGLISH, HOUR, NEXT_DAY
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
 from flagdata.ingest.anemometer.text.rows import cells_of_lines
 from flagdata.ingest.anemometer.text.source import RATE_GIVEN, TableText, TextFile
@@ -137,7 +137,7 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
     """Puts the date before the lines of an instrument, each after a time of day.
 
     Args:
-        date: of the first line; the next day begins where the time of day falls by half a day.
+        date: of the first line; the next day begins where the time of day falls by more than two hours.
     """
     text: list[str] = []
     day, last = date, ""
@@ -146,10 +146,11 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
         if match is None:
             text.append(line)
             continue
-        clock = match["time"].replace(",", ".").rjust(8, "0")
+        hour, _, rest = match["time"].replace(",", ".").partition(":")
+        clock = f"{hour:0>2}:{rest}"
         if match["month"]:
             day = _of_year(match, day, first=not last, where=str(source.path))
-        elif last and int(clock[:2]) + 12 < int(last[:2]):
+        elif last and _of_day(clock) < _of_day(last) - NEXT_DAY:
             day += dt.timedelta(days=1)
         last = clock
         text.append(f"{day.isoformat()}T{clock} {match['rest']}")
@@ -162,6 +163,11 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
     )
     finding = Finding.of("date-given", message)
     return TableText.of(source, text, [finding])
+
+
+def _of_day(clock: str) -> int:
+    """Returns the minute of "09:05:03.250" as nanoseconds since midnight."""
+    return (60 * int(clock[:2]) + int(clock[3:5])) * HOUR // 60
 
 
 def _counted(

@@ -51,6 +51,11 @@ class Timing:
         return 1 / (self.period * self.tick)
 
     @property
+    def mean_rate(self) -> Fraction:
+        """Frames a second over the whole, which is the `rate` where that is constant."""
+        return Fraction(self.count - 1) / (self.span * self.tick) if self.variable and self.span else self.rate
+
+    @property
     def duration(self) -> float:
         """From the first stamp to the last [s]."""
         return float(self.span * self.tick)

@@ -49,8 +49,8 @@ class CameraStream:
         facts, timing = source.facts, source.facts.timing
         self._scale = Fraction(1)
         if options.true_fps is not None:
-            self._scale = timing.rate / exact(options.true_fps)
-            self._opening.append(_rescaled(timing.variable, self._scale, options.true_fps, float(timing.rate)))
+            self._scale = timing.mean_rate / exact(options.true_fps)
+            self._opening.append(_rescaled(timing.variable, self._scale, options.true_fps, float(timing.mean_rate)))
         duration = timing.duration * float(self._scale)
         if duration > options.limits.duration:
             raise LimitError(

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from flagdata.align import host_clock, pair_clocks
-from flagdata.align.paired import nominal_times
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries
@@ -36,6 +35,20 @@ def clocks(
         late = late + np.where(time >= at, size, 0.0)
     device = START + np.round(time * SECOND).astype(np.int64)
     return device, device + np.round(late * SECOND).astype(np.int64)
+
+
+def nominal_times(host_time: np.ndarray) -> np.ndarray:
+    """Instants that a device of steady rate without a clock would have stamped: its samples counted, (n,) [UTC ns].
+
+    The period is the line through host stamps against the count of samples, robustly. Given to `pair_clocks` with the
+    host's stamps, every lost sample or gap of the device shows as a step, so that segments hold runs without loss.
+    """
+    count = np.arange(len(host_time), dtype=np.float64)
+    seconds = (host_time - host_time[0]) / SECOND
+    # Slopes over a tenth of the log, so that jitter averages out; their median, so that gaps do not count.
+    reach = max(1, len(host_time) // 10)
+    period = float(np.median(seconds[reach:] - seconds[:-reach])) / reach
+    return host_time[0] + np.round(count * period * SECOND).astype(np.int64)
 
 
 def test_offset_and_drift_are_those_of_the_lower_envelope() -> None:

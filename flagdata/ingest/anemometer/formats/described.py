@@ -134,7 +134,9 @@ class Described:
             period = float(np.median(np.abs(np.diff(reading.time)))) / NANOSECONDS
             reading = replace(reading, sensor=replace(reading.sensor, averaging=period))
         if done.starts and reading.sensor.averaging:
-            text = f"stamps are of the beginning of averages over {reading.sensor.averaging:g} s; kept as written"
+            averaging = reading.sensor.averaging
+            reading = replace(reading, time=reading.time + round(averaging * NANOSECONDS))
+            text = f"stamps are of the beginning of averages over {averaging:g} s; moved to their end"
             findings.append(Finding.of("stamps-at-start", text))
         if "described-by" in self.open.data:
             findings.append(described(self.open.data["described-by"]))

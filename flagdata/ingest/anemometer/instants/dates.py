@@ -19,7 +19,7 @@ from flagdata.arrays import IntArray
 from flagdata.errors import TimeError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants import stamps
-from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, Stamps
+from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, NEXT_DAY, Stamps
 from flagdata.timebase import NANOSECONDS, iso
 
 Order = Literal["ymd", "dmy", "mdy"]
@@ -172,7 +172,7 @@ def completed(
         if date is None:
             fix = "give the day of the first row: --date 2026-05-01"
             raise TimeError("the stamps are times of day without a date", where=where_first, fix=fix)
-        midnight = np.concatenate(([False], np.diff(wall) < -DAY // 2))
+        midnight = np.concatenate(([False], np.diff(wall) < -NEXT_DAY))
         time = wall + ((date - dt.date(1970, 1, 1)).days + np.cumsum(midnight)) * DAY
         return time, _date_given("times of day", date, f"{int(midnight.sum())} midnights")
     day = wall // DAY

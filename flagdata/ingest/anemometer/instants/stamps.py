@@ -41,6 +41,8 @@ from flagdata.timebase import NANOSECONDS
 
 HOUR = 3600 * NANOSECONDS
 DAY = 24 * HOUR
+NEXT_DAY = 2 * HOUR
+"""A time of day that falls by more is of the next day: clocks are set back by less, and a logger may rest by night."""
 _MINUTE = 60 * NANOSECONDS
 ABBREVIATED = {
     "WEST": 1,

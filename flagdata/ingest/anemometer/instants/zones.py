@@ -86,7 +86,7 @@ def to_utc(wall: IntArray, local_zone: tzinfo, *, lines: IntArray, where: str) -
 def _second_pass(wall: IntArray, rows: IntArray, length: int, local_zone: tzinfo, where: str) -> IntArray:
     """Finds the rows in a repeated interval [ns] that are of its second pass."""
     steps, step = np.diff(wall[rows[0] : rows[-1] + 1]), usual(wall)
-    back = np.flatnonzero((steps < -length // 2) | ((steps == 0) & (step >= length)))
+    back = np.flatnonzero((steps <= -length // 2) | ((steps == 0) & (step >= length)))
     if len(back) == 1:
         return rows[rows > rows[0] + back[0]]
     reach = max(10 * step, 2 * NANOSECONDS)

@@ -28,6 +28,8 @@ _BELOW = 0.1
 """Readings below an idle one, over those that are idle, beyond which it is no calm air's."""
 _LEAST_JUMP = 0.1
 """A smaller step out of idling is no dead zone [m/s]."""
+_BETWEEN = 0.02
+"""Share of the readings of wind that lie between calm and the step, beyond which no dead zone hides them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,12 +86,16 @@ def estimate(time: IntArray, speed: FloatArray) -> Zero | None:
     if same.sum() * _WINDOW < _SHORTEST or (speed < offset - band).sum() > _BELOW * idle.sum():
         return None  # a speed that often falls below it blows there
     leaves = np.append(idle[:-1] & ~idle[1:] & np.isfinite(speed[1:]), False)
+    jump = float(np.median(speed[np.flatnonzero(leaves) + 1] - offset)) if leaves.any() else float("nan")
+    blows = np.isfinite(speed) & ~idle
+    if (speed[blows] < offset + 0.8 * jump).mean() > _BETWEEN:
+        jump = float("nan")  # a cap that was taken off, say: the instrument reads such speeds
     return Zero(
         offset=offset,
         sigma=float(np.std(medians[same])),
         idle=idle,
         seconds=float(same.sum() * _WINDOW),
-        jump=float(np.median(speed[np.flatnonzero(leaves) + 1] - offset)) if leaves.any() else float("nan"),
+        jump=jump,
         leaves=leaves,
     )
 
@@ -150,12 +156,14 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
 def _reported(reading: Reading, zero: Zero, shift: float) -> Reading:
     """Reports what calm air reads, whether the `shift` subtracted [m/s] has settled it, and the jump out of it."""
     settled = abs(zero.offset - shift) <= _BAND
-    done, fix = "subtracted" if settled else "not subtracted", None
+    done, fix = "subtracted" if shift else f"left as it is, within {_BAND:g} m/s of zero", None
     if not settled:
         ways = f"--zero-offset estimate, or --zero-offset {zero.offset:.3g}"
         fix = f"correct it: {ways}" if shift else f"subtract it: {ways}"
         rest = zero.offset - shift
-        done = f"{shift:+.3f} m/s was subtracted, which leaves {rest:+.3f} m/s in calm air" if shift else done
+        done = (
+            f"{shift:+.3f} m/s was subtracted, which leaves {rest:+.3f} m/s in calm air" if shift else "not subtracted"
+        )
     message = f"calm air reads {zero.offset:+.3f} m/s (σ {zero.sigma:.3f}, {zero.seconds:.0f} s idle); {done}"
     severity = Severity.NOTE if settled else Severity.WARNING
     reading = reading.marked(zero.idle, "zero-offset", message, severity=severity, value=zero.offset, fix=fix)

@@ -56,7 +56,7 @@ def test_nrg_channels_are_identified_by_their_history() -> None:
     log = read(nrg())
     direction = np.radians(200)
     shows(
-        log, "nrg", "2026-05-01T17:00:00Z", wind_speed=[5, 6, 7, 8, 9], wind_direction=direction, air_temperature=288.15
+        log, "nrg", "2026-05-01T17:10:00Z", wind_speed=[5, 6, 7, 8, 9], wind_direction=direction, air_temperature=288.15
     )
     assert (log.series.sensor.name, log.series.sensor.height, log.series.sensor.averaging) == ("NRG S1", 40.0, 600.0)
     several = next(finding for finding in log.findings if finding.kind == "several-anemometers")
@@ -68,7 +68,7 @@ def test_nrg_channels_are_identified_by_their_history() -> None:
 
 def test_an_nrg_zone_that_the_user_contradicts_is_reported() -> None:
     log = read(nrg(), zone="-04:00")
-    shows(log, "nrg", "2026-05-01T16:00:00Z")
+    shows(log, "nrg", "2026-05-01T16:10:00Z")
     assert kinds(log)["zone-contradicts"] == 1
 
 

@@ -94,6 +94,27 @@ def test_midnight_adds_a_day() -> None:
     assert [iso(t)[:10] for t in log.series.time.tolist()] == ["2026-12-31", "2026-12-31", "2027-01-01", "2027-01-01"]
 
 
+def test_a_one_digit_hour_with_a_fraction_before_a_sentence_is_read() -> None:
+    lines = stream(*("WIMWV,010,R,5.0,M,A",) * 3).splitlines()
+    text = "\n".join(f"9:05:0{i}.250 {line}" for i, line in enumerate(lines))
+    log = read(text, date=dt.date(2026, 5, 1), zone="UTC")
+    assert [iso(t) for t in log.series.time.tolist()] == [f"2026-05-01T09:05:0{i}.250Z" for i in range(3)]
+
+
+def test_a_night_without_rows_is_a_midnight_in_times_of_day() -> None:
+    """Rows from 09:00 to 17:00, the next day from 09:00 on: a fall of eight hours."""
+    sentence = stream("WIMWV,010,R,5.0,M,A").strip()
+    hours = [*range(9, 18), *range(9, 18)]
+    ends = ["2026-05-01T09:00:00Z", "2026-05-01T17:00:00Z", "2026-05-02T09:00:00Z", "2026-05-02T17:00:00Z"]
+    sentences = "\n".join(f"{hour:02d}:00:00 {sentence}" for hour in hours)
+    rows = "".join(f"{hour:02d}:00:00,{4 + i % 3}\n" for i, hour in enumerate(hours))
+    for text, columns in ((sentences, None), (rows, "time[%H:%M:%S],wind_speed[m/s]")):
+        log = read(text, date=dt.date(2026, 5, 1), zone="UTC", columns=columns)
+        assert [iso(int(log.series.time[i])) for i in (0, 8, 9, 17)] == ends
+        (finding,) = [one for one in log.findings if one.kind == "date-given"]
+        assert "1 midnights follow" in finding.what
+
+
 def test_a_date_from_rmc_serves_times_from_gga() -> None:
     rmc = "GPRMC,120001,A,,,,,0.1,,010526,,"
     body = [s for i in range(6) for s in (f"GPGGA,12000{i},,,,,,,,,,,,,", "WIMWV,010,R,5.0,M,A")]

@@ -390,6 +390,18 @@ def test_a_zero_offset_is_subtracted_only_where_asked_and_reported(
     assert stated.sensor.threshold == 0.6
 
 
+def test_a_cap_that_is_taken_off_once_is_no_dead_zone() -> None:
+    """Two minutes at 0.04 m/s, then wind at once, of which the log has many readings below the first."""
+    wind = np.concatenate([[2.1], np.abs(gusts(11_999) - np.median(gusts(11_999))) + 0.3])
+    log = made(0.1 * np.arange(13_200), np.concatenate([np.full(1200, 0.04), wind]))
+    done = zero.settle(log, "report")
+    assert "dead-zone-jump" not in [finding.kind for finding in done.findings]
+    assert done.sensor.threshold is None
+    (about,) = [finding for finding in done.findings if finding.kind == "zero-offset"]
+    assert about.what.endswith("; left as it is, within 0.05 m/s of zero")
+    np.testing.assert_array_equal(done.channels["wind_speed"], log.channels["wind_speed"])
+
+
 def test_a_minute_of_calm_may_hide_anything_below_the_jump_out_of_it(idle: Reading) -> None:
     calm = zero.settle(idle, "estimate").take(np.arange(2000))
     sensor = replace(calm.sensor, accuracy=0.0)

@@ -150,6 +150,14 @@ def test_a_log_that_runs_through_the_repeated_hour_twice_is_an_hour_longer() -> 
     assert time[-1] == ns("2026-10-25T02:29:00")
 
 
+@pytest.mark.parametrize("step", [10, 15, 20, 30])
+def test_a_log_of_averages_runs_through_the_repeated_hour_twice(step: int) -> None:
+    rows = 60 // step
+    wall = [*minutes("2026-10-25T01:00:00", 120)[::step], *minutes("2026-10-25T02:00:00", 120)[::step]]
+    assert set(np.diff(utc(wall))) == {60 * S * step}
+    assert len(wall) == 4 * rows
+
+
 def test_a_log_that_ends_in_the_repeated_hour_without_a_break_is_in_its_first_pass() -> None:
     assert utc(minutes("2026-10-25T01:50:00", 30))[-1] == ns("2026-10-25T00:19:00")
 

@@ -152,6 +152,19 @@ def test_true_fps_rescales_the_times_of_a_high_speed_camera(tmp_path: Path) -> N
     assert found["frames-dropped"].count == 195
 
 
+def test_true_fps_of_a_varying_rate_is_the_mean_of_the_frames(tmp_path: Path) -> None:
+    """Steps of 7 to 12 ms, 120 in 1.053 s; the middle step of 8 ms alone would say 125 Hz."""
+    steps = np.random.default_rng(0).choice([7, 8, 8, 8, 8, 9, 12, 12], 120)
+    stamps = np.cumsum([0, *steps]).tolist()
+    path = write_video(tmp_path / "vfr.mkv", stamps)
+    mean = 120 / (stamps[-1] / 1000)
+    info, frames, found = read(path, replace(PLAIN, rate="native", true_fps=mean))
+    assert info.variable_rate
+    assert info.duration == pytest.approx(stamps[-1] / 1000, rel=1e-6)
+    assert (frames[-1].time - frames[0].time) / 1e9 == pytest.approx(stamps[-1] / 1000, rel=1e-6)
+    assert found["true-rate-of-variable"].value == pytest.approx(1.0, rel=1e-6)
+
+
 def test_the_native_rate_keeps_every_frame_at_its_own_stamp(tmp_path: Path) -> None:
     path = write_video(tmp_path / "fast.mp4", range(50), tick=Fraction(1, 60), rate=60)
     _, frames, found = read(path, replace(PLAIN, rate="native", true_fps=1000.0))
