@@ -7,6 +7,7 @@ design: a run that was interrupted goes on, and a second one simulates nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,6 +22,7 @@ from flagdata.findings import Finding
 from measure.cloth.design import CalibrationOptions, Weighable, weighable
 from measure.cloth.emulator import TAKEN_APART
 from measure.cloth.evidence import Experiments, Fit, Sight, Weighing, fitted, hypothesis, misfits, weigh
+from measure.cloth.prior import CLOTH
 from measure.cloth.recording import Observed, constant_wind
 from measure.cloth.score_test import Judged, directions, judge, score
 from measure.cloth.simulation import OBSERVED
@@ -76,6 +78,8 @@ def root_mean_square(departing: Sequence[Departure]) -> float:
 
 STRONG = 0.9
 """Share of the prior of strengths at which an effect counts as strong."""
+_BEYOND = 2.0
+"""Factor by which a stated area weight may lie beyond those of the null experiments: fewer and fewer are as heavy."""
 _DIFFERENCE = 1e-3
 
 
@@ -123,7 +127,7 @@ class FilmLoopOptions:
             is looked; None to look along all.
 
     Raises:
-        UsageError: a level or number that makes no sense, or an effect that is not weighed.
+        UsageError: a level, a number or a weight that makes no sense, or an effect that is not weighed.
     """
 
     calibration: CalibrationOptions
@@ -139,6 +143,15 @@ class FilmLoopOptions:
                 f"{self.kinds} kinds of numerics cannot test at a level of {self.level!r}",
                 where="close-loop",
                 fix=f"give a level between 0 and 1, and {CRITERIA.fewest_kinds} kinds or more",
+            )
+        (ends,) = (uncertain.ends for uncertain in CLOTH if uncertain.name == "area_weight")
+        low, high = ends or (0.0, math.inf)
+        if self.area_weight is not None and not low / _BEYOND < self.area_weight[0] < high * _BEYOND:
+            raise UsageError(
+                f"an area weight of {self.area_weight[0]:.3g} kg/m²; null experiments have flags of {low:g} "
+                f"to {high:g}",
+                where="--area-weight",
+                fix="give kg/m² (155 g/m² is 0.155)",
             )
         names = [effect.name for effect in weighable(self.calibration.flag)]
         if unknown := set(self.only) - set(names):

@@ -172,12 +172,15 @@ class Scene:
     def standing(self, without: int | None) -> Standing:
         """Standardises by null flags of all kinds but one; None for all."""
         without_kinds = () if without is None else (without,)
+        kinds = [kind for kind in np.unique(self.kinds[self.comparable]).tolist() if kind not in without_kinds]
+        if not kinds:
+            raise InputError(
+                "no null experiment of another kind of numerics has a flag as heavy as the cloth",
+                where="area weight",
+                fix="check its unit (kg/m²), or simulate more kinds",
+            )
         scores = np.concatenate(
-            [
-                self.axes(*without_kinds, kind).z(self.null[self.comparable & (self.kinds == kind)])
-                for kind in np.unique(self.kinds[self.comparable]).tolist()
-                if kind not in without_kinds
-            ]
+            [self.axes(*without_kinds, kind).z(self.null[self.comparable & (self.kinds == kind)]) for kind in kinds]
         )
         spread = scores.std(axis=0, ddof=1)
         return Standing(

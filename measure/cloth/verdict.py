@@ -99,7 +99,7 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
         provenance={
             "seed": options.calibration.seed,
             "code": code_version(),
-            "criteria": CRITERIA.as_dict(),
+            "criteria": replace(CRITERIA, level=options.level).as_dict(),
             "options": options.recipe(),
         },
         power=_power(outcome),

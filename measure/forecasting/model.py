@@ -82,7 +82,8 @@ def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segment
     They are members of one batch: small batches cost nearly as much as larger ones.
     """
     count, errors = len(segments), []
-    for chosen in np.array_split(np.arange(len(models)), math.ceil(len(models) * count / WIDEST)):
+    parts = min(len(models), math.ceil(len(models) * count / WIDEST))
+    for chosen in np.array_split(np.arange(len(models)), parts):
         members = [models[index] for index in chosen]
         copies = segments.select(list(range(count)) * len(members))
         batch = forecaster.system(copies, [model.calibration for model in members for _ in range(count)])

@@ -33,6 +33,7 @@ from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.gauss_newton import FitDivergedError, Refined, refine
 from measure.loop.validation import LeftOut, left_out
 from measure.nulls.reference import Reference
+from measure.nulls.simulation import FreeRunDivergedError
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Estimate
 from sim.effects.parameter import Parameter
@@ -233,7 +234,7 @@ class Refit:
 
 def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, workers: int = 1) -> dict[int, Refit | None]:
     """Refits the model with each column: column → what its model does; None where its cloth diverges, fitted to all
-    recordings or without one.
+    recordings, without one or run freely.
 
     Args:
         workers: threads; each model is run in one.
@@ -248,7 +249,10 @@ def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, worker
         fitted = fits.of((column,))
         if fitted is None:
             return None
-        evidence = fits.evidence(fitted)
+        try:
+            evidence = fits.evidence(fitted)
+        except FreeRunDivergedError:
+            return None
         gains = np.zeros(len(together))
         for outside, old, new in zip(parts, before, misfits_of(fitted), strict=True):
             gains[outside] = old - new

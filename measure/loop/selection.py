@@ -243,11 +243,14 @@ def _within(turned_wind: Weighed, direction: Estimate, tolerance: float) -> Weig
 
 
 def withdrawn(judgement: LibraryJudgement) -> LibraryJudgement:
-    """Withdraws the effects that were named: with those that were, errors on unseen recordings are larger than
-    without."""
-    why = "with it, errors on unseen recordings are larger than without"
+    """Withdraws the effects that were named: with those that were, or of several that may act with the first, errors on
+    unseen recordings are larger than without."""
+    worse = "errors on unseen recordings are larger than without"
+    tried = judgement.named if judgement.conclusion is Conclusion.EFFECT else judgement.named[:1]
+    why = {column: f"with it, {worse}" for column in tried}
+    why |= {c: f"with the first of those that may act, {worse}" for c in judgement.named if c not in why}
     ranking = tuple(
-        replace(w, candidate=replace(w.candidate, why_not=why)) if w.column in judgement.named else w
+        replace(w, candidate=replace(w.candidate, why_not=why[w.column])) if w.column in why else w
         for w in judgement.ranking
     )
     return replace(judgement, conclusion=Conclusion.OUTSIDE, named=(), ranking=ranking)

@@ -36,10 +36,20 @@ def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> FloatArra
         tracks=tracks * _COPIES,
         seed=child_seed(batch.seed, "free"),
     )
-    runs, period = copies.as_fitted(), 1 / batch.rate
-    modelled = np.stack([settled(batch.markers, runs[..., run], period=period) for run in range(runs.shape[-1])])
-    observed = [settled(r.markers, r.positions, period=1 / r.rate, noise=r.noise) for r in recordings]
-    return np.stack(observed) - modelled.reshape(_COPIES, count, -1).mean(axis=0)
+    runs = copies.as_fitted()
+    off = []
+    for number, recording in enumerate(recordings):
+        # As long as the recording, whose wind is not known further, and both at the model's rate: a speed between two
+        # frames is less the further they are apart.
+        stride = max(1, round(recording.rate / batch.rate))
+        positions, period = recording.positions[::stride], stride / recording.rate
+        modelled = [
+            settled(batch.markers, runs[: len(positions), ..., run], period=1 / batch.rate)
+            for run in range(number, runs.shape[-1], count)
+        ]
+        observed = settled(recording.markers, positions, period=period, noise=recording.noise)
+        off.append(observed - np.mean(modelled, axis=0))
+    return np.stack(off)
 
 
 def mistaken(batch: NullBatch) -> NullBatch:

@@ -118,7 +118,8 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
     """Refuses nulls that do not fit the recordings.
 
     Raises:
-        InputError: segments of another length, anchors known in another way, or cloths held in another way.
+        InputError: segments of another length or frame interval, anchors known in another way, or cloths held in
+            another way.
     """
     if bank.anchors_given != setting.experiment.specimen.anchors_given:
         ways = ("taken from where the recordings show the attachments", "given")
@@ -140,6 +141,14 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
             f"its segments last {bank.duration:.2g} s, those of the recordings {setting.segments.duration:.2g} s",
             where=where,
             fix="simulate nulls for these recordings: leave the bank out; or record for longer",
+        )
+    shortest, longest, period = bank.nulls.period.min(), bank.nulls.period.max(), setting.segments.period
+    if not 0.9 * shortest < period < 1.1 * longest:
+        raise InputError(
+            f"its frames are {1e3 * shortest:.3g} to {1e3 * longest:.3g} ms apart, those of the recordings "
+            f"{1e3 * period:.3g} ms",
+            where=where,
+            fix="simulate nulls for these recordings: leave the bank out",
         )
 
 

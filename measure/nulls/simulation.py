@@ -47,6 +47,10 @@ _HALVINGS = 3  # of the step of a run that diverges
 _GENTLE = 1e-3  # s of damping: up to it the explicit method is the cheaper one
 
 
+class FreeRunDivergedError(FlagdataError):
+    """Says that the model, run freely, does not stay a cloth."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NullBatch:
     """Null recordings that are simulated together, on one mesh by one method.
@@ -141,13 +145,13 @@ class NullBatch:
         """Computes the same by the mesh and the steps of the fit, without noise, (frame, marker, 3, recording) [m].
 
         Raises:
-            FlagdataError: it diverges.
+            FreeRunDivergedError: it diverges.
         """
         specimen = self.specimen
         try:
             frames = self._run(specimen.mesh, specimen.held, SplitEuler(), 0.0)
         except DivergedError:
-            raise FlagdataError(
+            raise FreeRunDivergedError(
                 "a free run of the model diverges",
                 where=f"{self.calibrations[0]}",
                 fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",

@@ -16,6 +16,8 @@ from measure.observe.trajectory import Trajectory, WindTrack
 
 _STEADY = 1e-3
 """Fluctuation below which a wind counts as steady, as a share of its mean [1]."""
+_STILL = 0.1
+"""Mean below which a log is of still air [m/s]: it has no course that could be multiplied to another mean."""
 _EVERY = 0.05
 """Between samples of a null's wind [s]."""
 
@@ -25,30 +27,34 @@ def like(
 ) -> tuple[WindTrack, ...]:
     """Draws a wind for each of `speeds` [m/s]; none where the logs of all recordings are steady.
 
-    Each is the log of a recording drawn at random, from an instant drawn at random, forwards and backwards in turns so
-    that it goes on, and multiplied to its speed.
+    Each is the log of a recording that has wind, drawn at random, from an instant drawn at random, forwards and
+    backwards in turns so that it goes on, and multiplied to its speed.
 
     Args:
         recordings: of the data, in the frame of the fit.
         duration: of a null recording behind the time in which it settles [s].
         seed: of the draws.
     """
-    changing = [recording for recording in recordings if _fluctuates(recording)]
-    if not changing:
+    blowing = [recording for recording in recordings if _mean(recording) > _STILL]
+    if not any(_fluctuates(recording) for recording in blowing):
         return ()
     rng = stream(seed, "null", "winds")
     times = np.arange(round((SETTLE + duration) / _EVERY) + 2, dtype=np.float64) * _EVERY
     drawn: list[WindTrack] = []
     for speed in speeds:
-        recording = recordings[int(rng.integers(len(recordings)))]
+        recording = blowing[int(rng.integers(len(blowing)))]
         length = float(recording.times[-1])
         folded = np.abs((times + rng.uniform(0, 2 * length)) % (2 * length) - length)
         velocity = recording.wind.at(folded)
-        mean = float(np.linalg.norm(recording.wind.at(np.arange(0.0, length, _EVERY)), axis=1).mean())
-        drawn.append(WindTrack(times=times - SETTLE, velocity=velocity * (speed / mean)))
+        drawn.append(WindTrack(times=times - SETTLE, velocity=velocity * (speed / _mean(recording))))
     return tuple(drawn)
 
 
 def _fluctuates(recording: Trajectory) -> bool:
     wind = recording.wind.at(np.arange(0.0, recording.times[-1], _EVERY))
     return bool(np.linalg.norm(wind.std(axis=0)) > _STEADY * recording.wind.speed)
+
+
+def _mean(recording: Trajectory) -> float:
+    """Computes the mean speed during a recording [m/s]."""
+    return float(np.linalg.norm(recording.wind.at(np.arange(0.0, recording.times[-1], _EVERY)), axis=1).mean())

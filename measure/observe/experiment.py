@@ -149,6 +149,9 @@ def _quietest(values: FloatArray, order: int) -> float:
 
 
 _NAMED = {Hold.HOIST_CORNERS: handles.corners, Hold.TOP_CORNERS: handles.top_corners, Hold.HOIST: handles.full_hoist}
+_AROUND, _CLOCKS = 5.0, 5.0
+"""Time [s], and standard deviations of a log's clock, by which its wind is kept before and behind the recording: means
+over more would say nothing of the wind at the cloth."""
 _NEAR = 1e-6
 """Share of the cloth's size: what is nearer than this is in one place."""
 
@@ -370,13 +373,15 @@ def _trajectory(observation: Observation, low: FloatArray) -> Trajectory:
     if observation.wind is None:
         raise InputError("no wind is known", where=where, fix="give its velocity, or an anemometer's log (--wind)")
     # Rounded, so that recordings of one rate and of different lengths have the same one to the last bit.
-    rate = float(f"{(len(observation.times) - 1) / float(observation.times[-1] - observation.times[0]):.9g}")
+    duration = float(observation.times[-1] - observation.times[0])
+    rate = float(f"{(len(observation.times) - 1) / duration:.9g}")
+    reach = _AROUND + _CLOCKS * observation.wind.clock
     return Trajectory(
         name=observation.name,
         markers=observation.markers - low,
         positions=observation.positions,
         rate=rate,
-        wind=observation.wind,
+        wind=observation.wind.between(-reach, duration + reach),
         noise=_noise(observation),
         source=observation.source,
         seen=observation.seen,

@@ -94,6 +94,15 @@ class WindTrack:
         """Shifts the wind's times to an instant that many seconds later."""
         return replace(self, times=self.times - seconds)
 
+    def between(self, begin: float, end: float) -> WindTrack:
+        """Cuts the wind to the part from `begin` to `end` [s], or as much of that as the log has."""
+        begin, end = max(begin, float(self.times[0])), min(end, float(self.times[-1]))
+        if not begin < end:
+            return self
+        inside = self.times[(self.times > begin) & (self.times < end)]
+        times = np.concatenate([[begin], inside, [end]])
+        return replace(self, times=times, velocity=self.at(times))
+
     def at(self, times: FloatArray) -> FloatArray:
         """Interpolates velocities (k, 3) [m/s] at times (k,) [s]; outside the log its first and last sample."""
         return np.stack([np.interp(times, self.times, self.velocity[:, axis]) for axis in range(3)], axis=-1)

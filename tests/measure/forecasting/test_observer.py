@@ -198,16 +198,18 @@ def test_batches_that_are_not_of_one_cloth_are_not_joined(forecaster: Forecaster
         JointBatch.of([(system, state), (system, replace(state, time=1.0))])
 
 
+@pytest.mark.parametrize("widest", [8, 2, 1])
 def test_models_in_one_batch_leave_what_they_leave_alone(
-    monkeypatch: pytest.MonkeyPatch, forecaster: Forecaster, own_recording: Trajectory
+    monkeypatch: pytest.MonkeyPatch, forecaster: Forecaster, own_recording: Trajectory, widest: int
 ) -> None:
+    """Also where the segments of one are more than a batch should have."""
     segments = Segments.of([own_recording])
     lift = EffectColumn(effect="lift", parameter="coefficient", step=0.3)
     models = [
         Model(calibration=Calibration(area_weight=area_weight), effects=((lift, strength),))
         for area_weight, strength in ((1.0, 0.0), (1.2, 0.5), (0.9, 0.8))
     ]
-    monkeypatch.setattr(model_module, "WIDEST", 2 * len(segments))
+    monkeypatch.setattr(model_module, "WIDEST", widest * len(segments) / 4)
     together = errors_of(models, forecaster, segments)
     for model, errors in zip(models, together, strict=True):
         alone = forecaster.errors(*model.system(forecaster, segments), segments)

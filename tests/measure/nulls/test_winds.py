@@ -32,6 +32,16 @@ def test_nulls_of_steady_data_have_no_winds_of_their_own() -> None:
     assert winds.like(steady, SPEEDS, duration=DURATION, seed=1) == ()
 
 
+def test_still_air_beside_a_gusty_wind_lends_nulls_no_course() -> None:
+    gusty = recording(4.0, share=0.2)
+    for still in (recording(0.0, share=0.0), recording(0.01, share=0.5)):
+        for seed in range(4):
+            made = winds.like([still, gusty], SPEEDS, duration=DURATION, seed=seed)
+            means = [np.linalg.norm(wind.velocity, axis=1).mean() for wind in made]
+            np.testing.assert_allclose(means, SPEEDS, rtol=0.05)
+        assert winds.like([still], SPEEDS, duration=DURATION, seed=1) == ()
+
+
 def test_nulls_fluctuate_as_the_logs_do_at_their_own_speeds() -> None:
     made = winds.like([recording(4.0, share=0.2)], SPEEDS, duration=DURATION, seed=1)
     for speed, wind in zip(SPEEDS, made, strict=True):

@@ -12,7 +12,7 @@ from flagdata.errors import InputError, UsageError
 from flagdata.ingest import WindOptions
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindSeries
-from measure.observe import LogPlacement, from_log
+from measure.observe import LogPlacement, WindTrack, from_log
 from measure.observe.wind import track
 
 NORTH_IS_Y = math.pi / 2
@@ -55,6 +55,22 @@ def test_components_of_a_sonic_are_taken_as_they_are():
     log = series(wind_x=[1.0], wind_y=[2.0], wind_z=[-0.5])
     wind, _ = track(log, LogPlacement(offset=0.0), where="log")
     np.testing.assert_array_equal(wind.velocity, [[1, 2, -0.5]])
+
+
+def test_a_part_of_a_log_has_its_own_mean_and_is_no_longer_than_the_log():
+    """An hour at 2 m/s in which one minute has 8 m/s."""
+    times = np.arange(3600.0)
+    speed = np.where((times >= 1000) & (times < 1060), 8.0, 2.0)
+    wind = WindTrack(times=times, velocity=np.outer(speed, [1.0, 0.0, 0.0])).later(1010.0)
+    part = wind.between(-5.0, 35.0)
+    assert (part.times[0], part.times[-1], part.speed) == (-5.0, 35.0, 8.0)
+    np.testing.assert_array_equal(part.at(np.array([0.5, 20.25])), wind.at(np.array([0.5, 20.25])))
+    assert part.uncertainty == wind.uncertainty
+    whole = wind.between(-1e4, 1e4)
+    np.testing.assert_array_equal(whole.times, wind.times)
+    steady = WindTrack.constant((3.0, 0.0, 0.0))
+    assert steady.between(-5.0, 35.0) is steady
+    assert wind.between(5000.0, 6000.0) is wind  # beside the recording; it is refused for that
 
 
 @pytest.mark.parametrize("placement", [LogPlacement(offset=1.5), LogPlacement(start=BEGIN + 1_500_000_000)])

@@ -44,6 +44,13 @@ def dragged(tmp_path_factory: pytest.TempPathFactory) -> Verdict:
         return close_loop(both(DRAG), options(), folder=tmp_path_factory.mktemp("dragged"))
 
 
+@pytest.mark.parametrize("weight", [155.0, 1.3, 0.018])
+def test_a_weight_that_no_null_flag_has_is_refused_before_anything_is_simulated(weight: float) -> None:
+    with pytest.raises(UsageError, match=r"null experiments have flags of 0\.05 to 0\.45"):
+        options(area_weight=(weight, 0.05 * weight))
+    assert options(area_weight=(0.6, 0.03)).area_weight == (0.6, 0.03)
+
+
 def test_flags_on_which_nothing_acts_need_no_effect_but_at_the_level(
     cheap: list[int], plain: Verdict, tmp_path: Path
 ) -> None:
