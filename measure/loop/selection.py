@@ -247,7 +247,7 @@ def withdrawn(judgement: LibraryJudgement) -> LibraryJudgement:
     unseen recordings are larger than without."""
     worse = "errors on unseen recordings are larger than without"
     tried = judgement.named if judgement.conclusion is Conclusion.EFFECT else judgement.named[:1]
-    why = {column: f"with it, {worse}" for column in tried}
+    why = dict.fromkeys(tried, f"with it, {worse}")
     why |= {c: f"with the first of those that may act, {worse}" for c in judgement.named if c not in why}
     ranking = tuple(
         replace(w, candidate=replace(w.candidate, why_not=why[w.column])) if w.column in why else w
