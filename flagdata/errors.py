@@ -42,6 +42,7 @@ class ErrorKind(StrEnum):
     TRAINING_DIVERGED = "training-diverged"
     DIVERGED = "diverged"
     CLOTH_DIVERGED = "cloth-diverged"
+    FREE_RUN_DIVERGED = "free-run-diverged"
 
 
 class FlagdataError(Exception):

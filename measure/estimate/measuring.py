@@ -291,21 +291,18 @@ def _of_flags(finding: Finding) -> bool:
 
 def _contradicted(stated: Sequence[str], factor: float) -> Finding:
     """Reports that the film speaks against what the user gave, by this Bayes factor."""
-    shape = "shape of the flag by its size"
+    words = (
+        f"the film much less probable (Bayes factor {factor:.2g}): either that is wrong, or the model errs on this film"
+    )
+    shape = "the shape of the flag by its size"
     if WEIGHT not in stated:
-        kind, given, fix = "flag-size-contradicted", f"the {shape}, which was given, makes", "check --flag-size"
-    elif ASPECT in stated:
-        kind, given = "area-weight-contradicted", f"the area weight and the {shape}, which were given, make"
-        fix = "check --area-weight and --flag-size"
-    else:
-        kind, given = "area-weight-contradicted", "the area weight that was given makes"
-        fix = "check --area-weight and --flag-size"
+        what = f"{shape}, which was given, makes {words}"
+        return Finding.of("flag-size-contradicted", what, value=factor, fix="check --flag-size")
+    given = (
+        f"the area weight and {shape}, which were given, make" if ASPECT in stated else "the area weight given makes"
+    )
     return Finding.of(
-        kind,
-        f"{given} the film much less probable (Bayes factor {factor:.2g}): either that is wrong, or the model errs on "
-        "this film",
-        value=factor,
-        fix=fix,
+        "area-weight-contradicted", f"{given} {words}", value=factor, fix="check --area-weight and --flag-size"
     )
 
 

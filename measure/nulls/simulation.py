@@ -15,7 +15,7 @@ import torch
 from scipy.spatial import Delaunay
 
 from flagdata.arrays import FloatArray
-from flagdata.errors import FlagdataError
+from flagdata.errors import ErrorKind, FlagdataError
 from flagdata.rng import stream
 from measure.forecasting.calibration import Calibration
 from measure.nulls.stiffness import StiffnessFactors
@@ -49,6 +49,8 @@ _GENTLE = 1e-3  # s of damping: up to it the explicit method is the cheaper one
 
 class FreeRunDivergedError(FlagdataError):
     """Says that the model, run freely, does not stay a cloth."""
+
+    kind = ErrorKind.FREE_RUN_DIVERGED
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -64,6 +64,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("measure/estimate/joint.py", "weigh the cloth and give"),
         ("measure/gate/reasons.py", "give the part in which t"),
         ("measure/estimate/measuring.py", "check --area-weight and"),
+        ("measure/estimate/measuring.py", "check --flag-size"),
         ("measure/estimate/measuring.py", "choose a part of the fil"),
         ("measure/estimate/measuring.py", "give the wind of single"),
     ),

@@ -50,7 +50,7 @@ METHOD = {
     },
     "nulls/tails": {"_NORMAL"},
     "nulls/tracks": {"_TURN", "_WEIGHTS", "_HALVINGS"},
-    "nulls/winds": {"_STEADY", "_EVERY"},
+    "nulls/winds": {"_STEADY", "_STILL", "_EVERY"},
     "loop/gauss_newton": {"ROUNDS", "_FEW", "_HALVINGS", "STAYS", "_LONGEST", "_TRIED"},
     "loop/refit": {"COUNT", "BEYOND", "_WITHIN_THE_END", "_AT_THE_END"},
     "loop/residuals": {"_SHOWN"},
