@@ -40,12 +40,12 @@ def test_one_bit_in_any_file_of_a_model_is_found_before_it_is_used(shipped: Path
         estimator.load(shipped)
 
 
-@pytest.mark.parametrize("name", ["flow-outdoor", "flow", "wave", "wave-cloth"])
+@pytest.mark.parametrize("name", ["flow-outdoor", "flow-world", "flow", "wave", "wave-cloth"])
 def test_every_model_that_comes_with_the_package_states_its_checksums(name: str) -> None:
     check_model(SHIPPED / name)
 
 
-@pytest.mark.parametrize("name", ["flow-outdoor", "flow", "wave", "wave-cloth"])
+@pytest.mark.parametrize("name", ["flow-outdoor", "flow-world", "flow", "wave", "wave-cloth"])
 def test_a_models_distribution_in_closed_form_is_the_one_that_it_draws_from(name: str) -> None:
     model = estimator.shipped(name)
     generator = torch.Generator().manual_seed(0)
