@@ -151,10 +151,11 @@ def test_the_accuracy_on_films_is_that_of_the_sheet(what: str, weight: str) -> N
         assert tested.endswith(f"{min(winds):g} to {max(winds):g} m/s")
         assert errors["bias"] < 0  # "the answer tends to be low"
     covered = errors["covered"]
-    assert result["refused"]["coverage"]["hits"] == 0
+    refused = result["refused"]["coverage"]["hits"]
     assert found.startswith(
         f"median error {errors['median_error']:.2f} m/s, {covered['hits']} of {covered['count']} in"
     )
+    assert found.endswith(f"; {refused} refused" if refused else "intervals")
 
 
 def test_the_accuracy_of_a_calibrated_flag_is_that_of_the_sheet() -> None:
