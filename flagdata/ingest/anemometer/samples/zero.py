@@ -41,7 +41,8 @@ class Zero:
         sigma: standard deviation of the idle stretches' medians [m/s]: how far the zero wanders.
         idle: (n,) rows that are idle.
         seconds: idle time in all [s].
-        jump: from the offset to the first reading outside the idle band after idling [m/s]; NaN if it never left.
+        jump: from the offset to the first reading outside the idle band after idling [m/s]; NaN if it never left, or
+            has readings below that.
         leaves: (n,) rows after which the reading leaves the idle band.
     """
 
@@ -86,10 +87,12 @@ def estimate(time: IntArray, speed: FloatArray) -> Zero | None:
     if same.sum() * _WINDOW < _SHORTEST or (speed < offset - band).sum() > _BELOW * idle.sum():
         return None  # a speed that often falls below it blows there
     leaves = np.append(idle[:-1] & ~idle[1:] & np.isfinite(speed[1:]), False)
-    jump = float(np.median(speed[np.flatnonzero(leaves) + 1] - offset)) if leaves.any() else float("nan")
-    blows = np.isfinite(speed) & ~idle
-    if (speed[blows] < offset + 0.8 * jump).mean() > _BETWEEN:
-        jump = float("nan")  # a cap that was taken off, say: the instrument reads such speeds
+    jump = float("nan")
+    if leaves.any():
+        step = float(np.median(speed[np.flatnonzero(leaves) + 1] - offset))
+        blows = np.isfinite(speed) & ~idle
+        if (speed[blows] < offset + 0.8 * step).mean() <= _BETWEEN:  # else a cap was taken off, say
+            jump = step
     return Zero(
         offset=offset,
         sigma=float(np.std(medians[same])),

@@ -390,6 +390,12 @@ def test_a_zero_offset_is_subtracted_only_where_asked_and_reported(
     assert stated.sensor.threshold == 0.6
 
 
+def test_a_log_that_is_idle_all_along_never_leaves_its_zero() -> None:
+    found = zero.estimate(T0 + np.arange(3000) * (S // 100), np.full(3000, 0.2))
+    assert found is not None
+    assert (found.offset, bool(found.leaves.any()), bool(np.isnan(found.jump))) == (0.2, False, True)
+
+
 def test_a_cap_that_is_taken_off_once_is_no_dead_zone() -> None:
     """Two minutes at 0.04 m/s, then wind at once, of which the log has many readings below the first."""
     wind = np.concatenate([[2.1], np.abs(gusts(11_999) - np.median(gusts(11_999))) + 0.3])
