@@ -13,6 +13,7 @@ import re
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 
 from flagdata.errors import CorruptError, FlagdataError
@@ -36,6 +37,24 @@ def flush_file(path: Path) -> None:
 def flush_folder(path: Path) -> None:
     """Forces a folder's entries (names that were added, renamed, removed) to the disk."""
     flush_file(path)
+
+
+def flush_tree(path: Path) -> None:
+    """Forces a file, or all that is in a folder, to the disk."""
+    for folder, _, names in os.walk(path):
+        for name in names:
+            flush_file(Path(folder, name))
+        flush_folder(Path(folder))
+    if not path.is_dir():
+        flush_file(path)
+
+
+@cache
+def boot() -> str | None:
+    """Identifies this machine since it was started; `None` where it does not say."""
+    with suppress(OSError):
+        return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    return None
 
 
 def write_durably(path: Place, data: bytes) -> None:

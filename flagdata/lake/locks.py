@@ -42,7 +42,7 @@ from pathlib import Path
 from typing import IO, Any, Protocol
 
 from flagdata.documents import from_json
-from flagdata.durable import disk_errors
+from flagdata.durable import boot, disk_errors
 from flagdata.errors import ConflictError
 from flagdata.lake.layout import LinkError
 from flagdata.storage import Place, RemotePath
@@ -457,9 +457,9 @@ def _now() -> float:
 def _machine() -> str | None:
     """Identifies this machine since it was started, and the processes that it numbers together; None where it does not
     say."""
-    with suppress(OSError):
-        boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
-        return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
+    if (since := boot()) is not None:
+        with suppress(OSError):
+            return f"{since} {Path('/proc/self/ns/pid').readlink()}"
     return None
 
 

@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 
 from flagdata.checksums import content_hash, files_of, read_sums, size_of, sums_of
-from flagdata.durable import flush_file, flush_folder
+from flagdata.durable import flush_folder, flush_tree
 from flagdata.errors import CorruptError, FlagdataError, InputError, NotFoundError
 from flagdata.files import is_beside
 from flagdata.lake.artifact import OBJECT_NAME
@@ -141,11 +141,8 @@ class Objects:
         """
         os.utime(staged)  # age counts from here
         for entry in files_of(staged):
-            flush_file(entry)
             entry.chmod(_READ_ONLY)
-        if staged.is_dir():
-            for folder in [staged, *(p for p in staged.rglob("*") if p.is_dir())]:
-                flush_folder(folder)
+        flush_tree(staged)
         target = self._file(name)
         target.parent.mkdir(exist_ok=True)
         for attempt in range(_ATTEMPTS):
@@ -445,8 +442,10 @@ class RemoteObjects(Objects):
     @staticmethod
     def remove(path: Place) -> None:
         if isinstance(path, RemotePath):
+            name = f"{path.parent.name}/{path.stem}"
+            forget(name, path.suffix)  # first: once the object is gone, nobody would ask for its copy again
             path.remove_tree(first=None if path.suffix == ".mcap" else SUMS)
-            forget(f"{path.parent.name}/{path.stem}", path.suffix)  # what is erased stays nowhere on this machine
+            forget(name, path.suffix)  # what a reader fetched meanwhile: what is erased stays nowhere on this machine
         else:
             Objects.remove(path)
 

@@ -17,7 +17,7 @@ from urllib.request import urlopen
 import pytest
 
 import flagdata
-from flagdata import object_cache
+from flagdata import durable, object_cache
 from flagdata.caches import beside
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError, RefusedError, UsageError
 from flagdata.findings import Severity
@@ -279,7 +279,7 @@ def test_the_cache_gives_up_what_was_used_least_recently(
     monkeypatch.setenv("FLAGDATA_CACHE_LIMIT", "250")
     first, second = (remote_lake.object_path(name) for name in names[:2])
     long_ago = time.time() - 3600
-    os.utime(first, (long_ago, long_ago))
+    os.utime(first.with_name(f"{first.name}.stamp"), (long_ago, long_ago))
     third = remote_lake.object_path(names[2])
     assert [path.exists() for path in (first, second, third)] == [False, True, True]
     assert remote_lake.object_path(names[0]).read_text() == "a" * 100  # fetched again
@@ -298,6 +298,92 @@ def test_a_copy_whose_deletion_was_cut_short_is_no_copy_any_more(
         killed.setattr(shutil, "rmtree", lambda *_, **__: None)  # the process ends here
         object_cache.forget("zarr/0", ".zarr")
     assert object_cache.copy_of("zarr/0", ".zarr") is None
+
+
+def cut_to_nothing(file: Path) -> None:
+    file.write_bytes(b"")
+
+
+def zero(file: Path) -> None:
+    file.write_bytes(bytes(file.stat().st_size))
+
+
+def flip(file: Path) -> None:
+    status = file.stat()
+    file.write_bytes(bytes([file.read_bytes()[0] ^ 1]) + file.read_bytes()[1:])
+    os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+
+@pytest.mark.parametrize("damage", [cut_to_nothing, zero, flip, Path.unlink])
+def test_a_copy_that_is_not_what_was_fetched_is_fetched_again_and_said_once(
+    remote_lake: Lake, caplog: pytest.LogCaptureFixture, damage: Callable[[Path], None]
+) -> None:
+    folder = str(put_folder(remote_lake, "sheet").object)
+    for name, inside in ((folder, "positions/c/0"), (str(put_text(remote_lake, "gusts").object), "")):
+        copy = remote_lake.object_path(name)
+        right = (copy / inside).read_bytes()
+        damage(copy / inside)
+        caplog.clear()
+        assert (remote_lake.object_path(name) / inside).read_bytes() == right
+        assert (remote_lake.object_path(name) / inside).read_bytes() == right
+        missing = damage is Path.unlink and not inside
+        assert [name in message for message in caplog.messages] == ([] if missing else [True])
+
+
+def test_copies_of_before_this_machine_was_started_are_compared_once(
+    remote_lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = [str(put_folder(remote_lake, "sheet").object), str(put_text(remote_lake, "gusts").object)]
+    compared: list[Path] = []
+
+    def hashed(path: Path, content_hash: Callable[[Path], str] = object_cache.content_hash) -> str:
+        compared.append(path)
+        return content_hash(path)
+
+    monkeypatch.setattr(object_cache, "content_hash", hashed)
+    copies = [remote_lake.object_path(name) for name in names]
+    assert compared == []
+    monkeypatch.setattr(object_cache, "boot", lambda: "another")
+    for _ in range(3):
+        assert [remote_lake.object_path(name) for name in names] == copies
+    assert compared == copies
+
+
+def test_a_copy_has_its_name_after_its_bytes_are_on_the_disk_and_a_deletion_is_confirmed(
+    remote_lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = str(put_folder(remote_lake, "sheet").object)
+    shutil.rmtree(tmp_path / "cache" / "objects")
+    done: list[str] = []
+    rename, flush = Path.rename, durable.flush_file
+    monkeypatch.setattr(durable, "flush_file", lambda path: (done.append(path.name), flush(path)))
+
+    def renamed(path: Path, target: Path) -> Path:
+        done.append(f"{target.name} takes its name")
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", renamed)
+    copy = remote_lake.object_path(name)
+    flushed, (named, folder, *_) = done[: done.index(f"{copy.name} takes its name")], done[-3:]
+    assert {"0", "c", "positions", "zarr.json"} <= set(flushed)
+    assert (named, folder) == (f"{copy.name} takes its name", "objects")
+    done.clear()
+    object_cache.forget(name, ".zarr")
+    assert done[-1] == "objects"
+    assert [path.name for path in copy.parent.iterdir() if copy.stem in path.name] == []
+
+
+def test_a_deletion_of_a_copy_that_was_cut_short_is_ended_by_the_next(
+    remote_lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    erased = put_folder(remote_lake, "sheet")
+    copies = remote_lake.object_path(str(erased.object)).parent
+    with monkeypatch.context() as killed:
+        killed.setattr(shutil, "rmtree", lambda *_, **__: None)
+        object_cache.forget(str(erased.object), ".zarr")
+    assert any(str(erased.object)[5:] in path.name for path in copies.iterdir())
+    remote_lake.erase([erased.id], "asked to")
+    assert not any(str(erased.object)[5:] in path.name for path in copies.iterdir())
 
 
 def test_a_sweep_passes_over_what_another_process_renames_meanwhile(
