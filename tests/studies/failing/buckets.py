@@ -17,164 +17,37 @@ import argparse
 import hashlib
 import json
 import os
-import pickle
 import shutil
 import signal
-import sys
 import tempfile
 import time
-import traceback
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
 from http.client import HTTPConnection
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from flagdata.cli import main
 from flagdata.findings import Severity
-from flagdata.lake import Lake, collect, doctor, labels_of, object_names, verify
+from flagdata.lake import Lake, collect, doctor, object_names, verify
 from flagdata.lake.objects import SUMS
 from flagdata.storage import RemotePath, connection
 from tests.evidence import circumstances
 from tests.s3 import BUCKET, SECRETS, moto
-from tests.studies.failing import slow
-from tests.studies.failing.commands import Scene, made_scene
+from tests.studies.failing.commands import Scene
+from tests.studies.failing.forked import Child, invoked, stand_in
 from tests.studies.failing.store import FAULTY, LOST, PATIENCE, failing, planned
-from tests.studies.failing.worker import SHARED
+from tests.studies.failing.verbs import SCENES, State, Verb, state
 
 POINTS = 20
-LONGEST = 180
-"""Seconds after which a command counts as hanging."""
 MAKING = 3600
 """Seconds that a scene may take to be made."""
 NOW = timedelta(0)
 _KILLED = -signal.SIGKILL
 _ORPHAN = b"of an ingest that was given up"
-State = frozenset[tuple[str, ...]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Verb:
-    """A command that writes to a lake in a bucket.
-
-    Attributes:
-        arguments: {lake} stands for the lake's address, {new} for one where nothing is, {folder} for the scene's
-            folder, {out} for one of the trial's own, other names in braces for the scene's ids.
-        one_step: whether it changes all or nothing.
-        deletes: whether data go, so that the state is of objects too.
-        target: what it writes to, {lake} or {new}.
-        again: what goes on where it was killed, if that is another command.
-        stand_in: as of `tests.studies.failing.trial.Command`.
-    """
-
-    arguments: tuple[str, ...]
-    one_step: bool = True
-    deletes: bool = False
-    target: str = "{lake}"
-    again: tuple[str, ...] | None = None
-    stand_in: str | None = None
-
-
-_LAKE = ("--lake", "{lake}")
-CORE = {
-    "init": Verb(arguments=("init", "{new}"), target="{new}"),
-    "clone": Verb(
-        arguments=("clone", "{folder}/ahead", "{new}"),
-        target="{new}",
-        one_step=False,
-        again=("push", "{new}", "--lake", "{folder}/ahead"),
-    ),
-    "push": Verb(arguments=("push", "{lake}", "--lake", "{folder}/ahead"), one_step=False),
-    "pull": Verb(arguments=("pull", "{folder}/ahead", *_LAKE), one_step=False),
-    "ingest camera": Verb(arguments=("ingest", "{folder}/second.mp4", *_LAKE)),
-    "ingest wind": Verb(arguments=("ingest", "{folder}/second.csv", *_LAKE)),
-    "ingest meshes": Verb(arguments=("ingest", "{folder}/meshes", "--rate", "25", *_LAKE)),
-    "ingest markers": Verb(arguments=("ingest", "{folder}/markers.csv", *_LAKE)),
-    "ingest record": Verb(arguments=("ingest", "{folder}/record.mcap", *_LAKE)),
-    "align": Verb(
-        arguments=(
-            "align",
-            "{camera}",
-            "{wind}",
-            "--by",
-            "given",
-            "--clock-offset",
-            "0",
-            "--offset-sigma",
-            "0.2",
-            *_LAKE,
-        )
-    ),
-    "realign": Verb(
-        arguments=("realign", "{recording}", "--by", "given", "--clock-offset", "0", "--offset-sigma", "0.3", *_LAKE)
-    ),
-    "declare": Verb(arguments=("declare", "{camera}", "--speed", "3", "--sigma", "0.2", *_LAKE)),
-    "declare-cloths": Verb(arguments=("declare-cloths", "{folder}/cloths.csv", *_LAKE), one_step=False),
-    "label": Verb(arguments=("label", "{camera}", "operator=me", *_LAKE)),
-    "tag": Verb(arguments=("tag", "v1", *_LAKE)),
-    "tag --delete": Verb(arguments=("tag", "v0", "--delete", *_LAKE)),
-    "branch": Verb(arguments=("branch", "more", *_LAKE)),
-    "branch --delete": Verb(arguments=("branch", "side", "--delete", "--discard", *_LAKE), one_step=False),
-    "merge": Verb(arguments=("merge", "side", *_LAKE)),
-    "withdraw": Verb(arguments=("withdraw", "{single}", "-m", "wrong", *_LAKE)),
-    "withdraw --everywhere": Verb(
-        arguments=("withdraw", "{single}", "--everywhere", "-m", "wrong", *_LAKE), one_step=False, deletes=True
-    ),
-    "gc": Verb(arguments=("gc", "--older-than", "0s", *_LAKE), one_step=False, deletes=True),
-    "expire": Verb(arguments=("expire", "--keep", "1", *_LAKE), one_step=False, deletes=True),
-    "simulate": Verb(arguments=("simulate", "{folder}/small.toml", "--workers", "1", *_LAKE)),
-}
-
-
-def core(folder: Path) -> Scene:
-    """Make the scene of the commands of the core, with markers, a record and a lake ahead beside it."""
-    from flagdata.ingest import ingest_camera
-
-    scene = made_scene(folder)
-    (folder / "markers.csv").write_text(
-        "time,marker,u,v,x,y,z\n"
-        + "".join(f"{k / 25},m{m},{m},0,{m},{k / 100},0\n" for k in range(30) for m in range(3))
-    )
-    shutil.copytree(folder / "lake", folder / "ahead")
-    ahead = Lake.open(folder / "ahead")
-    film = ingest_camera(ahead, folder / "film.mp4").artifact
-    (folder / "record.mcap").write_bytes(ahead.object_path(str(film.object)).read_bytes())
-    ahead.tag("later")
-    return scene
-
-
-_OF_A_TRIAL = {
-    "{folder}/lake": "{lake}",
-    "{folder}/out": "{out}",
-    "{folder}/report": "{out}-report",
-    "{folder}/answer": "{out}-answer",
-}
-
-
-def _slow(make: Callable[[Path], Scene], names: Sequence[str]) -> tuple[Callable[[Path], Scene], dict[str, Verb]]:
-    """A scene of commands that take long, with those of them that write to its lake."""
-    commands = next(found for scene, found in slow.SCENES.values() if scene is make)
-    verbs = {}
-    for name in names:
-        given = commands[name].arguments
-        for there, here in _OF_A_TRIAL.items():
-            given = tuple(part.replace(there, here) for part in given)
-        verbs[name] = Verb(arguments=given, one_step=commands[name].one_step, stand_in=commands[name].stand_in)
-    return make, verbs
-
-
-SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Verb]]] = {
-    "core": (core, CORE),
-    "train": _slow(slow.train_scene, ["train"]),
-    "measure": _slow(slow.measure_scene, ["measure"]),
-    "build": _slow(slow.build_scene, ["build"]),
-    "loop": _slow(slow.loop_scene, ["close-loop"]),
-}
 
 
 def copied(address: str, folder: Path) -> set[str]:
@@ -191,23 +64,6 @@ def copied(address: str, folder: Path) -> set[str]:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_bytes((place / name).read_bytes())
     return names
-
-
-def state(folder: Path, *, deletes: bool) -> State:
-    """What a copied lake shows: rows by branch, with their labels, tags and branches; and its objects."""
-    if not (folder / "lake.json").exists():
-        return frozenset({("no lake",)})
-    lake = Lake.open(folder)
-    found: set[tuple[str, ...]] = {("lake",)}
-    for branch in ("main", *lake.refs.branches()):
-        found.add(("branch", branch))
-        rows = lake.rows(at=branch)
-        labels = labels_of(rows)
-        found |= {("row", branch, one, str(labels.get(one))) for one in rows["artifact"].to_pylist()}
-    found |= {("tag", name) for name in lake.refs.tags()}
-    if deletes:
-        found |= {("object", stored.name) for stored in lake.objects}
-    return frozenset(found)
 
 
 def examine(address: str, folder: Path, *, remotely: bool) -> dict[str, Any]:
@@ -235,52 +91,6 @@ def _files(folder: Path) -> set[str]:
     """Names of the files of a copied lake, with those of the sums that were not copied."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     return files | {f"{'/'.join(name.split('/')[:2])}/{SUMS}" for name in files if name[:4] in ("zarr", "mode")}
-
-
-def _invoked(arguments: Sequence[str]) -> int:
-    try:
-        main(list(arguments))
-    except SystemExit as ended:
-        return int(ended.code or 0)
-    return 0
-
-
-class Child:
-    """A forked process, which may use a store; its parent must not."""
-
-    def __init__(self, work: Callable[[], object], folder: Path, *, longest: int = LONGEST) -> None:
-        self._folder = folder
-        folder.mkdir(parents=True, exist_ok=True)
-        self.pid = os.fork()
-        if self.pid == 0:
-            os.setsid()
-            for name, stream in (("stdout", 1), ("stderr", 2)):
-                os.dup2(os.open(folder / name, os.O_CREAT | os.O_WRONLY | os.O_TRUNC), stream)
-            signal.signal(signal.SIGALRM, signal.SIG_DFL)
-            signal.alarm(longest)
-            code = 70
-            try:
-                result = work()
-                (folder / "result").write_bytes(pickle.dumps(result))
-                code = 0
-            except BaseException:  # noqa: BLE001 — the parent gets it
-                traceback.print_exc()
-            sys.stdout.flush()
-            sys.stderr.flush()
-            (folder / "modules").write_text("\n".join(n for n in sys.modules if n.partition(".")[0] in SHARED))
-            os._exit(code)
-
-    def ended(self) -> tuple[int, Any, str]:
-        """Its exit code, what it gave, and what it wrote to stderr."""
-        code = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
-        result = self._folder / "result"
-        given = pickle.loads(result.read_bytes()) if code == 0 else None
-        modules = self._folder / "modules"
-        for name in modules.read_text().split() if modules.exists() else ():
-            import_module(name)
-        said = (self._folder / "stderr").read_text(errors="replace")
-        shutil.rmtree(self._folder)
-        return code, given, said
 
 
 class Bucket:
@@ -359,7 +169,7 @@ class Trials:
             target = self._target("whole")
             before = self._state(target)
             planned(self.proxy)
-            code = _invoked(self.given("whole"))
+            code = invoked(self.given("whole"))
             count = planned(self.proxy)["count"]
             return before, self._state(target), count, code
 
@@ -387,7 +197,7 @@ class Trials:
                 lost=LOST,
                 seed=1000 * number + call,
             )
-            return _invoked(self.given(prefix))
+            return invoked(self.given(prefix))
 
         def second() -> dict[str, Any]:
             faults = planned(self.proxy)["faults"]
@@ -395,7 +205,7 @@ class Trials:
             middle = self._state(target)
             planned(self.proxy, share=FAULTY, lost=LOST, seed=1000 * number + call + 1)
             again = self.verb.again if self.verb.again and middle != frozenset({("no lake",)}) else None
-            code = _invoked(self.given(prefix, again))
+            code = invoked(self.given(prefix, again))
             faults = Counter(faults) + Counter(planned(self.proxy)["faults"])
             end = self._state(target)
             seen = examine(target, self.scratch / "copy", remotely=number % 5 == 0)
@@ -504,7 +314,7 @@ def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path)
             assert code == 0, said
             bucket = Bucket(store)
             code, cloned, said = Child(
-                lambda folder=folder, group=group: _invoked(
+                lambda folder=folder, group=group: invoked(
                     ["clone", str(folder / "lake"), f"s3://{BUCKET}/template-{group}"]
                 ),
                 scratch / "cloned",
@@ -517,8 +327,7 @@ def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path)
             for name in wanted:
                 verb = verbs[name]
                 if verb.stand_in is not None:
-                    module, _, function = verb.stand_in.partition(":")
-                    getattr(import_module(module), function)(scene.ids["kept"])
+                    stand_in(verb.stand_in, scene.ids["kept"])
                 place = scratch / f"of-{name.replace(' ', '-')}"
                 place.mkdir()
                 trials = Trials(verb=verb, scene=scene, bucket=bucket, proxy=proxy, scratch=place)

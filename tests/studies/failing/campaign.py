@@ -160,7 +160,7 @@ def campaign(
             wanted = [name for name in commands if name in names or not names]
             if not wanted:
                 continue
-            scene = _kept(scenes or scratch, group, make)
+            scene = kept_scene(scenes or scratch, group, make)
             for name in wanted:
                 place = scratch / f"{group}-{name}"
                 place.mkdir()
@@ -228,7 +228,7 @@ def page(known: Mapping[str, Any]) -> str:
     return "\n".join([*lines, ""])
 
 
-def _kept(folder: Path, group: str, make: Callable[[Path], Scene]) -> Scene:
+def kept_scene(folder: Path, group: str, make: Callable[[Path], Scene]) -> Scene:
     """The scene that is kept in a folder, or one that is made there."""
     ids = folder / f"{group}.json"
     if not ids.exists():

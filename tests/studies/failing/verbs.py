@@ -1,0 +1,159 @@
+"""All verbs that write to a lake, each with a scene that is small enough to stop it at many places.
+
+A study gives the places: `{lake}`, `{new}` and `{out}` of a verb's arguments are in a folder or in a bucket.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from flagdata.lake import Lake, labels_of
+from tests.studies.failing import slow
+from tests.studies.failing.commands import Scene, made_scene
+
+State = frozenset[tuple[str, ...]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verb:
+    """A command that writes to a lake.
+
+    Attributes:
+        arguments: {lake} stands for the lake's address, {new} for one where nothing is, {folder} for the scene's
+            folder, {out} for one of the trial's own, other names in braces for the scene's ids.
+        one_step: whether it changes all or nothing.
+        deletes: whether data go, so that the state is of objects too.
+        target: what it writes to, {lake} or {new}.
+        again: what goes on where it was killed, if that is another command.
+        stand_in: as of `tests.studies.failing.trial.Command`.
+    """
+
+    arguments: tuple[str, ...]
+    one_step: bool = True
+    deletes: bool = False
+    target: str = "{lake}"
+    again: tuple[str, ...] | None = None
+    stand_in: str | None = None
+
+
+_LAKE = ("--lake", "{lake}")
+CORE = {
+    "init": Verb(arguments=("init", "{new}"), target="{new}"),
+    "clone": Verb(
+        arguments=("clone", "{folder}/ahead", "{new}"),
+        target="{new}",
+        one_step=False,
+        again=("push", "{new}", "--lake", "{folder}/ahead"),
+    ),
+    "push": Verb(arguments=("push", "{lake}", "--lake", "{folder}/ahead"), one_step=False),
+    "pull": Verb(arguments=("pull", "{folder}/ahead", *_LAKE), one_step=False),
+    "ingest camera": Verb(arguments=("ingest", "{folder}/second.mp4", *_LAKE)),
+    "ingest wind": Verb(arguments=("ingest", "{folder}/second.csv", *_LAKE)),
+    "ingest meshes": Verb(arguments=("ingest", "{folder}/meshes", "--rate", "25", *_LAKE)),
+    "ingest markers": Verb(arguments=("ingest", "{folder}/markers.csv", *_LAKE)),
+    "ingest record": Verb(arguments=("ingest", "{folder}/record.mcap", *_LAKE)),
+    "align": Verb(
+        arguments=(
+            "align",
+            "{camera}",
+            "{wind}",
+            "--by",
+            "given",
+            "--clock-offset",
+            "0",
+            "--offset-sigma",
+            "0.2",
+            *_LAKE,
+        )
+    ),
+    "realign": Verb(
+        arguments=("realign", "{recording}", "--by", "given", "--clock-offset", "0", "--offset-sigma", "0.3", *_LAKE)
+    ),
+    "declare": Verb(arguments=("declare", "{camera}", "--speed", "3", "--sigma", "0.2", *_LAKE)),
+    "declare-cloths": Verb(arguments=("declare-cloths", "{folder}/cloths.csv", *_LAKE), one_step=False),
+    "label": Verb(arguments=("label", "{camera}", "operator=me", *_LAKE)),
+    "tag": Verb(arguments=("tag", "v1", *_LAKE)),
+    "tag --delete": Verb(arguments=("tag", "v0", "--delete", *_LAKE)),
+    "branch": Verb(arguments=("branch", "more", *_LAKE)),
+    "branch --delete": Verb(arguments=("branch", "side", "--delete", "--discard", *_LAKE), one_step=False),
+    "merge": Verb(arguments=("merge", "side", *_LAKE)),
+    "withdraw": Verb(arguments=("withdraw", "{single}", "-m", "wrong", *_LAKE)),
+    "withdraw --everywhere": Verb(
+        arguments=("withdraw", "{single}", "--everywhere", "-m", "wrong", *_LAKE), one_step=False, deletes=True
+    ),
+    "gc": Verb(arguments=("gc", "--older-than", "0s", *_LAKE), one_step=False, deletes=True),
+    "expire": Verb(arguments=("expire", "--keep", "1", *_LAKE), one_step=False, deletes=True),
+    "simulate": Verb(arguments=("simulate", "{folder}/small.toml", "--workers", "1", *_LAKE)),
+}
+OUTSIDE = {
+    "recover": Verb(arguments=("recover", "{folder}/cut.mcap", "{out}.mcap")),
+    "export": Verb(arguments=("export", "parquet", "--to", "{out}", *_LAKE)),
+}
+"""Verbs of the same scene that write outside of a lake."""
+
+
+def core(folder: Path) -> Scene:
+    """Make the scene of the commands of the core, with markers, a record and a lake ahead beside it."""
+    from flagdata.ingest import ingest_camera
+
+    scene = made_scene(folder)
+    (folder / "markers.csv").write_text(
+        "time,marker,u,v,x,y,z\n"
+        + "".join(f"{k / 25},m{m},{m},0,{m},{k / 100},0\n" for k in range(30) for m in range(3))
+    )
+    shutil.copytree(folder / "lake", folder / "ahead")
+    ahead = Lake.open(folder / "ahead")
+    film = ingest_camera(ahead, folder / "film.mp4").artifact
+    (folder / "record.mcap").write_bytes(ahead.object_path(str(film.object)).read_bytes())
+    ahead.tag("later")
+    return scene
+
+
+_OF_A_TRIAL = {
+    "{folder}/lake": "{lake}",
+    "{folder}/out": "{out}",
+    "{folder}/report": "{out}-report",
+    "{folder}/answer": "{out}-answer",
+}
+
+
+def _slow(make: Callable[[Path], Scene], names: Sequence[str]) -> tuple[Callable[[Path], Scene], dict[str, Verb]]:
+    """A scene of commands that take long, with those of them that write to its lake."""
+    commands = next(found for scene, found in slow.SCENES.values() if scene is make)
+    verbs = {}
+    for name in names:
+        given = commands[name].arguments
+        for there, here in _OF_A_TRIAL.items():
+            given = tuple(part.replace(there, here) for part in given)
+        verbs[name] = Verb(arguments=given, one_step=commands[name].one_step, stand_in=commands[name].stand_in)
+    return make, verbs
+
+
+SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Verb]]] = {
+    "core": (core, CORE),
+    "train": _slow(slow.train_scene, ["train"]),
+    "measure": _slow(slow.measure_scene, ["measure"]),
+    "build": _slow(slow.build_scene, ["build"]),
+    "loop": _slow(slow.loop_scene, ["close-loop"]),
+}
+
+
+def state(folder: Path, *, deletes: bool) -> State:
+    """What a lake in a folder shows: rows by branch, with their labels, and by tag; and its objects."""
+    if not (folder / "lake.json").exists():
+        return frozenset({("no lake",)})
+    lake = Lake.open(folder)
+    found: set[tuple[str, ...]] = {("lake",)}
+    for branch in ("main", *lake.refs.branches()):
+        found.add(("branch", branch))
+        rows = lake.rows(at=branch)
+        labels = labels_of(rows)
+        found |= {("row", branch, one, str(labels.get(one))) for one in rows["artifact"].to_pylist()}
+    for tag in lake.refs.tags():
+        found |= {("tag", tag), *(("tagged", tag, one) for one in lake.rows(at=tag)["artifact"].to_pylist())}
+    if deletes:
+        found |= {("object", stored.name) for stored in lake.objects}
+    return frozenset(found)
