@@ -238,16 +238,19 @@ ON_PATH(unlinkat, fd, (int fd, const char *path, int flags), (fd, path, flags))
 ON_PATH(rmdir, AT_FDCWD, (const char *path), (path))
 ON_PATH(remove, AT_FDCWD, (const char *path), (path))
 
-int truncate(const char *path, off_t size) {
-    char whole[2 * PATH_MAX];
-    struct stat found;
-    if (!find(AT_FDCWD, path, whole)) return REAL(truncate)(path, size);
-    begin();
-    int done = REAL(truncate)(path, size);
-    if (done == 0 && !stat(whole, &found)) note(RESIZE, found.st_ino, size, "", "", NULL, 0);
-    end();
-    return done;
-}
+#define TRUNCATES(name, type) \
+    int name(const char *path, type size) { \
+        char whole[2 * PATH_MAX]; \
+        struct stat found; \
+        if (!find(AT_FDCWD, path, whole)) return REAL(name)(path, size); \
+        begin(); \
+        int done = REAL(name)(path, size); \
+        if (done == 0 && !stat(whole, &found)) note(RESIZE, found.st_ino, size, "", "", NULL, 0); \
+        end(); \
+        return done; \
+    }
+TRUNCATES(truncate, off_t)
+TRUNCATES(truncate64, off64_t)
 
 #define TWO_PATHS(kind, name, a, b, flags, parameters, arguments) \
     int name parameters { \
