@@ -84,7 +84,7 @@ def show(chosen: Showing) -> Iterator[Result]:
     from flagdata.cells import said
     from flagdata.documents import column_json
     from flagdata.ingest.before import unconfirmed
-    from flagdata.lake.labels import PREFIX
+    from flagdata.lake.label_columns import PREFIX
     from flagdata.lake.lineage import labels_of
     from flagdata.lake.results import versions
 

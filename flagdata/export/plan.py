@@ -23,7 +23,7 @@ from flagdata.errors import NotFoundError, UsageError
 from flagdata.export.croissant import write_croissant
 from flagdata.export.source import ExportRows
 from flagdata.lake import Lake
-from flagdata.lake.labels import columns
+from flagdata.lake.label_columns import columns
 from flagdata.lake.lineage import labels_of, with_labels
 from flagdata.lake.selection import Request, Selection
 from flagdata.manifest import write_manifest

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from flagdata.lake.copying import clone, transfer
     from flagdata.lake.deposit import Deposit
     from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, sampled, verify, verify_catalog
-    from flagdata.lake.labels import columns, given
+    from flagdata.lake.label_columns import columns
+    from flagdata.lake.labels import given
     from flagdata.lake.lake import Lake
     from flagdata.lake.leases import Lease, collecting
     from flagdata.lake.lineage import labels_of

@@ -200,7 +200,7 @@ class Catalog:
 
     @_one_at_a_time
     def append(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
-        """Publish `rows` as version `base + 1`; durable when it returns, or a warning says that it may not be.
+        """Publish `rows`, if any, as version `base + 1`; durable when it returns, or a warning says that it may not be.
 
         Raises:
             Moved: `base` is no longer the newest version; nothing was published.
@@ -381,35 +381,41 @@ class Catalog:
         version = table.version() + 1
         if (protocol := table.protocol()).min_writer_version > _WRITER:
             raise newer(f"writing to it takes version {protocol.min_writer_version} of Delta's protocol", self.path)
-        path = self.path / f"{uuid.uuid4().hex}.parquet"
-        sink = pa.BufferOutputStream()
-        # The Arrow schema is schema.py's, and most values occur once: without both, a row's file has 6 kB, not 15.
-        pq.write_table(rows, sink, compression="zstd", store_schema=False, use_dictionary=False)
-        content = sink.getvalue().to_pybytes()
-        write_durably(path, content)
         now = time.time_ns() // 1_000_000
+        path = self.path / f"{uuid.uuid4().hex}.parquet"
+        added, hashes = [], {}
+        if rows.num_rows or removed:  # a commit of notes alone needs no file
+            sink = pa.BufferOutputStream()
+            # The Arrow schema is schema.py's, and most values occur once: without both, a row's file has 6 kB, not 15.
+            pq.write_table(rows, sink, compression="zstd", store_schema=False, use_dictionary=False)
+            content = sink.getvalue().to_pybytes()
+            write_durably(path, content)
+            hashes = {FILE_HASH: hashlib.sha256(content).hexdigest()}
+            added = [
+                {
+                    "path": path.name,
+                    "partitionValues": {},
+                    "size": len(content),
+                    "modificationTime": now,
+                    "dataChange": rows_change,
+                    "stats": json.dumps({"numRecords": rows.num_rows}),
+                }
+            ]
         written = {
             "timestamp": now,
             "operation": "WRITE",
             "operationParameters": {"mode": "Append", "partitionBy": "[]"},
             "engineInfo": "flagdata",
             **{f"{_INFO_PREFIX}{key}": value for key, value in info.items()},
-            FILE_HASH: hashlib.sha256(content).hexdigest(),
+            **hashes,
             PREVIOUS_HASH: self._entries.hash(version - 1),
-        }
-        added = {
-            "path": path.name,
-            "partitionValues": {},
-            "size": len(content),
-            "modificationTime": now,
-            "dataChange": rows_change,
-            "stats": json.dumps({"numRecords": rows.num_rows}),
         }
         dropped = [{"path": name, "dataChange": rows_change, "deletionTimestamp": now} for name in removed]
         # Not by the Delta library, which reads the log again after it has put the entry, and may fail then.
-        actions = [{"commitInfo": written}, {"add": added}, *({"remove": action} for action in dropped)]
+        adding = ({"add": action} for action in added)
+        actions = [{"commitInfo": written}, *adding, *({"remove": action} for action in dropped)]
         if not self._entries.put(version, actions):
-            path.unlink()
+            path.unlink(missing_ok=True)
             raise Moved
         with confirming(f"version {version}", self._entries.path(version)):
             self._entries.acknowledge(version)

@@ -5,7 +5,7 @@
   if a running transaction has put it or looked it up.
 - A file younger than the grace period, by the clock that gave it its time, is kept.
 - An unfinished upload in parts to a bucket goes by the same rules.
-- An object that the log says was erased is deleted at any age: its erasure was not finished.
+- An object that the log says was erased, or expired, is deleted at any age: that was not finished.
 - A staging folder is deleted as soon as its owner is dead, which its lock proves; one without a lease, after the grace
   period.
 - A file of the catalog that some version is made of is kept.
@@ -23,7 +23,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from flagdata.durable import disk_errors
+from flagdata.durable import disk_errors, flush_folder
 from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import STORES, check_own
@@ -82,12 +82,13 @@ def collect(lake: Lake, *, grace: timedelta) -> Garbage:
     """
     with lake.changing("collecting", alone=True) as check:
         deletable = _find(lake, grace)
-        for name in deletable.objects:
-            check()
-            lake.objects.delete(name)
+        for error in lake.objects.delete_all(deletable.objects, check).values():
+            raise error
         for path in deletable.leftovers:
             check()
             Objects.remove(path)
+        for folder in sorted({path.parent for path in deletable.leftovers if isinstance(path, Path)}):
+            flush_folder(folder)
         for upload in deletable.uploads:
             check()
             upload.abort()
@@ -134,8 +135,8 @@ def unneeded(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace:
     """
     needed = marked.objects.union(*(state.objects for state in states if state.alive))
     limit = lake.now() - grace.total_seconds()
-    erased = unfinished(lake, needed)
-    objects = [o for o in lake.objects if o.name not in needed and (o.modified <= limit or o.name in erased)]
+    given_up = {left.name for left in unfinished(lake, needed)}
+    objects = [o for o in lake.objects if o.name not in needed and (o.modified <= limit or o.name in given_up)]
     leftovers: list[Place] = [state.folder for state in states if state.leased and not state.alive]
     leftovers += [path for path in unleased(lake.staging) if last_written(path) <= limit]
     leftovers += [path for path in lake.unpublished_files() if path.lstat().st_mtime <= limit]

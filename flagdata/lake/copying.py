@@ -13,20 +13,20 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import timedelta
 
 from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.lake import Lake
 from flagdata.lake.marking import Marked, mark
+from flagdata.lake.refs import NOUNS, Deletion, deleted_by
 from flagdata.lake.transaction import Transaction
 from flagdata.printable import counted
 from flagdata.storage import Place
 
 _SHOWN = ("name", "session", "source_name", "code_version", "branch", "kind")
 """Columns of text that commands show."""
-_NOUNS = {"tags": "tag", "branches": "branch"}
 Bars = Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]]
 
 
@@ -100,7 +100,8 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
     head, target_head = source.catalog.head(), target.catalog.head()
     _check_history(source, target, head=head, target_head=target_head)
     source.catalog.check_entries(min(head, target_head))
-    refs = _missing_refs(source, target)
+    _check_refs(source, target)
+    refs_before = target.refs.stored()
     sizes = _sizes(marked)
     missing = [name for name in sorted(marked.objects) if not target.objects.is_there(name, sizes.get(name))]
     size = 0
@@ -119,10 +120,12 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
             size += transaction.hold(name)
             advance(1)
         _adopt(source, target, transaction, versions=range(target_head + 1, head + 1), bars=bars)
-        _delete_refs(source, target)
-        for (kind, name), stored in refs.items():
-            target.refs.adopt(kind, name, stored)
-    names = tuple(sorted(name for _, name in refs))
+        older = source.refs.older()
+        for (kind, name), stored in source.refs.stored().items():
+            if (kind, name) in older:
+                target.refs.adopt(kind, name, stored)
+        target.refs.write_files()
+    names = tuple(sorted(name for kind, name in target.refs.stored().keys() - refs_before.keys()))
     findings = tuple(_unprintable(source, marked, versions=head - target_head))
     return Transfer(
         versions=head - target_head, head=head, objects=tuple(missing), size=size, refs=names, findings=findings
@@ -171,22 +174,6 @@ def _adopt(source: Lake, target: Lake, transaction: Transaction, *, versions: ra
         target.catalog.acknowledge(versions[-1])
 
 
-def _delete_refs(source: Lake, target: Lake) -> None:
-    """Deletes the target's refs that the source lacks and that the log says were deleted since they were made: also
-    where an earlier transfer brought that entry, and was stopped."""
-    for kind, noun, present in (
-        ("tags", "tag", source.refs.tags()),
-        ("branches", "branch", source.refs.branches()),
-    ):
-        refs_of_target = target.refs.tags() if kind == "tags" else target.refs.branches()
-        for entry in source.catalog.history():
-            name = entry.get("deleted", "").removeprefix(f"{noun} ")
-            ref = refs_of_target.get(name) if entry.get("deleted") == f"{noun} {name}" and name not in present else None
-            if ref is not None and datetime.fromisoformat(ref.created).timestamp() * 1000 <= entry["timestamp"]:
-                target.refs.remove(kind, name)
-                del refs_of_target[name]
-
-
 def _check_history(source: Lake, target: Lake, *, head: int, target_head: int) -> None:
     """Checks whether all versions of the target are versions of the source.
 
@@ -210,18 +197,25 @@ def _check_history(source: Lake, target: Lake, *, head: int, target_head: int) -
         )
 
 
-def _missing_refs(source: Lake, target: Lake) -> dict[tuple[str, str], bytes]:
-    """Lists the refs that the target lacks.
+def _check_refs(source: Lake, target: Lake) -> None:
+    """Checks whether the refs that the target has as files only, of an earlier version, are those of the source, or
+    refs that the source has deleted since, or that it does not know.
 
     Raises:
-        ConflictError: it has another one of the same name.
+        ConflictError: the source has another one of the same name.
     """
-    stored, stored_there = source.refs.stored(), target.refs.stored()
-    for key, content in stored.items():
-        if stored_there.get(key, content) != content:
+    refs_of_source = {("tags", name): ref for name, ref in source.refs.tags().items()}
+    refs_of_source |= {("branches", name): ref for name, ref in source.refs.branches().items()}
+    deletions = [
+        (key, Deletion(timestamp=int(entry["timestamp"])))
+        for entry in source.catalog.history()
+        if (key := deleted_by(entry)) is not None
+    ]
+    for key, ref in target.refs.older().items():
+        is_ended = any(ended == key and deletion.ends(ref) for ended, deletion in deletions)
+        if not is_ended and refs_of_source.get(key, ref) != ref:
             raise ConflictError(
-                f"both lakes have a {_NOUNS[key[0]]} {key[1]!r}, and not the same",
+                f"both lakes have a {NOUNS[key[0]]} {key[1]!r}, and not the same",
                 where=str(target.path),
                 fix="delete one of the two",
             )
-    return {key: content for key, content in stored.items() if key not in stored_there}

@@ -20,6 +20,7 @@ from flagdata.files import is_beside
 from flagdata.findings import Finding, Severity
 from flagdata.lake.artifact import OBJECT_NAME, Artifact
 from flagdata.lake.collection import left_uploads
+from flagdata.lake.label_columns import clashes, shown_labels
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import FOLDERS, STORES, foreign_entries
 from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased
@@ -29,7 +30,8 @@ from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import DAMAGED, StoredObject
 from flagdata.lake.refs import MAIN
-from flagdata.lake.removal import erased_objects, left, unfinished
+from flagdata.lake.removal import Unfinished, erased_objects, unfinished
+from flagdata.lake.removal import left as rows_left
 from flagdata.printable import SHORT, counted
 from flagdata.schema import FORMAT_VERSION, Kind
 from flagdata.storage import Place, StoreError
@@ -95,15 +97,16 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         except FlagdataError as error:
             findings.append(_log_damaged(error))
         needed = marked.objects | in_use
-        leftovers = unfinished(lake, needed)
-        findings += [_unfinished(lake, name, *why) for name, why in leftovers.items()]
+        leftovers = {left.name: left for left in unfinished(lake, needed)}
+        findings += [_unfinished(lake, left) for left in leftovers.values()]
         findings += [
             _orphan(stored_object, limit, grace)
             for stored_object in stored
             if stored_object.name not in needed | leftovers.keys()
         ]
         findings += _left_uploads(lake, states, limit, grace)
-    findings += [*_strays(lake, foreign), *_system_files(lake)]
+    findings += _label_clashes(lake, marked)
+    findings += [*_strays(lake, foreign), *_system_files(lake), *_ref_files(lake)]
     findings += [_abandoned(state) for state in states if state.leased and not state.alive]
     findings += [_unleased(path, written, limit, grace) for path, written in unowned]
     try:
@@ -306,13 +309,15 @@ def _erased(lake: Lake, marked: Marked) -> list[Finding]:
     return findings
 
 
-def _unfinished(lake: Lake, name: str, version: int, message: str) -> Finding:
+def _unfinished(lake: Lake, left: Unfinished) -> Finding:
+    again = {"erasure": "; or the same flagdata withdraw --everywhere again", "expiry": ""}[left.kind]
+    done = {"erasure": "erased", "expiry": "let expire"}[left.kind]
     return Finding.of(
-        "erasure-unfinished",
-        f"version {version} erased what {name} holds ({message}), and its bytes are still there: the erasure was "
-        "interrupted, or the disk refused it",
-        where=str(lake.objects.path(name)),
-        fix="run flagdata gc, which deletes it at once; or the same flagdata withdraw --everywhere again",
+        f"{left.kind}-unfinished",
+        f"version {left.version} {done} what {left.name} holds ({left.reason}), and its bytes are still there: the "
+        f"{left.kind} was interrupted, or the disk refused it",
+        where=str(lake.objects.path(left.name)),
+        fix=f"run flagdata gc, which deletes it at once{again}",
     )
 
 
@@ -339,7 +344,7 @@ def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Find
         gone = lake.catalog.objects() - _needed(marked) - frozenset(stored)
         removed = removals(lake.catalog.history())
         gone -= {name for removal in removed for name in removal.expired[1]}
-        last = next((r for r in removed if not gone.isdisjoint(left(lake, r).values())), None) if gone else None
+        last = next((r for r in removed if not gone.isdisjoint(rows_left(lake, r).values())), None) if gone else None
     except FlagdataError as error:  # a file of which older versions are made
         kind = "catalog-file-unreadable"
         return [Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)]
@@ -413,17 +418,52 @@ def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
         for path in (lake.path / store).glob("*")
         if path not in paths_known and not OBJECT_NAME.fullmatch(f"{store}/{path.name.removesuffix(suffix + DAMAGED)}")
     ]
-    strays = [path for path in strays if not is_beside(path.name)]
+    strays = [path for path in [*strays, *lake.refs.strays()] if not is_beside(path.name)]
     return [
         Finding.of(
             "stray-file",
-            "not an object: its name is not a content hash",
+            "neither an object nor a tag or branch: it has no name of theirs",
             where=str(path),
             fix="flagdata did not put it there: move it out of the lake (and flagdata ingest it from there, if it is"
             " a recording)",
         )
         for path in sorted(strays)  # type: ignore[type-var]
     ]
+
+
+def _label_clashes(lake: Lake, marked: Marked) -> list[Finding]:
+    """Warns of labels that are no columns together, which an earlier version let a merge bring together."""
+    if marked.findings:
+        return []
+    return [
+        Finding.of(
+            "labels-clash",
+            f"{clash.what}; queries see a column of texts, or one with a number behind its name",
+            where=f"ref {ref}",
+            fix=clash.fix({ref: labels}),
+        )
+        for ref in (MAIN, *lake.refs.branches())
+        for labels in [shown_labels(marked.refs[ref])]
+        for clash in clashes(labels)
+    ]
+
+
+def _ref_files(lake: Lake) -> list[Finding]:
+    """Writes the files of refs anew that do not say what the log says, and notes which they were."""
+    try:
+        stale = lake.refs.stale_files()
+    except FlagdataError:  # of which the refs' own finding says more
+        return []
+    if not stale:
+        return []
+    try:
+        lake.check_writable()
+        lake.refs.write_files()
+        done, fix = "written anew from the log", "none needed"
+    except (OSError, FlagdataError):
+        done, fix = "the lake can only be read, so that they stay as they are", "none needed: the log says what counts"
+    message = f"{counted(len(stale), 'file')} of tags and branches did not say what the log says: {done}"
+    return [Finding.of("ref-file-stale", message, where=str(stale[0]), count=len(stale), fix=fix)]
 
 
 def _system_files(lake: Lake) -> list[Finding]:

@@ -1,7 +1,8 @@
 """The user's own columns: values by name that are put on artifacts, typed, versioned with the branch they are put on.
 
 They are notes of commits, not columns of the stored catalog, so that programs that know nothing of them read the lake
-as before. `Store.table` hands them on in its schema's metadata; queries see each as a column `label_<name>`.
+as before. `Store.table` hands them on in its schema's metadata; queries see each as a column, see
+`flagdata.lake.label_columns`.
 """
 
 from __future__ import annotations
@@ -10,21 +11,14 @@ import json
 import re
 import sys
 from collections.abc import Collection, Mapping
-from typing import TypeAlias
 
-import pyarrow as pa
-
-from flagdata.errors import ConflictError, NotFoundError, UsageError
+from flagdata.errors import NotFoundError, UsageError
 from flagdata.lake.catalog import persist
-from flagdata.lake.lineage import LABELS, labels_of
-from flagdata.lake.removal import clips_of
+from flagdata.lake.commits import Change, commit
+from flagdata.lake.label_columns import Value
+from flagdata.lake.removal import CLIP_COLUMNS, clips_of
 from flagdata.lake.store import Store
-from flagdata.schema import catalog_schema
 
-Value: TypeAlias = bool | int | float | str
-PREFIX = "label_"
-_NAMED = 4
-"""Artifacts at most whose ids a remedy names."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 _LONGEST = 1000  # characters of a text
 
@@ -73,7 +67,7 @@ def put(
 
     def attempt() -> tuple[int, frozenset[str]]:
         head = lake.catalog.head()
-        rows = lake.table(lake.refs.view(branch, head))
+        rows = lake.columns(lake.refs.view(branch, head), CLIP_COLUMNS)
         identities = set(rows["artifact"].to_pylist())
         if absent := sorted(set(artifacts) - identities):
             raise NotFoundError(
@@ -81,85 +75,11 @@ def put(
                 where=str(lake.path),
                 fix=f"give ids of rows that flagdata ls --at {branch} shows",
             )
-        labelled = frozenset(artifacts) | clips_of(rows, artifacts)
-        present = labels_of(rows)
-        present_labels = {artifact: present[artifact] for artifact in sorted(present.keys() & identities)}
-        _check_types(present_labels, values, except_of=labelled)
-        if fresh := {name for name, value in values.items() if value is not None}:
-            _check_case(fresh, present_labels)
-        noted = {artifact: dict(values) for artifact in sorted(labelled)}
-        info = {"message": message, "branch": branch, LABELS: json.dumps(noted, ensure_ascii=False, allow_nan=False)}
-        return lake.catalog.append(catalog_schema().empty_table(), base=head, info=info), labelled
+        labelled = sorted(frozenset(artifacts) | clips_of(rows, artifacts))
+        change = Change(message=message, branch=branch, labels=dict.fromkeys(labelled, values))
+        return commit(lake, change, base=head), frozenset(labelled)
 
     for name, value in values.items():
         _check(name, value)
     with lake.changing("labelling"):
         return persist(attempt, where=lake.catalog.path)
-
-
-def _check_types(
-    present: Mapping[str, Mapping[str, Value]], values: Mapping[str, Value | None], *, except_of: Collection[str]
-) -> None:
-    """Checks whether a name keeps its type; that of artifacts which are labelled anew does not count.
-
-    Raises:
-        ConflictError: it does not.
-    """
-    for artifact, labels in present.items():
-        for name, value in values.items():
-            if value is None or artifact in except_of or name not in labels:
-                continue
-            if kind(labels[name]) != kind(value):
-                raise ConflictError(
-                    f"{name} is a {kind(labels[name])} on other artifacts, as {labels[name]!r}, not a {kind(value)}",
-                    where=artifact,
-                    fix="give a value of that type, or take the label off the others: name=",
-                )
-
-
-def _check_case(fresh: Collection[str], present: Mapping[str, Mapping[str, Value]]) -> None:
-    """Checks whether all names, new ones and those that artifacts have, are other columns in SQL: it ignores capitals.
-
-    Raises:
-        ConflictError: they are not.
-    """
-    names_by_lower = {name.lower(): name for name in sorted(fresh)}
-    for name in {name: None for labels in present.values() for name in labels} | dict.fromkeys(sorted(fresh)):
-        first_name = names_by_lower.setdefault(name.lower(), name)
-        if first_name != name:
-            raise ConflictError(
-                f"the labels {name} and {first_name} are one column in SQL, which takes capitals for small letters",
-                where=first_name,
-                fix="keep one of the two names" + _taking_off(name, present),
-            )
-
-
-def _taking_off(name: str, present: Mapping[str, Mapping[str, Value]]) -> str:
-    """Explains how a label is taken off the artifacts that have it, if any do."""
-    holders = [artifact for artifact, labels in present.items() if name in labels]
-    rest = f"; then repeat this, for the rest of the {len(holders)}" if len(holders) > _NAMED else ""
-    return f"; flagdata label {' '.join(holders[:_NAMED])} {name}= takes the other off{rest}" if holders else ""
-
-
-def kind(value: Value) -> str:
-    """Names the type of a label's value in words."""
-    return "truth value" if isinstance(value, bool) else "text" if isinstance(value, str) else "number"
-
-
-def columns(catalog: pa.Table) -> dict[str, pa.Array]:
-    """Name of a column → the values of the rows of a table, null where a row has no such label."""
-    labels = labels_of(catalog)
-    ids = catalog["artifact"].to_pylist()
-    labels_of_rows = {artifact: labels[artifact] for artifact in ids if artifact in labels}
-    _check_case((), labels_of_rows)
-    names = sorted({name for labels_of_row in labels_of_rows.values() for name in labels_of_row})
-    return {PREFIX + name: _column([labels.get(artifact, {}).get(name) for artifact in ids]) for name in names}
-
-
-def _column(values: list[Value | None]) -> pa.Array:
-    kinds = {kind(value) for value in values if value is not None}
-    if kinds == {"truth value"}:
-        return pa.array(values, pa.bool_())
-    if kinds == {"number"}:
-        return pa.array([None if value is None else float(value) for value in values], pa.float64())
-    return pa.array([None if value is None else str(value) for value in values], pa.string())

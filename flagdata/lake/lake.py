@@ -18,38 +18,19 @@ from flagdata.durable import disk_errors, put_if_absent
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.files import is_beside, open_regular
 from flagdata.lake.catalog import newer
-from flagdata.lake.labels import Value, put
+from flagdata.lake.label_columns import Value
+from flagdata.lake.labels import put
 from flagdata.lake.layout import FOLDERS, STAGING, STORES, scratch_files
-from flagdata.lake.lineage import removals
 from flagdata.lake.locks import MADE, TimedLocks
 from flagdata.lake.merging import MergeResult, merge
 from flagdata.lake.objects import Objects
-from flagdata.lake.refs import MAIN, Ref, View
-from flagdata.lake.removal import Erasure, Withdrawal, check_whole, delete, descendants, erase, explained, withdraw
+from flagdata.lake.ref_commits import delete_ref, make_ref
+from flagdata.lake.refs import MAIN, Ref
+from flagdata.lake.removal import Erasure, Withdrawal, descendants, erase, explained, withdraw
 from flagdata.lake.store import Store
 from flagdata.lake.transaction import Transaction
 from flagdata.schema import FORMAT_VERSION
 from flagdata.storage import Place, RemotePath
-
-
-def check_reuse(lake: Store, name: str, view: View) -> None:
-    """Checks whether a tag may have a name: one that was published and deleted never shows anything else.
-
-    Raises:
-        ConflictError: a deleted tag of that name showed other artifacts.
-    """
-    for removal in removals(lake.catalog.history()):
-        if removal.deleted == f"tag {name}" and _quoted(lake, removal.view) != _quoted(lake, view):
-            raise ConflictError(
-                f"a tag {name!r} showed other artifacts until it was deleted",
-                where=str(lake.path),
-                fix="choose another name; a tag never moves",
-            )
-
-
-def _quoted(lake: Store, view: View) -> set[str]:
-    return set(lake.table(view)["artifact"].to_pylist())
-
 
 _MARKER = "lake.json"
 _MARKER_SCHEMA = "flagdata.lake/1"
@@ -263,19 +244,18 @@ class Lake(Store):
         """
         return self.view(at)[0].version
 
-    def tag(self, name: str, *, at: str | None = None) -> Ref:
+    def tag(self, name: str, *, at: str | None = None, notes: Mapping[str, str] | None = None) -> Ref:
         """Name what `at` shows, for good.
+
+        Args:
+            notes: what else is stated of it, by name.
 
         Raises:
             UsageError: a name that cannot be one.
             ConflictError: the name is taken, or was that of a tag that showed other artifacts; or data of an expired
                 version went.
         """
-        with self.changing("naming a version", alone=True):  # one ref at a time: no name is both a tag and a branch
-            view = self.view(at)
-            check_whole(self, view)
-            check_reuse(self, name, view)
-            return self.refs.put("tags", name, view)
+        return make_ref(self, "tags", name, at=at, notes=notes or {})
 
     def branch(self, name: str, *, at: str | None = None) -> Ref:
         """Begin a branch from what `at` shows.
@@ -284,10 +264,7 @@ class Lake(Store):
             UsageError: a name that cannot be one.
             ConflictError: the name is taken; data of an expired version went.
         """
-        with self.changing("naming a version", alone=True):  # one ref at a time: no name is both a tag and a branch
-            view = self.view(at)
-            check_whole(self, view)
-            return self.refs.put("branches", name, view)
+        return make_ref(self, "branches", name, at=at, notes={})
 
     def delete_tag(self, name: str, message: str | None = None, *, discard: bool = False) -> int:
         """Delete a tag; the version that notes it. Its name never shows another version.
@@ -301,7 +278,7 @@ class Lake(Store):
             NotFoundError: no such tag.
             ConflictError: it alone shows some rows.
         """
-        return delete(self, "tags", name, message, discard=discard)
+        return delete_ref(self, "tags", name, message, discard=discard)
 
     def delete_branch(self, name: str, message: str | None = None, *, discard: bool = False) -> int:
         """Delete a branch; the version that takes its rows off. Tags, commits and branches made from it stay.
@@ -314,7 +291,7 @@ class Lake(Store):
             ConflictError: it alone shows some rows.
             UsageError: main.
         """
-        return delete(self, "branches", name, message, discard=discard)
+        return delete_ref(self, "branches", name, message, discard=discard)
 
     def merge(self, branch: str, message: str, *, into: str = MAIN) -> MergeResult:
         """Commit on `into` what `branch` changed since the two last had the same: its new rows come, rows that it

@@ -102,7 +102,7 @@ def check_writable(root: Place) -> None:
         return
     check_own(root)
     for path in (root / name for name in FOLDERS):
-        folder = path if path.exists() else path.parent
+        folder = next(place for place in (path, *path.parents) if place.exists())
         if not os.access(folder, os.W_OK | os.X_OK):
             mounted = bool(os.statvfs(folder).f_flag & os.ST_RDONLY)
             raise FlagdataError(

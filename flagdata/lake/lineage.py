@@ -18,9 +18,8 @@ import pyarrow as pa
 
 from flagdata.documents import from_json
 from flagdata.errors import CorruptError, NotFoundError
-from flagdata.lake.refs import MAIN, Slice, View, view_from
+from flagdata.lake.refs import DELETED, MAIN, Entry, Slice, View, view_from
 
-Entry = Mapping[str, Any]
 Life = tuple[str, int]
 """A branch, and the version that deleted the last one of its name; -1 for the first."""
 
@@ -42,9 +41,17 @@ LABELS = "labels"
 """Note of a commit that puts labels on artifacts: artifact → name → value, `null` where it takes one off."""
 
 
+HIDDEN_ON = "hidden_on"
+"""Note of a commit by which rows leave several branches: each but the first → the rows of its base that it hides."""
+
+
 def _noted_merge(entry: Entry) -> Slice:
     with _reading(entry):
         return Slice(branch=entry["merged"], version=int(entry["merged_version"]))
+
+
+def _further_branches(entry: Entry) -> frozenset[str]:
+    return Removal(entry).branches if HIDDEN_ON in entry else frozenset()
 
 
 @contextmanager
@@ -81,7 +88,7 @@ class Removal:
 
     @property
     def branch(self) -> str:
-        """Returns the branch that it is on, "" for one of a tag or of versions."""
+        """Returns the branch that it is on, the first of several; "" for one of a tag or of versions."""
         return str(self.entry.get("branch", ""))
 
     @property
@@ -95,10 +102,21 @@ class Removal:
         return "withdrawn" in self.entry
 
     @property
-    def hidden(self) -> frozenset[str]:
-        """Returns the ids of the rows of its base that it hides on its branch."""
+    def branches(self) -> frozenset[str]:
+        """Returns the branches that do not show some rows any more; none for one of a tag or of versions."""
+        return frozenset({self.branch} - {""}) | self._hidden_elsewhere().keys()
+
+    def hidden(self, branch: str) -> frozenset[str]:
+        """Returns the ids of the rows of its base that it hides on a branch."""
         with _reading(self.entry):
-            return frozenset(str(artifact) for artifact in from_json(self.entry.get("hidden", "[]")))
+            noted = from_json(self.entry.get("hidden", "[]")) if branch == self.branch else []
+            return frozenset(map(str, noted)) | self._hidden_elsewhere().get(branch, frozenset())
+
+    def _hidden_elsewhere(self) -> Mapping[str, frozenset[str]]:
+        """Reads what it hides on further branches than its own, with those of which it hides nothing."""
+        with _reading(self.entry):
+            noted = from_json(self.entry.get(HIDDEN_ON, "{}"))
+            return {Slice(branch=branch, version=0).branch: frozenset(map(str, ids)) for branch, ids in noted.items()}
 
     @property
     def erased(self) -> Mapping[str, str | None]:
@@ -112,7 +130,7 @@ class Removal:
     @property
     def deleted(self) -> str:
         """Returns the tag or branch that it deleted, as "tag v1"; "" where it deleted none."""
-        return str(self.entry.get("deleted", ""))
+        return str(self.entry.get(DELETED, ""))
 
     @property
     def view(self) -> View:
@@ -147,13 +165,13 @@ class Lineage:
     def __init__(self, history: Iterable[Entry], forks: Mapping[str, View]) -> None:
         self._entries: dict[str, list[Entry]] = {}
         for entry in sorted(history, key=lambda entry: entry["version"]):
-            branch = entry.get("branch")
-            if branch is None:
-                continue
-            if branch not in self._entries:
-                with _reading(entry):
-                    Slice(branch=branch, version=entry["version"])  # whether that is a branch's name
-            self._entries.setdefault(branch, []).append(entry)
+            for branch in {entry.get("branch"): None, **dict.fromkeys(_further_branches(entry))}:
+                if branch is None:
+                    continue
+                if branch not in self._entries:
+                    with _reading(entry):
+                        Slice(branch=branch, version=entry["version"])  # whether that is a branch's name
+                self._entries.setdefault(branch, []).append(entry)
         self._forks = {**forks, MAIN: ()}
 
     def fork(self, part: Slice) -> View | None:
@@ -161,7 +179,7 @@ class Lineage:
         lost: it is not there, though nobody deleted it."""
         later = (entry for entry in self._entries.get(part.branch, ()) if entry["version"] > part.version)
         for entry in later:
-            if "deleted" in entry:
+            if DELETED in entry:
                 return Removal(entry).view
         return self._forks.get(part.branch)
 
@@ -178,7 +196,7 @@ class Lineage:
 
     def life(self, part: Slice) -> Life:
         """Finds which of the branches of that name had it at a version."""
-        deleted = (e["version"] for e in self._entries.get(part.branch, ()) if "deleted" in e)
+        deleted = (e["version"] for e in self._entries.get(part.branch, ()) if DELETED in e)
         return (part.branch, max((version for version in deleted if version <= part.version), default=-1))
 
     def commits(self, part: Slice) -> Sequence[Entry]:
@@ -189,7 +207,7 @@ class Lineage:
 
     def hidden(self, part: Slice) -> frozenset[str]:
         """Ids of rows of its base that a branch does not show, since they were withdrawn from it."""
-        return frozenset(artifact for entry in self.commits(part) for artifact in Removal(entry).hidden)
+        return frozenset(artifact for entry in self.commits(part) for artifact in Removal(entry).hidden(part.branch))
 
     def labels(self, part: Slice) -> dict[str, dict[str, Any]]:
         """Returns the labels of each artifact, after all commits that went into a branch at a version.
@@ -197,7 +215,9 @@ class Lineage:
         Raises:
             CorruptError: what a commit notes cannot be read.
         """
-        labelled = [e for entries in self._entries.values() for e in entries if LABELS in e]
+        labelled = [
+            e for branch, entries in self._entries.items() for e in entries if LABELS in e and e["branch"] == branch
+        ]
         newest_versions = self._newest(part) if labelled else {}
         labels: dict[str, dict[str, Any]] = {}
         for entry in sorted(labelled, key=lambda entry: entry["version"]):

@@ -281,7 +281,7 @@ class Log:
 
     def acknowledge(self, version: int) -> None:
         """Notes for good that the entry of `version` is on the disk; durable when it returns."""
-        self.marks.mkdir(exist_ok=True)
+        self.marks.mkdir(parents=True, exist_ok=True)
         put_if_absent(self.marks / str(version), f"{self.hash(version)}\n".encode())
         for lower in self._marks():
             if lower < version:
@@ -467,7 +467,7 @@ class Summaries:
             "versions": list(history[first:]),
         }
         text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
-        self._folder.mkdir(exist_ok=True)
+        self._folder.mkdir(parents=True, exist_ok=True)
         put_if_absent(self._folder / f"{first:020d}-{last:020d}-{digest(text)}.json", text.encode())
 
     def _chain(self, head: int) -> list[Summary]:

@@ -157,12 +157,13 @@ def _withdrawn(lake: Store, *, since: float, first: int | None) -> Iterator[pa.T
         if not recent and (first is None or before < first):
             continue
         if removal.withdrawn:
-            yield _unerased(lake, lake.catalog.rows(before), (Slice(branch=MAIN, version=before),))
-        if removal.hidden:  # rows of a base, which may have left the table long ago
-            view = lake.lineage().view(Slice(branch=removal.branch, version=before))
-            yield _unerased(lake, lake.table(view), view)
+            yield _unexpired(lake, lake.catalog.rows(before), (Slice(branch=MAIN, version=before),))
+        for branch in removal.branches:
+            if removal.hidden(branch):  # rows of a base, which may have left the table long ago
+                view = lake.lineage().view(Slice(branch=branch, version=before))
+                yield _unexpired(lake, lake.table(view), view)
         if recent and removal.deleted:
-            yield _unerased(lake, lake.table(removal.view), removal.view)
+            yield _unexpired(lake, lake.table(removal.view), removal.view)
 
 
 def _is_recent(lake: Store, removal: Removal, since: float) -> bool:
@@ -172,6 +173,15 @@ def _is_recent(lake: Store, removal: Removal, since: float) -> bool:
     return bool(
         writers_time >= since or (writers_time >= since - _BEHIND and lake.catalog.written(removal.version) >= since)
     )
+
+
+def _unexpired(lake: Store, rows: pa.Table, view: View) -> pa.Table:
+    """Returns the rows that no version after those of a view erased, and whose data did not go with versions that
+    expired since."""
+    newest = max(part.version for part in view)
+    gone = {name for r in removals(lake.catalog.history()) if r.version > newest for name in r.expired[1]}
+    rows = _unerased(lake, rows, view)
+    return rows.filter(~pc.field("object").isin(pa.array(sorted(gone), pa.string()))) if gone else rows
 
 
 def _unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:

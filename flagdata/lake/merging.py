@@ -3,7 +3,8 @@
 A row that both had and that the other has withdrawn since stays withdrawn; a row that both had and that the branch has
 withdrawn is withdrawn. So it is where no merge is recorded (lakes of older versions of flagdata, or the same source
 ingested on both): a withdrawal that is later than the branch's own row stands. What is made anew on the branch after
-the other withdrew it comes back, and is named. `difference` says what changed between any two refs.
+the other withdrew it comes back, and is named. Labels are merged by `flagdata.lake.label_merging`. `difference` says
+what changed between any two refs.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ import pyarrow as pa
 
 from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake.catalog import persist
+from flagdata.lake.commits import Change, commit, labels_after
+from flagdata.lake.label_merging import amended_labels, merge_labels
 from flagdata.lake.lineage import removals
 from flagdata.lake.matching import made_from, matching
 from flagdata.lake.refs import Slice
-from flagdata.lake.removal import left, remove
+from flagdata.lake.removal import left
 from flagdata.lake.store import Store
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
@@ -73,7 +76,7 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
     if lineage.knows(ours, theirs):
         return MergeResult(version=head, commit=None, left_out={}, brought_back={})
     base = lineage.merge_base(ours, theirs)
-    before = frozenset(lake.identities(lineage.view(base)).to_pylist()) if base is not None else frozenset()
+    before = lake.identities(lineage.view(base)) if base is not None else frozenset()
     ids_here, ids_there = _ids(mine), _ids(theirs_rows)
     new = ids_there - before
     left_out, brought_back = _decided(lake, ours, theirs, new - ids_here, since=-1 if base is None else base.version)
@@ -82,22 +85,29 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
     _check_objects(lake, fresh)
     _check_parents(mine, theirs_rows, added=added, withdrawn=withdrawn, branch=branch, into=into)
 
-    commit = f"c{secrets.token_hex(8)}"
-    info = {
-        "commit": commit,
-        "message": message,
-        "branch": into,
+    commit_id = f"c{secrets.token_hex(8)}"
+    notes = {
+        "commit": commit_id,
         "rows": str(len(added)),
         "merged": branch,
         "merged_version": str(head),
         "code_version": code_version(),
     }
-    if withdrawn:
-        info["withdrawn"] = str(len(withdrawn))
-    version = remove(lake, withdrawn, branch=into, base=head, info=info, fresh=_published(fresh, into))
+    here = ids_here - withdrawn
+    labels = merge_labels(lake, ours, theirs, base, here=here, there=ids_there)
+    change = Change(
+        message=message,
+        branch=into,
+        fresh=_published(fresh, into),
+        held=fresh["object"].drop_null().to_pylist(),
+        leaving={into: withdrawn} if withdrawn else {},
+        labels=amended_labels(labels_after(lake, into, {**notes, "branch": into}, head), labels, here | added),
+        notes=notes,
+    )
+    version = commit(lake, change, base=head)
     return MergeResult(
         version=version,
-        commit=commit,
+        commit=commit_id,
         added=tuple(sorted(added)),
         existing=tuple(sorted(new & ids_here)),
         withdrawn=tuple(sorted(withdrawn)),
@@ -130,11 +140,11 @@ def _decided(
     brought_back: dict[str, int] = {}
     first = max(since, lineage.life(ours)[1])
     for removal in reversed(removals(lake.catalog.history())):
-        if not (candidates and removal.withdrawn and removal.version > first and removal.branch == ours.branch):
+        if not (candidates and removal.withdrawn and removal.version > first and ours.branch in removal.branches):
             continue
-        if removed := (left(lake, removal).keys() | removal.hidden) & candidates:
+        if removed := (left(lake, removal).keys() | removal.hidden(ours.branch)) & candidates:
             then = Slice(branch=theirs.branch, version=max(removal.version, lineage.life(theirs)[1]))
-            had = removed & frozenset(lake.identities(lineage.view(then)).to_pylist())
+            had = removed & lake.identities(lineage.view(then))
             for artifact in removed:
                 left_out.pop(artifact, None)
                 brought_back.pop(artifact, None)

@@ -12,7 +12,7 @@ import errno
 import hashlib
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -198,8 +198,29 @@ class Objects:
             if self._note(name).exists():
                 self._remove_note(name)
 
+    def delete_all(self, names: Sequence[str], check: Callable[[], None]) -> dict[str, OSError]:
+        """Delete objects, and what is noted of them; they are gone for good when it returns.
+
+        Args:
+            check: raises where the lock may have been lost that keeps others from needing them.
+
+        Returns:
+            name → what the disk refused.
+        """
+        refused: dict[str, OSError] = {}
+        try:
+            for name in names:
+                check()
+                try:
+                    self.delete(name)
+                except OSError as error:
+                    refused[name] = error
+        finally:
+            self._flush_stores({name.partition("/")[0] for name in names})
+        return refused
+
     def delete(self, name: str) -> None:
-        """Delete an object, and what is noted of it.
+        """Delete an object, and what is noted of it; a power cut may bring it back until its store is flushed.
 
         Raises:
             OSError: what the disk refused.
@@ -207,6 +228,11 @@ class Objects:
         self.remove(self.path(name))
         with suppress(OSError):  # a note without its object says nothing
             self._remove_note(name)
+
+    def _flush_stores(self, stores: Collection[str]) -> None:
+        """Forces deletions to the disk."""
+        for store in sorted(stores):
+            flush_folder(self.root / store)
 
     def _remove_note(self, name: str) -> None:
         self._note(name).unlink(missing_ok=True)
@@ -448,6 +474,9 @@ class RemoteObjects(Objects):
             forget(name, path.suffix)  # what a reader fetched meanwhile: what is erased stays nowhere on this machine
         else:
             Objects.remove(path)
+
+    def _flush_stores(self, stores: Collection[str]) -> None:
+        """Does nothing: a store answers a deletion when it is done."""
 
     def _copied(self, name: str) -> bool:
         return copy_of(name, self.path(name).suffix) is not None

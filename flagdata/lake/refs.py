@@ -1,9 +1,13 @@
-"""Tags and branches: small JSON files, put only if absent. Delta has neither.
+"""Tags and branches. Delta has neither: each is an entry of the log, which says what it shows and when it was deleted.
+
+The files in `refs/tags` and `refs/branches` repeat the log for earlier versions of flagdata, whose refs were these
+files alone. What the log says counts; `flagdata doctor` writes a file anew that says something else. A ref that only a
+file states, of an earlier version, is entered into the log by the next commit.
 
 A view is what a ref shows: for each branch of its line, that branch's rows at one version of the table. A branch's
 view is its own rows at the head, and its parent's view at the version it forked from, without rows that were withdrawn
 from the branch; so `main` may go on without the branch noticing. Every row names the branch that it was committed on. A
-tag stores its whole view and stays what it was. Each file ends with the SHA-256 of what it states.
+tag states its whole view and stays what it was. Each file ends with the SHA-256 of what it states.
 
 Instants by which a version can be named: 2026-11-26 (the end of that day, UTC), a time with its zone, 3.days.ago.
 """
@@ -12,15 +16,16 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from flagdata.documents import from_json
-from flagdata.durable import confirming, disk_errors, flush_folder, put_if_absent, unreadable
-from flagdata.errors import ConflictError, CorruptError, NotFoundError, TimeError, UnknownNameError, UsageError
+from flagdata.durable import SCRATCH, confirming, disk_errors, flush_folder, put_if_absent, unreadable
+from flagdata.errors import CorruptError, FlagdataError, NotFoundError, TimeError, UnknownNameError, UsageError
 from flagdata.files import open_regular
 from flagdata.provenance import recipe_hash
 from flagdata.storage import Place
@@ -59,11 +64,14 @@ def moment(text: str, *, now: datetime | None = None) -> int | None:
         raise UsageError(error.what, where="--at", fix="write 2026-11-26, or 2026-11-26T12:00:00Z") from None
 
 
+Entry: TypeAlias = Mapping[str, Any]
+"""What the log states of a version, see `Catalog.history`."""
 MAIN = "main"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _VERSION = re.compile(r"[0-9]+")
 _SHOWN = 60  # characters of a name in a message
-_NOUNS = {"tags": "tag", "branches": "branch"}
+NOUNS = {"tags": "tag", "branches": "branch"}
+"""Kind of a ref, which is the folder of its file → what it is called."""
 _HASH = "sha256"
 _PULL = "delete the file and flagdata pull a clone of this lake, or restore it from a copy"
 _COMMIT = re.compile(r"c[0-9a-f]{16}")
@@ -109,15 +117,36 @@ def view_from(stored: Iterable[Mapping[str, Any]]) -> View:
 
 @dataclass(frozen=True, kw_only=True)
 class Ref:
-    """A tag (its view is fixed) or a branch (its view is what it forked from, without its own rows)."""
+    """A tag (its view is fixed) or a branch (its view is what it forked from, without its own rows).
+
+    Attributes:
+        created: when it was made, ISO 8601.
+        notes: what else its maker stated of it, by name.
+    """
 
     name: str
     created: str
     view: View
+    notes: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and isinstance(self.created, str)):
             raise TypeError("name and time of creation are texts")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Deletion:
+    """A commit that deleted a tag or branch, at `timestamp` [UTC ms]."""
+
+    timestamp: int
+
+    def ends(self, ref: Ref) -> bool:
+        """Checks whether a ref of that name was made before, so that it is the one that was deleted."""
+        return datetime.fromisoformat(ref.created).timestamp() * 1000 <= self.timestamp
+
+
+Key = tuple[str, str]
+"""Kind ("tags" or "branches") and name of a ref."""
 
 
 def check_name(name: str, *, noun: str) -> str:
@@ -139,68 +168,123 @@ def check_name(name: str, *, noun: str) -> str:
 
 
 class Refs:
-    """The folder `refs/` of a lake."""
+    """The tags and branches of a lake; main is none of them.
 
-    def __init__(self, root: Place) -> None:
+    Args:
+        root: the folder `refs/`, whose files repeat what the log states.
+        history: gives what the log states of each version, newest first.
+    """
+
+    def __init__(self, root: Place, history: Callable[[], Sequence[Entry]]) -> None:
         self.root = root
+        self._history = history
+        self._lives: tuple[int, Mapping[Key, Ref | Deletion]] = (-1, {})
 
     def make_folders(self) -> None:
         for kind in ("tags", "branches", "history"):
             (self.root / kind).mkdir(parents=True)
 
     def tags(self) -> dict[str, Ref]:
-        """Reads all tags by name."""
+        """Lists all tags by name."""
         return self._all("tags")
 
     def branches(self) -> dict[str, Ref]:
-        """Reads all branches but `main`, by name."""
+        """Lists all branches but `main`, by name."""
         return self._all("branches")
 
-    def put(self, kind: str, name: str, view: View) -> Ref:
-        """Create a tag or branch, and return it.
-
-        Args:
-            kind: "tags" or "branches".
+    def older(self) -> dict[Key, Ref]:
+        """Reads the refs that only a file states, by kind and name: those that an earlier version of flagdata made.
 
         Raises:
-            ConflictError: the name is taken, by a tag or by a branch.
+            CorruptError: a file that cannot be read, or has changed since it was written.
         """
-        check_name(name, noun=_NOUNS[kind])
-        other_kind = "branches" if kind == "tags" else "tags"
-        ref = Ref(name=name, created=datetime.now(UTC).isoformat(timespec="seconds"), view=view)
-        content = {
-            "schema": "flagdata.ref/1",
-            "name": ref.name,
-            "created": ref.created,
-            "view": as_json(view),
-        }
-        content[_HASH] = recipe_hash(content)
-        path = self.root / kind / f"{name}.json"
-        with disk_errors(f"creating the ref {name}", path):
-            # In a bucket a put of the same bytes counts as one that was sent twice, so that it would not say so.
-            taken = name == MAIN or any((self.root / folder / f"{name}.json").exists() for folder in (other_kind, kind))
-            if taken or not put_if_absent(path, (json.dumps(content, indent=2) + "\n").encode()):
-                raise ConflictError(
-                    f"there is a tag or branch {name!r} already",
-                    where=str(path),
-                    fix="choose another name; a tag never moves" if kind == "tags" else "choose another name",
-                )
-        return ref
+        found = {key: self._older(key, path) for key, path in self._unstated().items()}
+        return {key: ref for key, ref in found.items() if ref is not None}
 
-    def stored(self) -> dict[tuple[str, str], bytes]:
-        """Reads the bytes of each ref by its kind ("tags" or "branches") and name."""
-        contents: dict[tuple[str, str], bytes] = {}
-        for kind, refs in (("tags", self.tags()), ("branches", self.branches())):
-            for name in refs:
-                with open_regular(self.root / kind / f"{name}.json") as stream:
-                    contents[kind, name] = stream.read()
-        return contents
+    def enterable(self, head: int) -> dict[Key, Ref]:
+        """Reads those of them that the log can take: what is damaged, or names a version after `head`, stays a file."""
+        found: dict[Key, Ref] = {}
+        for key, path in self._unstated().items():
+            with suppress(FlagdataError):
+                ref = self._older(key, path)
+                if ref is not None and max(part.version for part in ref.view) <= head:
+                    found[key] = ref
+        return found
 
-    def adopt(self, kind: str, name: str, stored: bytes) -> None:
-        """Put a ref of another lake of the same history, unless it is there."""
-        path = self.root / kind / f"{name}.json"
-        with disk_errors(f"creating the ref {name}", path):
-            put_if_absent(path, stored)
+    def _unstated(self) -> dict[Key, Place]:
+        """Lists the files of refs that the log does not state, by kind and name."""
+        files = {(kind, path.stem): path for kind in NOUNS for path in self._files(kind)}
+        lives = self.lives() if files else {}
+        return {key: path for key, path in files.items() if not isinstance(lives.get(key), Ref)}
+
+    def _older(self, key: Key, path: Place) -> Ref | None:
+        """Reads the ref that a file states; `None` where the log says that it was deleted since."""
+        ref, life = self._read(path), self.lives().get(key)
+        return None if isinstance(life, Deletion) and life.ends(ref) else ref
+
+    def lives(self) -> Mapping[Key, Ref | Deletion]:
+        """Finds for each name that the log states, by kind, the ref that has it now, or the last deletion.
+
+        Raises:
+            CorruptError: a note of the log cannot be read.
+        """
+        history = self._history()
+        head = int(history[0]["version"]) if history else -1
+        if self._lives[0] != head:
+            lives: dict[Key, Ref | Deletion] = {}
+            for entry in reversed(history):
+                lives |= made_by(entry)
+                if (key := deleted_by(entry)) is not None:
+                    lives[key] = Deletion(timestamp=int(entry["timestamp"]))
+            self._lives = (head, lives)
+        return self._lives[1]
+
+    def stored(self) -> dict[Key, bytes]:
+        """Returns the bytes of the file of each ref, by kind and name."""
+        return {key: _content(ref) for key, ref in self._by_key().items()}
+
+    def cache(self, kind: str, ref: Ref) -> None:
+        """Write the file of a ref that the log states, for earlier versions of flagdata. A file of other content goes.
+
+        Raises:
+            OSError: what the disk refused.
+        """
+        path = self.root / kind / f"{ref.name}.json"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not put_if_absent(path, _content(ref)) and path.read_bytes() != _content(ref):
+            path.unlink()
+            put_if_absent(path, _content(ref))
+
+    def stale_files(self) -> list[Place]:
+        """Lists the files of refs that do not say what the log says: missing, changed, or of a ref that was deleted."""
+        live = self._by_key()
+        stale = [
+            path
+            for (kind, name), ref in live.items()
+            if not _holds(path := self.root / kind / f"{name}.json", _content(ref))
+        ]
+        stale += [path for kind in NOUNS for path in self._files(kind) if (kind, path.stem) not in live]
+        return sorted(stale)  # type: ignore[type-var]
+
+    def strays(self) -> list[Place]:
+        """Lists what lies among the files of refs and has no ref's name."""
+        paths = [path for kind in NOUNS for path in (self.root / kind).glob("*")]
+        strays = [path for path in paths if path.suffix != ".json" or not _NAME.fullmatch(path.stem)]
+        return sorted(path for path in strays if not SCRATCH.fullmatch(path.name))  # type: ignore[type-var]
+
+    def write_files(self) -> None:
+        """Write the files of refs anew that do not say what the log says.
+
+        Raises:
+            OSError: what the disk refused.
+        """
+        live = self._by_key()
+        for path in self.stale_files():
+            ref = live.get((path.parent.name, path.stem))
+            if ref is not None:
+                self.cache(path.parent.name, ref)
+            else:
+                self._delete(path)
 
     def view(self, branch: str, head: int) -> View:
         """Returns what a branch shows when the table is at version `head`.
@@ -224,24 +308,43 @@ class Refs:
         newest = max(part.version for part in ref.view)
         if newest > head:
             path = self.root / kind / f"{ref.name}.json"
-            message = f"the {_NOUNS[kind]} {ref.name!r} shows version {newest}, but the newest is {head}"
+            message = f"the {NOUNS[kind]} {ref.name!r} shows version {newest}, but the newest is {head}"
             raise CorruptError(message, where=str(path), fix=_PULL)
         return ref.view
 
     def remove(self, kind: str, name: str) -> None:
-        """Take a tag or branch away; what is noted of it is the log's.
+        """Delete the file of a tag or branch; the log says whether there is one.
 
         Raises:
             OSError: what the disk refused.
         """
-        path = self.root / kind / f"{name}.json"
-        path.unlink()
+        self._delete(self.root / kind / f"{name}.json")
+
+    @staticmethod
+    def _delete(path: Place) -> None:
+        path.unlink(missing_ok=True)
         if isinstance(path, Path):
-            with confirming(f"the deletion of {name}", path):
+            with confirming(f"the deletion of {path.stem}", path):
                 flush_folder(path.parent)
 
+    def adopt(self, kind: str, name: str, stored: bytes) -> None:
+        """Put the file of a ref that a lake of the same history has as a file only, unless it is there."""
+        path = self.root / kind / f"{name}.json"
+        with disk_errors(f"creating the ref {name}", path):
+            put_if_absent(path, stored)
+
     def _all(self, kind: str) -> dict[str, Ref]:
-        return {path.stem: self._read(path) for path in sorted((self.root / kind).glob("[!.]*.json"))}  # type: ignore[type-var]
+        return {name: ref for (its_kind, name), ref in self._by_key().items() if its_kind == kind}
+
+    def _by_key(self) -> dict[Key, Ref]:
+        """Lists all refs by kind and name, sorted."""
+        stated = {key: life for key, life in self.lives().items() if isinstance(life, Ref)}
+        return dict(sorted({**stated, **self.older()}.items()))
+
+    def _files(self, kind: str) -> list[Place]:
+        """Lists the files of refs of a kind. What has no ref's name is none: it may be of any program."""
+        files = [path for path in (self.root / kind).glob("[!.]*.json") if _NAME.fullmatch(path.stem)]
+        return sorted(files)  # type: ignore[type-var]
 
     @staticmethod
     def _read(path: Place) -> Ref:
@@ -251,7 +354,7 @@ class Refs:
             noted = content.pop(_HASH, None)  # which those of older lakes lack
             if content["name"] != path.stem or (noted is not None and noted != recipe_hash(content)):
                 raise ValueError("it has changed since it was written")
-            return Ref(name=content["name"], created=content["created"], view=view_from(content["view"]))
+            return _from_stated(content)
         except OSError as error:
             raise unreadable("the ref", path, error) from None
         except (ValueError, KeyError, TypeError, AttributeError):
@@ -260,6 +363,75 @@ class Refs:
                 where=str(path),
                 fix=_PULL,
             ) from None
+
+
+def _holds(path: Place, content: bytes) -> bool:
+    try:
+        with open_regular(path) as stream:
+            return stream.read() == content
+    except (OSError, FlagdataError):
+        return False
+
+
+def _stated(ref: Ref) -> dict[str, Any]:
+    """Returns what the log and a file state of a ref."""
+    stated = {"name": ref.name, "created": ref.created, "view": as_json(ref.view)}
+    return {**stated, **({"notes": dict(ref.notes)} if ref.notes else {})}
+
+
+def _from_stated(stated: Mapping[str, Any]) -> Ref:
+    """Reads what `_stated` returned.
+
+    Raises:
+        ValueError, KeyError, TypeError, AttributeError: it states no ref.
+    """
+    notes = {key: value for key, value in stated.get("notes", {}).items() if isinstance(value, str)}
+    return Ref(name=stated["name"], created=stated["created"], view=view_from(stated["view"]), notes=notes)
+
+
+def _content(ref: Ref) -> bytes:
+    content = {"schema": "flagdata.ref/1", **_stated(ref)}
+    content[_HASH] = recipe_hash(content)
+    return (json.dumps(content, indent=2) + "\n").encode()
+
+
+MADE = "made"
+"""Note of a commit that makes refs: a list of what each states, with its kind."""
+DELETED = "deleted"
+"""Note of a commit that deletes a ref: "tag v1"."""
+
+
+def note_made(refs: Mapping[Key, Ref]) -> dict[str, str]:
+    """Writes the note of a commit that makes some refs; none where there are none."""
+    made = [{"kind": kind, **_stated(ref)} for (kind, _), ref in refs.items()]
+    return {MADE: json.dumps(made, ensure_ascii=False)} if made else {}
+
+
+def made_by(entry: Entry) -> dict[Key, Ref]:
+    """Reads the refs that a commit made, by kind and name.
+
+    Raises:
+        CorruptError: the note cannot be read.
+    """
+    if MADE not in entry:
+        return {}
+    try:
+        made = {(str(stated["kind"]), str(stated["name"])): _from_stated(stated) for stated in from_json(entry[MADE])}
+        if not all(kind in NOUNS and _NAME.fullmatch(name) for kind, name in made):
+            raise ValueError("what is made is neither a tag nor a branch, or has no name")
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise CorruptError(
+            f"what version {entry['version']} notes of tags and branches cannot be read",
+            where="the catalog's log",
+            fix="run flagdata verify; restore the log entry from a copy",
+        ) from None
+    return made
+
+
+def deleted_by(entry: Entry) -> Key | None:
+    """Returns kind and name of the ref that a commit deleted, if it deleted one."""
+    noun, _, name = str(entry.get(DELETED, "")).partition(" ")
+    return next(((kind, name) for kind, its_noun in NOUNS.items() if its_noun == noun), None)
 
 
 def resolve(

@@ -1,44 +1,43 @@
-"""Rows go, for a reason: withdrawn from a branch, erased everywhere, with a branch or tag that is deleted, with
-versions that expire. All go by one commit, `remove`, whose notes say which rows and why.
+"""Rows go, for a reason: withdrawn from a branch, erased everywhere, with versions that expire, or with a branch or tag
+that is deleted, see `flagdata.lake.ref_commits`. All go by one commit, see `flagdata.lake.commits`, whose notes say
+which rows and why.
 
 *Withdrawn*: the branch's rows leave the table; rows of its base, which its parent goes on to show, are hidden by a
 note, see `flagdata.lake.lineage`. `gc` deletes their data after the grace period.
 
-*Erased*: off every branch, the bytes deleted at once, also where a tag or an old version shows them. Their rows stay in
-tags and older versions, which say what was erased and why. Objects that other rows need stay. What a lake cannot reach
-is named: exports, clones, caches. The commit comes first: a process that is killed before it has deleted the bytes, or
-a disk that refuses, leaves an erasure that the log knows, see `unfinished`. The same command finishes it, and so does
-`gc`.
+*Erased*: off every branch by one commit, the bytes deleted at once, also where a tag or an old version shows them.
+Their rows stay in tags and older versions, which say what was erased and why. Objects that other rows need stay. What a
+lake cannot reach is named: exports, clones, caches. The commit comes first: a process that is killed before it has
+deleted the bytes, or a disk that refuses, leaves an erasure that the log knows, see `unfinished`. The same command
+finishes it, and so does `gc`.
 
 *Expired*: the oldest versions give up the data that only they show, at once. Their rows stay readable, and what a
-branch or a tag shows does not change.
-
-*Deleted*: a branch or tag; the commit notes what it showed, so that what was built on it is still resolved.
+branch or a tag shows does not change. What a process that is killed has not deleted, `gc` does.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
-from functools import partial
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from flagdata.durable import disk_errors
-from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import ConflictError, FlagdataError, NotFoundError
 from flagdata.lake import naming
 from flagdata.lake.catalog import persist
+from flagdata.lake.commits import Change, commit
 from flagdata.lake.leases import leases, looking
 from flagdata.lake.lineage import Removal, removals
 from flagdata.lake.locks import Check
 from flagdata.lake.marking import catalog_files, mark
 from flagdata.lake.matching import made_from, matching
-from flagdata.lake.refs import MAIN, Slice, View, as_json
+from flagdata.lake.refs import MAIN
 from flagdata.lake.store import Store
-from flagdata.schema import Kind, catalog_schema
+from flagdata.schema import Kind
 
 BEYOND = (
     "exports that were made of them",
@@ -50,44 +49,10 @@ BEYOND = (
 """What holds the bytes of what is erased where this lake does not reach."""
 _GRACE = timedelta(days=1)
 """How long what was withdrawn is needed, as far as an erasure before it is concerned."""
-_NOUNS = {"tags": "tag", "branches": "branch"}
-_COLUMNS = ["artifact", "branch", "kind", "name", "object", "parents"]
+CLIP_COLUMNS = ["artifact", "branch", "kind", "name", "object", "parents"]
+"""Columns that `clips_of` reads."""
 _RESTORE = "the version of flagdata that ingested the source restores it by ingesting it again"
 _LEAVE_OUT = "leave its artifact out by --where; no version has its data any more"
-
-
-def remove(
-    lake: Store,
-    leaving: Collection[str],
-    *,
-    base: int,
-    info: Mapping[str, str],
-    branch: str | None = None,
-    fresh: pa.Table | None = None,
-) -> int:
-    """Commits that a branch does not show some rows any more, and returns the version.
-
-    Args:
-        leaving: ids of these rows; there may be none.
-        base: the version that the commit follows.
-        info: notes of the commit: its message, and the reason.
-        branch: the branch; `None` where no row leaves one.
-        fresh: rows that the same commit adds.
-
-    Raises:
-        Moved: `base` is no longer the newest version; nothing was published.
-    """
-    fresh = catalog_schema().empty_table() if fresh is None else fresh
-    noted = {**info, **({"branch": branch} if branch else {})}
-    stored: set[str] = set()
-    if branch and leaving:
-        stored = set(leaving).intersection(lake.identities((Slice(branch=branch, version=base),)).to_pylist())
-    if hidden := sorted(set(leaving) - stored):
-        noted["hidden"] = json.dumps(hidden)
-    if not stored:
-        return lake.catalog.append(fresh, base=base, info=noted)
-    going = (pc.field("branch") == branch) & pc.field("artifact").isin(pa.array(sorted(stored), pa.string()))
-    return lake.catalog.drop(going, fresh=fresh, base=base, info=noted)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,12 +76,11 @@ def withdraw(lake: Store, artifacts: Collection[str], message: str, *, branch: s
 
     def attempt() -> Withdrawal:
         head = lake.catalog.head()
-        rows = lake.columns(lake.refs.view(branch, head), _COLUMNS)
+        rows = lake.columns(lake.refs.view(branch, head), CLIP_COLUMNS)
         clips = clips_of(rows, asked)
         leaving = asked | clips
         check_leaving(rows, leaving, branch=branch, where=str(lake.path))
-        info = {"message": message, "withdrawn": str(len(leaving))}
-        version = remove(lake, leaving, branch=branch, base=head, info=info)
+        version = commit(lake, Change(message=message, leaving={branch: leaving}), base=head)
         return Withdrawal(version=version, asked=tuple(sorted(asked)), clips=tuple(sorted(clips)))
 
     with lake.changing("withdrawing"):
@@ -125,9 +89,9 @@ def withdraw(lake: Store, artifacts: Collection[str], message: str, *, branch: s
 
 def clips_of(rows: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
     """Ids of the clips that are slices of the objects of `artifacts` themselves, so that they mean nothing without."""
-    parents = matching(rows, {"artifact": list(artifacts)}).select(_COLUMNS).to_pylist()
+    parents = matching(rows, {"artifact": list(artifacts)}).select(CLIP_COLUMNS).to_pylist()
     objects = {row["artifact"]: row["object"] for row in parents}
-    clips = matching(made_from(rows, objects), {"kind": Kind.CLIP}).select(_COLUMNS).to_pylist()
+    clips = matching(made_from(rows, objects), {"kind": Kind.CLIP}).select(CLIP_COLUMNS).to_pylist()
     return frozenset(
         row["artifact"]
         for row in clips
@@ -158,7 +122,7 @@ def check_leaving(rows: pa.Table, leaving: Collection[str], *, branch: str, wher
             where=where,
             fix=f"give ids of rows that flagdata ls --at {branch} shows",
         )
-    made_from_leaving = made_from(rows, leaving).select(_COLUMNS).to_pylist()
+    made_from_leaving = made_from(rows, leaving).select(CLIP_COLUMNS).to_pylist()
     staying = [row for row in made_from_leaving if row["artifact"] not in leaving]
     if staying:
         first = f"{staying[0]['kind']} {staying[0]['name']!r} ({staying[0]['artifact']})"
@@ -208,14 +172,14 @@ def erase(lake: Store, artifacts: Collection[str], message: str, *, with_descend
         concerned = [ref for ref, table in rows_of_refs.items() if going.intersection(table["artifact"].to_pylist())]
         branches = [ref for ref in concerned if ref not in tags]
 
-        def attempt(branch: str) -> int:
+        def attempt() -> int:
             head = lake.catalog.head()
-            leaving = erased.keys() & set(lake.table(lake.refs.view(branch, head))["artifact"].to_pylist())
-            noted = {"withdrawn": str(len(leaving)), "erased": json.dumps(erased, sort_keys=True)}
-            return remove(lake, leaving, branch=branch, base=head, info={"message": message, **noted})
+            leaving = {branch: erased.keys() & lake.identities(lake.refs.view(branch, head)) for branch in branches}
+            notes = {"erased": json.dumps(erased, sort_keys=True)}
+            return commit(lake, Change(message=message, leaving=leaving or {MAIN: ()}, notes=notes), base=head)
 
-        for branch in branches or ([] if going <= before.keys() else [MAIN]):
-            version = persist(partial(attempt, branch), where=lake.catalog.path)
+        if branches or not going <= before.keys():
+            version = persist(attempt, where=lake.catalog.path)
         objects = {name for name in (*erased.values(), *before.values()) if name is not None}
         removed, kept_objects = _delete(lake, objects, check)
     return Erasure(
@@ -250,16 +214,40 @@ def erased_objects(lake: Store) -> dict[str, tuple[int, str]]:
     }
 
 
-def unfinished(lake: Store, needed: Collection[str]) -> dict[str, tuple[int, str]]:
-    """Finds objects that are stored though all artifacts of them were erased: name → the version that erased it, and
-    why.
+@dataclass(frozen=True, kw_only=True)
+class Unfinished:
+    """An object that a commit gave up, and that is stored all the same: the process was killed, or the disk refused.
+
+    Attributes:
+        name: of the object.
+        kind: "erasure" or "expiry".
+        version: of the commit.
+        reason: its message.
+    """
+
+    name: str
+    kind: str
+    version: int
+    reason: str
+
+
+def unfinished(lake: Store, needed: Collection[str]) -> list[Unfinished]:
+    """Finds what commits left to be done: objects that are stored though all artifacts of them were erased, or though
+    they went with versions that expired; by name. Nothing else asks the log for that.
 
     Args:
         needed: objects of other rows, and those that running transactions hold.
     """
-    erased = erased_objects(lake)
-    stored = {stored.name for stored in lake.objects} if erased else set()
-    return {name: erased[name] for name in sorted((erased.keys() & stored) - set(needed))}
+    given_up: dict[str, Unfinished] = {}
+    for removal in reversed(removals(lake.catalog.history())):
+        facts = {"version": removal.version, "reason": removal.reason}
+        for name in removal.expired[1]:
+            given_up[name] = Unfinished(name=name, kind="expiry", **facts)
+        for name in removal.erased.values():
+            if name is not None:
+                given_up[name] = Unfinished(name=name, kind="erasure", **facts)
+    stored = {stored.name for stored in lake.objects} if given_up else set()
+    return [given_up[name] for name in sorted((given_up.keys() & stored) - set(needed))]
 
 
 def erased_as(lake: Store, artifact: str) -> str | None:
@@ -322,13 +310,7 @@ def _delete(lake: Store, names: Collection[str], check: Check) -> tuple[tuple[st
     reasons_kept = dict.fromkeys(sorted(set(names) & marked.objects), "another artifact has the same content")
     reasons_kept |= dict.fromkeys(sorted(set(names) & in_use - marked.objects), "a running transaction holds it")
     gone = sorted({stored.name for stored in lake.objects}.intersection(names) - reasons_kept.keys())
-    refused: dict[str, OSError] = {}
-    for name in gone:
-        check()
-        try:
-            lake.objects.delete(name)
-        except OSError as error:
-            refused[name] = error
+    refused = lake.objects.delete_all(gone, check)
     if refused:
         name, error = next(iter(refused.items()))
         raise FlagdataError(
@@ -390,11 +372,10 @@ def expire(lake: Store, up_to: int, message: str | None = None, *, dry_run: bool
     with lake.changing("expiring versions", alone=True) as check:
         going = _expiring(lake, up_to)
         noted = json.dumps({"up_to": up_to, "objects": list(going.objects)})
-        info = {"message": message or f"expire versions up to {up_to}", "expired": noted}
-        version = persist(lambda: remove(lake, (), base=lake.catalog.head(), info=info), where=lake.catalog.path)
-        for name in going.objects:
-            check()
-            lake.objects.delete(name)
+        change = Change(message=message or f"expire versions up to {up_to}", notes={"expired": noted})
+        version = persist(lambda: commit(lake, change, base=lake.catalog.head()), where=lake.catalog.path)
+        for error in lake.objects.delete_all(going.objects, check).values():
+            raise error
     return replace(going, version=version)
 
 
@@ -414,69 +395,6 @@ def _expiring(lake: Store, up_to: int) -> Expiry:
 def _in_use(lake: Store) -> set[str]:
     """Returns the names of the objects that running transactions hold."""
     return {name for state in leases(lake.staging) if state.alive for name in state.objects}
-
-
-def check_whole(lake: Store, view: View) -> None:
-    """Checks whether a new tag or branch may show a view: not that of an expired version whose data went.
-
-    Raises:
-        ConflictError: some of its data are not in the lake.
-    """
-    newest = max(part.version for part in view)
-    if any(newest <= removal.expired[0] for removal in removals(lake.catalog.history())):
-        for why in lost(lake, lake.table(view)).values():
-            raise ConflictError(why.what, where=str(lake.path), fix="choose a newer version, or one that a tag shows")
-
-
-def delete(lake: Store, kind: str, name: str, message: str | None, *, discard: bool) -> int:
-    """Deletes a ref, see `Lake.delete_tag` and `Lake.delete_branch`.
-
-    Args:
-        kind: "tags" or "branches".
-    """
-    noun = _NOUNS[kind]
-
-    def attempt() -> int:
-        head = lake.catalog.head()
-        refs = lake.refs.tags() if kind == "tags" else lake.refs.branches()
-        if name not in refs:
-            raise NotFoundError(
-                f"there is no {noun} {name!r}", where=str(lake.path), fix=UnknownNameError.of(noun, name, refs).fix
-            )
-        rows = lake.table(refs[name].view if kind == "tags" else lake.refs.view(name, head))
-        if not discard:
-            _check_elsewhere(lake, noun, name, set(rows["artifact"].to_pylist()))
-        info = {"message": message or f"delete the {noun} {name}", "deleted": f"{noun} {name}"}
-        info["view"] = json.dumps(as_json(refs[name].view))
-        if kind == "tags":
-            return remove(lake, (), base=head, info=info)
-        leaving = rows.filter(pc.field("branch") == name)["artifact"].to_pylist()
-        return remove(lake, leaving, branch=name, base=head, info={**info, "withdrawn": str(len(leaving))})
-
-    lake.check_writable()
-    if name == MAIN:
-        raise UsageError(f"{MAIN} cannot be deleted", fix="withdraw what is on it, or begin a new lake")
-    with lake.changing(f"deleting the {noun} {name}", alone=True):
-        version = persist(attempt, where=lake.catalog.path)
-        lake.refs.remove(kind, name)
-    return version
-
-
-def _check_elsewhere(lake: Store, noun: str, name: str, identities: set[str]) -> None:
-    """Checks whether other refs show all rows, too.
-
-    Raises:
-        ConflictError: some would be lost.
-    """
-    for ref in (MAIN, *lake.refs.branches(), *lake.refs.tags()):
-        if ref != name:
-            identities = identities - set(lake.rows(at=ref, columns=["artifact"])["artifact"].to_pylist())
-    if identities:
-        raise ConflictError(
-            f"{len(identities)} artifacts are shown by this {noun} alone: without it, gc deletes them",
-            where=f"{noun} {name}",
-            fix="merge or tag them first, or add --discard to give them up",
-        )
 
 
 def left(lake: Store, removal: Removal) -> dict[str, str | None]:

@@ -19,7 +19,7 @@ import pyarrow as pa
 from flagdata.bounded import EndedError
 from flagdata.catalog_sql import COLUMNS, Question
 from flagdata.errors import LimitError, UnknownNameError, UsageError
-from flagdata.lake.labels import PREFIX, columns
+from flagdata.lake.label_columns import PREFIX, columns
 from flagdata.lake.matching import Where, condition, matching
 from flagdata.lake.refs import View
 from flagdata.lake.rowfiles import Scan

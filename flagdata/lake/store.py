@@ -6,7 +6,7 @@ import difflib
 import os
 import time
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from tempfile import TemporaryFile
 
 import pyarrow as pa
@@ -17,7 +17,7 @@ from flagdata.errors import NotFoundError, UnknownNameError
 from flagdata.lake import naming
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import Catalog
+from flagdata.lake.catalog import Catalog, Moved
 from flagdata.lake.layout import STAGING, check_writable
 from flagdata.lake.leases import collecting, keeping_collectors_out
 from flagdata.lake.lineage import Lineage, with_labels
@@ -47,9 +47,13 @@ class Store:
         self.path = path
         self.catalog = Catalog(path / "catalog", path / "refs" / "newest")
         self.objects = RemoteObjects(path) if isinstance(path, RemotePath) else Objects(path)
-        self.refs = Refs(path / "refs")
+        self.refs = Refs(path / "refs", self.catalog.history)
         self.staging = path / STAGING
         self._lineage: tuple[int, dict[str, View], Lineage] | None = None
+        self._identities: tuple[View, frozenset[str]] | None = None
+
+    def __reduce__(self) -> tuple[type[Store], tuple[Place]]:
+        return (type(self), (self.path,))
 
     def check_writable(self) -> None:
         """Checks whether this process may write here: called before the first second of work that ends in a commit.
@@ -62,7 +66,7 @@ class Store:
 
     @contextmanager
     def changing(self, doing: str, *, alone: bool = False) -> Iterator[Check]:
-        """Keeps collections out while the block commits, or all other processes that change the lake.
+        """Keeps collections out while the block commits, or all other processes that change the lake. Tidies before.
 
         Args:
             doing: what the block does, for errors of the disk ("withdrawing").
@@ -71,8 +75,16 @@ class Store:
             FlagdataError: as `check_writable`, or what the disk refused.
         """
         self.check_writable()
-        with disk_errors(doing, self.path), (collecting if alone else keeping_collectors_out)(self.staging) as check:
-            yield check
+        with disk_errors(doing, self.path):
+            self.tidy()
+            with (collecting if alone else keeping_collectors_out)(self.staging) as check:
+                yield check
+
+    def tidy(self) -> None:
+        """Tidies the catalog, if that is due: alone, so that it is not always overtaken by commits."""
+        if self.catalog.is_due_for_tidying():
+            with collecting(self.staging), suppress(Moved):
+                self.catalog.tidy()
 
     def now(self) -> float:
         """Read the clock by which files of the lake have their times [s since 1970].
@@ -230,9 +242,11 @@ class Store:
                 hidden |= self.lineage().hidden(part)
         return scans[::-1]
 
-    def identities(self, view: View) -> pa.ChunkedArray:
-        """Lists the ids of all rows of a view."""
-        return self.columns(view, ["artifact"])["artifact"]
+    def identities(self, view: View) -> frozenset[str]:
+        """Lists the ids of all rows of a view. Those of the view that was asked for last are kept."""
+        if self._identities is None or self._identities[0] != view:
+            self._identities = (view, frozenset(self.columns(view, ["artifact"])["artifact"].to_pylist()))
+        return self._identities[1]
 
     def lineage(self) -> Lineage:
         """Reads how branches came to be, as known at the head."""

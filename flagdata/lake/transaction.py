@@ -22,11 +22,12 @@ from flagdata.checksums import files_of
 from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import Moved, persist
+from flagdata.lake.catalog import persist
+from flagdata.lake.commits import Change, commit
 from flagdata.lake.deposit import Deposit
 from flagdata.lake.healing import Healing, healing
-from flagdata.lake.leases import Lease, collecting
-from flagdata.lake.removal import remove
+from flagdata.lake.leases import Lease
+from flagdata.lake.refs import Slice
 from flagdata.lake.store import Store
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
@@ -254,7 +255,7 @@ class Transaction:
         """Reads the head, and the ids of the rows that the branch shows at it."""
         head = self._lake.catalog.head()
         if head != self._seen:
-            self._known = frozenset(self._lake.identities(self._lake.refs.view(self.branch, head)).to_pylist())
+            self._known = self._lake.identities(self._lake.refs.view(self.branch, head))
             self._seen = head
         return head, self._known
 
@@ -266,11 +267,10 @@ class Transaction:
         return {row["artifact"]: Artifact.from_row(row) for row in rows.to_pylist()}
 
     def _publish(self) -> CommitResult:
-        if self._pending and self._lake.catalog.is_due_for_tidying():
-            with collecting(self._lake.staging), suppress(Moved):  # alone, so that it is not always overtaken
-                self._lake.catalog.tidy()
+        if self._pending:
+            self._lake.tidy()
         created = datetime.now(UTC)
-        commit = f"c{secrets.token_hex(8)}"
+        commit_id = f"c{secrets.token_hex(8)}"
 
         def attempt() -> CommitResult:
             version, identities = self._look()
@@ -289,23 +289,28 @@ class Transaction:
             self._check_parents(fresh.values(), identities)
             written = [artifact.row() for artifact in (*fresh.values(), *moved.values())]
             rows = pa.Table.from_pylist(written, schema=catalog_schema())
-            info = {
-                "commit": commit,
-                "message": self.message,
-                "branch": self.branch,
-                "rows": str(len(rows)),
-                "code_version": code_version(),
-            }
-            if moved:
-                info["withdrawn"] = str(len(moved))
+            change = Change(
+                message=self.message,
+                branch=self.branch,
+                fresh=rows,
+                held=self._sizes,
+                leaving={self.branch: moved} if moved else {},
+                labels=self._labels_left(fresh, version),
+                notes={"commit": commit_id, "rows": str(len(rows)), "code_version": code_version()},
+            )
             with self.keeping_collectors_out():
-                version = remove(self._lake, moved, branch=self.branch, base=version, info=info, fresh=rows)
+                version = commit(self._lake, change, base=version)
                 self._result = CommitResult(
-                    version=version, commit=commit, added=tuple(fresh), existing=existing, artifacts=artifacts
+                    version=version, commit=commit_id, added=tuple(fresh), existing=existing, artifacts=artifacts
                 )
             return self._result
 
         return persist(attempt, where=self._lake.catalog.path)
+
+    def _labels_left(self, fresh: Collection[str], version: int) -> dict[str, dict[str, None]]:
+        """Takes off what is left of labels of artifacts that were withdrawn: one that comes anew begins without."""
+        labels = self._lake.lineage().labels(Slice(branch=self.branch, version=version))
+        return {artifact: dict.fromkeys(labels[artifact]) for artifact in sorted(labels.keys() & set(fresh))}
 
     def _hold(self, name: str) -> int:
         self._lease.hold(name)

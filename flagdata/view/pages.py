@@ -19,7 +19,7 @@ from flagdata.documents import column_json
 from flagdata.errors import FlagdataError, NotFoundError, UnknownNameError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.ancestry import ancestry
-from flagdata.lake.labels import PREFIX
+from flagdata.lake.label_columns import PREFIX
 from flagdata.lake.lineage import labels_of
 from flagdata.lake.refs import MAIN, View
 from flagdata.lake.results import versions

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -15,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.lake import Artifact, Lake, locks
+from flagdata.provenance import recipe_hash
 from flagdata.schema import Kind
 from flagdata.storage import Place
 
@@ -43,6 +45,19 @@ def put_text(lake: Lake, text: str, *, branch: str = "main", parents: tuple[str,
         artifact = Artifact(kind=Kind.WIND, name=text, object=name, source_hash=name.partition("/")[2], parents=parents)
         tx.add(artifact)
     return artifact
+
+
+def put_older_ref(lake: Lake, kind: str, name: str, *, created: str = "2026-05-14T09:30:00+00:00") -> Place:
+    """Makes a tag or branch from the head of main, as versions of flagdata did whose refs were files alone."""
+    content: dict[str, object] = {
+        "schema": "flagdata.ref/1",
+        "name": name,
+        "created": created,
+        "view": [{"branch": "main", "version": lake.catalog.head()}],
+    }
+    path = lake.refs.root / kind / f"{name}.json"
+    path.write_bytes((json.dumps({**content, "sha256": recipe_hash(content)}, indent=2) + "\n").encode())
+    return path
 
 
 @pytest.fixture(params=["folder", "bucket"])

@@ -132,7 +132,7 @@ def test_tags_and_branches_are_made_and_listed(run: Run, lake: Lake) -> None:
 def test_merge_brings_a_branch_to_main(run: Run, lake: Lake) -> None:
     run("branch", "try")
     put_text(lake, "a", branch="try")
-    assert run("merge", "try").out == "version 2: 1 added, 0 were there\n"
+    assert run("merge", "try").out == "version 3: 1 added, 0 were there\n"
     assert run("merge", "try", "--json").document["added"] == []
     assert [a["name"] for a in run("ls", "--json").document["artifacts"]] == ["a"]
     assert run("merge", "v1").code == 1

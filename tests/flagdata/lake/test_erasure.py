@@ -27,7 +27,7 @@ def test_bytes_go_from_tags_branches_and_old_versions_and_each_says_by_which_ver
     for ref in ("main", "b"):
         assert lake.rows(at=ref)["artifact"].to_pylist() == [other.id]
     assert set(lake.rows(at="v1")["artifact"].to_pylist()) == {film.id, other.id}
-    with pytest.raises(NotFoundError, match=r"erased from all versions by version 4 .asked to be erased."):
+    with pytest.raises(NotFoundError, match=r"erased from all versions by version 5 .asked to be erased."):
         lake.object_path(str(film.object))
     assert list(lost(lake, lake.rows(at="v1"))) == [film.object]
     notes = doctor(lake)

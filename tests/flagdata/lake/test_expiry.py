@@ -39,13 +39,13 @@ def test_what_only_expired_versions_show_goes_and_ls_export_and_doctor_say_alike
 
 def test_branches_tags_and_versions_that_have_not_expired_keep_their_data(lake: Lake) -> None:
     tagged, branched, later, gone = (put_text(lake, name) for name in ("tagged", "branched", "later", "gone"))
-    lake.tag("v1", at="1")
+    lake.tag("v1", at="1")  # version 5
     lake.branch("b", at="2")
-    lake.withdraw([gone.id], "version 5")
-    lake.withdraw([tagged.id, branched.id, later.id], "version 6")
-    assert set(expire(lake, 4).objects) == {gone.object}  # version 5 still shows the others
+    lake.withdraw([gone.id], "version 7")
+    lake.withdraw([tagged.id, branched.id, later.id], "version 8")
+    assert set(expire(lake, 6).objects) == {gone.object}  # version 7 still shows the others
     assert stored(lake) == {tagged.object, branched.object, later.object}
-    assert set(expire(lake, 5).objects) == {later.object}
+    assert set(expire(lake, 7).objects) == {later.object}
     assert stored(lake) == {tagged.object, branched.object}
     for ref in ("v1", "b"):
         assert not lost(lake, lake.rows(at=ref))

@@ -382,7 +382,7 @@ NOTES = ("rows", "withdrawn", "merged_version", "expired", "labels", "hidden", "
 )
 def test_notes_of_the_log_that_cannot_be_read_are_never_unforeseen(filled: Lake, key: str, value: str) -> None:
     info = {"commit": "c" + "0" * 16, "message": "m", "branch": "main", "merged": "side", key: value}
-    filled.catalog.append(catalog_schema().empty_table(), base=3, info=info)
+    filled.catalog.append(catalog_schema().empty_table(), base=filled.catalog.head(), info=info)
     acts: list[Callable[[], object]] = [
         lambda: Lake.open(filled.path).rows(),
         lambda: doctor(Lake.open(filled.path), grace=NOW),

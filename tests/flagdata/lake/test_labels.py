@@ -56,7 +56,9 @@ def test_labels_are_columns_of_queries_with_their_type_and_of_their_version(lake
 def test_a_name_keeps_its_type_and_an_artifact_has_to_be_there(lake: Lake) -> None:
     one, two = put_text(lake, "one"), put_text(lake, "two")
     lake.label([one.id], {"rating": 4}, "a number")
-    with pytest.raises(ConflictError, match="rating is a number on other artifacts"):
+    with pytest.raises(
+        ConflictError, match="rating is a number on some artifacts, as 4, and a text on others, as 'good'"
+    ):
         lake.label([two.id], {"rating": "good"}, "a text")
     lake.label([one.id], {"rating": "good"}, "the only one may change")
     with pytest.raises(NotFoundError):

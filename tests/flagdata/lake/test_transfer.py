@@ -12,7 +12,7 @@ import pytest
 from flagdata.errors import ConflictError, CorruptError
 from flagdata.lake import Lake, clone, collect, doctor, object_names, transfer, verify, verify_catalog
 from flagdata.object_cache import forget
-from tests.flagdata.lake.conftest import overwrite, put_text
+from tests.flagdata.lake.conftest import overwrite, put_older_ref, put_text
 from tests.program import invoke
 
 NOW = timedelta(0)
@@ -49,7 +49,7 @@ def test_what_was_moved_before_is_not_moved_again(lake: Lake, tmp_path: Path) ->
     later = put_text(lake, "second")
     lake.tag("v2")
     done = transfer(lake, copy, bars=no_bar)
-    assert (done.versions, done.objects, done.size, done.refs) == (1, (later.object,), len("second"), ("v2",))
+    assert (done.versions, done.objects, done.size, done.refs) == (2, (later.object,), len("second"), ("v2",))
     again = transfer(lake, copy, bars=no_bar)
     assert (again.versions, again.objects, again.refs) == (0, (), ())
     assert copy.rows(at="v2").equals(lake.rows(at="v2"))
@@ -116,12 +116,24 @@ def test_lakes_that_went_apart_are_refused_and_stay_as_they_are(lake: Lake, tmp_
 def test_a_tag_of_the_same_name_that_is_another_is_refused(lake: Lake, tmp_path: Path) -> None:
     put_text(lake, "first")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
-    copy.tag("v1")
+    put_older_ref(copy, "tags", "v1")
     put_text(lake, "second")
     lake.tag("v1")
     with pytest.raises(ConflictError, match="tag 'v1'"):
         transfer(lake, copy, bars=no_bar)
     assert copy.rows().num_rows == 1
+
+
+def test_a_tag_of_a_clone_is_a_commit_of_the_clone(lake: Lake, tmp_path: Path) -> None:
+    put_text(lake, "first")
+    copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
+    copy.tag("v1")
+    assert transfer(copy, lake, bars=no_bar).refs == ("v1",)
+    assert lake.refs.tags() == copy.refs.tags()
+    put_text(lake, "second")
+    copy.tag("v2")
+    with pytest.raises(ConflictError, match="versions that the other lacks"):
+        transfer(lake, copy, bars=no_bar)
 
 
 def test_a_tag_that_was_deleted_goes_from_the_clone_too(lake: Lake, tmp_path: Path) -> None:

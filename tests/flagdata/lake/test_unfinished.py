@@ -20,6 +20,7 @@ from flagdata.lake import (
     clone,
     collect,
     doctor,
+    expire,
     garbage,
     is_healthy,
     object_names,
@@ -27,8 +28,9 @@ from flagdata.lake import (
     verify,
     verify_catalog,
 )
+from flagdata.lake.refs import made_by
 from flagdata.lake.removal import Erasure
-from tests.flagdata.lake.conftest import overwrite, put_text, stored
+from tests.flagdata.lake.conftest import overwrite, put_older_ref, put_text, stored
 from tests.flagdata.lake.test_transfer import no_bar
 from tests.program import invoke
 
@@ -110,20 +112,38 @@ def test_a_folder_that_was_half_deleted_is_found_and_deleted(place: Lake, monkey
     assert (stored(place), is_whole(place)) == (set(), True)
 
 
-def test_an_erasure_that_was_killed_between_its_branches_is_finished_by_the_same_call(
+def test_an_erasure_takes_its_artifacts_off_all_branches_by_one_commit(
     lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     film = put_text(lake, "film")
-    lake.branch("side")
-    made = put_text(lake, "made", parents=(film.id,))
+    for branch in ("side", "other"):
+        lake.branch(branch)
+    made = put_text(lake, "made", parents=(film.id,), branch="other")
+    put_text(lake, "film", branch="side")
+    lake.tag("v1", at="other")
+    head = lake.catalog.head()
 
     def erase() -> Erasure:
         return lake.erase([film.id], "asked", with_descendants=True)
 
-    assert stopped(monkeypatch, Catalog, "append", erase, at=0) == 1  # off main by `drop`, off the branch by `append`
-    assert (stored(lake), made.id in lake.rows()["artifact"].to_pylist()) == ({film.object, made.object}, False)
-    erase()
+    assert stopped(monkeypatch, Objects, "delete", erase, at=0) == 1
+    assert lake.catalog.head() == head + 1
+    assert [lake.rows(at=branch).num_rows for branch in ("main", "side", "other", "v1")] == [0, 0, 0, 2]
+    assert {finding.kind for finding in doctor(lake)} >= {"erasure-unfinished"}
+    assert erase().branches == ()
     assert (stored(lake), is_whole(lake)) == (set(), True)
+    assert lake.rows(at=str(head))["artifact"].to_pylist() == [film.id]
+    assert lake.merge("side", "nothing").added == ()
+    assert {film.id, made.id}.isdisjoint(lake.rows()["artifact"].to_pylist())
+
+
+def test_an_expiry_that_was_killed_is_found_and_finished_by_gc(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+    gone, film = put_text(lake, "gone"), put_text(lake, "film")
+    lake.withdraw([gone.id], "wrong")
+    assert stopped(monkeypatch, Objects, "delete", lambda: expire(lake, 2), at=0) == 1
+    assert "expiry-unfinished" in {finding.kind for finding in doctor(lake)}
+    assert collect(lake, grace=timedelta(days=1)).objects == (gone.object,)
+    assert (stored(lake), is_whole(lake)) == ({film.object}, True)
 
 
 @pytest.mark.parametrize(
@@ -228,7 +248,7 @@ def test_an_erasure_that_a_clone_pulled_is_finished_there_by_gc(lake: Lake, tmp_
 
 
 @pytest.mark.parametrize(
-    ("owner", "method"), [(Objects, "publish"), (Catalog, "adopt"), (Catalog, "acknowledge"), (Refs, "adopt")]
+    ("owner", "method"), [(Objects, "publish"), (Catalog, "adopt"), (Catalog, "acknowledge"), (Refs, "write_files")]
 )
 def test_a_push_that_was_killed_at_any_step_names_the_push_that_heals(
     lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, owner: type, method: str
@@ -261,13 +281,39 @@ def test_a_deleted_branch_goes_with_the_next_transfer_where_one_was_killed_befor
     lake.branch("side")
     lake.tag("v1")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
-    copy.tag("own")
     lake.delete_branch("side")
     lake.delete_tag("v1")
-    stopped(monkeypatch, Refs, "remove", lambda: transfer(lake, copy, bars=no_bar), at=0)
-    assert set(copy.refs.branches()) == {"side"}
+    stopped(monkeypatch, Refs, "write_files", lambda: transfer(lake, copy, bars=no_bar), at=0)
+    assert (set(copy.refs.branches()), set(copy.refs.tags())) == (set(), set())
     transfer(lake, copy, bars=no_bar)
-    assert (set(copy.refs.branches()), set(copy.refs.tags())) == (set(), {"own"})
+    assert copy.refs.stale_files() == []
+
+
+def test_a_branch_that_was_made_again_goes_to_clones_that_have_the_one_before(lake: Lake, tmp_path: Path) -> None:
+    put_text(lake, "first")
+    lake.branch("dev")
+    put_text(lake, "old", branch="dev")
+    copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
+    lake.delete_branch("dev", discard=True)
+    put_text(lake, "second")
+    lake.branch("dev")
+    put_text(lake, "new", branch="dev")
+    transfer(lake, copy, bars=no_bar)
+    assert copy.rows(at="dev")["name"].to_pylist() == ["first", "second", "new"]
+    assert copy.refs.stored() == lake.refs.stored()
+    assert is_whole(copy)
+
+
+def test_a_branch_of_an_earlier_version_that_was_made_again_goes_to_clones(lake: Lake, tmp_path: Path) -> None:
+    put_text(lake, "first")
+    put_older_ref(lake, "branches", "dev", created="2020-01-01T00:00:00+00:00")
+    copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
+    lake.delete_branch("dev")
+    put_text(lake, "second")
+    lake.branch("dev")
+    transfer(lake, copy, bars=no_bar)
+    assert copy.rows(at="dev")["name"].to_pylist() == ["first", "second"]
+    assert copy.refs.stored() == lake.refs.stored()
 
 
 def test_a_clone_that_was_killed_is_gone_on_with_by_the_command_that_its_refusal_names(
@@ -305,12 +351,70 @@ def test_a_lake_whose_making_was_killed_is_distinguished_from_another_folder(
 
 
 @pytest.mark.parametrize("kind", ["tags", "branches"])
-def test_a_damaged_ref_that_is_deleted_comes_back_by_a_pull(lake: Lake, tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize("content", [b"{", b"", None])
+def test_a_ref_is_what_the_log_says_whatever_becomes_of_its_file(lake: Lake, kind: str, content: bytes | None) -> None:
     put_text(lake, "first")
-    lake.tag("name") if kind == "tags" else lake.branch("name")
-    put_text(lake, "second", branch="main" if kind == "tags" else "name")
-    copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
+    lake.tag("name", notes={"split": "stated"}) if kind == "tags" else lake.branch("name")
     path = lake.refs.root / kind / "name.json"
+    before = path.read_bytes()
+    overwrite(path, content) if content is not None else path.unlink()
+    put_text(lake, "second")
+    assert lake.rows(at="name")["name"].to_pylist() == ["first"]
+    for make in (lake.tag, lake.branch):
+        with pytest.raises(ConflictError, match="already"):
+            make("name")
+    found = [finding for finding in doctor(lake) if finding.kind == "ref-file-stale"]
+    assert [(finding.severity, finding.count) for finding in found] == [(Severity.NOTE, 1)]
+    assert path.read_bytes() == before
+    assert is_whole(lake)
+
+
+def test_a_lake_without_its_refs_folder_has_its_tags_and_branches(lake: Lake) -> None:
+    put_text(lake, "first")
+    lake.tag("v1", notes={"split": "stated"})
+    lake.branch("side")
+    put_text(lake, "on side", branch="side")
+    shutil.rmtree(lake.refs.root)
+    again = Lake.open(lake.path)
+    assert again.refs.tags()["v1"].notes == {"split": "stated"}
+    assert again.rows(at="side")["name"].to_pylist() == ["first", "on side"]
+    doctor(again)
+    assert is_whole(again)
+    assert {path.stem for path in lake.refs.root.glob("*/*.json")} == {"v1", "side"}
+
+
+@pytest.mark.parametrize("kind", ["tags", "branches"])
+def test_the_file_of_a_ref_that_was_deleted_is_no_ref(lake: Lake, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    put_text(lake, "first")
+    make, delete = (lake.tag, lake.delete_tag) if kind == "tags" else (lake.branch, lake.delete_branch)
+    make("name")
+    assert stopped(monkeypatch, Refs, "remove", lambda: delete("name"), at=0) == 1
+    path = lake.refs.root / kind / "name.json"
+    assert path.exists()
+    assert {*lake.refs.tags(), *lake.refs.branches()} == set()
+    assert "ref-file-stale" in {finding.kind for finding in doctor(lake)}
+    assert not path.exists()
+    make("name")
+    assert lake.rows(at="name")["name"].to_pylist() == ["first"]
+
+
+@pytest.mark.parametrize("kind", ["tags", "branches"])
+def test_a_ref_of_an_earlier_version_is_entered_into_the_log_by_the_next_commit(lake: Lake, kind: str) -> None:
+    put_text(lake, "first")
+    path = put_older_ref(lake, kind, "name")
+    put_text(lake, "second")
+    path.unlink()
+    assert Lake.open(lake.path).rows(at="name")["name"].to_pylist() == ["first"]
+    assert made_by(lake.catalog.history()[0])[kind, "name"].name == "name"
+
+
+@pytest.mark.parametrize("kind", ["tags", "branches"])
+def test_a_damaged_ref_of_an_earlier_version_that_is_deleted_comes_back_by_a_pull(
+    lake: Lake, tmp_path: Path, kind: str
+) -> None:
+    put_text(lake, "first")
+    path = put_older_ref(lake, kind, "name")
+    copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
     overwrite(path, b"{")
     found = [finding for finding in doctor(lake) if finding.kind == "ref-unreadable"]
     assert found
@@ -319,3 +423,12 @@ def test_a_damaged_ref_that_is_deleted_comes_back_by_a_pull(lake: Lake, tmp_path
     transfer(copy, lake, bars=no_bar)
     assert lake.refs.stored() == copy.refs.stored()
     assert is_whole(lake)
+
+
+@pytest.mark.parametrize("name", ["a\x1b]0;x\x07b", "a b", "-", "9" * 200])
+def test_a_file_with_a_name_that_no_ref_may_have_is_no_ref(lake: Lake, name: str) -> None:
+    put_text(lake, "first")
+    put_older_ref(lake, "branches", name)
+    assert lake.refs.branches() == {}
+    assert {finding.kind for finding in doctor(lake)} == {"stray-file"}
+    assert collect(lake, grace=timedelta(0)).objects == ()
