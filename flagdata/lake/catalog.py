@@ -10,8 +10,7 @@ old versions are made of them. (Each file costs a fresh reader about 1 ms; tidyi
 commit.) The library's own checkpoints are off: it does not flush them to the disk, so a power cut could leave one that
 is empty and a table that does not open.
 
-Each commit notes the SHA-256 of its file, which is compared whenever the file is read. (Not the checksums that Parquet
-can keep of its pages: the hash covers the whole file, footer too, and `sha256sum` prints it.)
+Each commit notes the SHA-256 of its file, which is compared whenever the file is read.
 """
 
 from __future__ import annotations
@@ -33,7 +32,6 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import deltalake
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 from deltalake import CommitProperties, DeltaTable
 from deltalake.exceptions import CommitFailedError, DeltaError
 
@@ -42,7 +40,7 @@ from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.files import is_beside, open_regular
 from flagdata.forks import OneProcess
 from flagdata.lake.log import CHECKPOINT, COPY_BACK, FILE_HASH, PREVIOUS_HASH, Entry, Log, Summaries, is_stated
-from flagdata.lake.rowfiles import RowFiles, Scan, changed_file
+from flagdata.lake.rowfiles import RowFiles, Scan, changed_file, encode_rows
 from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 from flagdata.storage import Place, RemotePath
@@ -385,22 +383,12 @@ class Catalog:
         path = self.path / f"{uuid.uuid4().hex}.parquet"
         added, hashes = [], {}
         if rows.num_rows or removed:  # a commit of notes alone needs no file
-            sink = pa.BufferOutputStream()
-            # The Arrow schema is schema.py's, and most values occur once: without both, a row's file has 6 kB, not 15.
-            pq.write_table(rows, sink, compression="zstd", store_schema=False, use_dictionary=False)
-            content = sink.getvalue().to_pybytes()
+            content = encode_rows(rows)
             write_durably(path, content)
             hashes = {FILE_HASH: hashlib.sha256(content).hexdigest()}
-            added = [
-                {
-                    "path": path.name,
-                    "partitionValues": {},
-                    "size": len(content),
-                    "modificationTime": now,
-                    "dataChange": rows_change,
-                    "stats": json.dumps({"numRecords": rows.num_rows}),
-                }
-            ]
+            stats = json.dumps({"numRecords": rows.num_rows})
+            facts = {"size": len(content), "modificationTime": now, "dataChange": rows_change, "stats": stats}
+            added = [{"add": {"path": path.name, "partitionValues": {}, **facts}}]
         written = {
             "timestamp": now,
             "operation": "WRITE",
@@ -412,8 +400,7 @@ class Catalog:
         }
         dropped = [{"path": name, "dataChange": rows_change, "deletionTimestamp": now} for name in removed]
         # Not by the Delta library, which reads the log again after it has put the entry, and may fail then.
-        adding = ({"add": action} for action in added)
-        actions = [{"commitInfo": written}, *adding, *({"remove": action} for action in dropped)]
+        actions = [{"commitInfo": written}, *added, *({"remove": action} for action in dropped)]
         if not self._entries.put(version, actions):
             path.unlink(missing_ok=True)
             raise Moved

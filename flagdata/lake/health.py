@@ -92,12 +92,13 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         return tuple(findings)  # what follows would call the files of the missing entries' commits leftovers
     if not marked.findings:
         in_use = {name for state in states if state.alive for name in state.objects}
+        needed = marked.objects | in_use
+        leftovers: dict[str, Unfinished] = {}
         try:
+            leftovers = {left.name: left for left in unfinished(lake, needed)}
             findings += _gone(lake, marked, {stored_object.name for stored_object in stored})
         except FlagdataError as error:
             findings.append(_log_damaged(error))
-        needed = marked.objects | in_use
-        leftovers = {left.name: left for left in unfinished(lake, needed)}
         findings += [_unfinished(lake, left) for left in leftovers.values()]
         findings += [
             _orphan(stored_object, limit, grace)

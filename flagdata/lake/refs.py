@@ -251,7 +251,7 @@ class Refs:
         """
         path = self.root / kind / f"{ref.name}.json"
         path.parent.mkdir(parents=True, exist_ok=True)
-        if not put_if_absent(path, _content(ref)) and path.read_bytes() != _content(ref):
+        if not put_if_absent(path, _content(ref)) and not self._states(path, ref):
             path.unlink()
             put_if_absent(path, _content(ref))
 
@@ -261,7 +261,7 @@ class Refs:
         stale = [
             path
             for (kind, name), ref in live.items()
-            if not _holds(path := self.root / kind / f"{name}.json", _content(ref))
+            if not self._states(path := self.root / kind / f"{name}.json", ref)
         ]
         stale += [path for kind in NOUNS for path in self._files(kind) if (kind, path.stem) not in live]
         return sorted(stale)  # type: ignore[type-var]
@@ -320,6 +320,13 @@ class Refs:
         """
         self._delete(self.root / kind / f"{name}.json")
 
+    def _states(self, path: Place, ref: Ref) -> bool:
+        """Checks whether a file states a ref."""
+        try:
+            return self._read(path) == ref
+        except FlagdataError:
+            return False
+
     @staticmethod
     def _delete(path: Place) -> None:
         path.unlink(missing_ok=True)
@@ -363,14 +370,6 @@ class Refs:
                 where=str(path),
                 fix=_PULL,
             ) from None
-
-
-def _holds(path: Place, content: bytes) -> bool:
-    try:
-        with open_regular(path) as stream:
-            return stream.read() == content
-    except (OSError, FlagdataError):
-        return False
 
 
 def _stated(ref: Ref) -> dict[str, Any]:

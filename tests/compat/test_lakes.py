@@ -27,6 +27,7 @@ from flagdata.lake import (
 )
 from flagdata.record import Record
 from flagdata.schema import CATALOG, FORMAT_VERSION, Kind, catalog_schema
+from tests.flagdata.lake.conftest import put_older_ref
 
 ARCHIVES = sorted(Path(__file__).parent.glob("lake_v*.tar.xz"))
 NOW = timedelta(0)
@@ -113,7 +114,7 @@ def lake_without(path: Path, missing: set[str], *artifacts: Artifact) -> Lake:
     deltalake.DeltaTable.create(str(table), schema)
     rows = pa.Table.from_pylist([artifact.row() for artifact in artifacts], schema=schema)
     deltalake.write_deltalake(str(table), rows, mode="append")
-    lake.refs.put("tags", "v1", Lake.open(lake.path).view(None))
+    put_older_ref(Lake.open(lake.path), "tags", "v1")
     return Lake.open(lake.path)
 
 

@@ -36,7 +36,7 @@ from flagdata.lake import (
 from flagdata.provenance import digest
 from flagdata.schema import Kind, catalog_schema
 from flagdata.storage import Place, RemotePath
-from tests.flagdata.lake.conftest import LINKS, overwrite, put_text
+from tests.flagdata.lake.conftest import LINKS, overwrite, put_older_ref, put_text
 from tests.flagdata.lake.test_transfer import no_bar
 
 NOW = timedelta(0)
@@ -116,12 +116,12 @@ def test_a_ref_of_a_version_that_cannot_be_is_named(filled: Lake, number: str) -
         path.unlink()
 
 
-@pytest.mark.parametrize("at", ["7" * 5000, "9" * 20, "4"])
+@pytest.mark.parametrize("at", ["7" * 5000, "9" * 20, "6"])
 def test_a_version_beyond_the_newest_is_not_there_however_many_digits_it_has(filled: Lake, at: str) -> None:
-    with pytest.raises(NotFoundError, match="the newest is 3") as caught:
+    with pytest.raises(NotFoundError, match="the newest is 5") as caught:
         filled.rows(at=at)
     assert len(caught.value.what) < 200
-    assert filled.rows(at="0" * 5000 + "3").num_rows == 3
+    assert filled.rows(at="0" * 5000 + "5").num_rows == 3
 
 
 def test_a_listing_of_a_bucket_with_a_flipped_digit_ends_in_an_error(
@@ -242,7 +242,7 @@ def test_a_bit_that_flips_in_an_entry_of_the_log_is_refused_and_a_clone_heals(fi
 
 
 def test_a_mark_that_has_changed_is_named_and_its_deletion_heals(filled: Lake) -> None:
-    mark = filled.path / "refs" / "newest" / "3"
+    mark = filled.path / "refs" / "newest" / "5"
     overwrite(mark, mark.read_bytes().replace(mark.read_bytes()[:1], b"g"))
     error = refused(lambda: Lake.open(filled.path).rows())
     assert f"delete {mark}" in error.fix
@@ -252,9 +252,9 @@ def test_a_mark_that_has_changed_is_named_and_its_deletion_heals(filled: Lake) -
 
 @pytest.mark.disk("it reads a lake hundreds of times")
 def test_a_bit_that_flips_in_a_ref_is_refused_or_changes_nothing(filled: Lake) -> None:
-    for kind, name in (("tags", "v1"), ("branches", "side")):
-        path = filled.path / "refs" / kind / f"{name}.json"
-        content = path.read_bytes()
+    for kind in ("tags", "branches"):
+        path = put_older_ref(filled, kind, "older")
+        name, content = "older", path.read_bytes()
         right = Lake.open(filled.path).view(name)
         harmless = 0
         for position in range(len(content)):
@@ -266,7 +266,7 @@ def test_a_bit_that_flips_in_a_ref_is_refused_or_changes_nothing(filled: Lake) -
                     assert Lake.open(filled.path).view(name) == right
                     harmless += 1
         assert harmless < len(content)  # of 8 times so many: the key of the checksum, and blanks
-        overwrite(path, content)
+        path.unlink()
 
 
 def test_a_ref_under_another_name_is_refused(filled: Lake) -> None:
@@ -276,11 +276,11 @@ def test_a_ref_under_another_name_is_refused(filled: Lake) -> None:
 
 
 def test_refs_without_a_checksum_as_older_lakes_have_are_read(filled: Lake) -> None:
-    path = filled.path / "refs" / "tags" / "v1.json"
+    path = put_older_ref(filled, "tags", "older")
     content = json.loads(path.read_bytes())
     del content["sha256"]
     overwrite(path, json.dumps(content).encode())
-    assert Lake.open(filled.path).rows(at="v1").num_rows == 3
+    assert Lake.open(filled.path).rows(at="older").num_rows == 3
 
 
 @pytest.mark.disk("it reads a lake hundreds of times")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import json
 import os
 import threading
@@ -33,7 +34,7 @@ from flagdata.lake import (
 from flagdata.lake.leases import keeping_collectors_out, leases
 from flagdata.schema import Kind
 from flagdata.storage import Place
-from tests.flagdata.lake.conftest import AGES, LINKS, LOCKS, overwrite, put_text
+from tests.flagdata.lake.conftest import AGES, LINKS, LOCKS, overwrite, put_older_ref, put_text
 
 NOW = timedelta(0)
 DAY = timedelta(hours=24)
@@ -126,9 +127,9 @@ def test_a_row_of_a_newer_format_is_named(lake: Lake) -> None:
 
 def test_a_ref_that_cannot_be_read_is_an_error_and_stops_collection(lake: Lake) -> None:
     put_text(lake, "a")
-    lake.tag("v1")
+    path = put_older_ref(lake, "tags", "v1")
     name = abandon(lake, "orphan")
-    (lake.path / "refs" / "tags" / "v1.json").write_bytes(b"{")
+    path.write_bytes(b"{")
     assert kinds(doctor(lake)) == ["ref-unreadable"]
     with pytest.raises(CorruptError):
         collect(lake, grace=NOW)
@@ -197,10 +198,29 @@ def test_a_bit_that_flips_anywhere_in_a_file_of_the_catalog_is_found_and_stops_c
     assert "catalog-file-missing" in kinds(verify_catalog(Lake.open(lake.path)))
 
 
+def of_an_earlier_version(lake: Lake) -> None:
+    """Makes the log one that says nothing of refs, as versions of flagdata wrote it whose refs were files alone."""
+    folder = lake.path / "catalog" / "_delta_log"
+    noted: dict[str, str] = {}
+    for path in sorted(folder.glob("*.json")):
+        actions = [json.loads(line) for line in path.read_text().splitlines()]
+        for action in actions:
+            info = action.get("commitInfo", {})
+            info.pop("flagdata.made", None)
+            info.update({"flagdata.previous_sha256": noted["before"]} if "flagdata.previous_sha256" in info else {})
+        text = "\n".join(json.dumps(action, ensure_ascii=False, separators=(",", ":")) for action in actions)
+        overwrite(path, text.encode())
+        noted["before"] = hashlib.sha256(text.encode()).hexdigest()
+    for mark in (lake.path / "refs" / "newest").iterdir():
+        overwrite(mark, f"{noted['before']}\n".encode())
+
+
 def test_a_branch_whose_ref_is_lost_is_reported_and_its_objects_are_kept(lake: Lake) -> None:
     lake.branch("try")
     artifact = put_text(lake, "a", branch="try")
+    of_an_earlier_version(lake)
     (lake.path / "refs" / "branches" / "try.json").unlink()
+    lake = Lake.open(lake.path)
     assert kinds(doctor(lake, grace=NOW)) == ["branch-lost"]
     with pytest.raises(CorruptError, match="try"):
         collect(lake, grace=NOW)
