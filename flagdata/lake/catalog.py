@@ -272,7 +272,7 @@ class Catalog:
 
     @_one_at_a_time
     def tidy(self) -> None:
-        """Merge the small files and write a checkpoint, if it is due; called before an append.
+        """Summarise the log and merge the small files, if it is due; called before a commit.
 
         Raises:
             Moved: another writer intervened; the small files are left to the next time.
@@ -281,8 +281,21 @@ class Catalog:
             return
         version = self.head()
         table = self._writable(version)
+        self.summarise()
+        small = [name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL]
+        if len(small) > 1:
+            rows = pa.concat_tables(self._files.read(name) for name in small)
+            info = {"message": f"merge {len(small)} files of the catalog; no row changed"}
+            self._commit(table, rows, removed=small, rows_change=False, info=info)
+
+    @_one_at_a_time
+    def summarise(self) -> None:
+        """Write a checkpoint and a summary of the log, if that is due; no version is added."""
+        if not self.is_due_for_tidying():
+            return
+        version = self.head()
         try:
-            table.create_checkpoint()
+            self._open(version).create_checkpoint()
         except DeltaError as error:
             raise self._refused(error) from None
         if isinstance(self._log, Path):
@@ -292,11 +305,6 @@ class Catalog:
             flush_folder(self._log)
         checkpoint_hash = file_hash(self._log / f"{version:020d}{CHECKPOINT}")
         self._summaries.extend(self.history()[::-1], checkpoint=checkpoint_hash)
-        small = [name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL]
-        if len(small) > 1:
-            rows = pa.concat_tables(self._files.read(name) for name in small)
-            info = {"message": f"merge {len(small)} files of the catalog; no row changed"}
-            self._commit(table, rows, removed=small, rows_change=False, info=info)
 
     def unpublished_files(self) -> Sequence[Place]:
         """Lists what processes left that died before, or while, they put their log entry: no version refers to it.

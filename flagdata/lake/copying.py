@@ -125,6 +125,8 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
             if (kind, name) in older:
                 target.refs.adopt(kind, name, stored)
         target.refs.write_files()
+        with transaction.keeping_collectors_out():
+            target.catalog.summarise()
     names = tuple(sorted(name for kind, name in target.refs.stored().keys() - refs_before.keys()))
     findings = tuple(_unprintable(source, marked, versions=head - target_head))
     return Transfer(
