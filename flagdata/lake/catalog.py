@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import random
 import re
 import tempfile
 import threading
@@ -39,6 +38,7 @@ from flagdata.durable import confirming, disk_errors, flush_file, flush_folder, 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.files import is_beside, open_regular
 from flagdata.forks import OneProcess
+from flagdata.lake.attempts import Moved
 from flagdata.lake.log import CHECKPOINT, COPY_BACK, FILE_HASH, PREVIOUS_HASH, Entry, Log, Summaries, is_stated
 from flagdata.lake.rowfiles import RowFiles, Scan, changed_file, encode_rows
 from flagdata.provenance import file_hash
@@ -59,15 +59,7 @@ _INFO_PREFIX = "flagdata."
 _TIDY_EVERY = 32
 _SMALL = 4 << 20  # B
 _LISTED = 8  # versions whose files are kept in mind
-_PATIENCE = 120.0  # s, how long a commit competes with other writers before it gives up
-_LEAST_TRIES = 20  # whatever time these take: an attempt may have waited for a collection
-_FIRST_WAIT = 0.01  # s
-_LONGEST_WAIT = 0.5  # s
 _PROCESS = OneProcess("the catalog", fix="resolve the query in the parent, or start workers by spawn")
-
-
-class Moved(Exception):  # noqa: N818 — an outcome to act on, never shown to a user
-    """Another writer has published since the version the append was based on."""
 
 
 def _one_at_a_time(method: Callable[Concatenate[Catalog, P], T]) -> Callable[Concatenate[Catalog, P], T]:
@@ -80,27 +72,6 @@ def _one_at_a_time(method: Callable[Concatenate[Catalog, P], T]) -> Callable[Con
             return method(self, *args, **kwargs)
 
     return guarded
-
-
-def persist(attempt: Callable[[], T], *, where: Place) -> T:
-    """Run `attempt` until it does not raise `Moved`, with random waits that grow.
-
-    Raises:
-        ConflictError: after two minutes and at least twenty attempts in which others were faster.
-    """
-    deadline = time.monotonic() + _PATIENCE
-    wait, tries = _FIRST_WAIT, 0
-    while True:
-        tries += 1
-        try:
-            return attempt()
-        except Moved:
-            if time.monotonic() > deadline and tries >= _LEAST_TRIES:
-                raise ConflictError(
-                    f"other processes kept committing for {_PATIENCE:.0f} s", where=str(where), fix="try again"
-                ) from None
-            time.sleep(random.uniform(0, wait))
-            wait = min(2 * wait, _LONGEST_WAIT)
 
 
 class Catalog:
@@ -265,6 +236,17 @@ class Catalog:
     def acknowledge(self, version: int) -> None:
         """Notes that a version that was adopted, and those before it, are there for good."""
         self._entries.acknowledge(version)
+
+    def renew_mark(self) -> bool:
+        """Note the newest version as acknowledged where the note of it is lost; False where it is there.
+
+        Raises:
+            OSError: what the disk refused.
+        """
+        if self._entries.acknowledged() >= 0:
+            return False
+        self._flush_log(self.head())
+        return True
 
     def is_due_for_tidying(self) -> bool:
         """Checks whether `tidy` would do anything: `_TIDY_EVERY` versions after it last did."""

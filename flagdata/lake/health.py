@@ -450,7 +450,8 @@ def _label_clashes(lake: Lake, marked: Marked) -> list[Finding]:
 
 
 def _ref_files(lake: Lake) -> list[Finding]:
-    """Writes the files of refs anew that do not say what the log says, and notes which they were."""
+    """Writes the files of refs anew that do not say what the log says, with the mark of the newest version where all of
+    `refs/` is lost, and notes which they were."""
     try:
         stale = lake.refs.stale_files()
     except FlagdataError:  # of which the refs' own finding says more
@@ -460,6 +461,7 @@ def _ref_files(lake: Lake) -> list[Finding]:
     try:
         lake.check_writable()
         lake.refs.write_files()
+        lake.catalog.renew_mark()
         done, fix = "written anew from the log", "none needed"
     except (OSError, FlagdataError):
         done, fix = "the lake can only be read, so that they stay as they are", "none needed: the log says what counts"

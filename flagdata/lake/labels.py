@@ -13,7 +13,7 @@ import sys
 from collections.abc import Collection, Mapping
 
 from flagdata.errors import NotFoundError, UsageError
-from flagdata.lake.catalog import persist
+from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
 from flagdata.lake.label_columns import Value
 from flagdata.lake.removal import CLIP_COLUMNS, clips_of

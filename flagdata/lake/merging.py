@@ -19,7 +19,7 @@ from datetime import UTC, datetime
 import pyarrow as pa
 
 from flagdata.errors import ConflictError, NotFoundError, UsageError
-from flagdata.lake.catalog import persist
+from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit, labels_after
 from flagdata.lake.label_merging import amended_labels, merge_labels
 from flagdata.lake.lineage import removals

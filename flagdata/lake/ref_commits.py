@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 
 from flagdata.durable import confirming
 from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, UsageError
-from flagdata.lake.catalog import persist
+from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
 from flagdata.lake.lineage import removals
 from flagdata.lake.refs import MAIN, NOUNS, Ref, View, as_json, check_name

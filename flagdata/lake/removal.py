@@ -28,7 +28,7 @@ import pyarrow.compute as pc
 from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError
 from flagdata.lake import naming
-from flagdata.lake.catalog import persist
+from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
 from flagdata.lake.leases import leases, looking
 from flagdata.lake.lineage import Removal, removals

@@ -17,7 +17,8 @@ from flagdata.errors import NotFoundError, UnknownNameError
 from flagdata.lake import naming
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import Catalog, Moved
+from flagdata.lake.attempts import Moved
+from flagdata.lake.catalog import Catalog
 from flagdata.lake.layout import STAGING, check_writable
 from flagdata.lake.leases import collecting, keeping_collectors_out
 from flagdata.lake.lineage import Lineage, with_labels

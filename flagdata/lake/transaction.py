@@ -22,7 +22,7 @@ from flagdata.checksums import files_of
 from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import persist
+from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
 from flagdata.lake.deposit import Deposit
 from flagdata.lake.healing import Healing, healing

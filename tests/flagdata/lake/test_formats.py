@@ -18,7 +18,7 @@ from flagdata.checksums import content_hash
 from flagdata.errors import ConflictError, CorruptError, UsageError
 from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake, Log, collect, doctor, verify_catalog
-from flagdata.lake.catalog import Moved
+from flagdata.lake.attempts import Moved
 from flagdata.schema import CATALOG, Kind
 from flagdata.storage import RemotePath
 from flagdata.storage.connection import settings

@@ -13,7 +13,7 @@ import pytest
 
 from flagdata.errors import ConflictError
 from flagdata.findings import Severity
-from flagdata.lake import Lake, catalog, collect, doctor, object_names, verify
+from flagdata.lake import Lake, attempts, collect, doctor, object_names, verify
 from tests.flagdata.lake.conftest import put_text
 
 NOW = timedelta(0)
@@ -55,22 +55,22 @@ def test_the_history_at_a_head_is_the_same_while_others_commit(lake: Lake, monke
 def test_a_commit_that_waited_for_a_collection_does_not_give_up_at_the_first_other_commit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(catalog, "_PATIENCE", -1.0)  # used up by the wait
-    monkeypatch.setattr(catalog, "_LONGEST_WAIT", 0.0)
-    outcomes = iter([catalog.Moved(), catalog.Moved()])
+    monkeypatch.setattr(attempts, "_PATIENCE", -1.0)  # used up by the wait
+    monkeypatch.setattr(attempts, "_LONGEST_WAIT", 0.0)
+    outcomes = iter([attempts.Moved(), attempts.Moved()])
 
     def attempt() -> str:
         for moved in outcomes:
             raise moved
         return "published"
 
-    assert catalog.persist(attempt, where=Path("catalog")) == "published"
+    assert attempts.persist(attempt, where=Path("catalog")) == "published"
 
     def overtaken() -> str:
-        raise catalog.Moved
+        raise attempts.Moved
 
     with pytest.raises(ConflictError, match="kept committing"):
-        catalog.persist(overtaken, where=Path("catalog"))
+        attempts.persist(overtaken, where=Path("catalog"))
 
 
 def test_a_process_reads_what_others_committed_once_and_finds_the_history_that_a_fresh_one_does(
@@ -86,9 +86,9 @@ def test_a_process_reads_what_others_committed_once_and_finds_the_history_that_a
     lake.branch("side")
     put_text(lake, "three", branch="side")
     assert reader.history() == Lake.open(lake.path).catalog.history()
-    assert read == [2, 3]
+    assert read == [2, 3, 4]
     assert reader.history(1)[0]["message"] == "ingest three"
-    assert read == [2, 3]
+    assert read == [2, 3, 4]
 
 
 def test_collection_beside_ingests_deletes_nothing_that_they_publish(

@@ -381,6 +381,7 @@ def test_a_lake_without_its_refs_folder_has_its_tags_and_branches(lake: Lake) ->
     doctor(again)
     assert is_whole(again)
     assert {path.stem for path in lake.refs.root.glob("*/*.json")} == {"v1", "side"}
+    assert [path.name for path in (lake.refs.root / "newest").iterdir()] == [str(lake.catalog.head())]
 
 
 @pytest.mark.parametrize("kind", ["tags", "branches"])
