@@ -156,6 +156,43 @@ def test_two_states_of_a_checkout_are_two_versions_of_the_code(tmp_path: Path) -
     assert all(str(one).startswith(f"{commit}-dirty.") for one in found[1:])
 
 
+_REPOSITORYS_OWN = subprocess.run(["git", "rev-parse", "--local-env-vars"], capture_output=True, text=True, check=True)
+GIT_VARIABLES = {
+    **dict.fromkeys(_REPOSITORYS_OWN.stdout.split(), "{other}/.git"),
+    "GIT_WORK_TREE": "{other}",
+    "GIT_INDEX_FILE": "{other}/.git/index",
+    "GIT_OBJECT_DIRECTORY": "{other}/.git/objects",
+    "GIT_CEILING_DIRECTORIES": "{parent}",
+    "GIT_CONFIG_PARAMETERS": "'core.worktree'='{other}'",
+    "GIT_CONFIG_COUNT": "1",
+    "GIT_EXTERNAL_DIFF": "true",
+    "GIT_DIFF_OPTS": "-u0",
+    "GIT_NAMESPACE": "other",
+    "GIT_REFLOG_ACTION": "rebase",
+    "GIT_TRACE": "1",
+}
+"""What git sets for a hook, `rebase -x` or an alias, or a user does → a value that means another repository."""
+
+
+@pytest.mark.parametrize("variable", GIT_VARIABLES)
+def test_the_version_of_the_code_is_its_checkouts_within_a_hook_of_another_repository(
+    variable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checkout, other = tmp_path / "checkout", tmp_path / "other"
+    for folder in (checkout, other):
+        folder.mkdir()
+        (folder / "lift.py").write_text(folder.name)
+        for arguments in (["init", "-q"], ["add", "."], ["commit", "-qm", folder.name]):
+            subprocess.run(["git", "-c", "user.name=a", "-c", "user.email=a@b", *arguments], cwd=folder, check=True)
+    (checkout / "lift.py").write_text("changed")
+    commit = provenance.commit_of(checkout)
+    monkeypatch.setenv(variable, GIT_VARIABLES[variable].format(other=other, parent=tmp_path))
+    monkeypatch.setenv("GIT_CONFIG_KEY_0", "core.worktree")
+    monkeypatch.setenv("GIT_CONFIG_VALUE_0", str(other))
+    assert commit is not None
+    assert provenance.commit_of(checkout) == commit
+
+
 def test_the_catalog_schema_carries_units() -> None:
     arrow = schema.catalog_schema()
     assert arrow.field("wind").metadata[b"unit"] == b"m/s"
