@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
-from flagdata.errors import CorruptError, FlagdataError
+from flagdata.errors import CorruptError, FlagdataError, RefusedError
 from flagdata.storage import Place, RemotePath, StoreError
 from flagdata.storage.connection import COLOUR
 
@@ -25,18 +25,81 @@ SCRATCH = re.compile(r"\.[0-9a-f]{32}")
 _LOG = logging.getLogger("flagdata")
 
 
+LACKS = frozenset(
+    {
+        errno.EACCES,
+        errno.EBADF,
+        errno.EINVAL,
+        errno.EMLINK,
+        errno.ENOLCK,
+        errno.ENOSYS,
+        errno.ENOTSUP,
+        errno.EOPNOTSUPP,
+        errno.EPERM,
+        errno.EXDEV,
+    }
+)
+"""What a file system answers where it lacks what it was asked for: a link, a lock, a flush."""
+
+
+def lacking(lack: str, where: Path, *, error: OSError | None = None) -> RefusedError:
+    """Returns the error for a disk that cannot do what writing that survives a crash, or other processes, takes.
+
+    Args:
+        lack: goes on with "this disk".
+        error: by which it said so.
+    """
+    said = "" if error is None else f" ({error.strerror})"
+    return RefusedError(
+        f"this disk {lack}{said}",
+        where=str(where),
+        fix="use a disk of this machine that is formatted as ext4, XFS, Btrfs or APFS, or for a lake a bucket "
+        "(s3://bucket/prefix); what lies here can be read, and copied there",
+    )
+
+
 def flush_file(path: Path) -> None:
-    """Forces a file's bytes to the disk."""
+    """Forces a file's bytes to the disk.
+
+    Raises:
+        RefusedError: the disk does not say when they are there.
+        OSError: whatever else it refused.
+    """
+    _flush(path, "a file")
+
+
+def flush_folder(path: Path) -> None:
+    """Forces a folder's entries (names that were added, renamed, removed) to the disk; raises as `flush_file`."""
+    _flush(path, "a folder")
+
+
+def _flush(path: Path, noun: str) -> None:
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in LACKS:
+            raise
+        raise lacking(f"does not confirm that {noun} has reached it", path, error=error) from error
     finally:
         os.close(descriptor)
 
 
-def flush_folder(path: Path) -> None:
-    """Forces a folder's entries (names that were added, renamed, removed) to the disk."""
-    flush_file(path)
+def make_folders(*paths: Place) -> None:
+    """Makes folders, and those above them that are missing; their names are on the disk when this returns.
+
+    Raises:
+        FileExistsError: there is a file of that name.
+        RefusedError, OSError: as `flush_file`.
+    """
+    holding: dict[Path, None] = {}
+    for path in paths:
+        if isinstance(path, RemotePath):  # a bucket has no folders
+            continue
+        holding |= dict.fromkeys(folder.parent for folder in (path, *path.parents) if not folder.exists())
+        path.mkdir(parents=True, exist_ok=True)
+    for folder in holding:
+        flush_folder(folder)
 
 
 def flush_tree(path: Path) -> None:
@@ -74,7 +137,8 @@ def put_if_absent(path: Place, data: bytes, *, noun: str | None = None) -> bool:
         noun: is published by it, for a warning; the file by its name if `None`.
 
     Raises:
-        OSError: what the disk refused; the name was not taken.
+        RefusedError: the disk has no hard links, or does not confirm what is written; the name was not taken.
+        OSError: whatever else the disk refused; the name was not taken.
     """
     if isinstance(path, RemotePath):
         return path.create(data)
@@ -82,7 +146,7 @@ def put_if_absent(path: Place, data: bytes, *, noun: str | None = None) -> bool:
     try:
         scratch.write_bytes(data)
         flush_file(scratch)
-        os.link(scratch, path)
+        link(scratch, path)
     except FileExistsError:
         scratch.unlink(missing_ok=True)
         return False
@@ -96,6 +160,22 @@ def put_if_absent(path: Place, data: bytes, *, noun: str | None = None) -> bool:
     with confirming(noun, path):
         scratch.unlink(missing_ok=True)
     return True
+
+
+def link(file: Path, path: Path) -> None:
+    """Gives a file a second name.
+
+    Raises:
+        FileExistsError: the name is taken.
+        RefusedError: the disk has no hard links.
+        OSError: whatever else it refused.
+    """
+    try:
+        os.link(file, path)
+    except OSError as error:
+        if error.errno not in LACKS:
+            raise
+        raise lacking("has no hard links, as exFAT and FAT32 have none", path.parent, error=error) from error
 
 
 @contextmanager
@@ -154,6 +234,6 @@ _FIXES = {
     errno.EDQUOT: "free some space, or ask for a larger quota",
     errno.EFBIG: "raise the file size limit (ulimit -f)",
     errno.EACCES: "give yourself read and write permission on the folder",
-    errno.EPERM: "give yourself read and write permission on the folder",
+    errno.EPERM: "make the folder and what is in it your own, and nothing of it immutable",
     errno.EROFS: "mount the disk writable",
 }

@@ -29,7 +29,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from flagdata.durable import confirming, disk_errors, flush_file, flush_folder
+from flagdata.durable import LACKS, confirming, disk_errors, flush_file, flush_folder, make_folders
 from flagdata.errors import ConflictError, InputError
 from flagdata.manifest import remove_listed, unlisted, write_manifest
 
@@ -89,7 +89,6 @@ def _block(data: bytes, name: str, command: str, digest: str) -> tuple[bytes, in
 
 
 _NAMED = 3  # files that a refusal names
-_NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EMLINK)
 
 
 def check_file(path: Path, *, command: str | None = None) -> None:
@@ -190,7 +189,7 @@ def write_files(folder: Path, contents: Mapping[str, str | bytes | None], *, com
     """
     check_files(folder, *contents, command=command)
     with disk_errors("writing the output", folder), _removed() as scratch:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folders(folder)
         for name, content in contents.items():
             if content is not None:
                 scratch[name] = _scratch(folder)
@@ -215,7 +214,7 @@ def rewrite(path: Path, content: str | bytes) -> None:
     """
     check_rewrite(path)
     with disk_errors("writing the file", path), _removed() as scratch:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folders(path.parent)
         scratch[path.name] = _scratch(path.parent)
         scratch[path.name].write_bytes(_bytes(path.name, content, None))
         flush_file(scratch[path.name])
@@ -252,7 +251,7 @@ def fresh_folder(path: Path, *, schema: str | None = None) -> Iterator[Path]:
     check_folder(path, schema=schema)
     parent = path.absolute().parent
     with disk_errors("writing the output", path), _removed() as scratch:
-        parent.mkdir(parents=True, exist_ok=True)
+        make_folders(parent)
         scratch[path.name] = _scratch(parent)
         scratch[path.name].mkdir()
         yield scratch[path.name]
@@ -341,7 +340,7 @@ def _take(scratch: Path, path: Path) -> None:
     except FileExistsError:
         raise _taken(path) from None
     except OSError as error:
-        if error.errno not in _NO_LINKS:
+        if error.errno not in LACKS:
             raise
         _check_free(path, None)  # a file system without hard links: a name taken in this very moment would be lost
         scratch.rename(path)

@@ -118,7 +118,6 @@ class Catalog:
             except DeltaError as error:
                 raise self._refused(error) from None
             entry = (Path(folder) / "_delta_log" / self._entries.path(0).name).read_bytes()
-        self._log.mkdir(parents=True, exist_ok=True)
         if not self._entries.adopt(0, entry):
             raise ConflictError("another process is making a lake there", where=str(self.path), fix="open that one")
         self._flush_log(0)

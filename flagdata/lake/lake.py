@@ -14,16 +14,17 @@ from urllib.parse import unquote
 from flagdata import provenance
 from flagdata.addresses import lake_place
 from flagdata.documents import from_json
-from flagdata.durable import disk_errors, put_if_absent
+from flagdata.durable import disk_errors, make_folders, put_if_absent
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.files import is_beside, open_regular
 from flagdata.lake.catalog import newer
 from flagdata.lake.label_columns import Value
 from flagdata.lake.labels import put
-from flagdata.lake.layout import FOLDERS, STAGING, STORES, scratch_files
+from flagdata.lake.layout import FOLDERS, STAGING, scratch_files
 from flagdata.lake.locks import MADE, TimedLocks
 from flagdata.lake.merging import MergeResult, merge
 from flagdata.lake.objects import Objects
+from flagdata.lake.probing import probe
 from flagdata.lake.ref_commits import delete_ref, make_ref
 from flagdata.lake.refs import MAIN, Ref
 from flagdata.lake.removal import Erasure, Withdrawal, descendants, erase, explained, withdraw
@@ -50,7 +51,7 @@ class Lake(Store):
         Raises:
             ConflictError: a lake, or anything else, is there.
             UsageError: any other address, or a path that the Delta library cannot work in.
-            RefusedError: a store that ignores the conditions of puts.
+            RefusedError: a disk or store that lacks what every commit relies on, see `flagdata.lake.probing`.
         """
         return cls._make(path, lambda lake: lake._fill())
 
@@ -64,6 +65,8 @@ class Lake(Store):
                 raise ConflictError("another process is making a lake there", where=str(lake.path), fix="open that one")
             try:
                 lake._clear()
+                probe(lake.staging)
+                make_folders(*(lake.path / folder for folder in FOLDERS))
                 fill(lake)
             except BaseException:
                 for entry in lake._entries():
@@ -110,7 +113,7 @@ class Lake(Store):
         if isinstance(self.staging, RemotePath):
             self.check_writable()
             return TimedLocks(self.staging).claimed(done=self.path / _MARKER)
-        self.path.mkdir(parents=True, exist_ok=True)
+        make_folders(self.path)
         try:
             self.staging.mkdir()
         except FileExistsError:
@@ -155,17 +158,12 @@ class Lake(Store):
         return lake
 
     def _begin_as(self, source: Lake) -> None:
-        for folder in FOLDERS:
-            (self.path / folder).mkdir(parents=True, exist_ok=True)
         self.catalog.adopt(0, *source.catalog.entry(0))
         self.catalog.acknowledge(0)
         with open_regular(source.path / _MARKER) as stream:
             put_if_absent(self.path / _MARKER, stream.read())
 
     def _fill(self) -> None:
-        for store in STORES:
-            (self.path / store).mkdir()
-        self.refs.make_folders()
         self.catalog.create({"message": "create the lake", "code_version": provenance.code_version()})
         marker = {
             "schema": _MARKER_SCHEMA,

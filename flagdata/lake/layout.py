@@ -2,62 +2,19 @@
 
 Reading follows links, as a copy made of links needs. Whatever writes or deletes refuses a lake whose folders are not
 its own: through a linked store it would change files of another lake.
-
-Whether a store keeps the conditions of puts, on which every commit relies.
-
-Some servers take `If-None-Match` and `If-Match` and ignore them: of two writers at one version both would win, and a
-commit would be lost without a word.
 """
 
 from __future__ import annotations
 
 import os
 import stat
-import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 
 from flagdata.durable import SCRATCH, disk_errors
-from flagdata.errors import CorruptError, ErrorKind, FlagdataError, RefusedError
-from flagdata.storage import Place, RemotePath, StoreError
-from flagdata.storage.refusals import DeniedError
-
-
-@cache
-def probe(folder: RemotePath) -> None:
-    """Puts one object twice in `folder`, each time only if its name is free, and replaces it by a version it has not:
-    once a process and folder.
-
-    Raises:
-        RefusedError: the store did what it was asked not to do.
-        FlagdataError: it cannot be written to.
-    """
-    probe_object = folder / f"probe-{uuid.uuid4().hex}"
-    try:
-        first = probe_object.create(b"1")
-        twice = probe_object.create(b"2")
-        swapped = probe_object.replace_if('"00000000000000000000000000000000"', b"3") is not None
-        content = probe_object.read_bytes()
-        probe_object.unlink()
-    except DeniedError as error:
-        raise FlagdataError(
-            f"this lake can be read, but not written: {error.strerror}", where=str(folder.parent), fix=error.fix
-        ) from None
-    except StoreError as error:
-        raise FlagdataError(
-            f"this lake cannot be written: {error.strerror}",
-            where=str(folder.parent),
-            fix=f"{error.fix}, then try again",
-        ) from None
-    if not first or twice or swapped or content != b"1":
-        raise RefusedError(
-            "the store ignores the conditions of puts, so that writers would lose each other's commits",
-            where=str(folder.parent),
-            fix="use a store that keeps If-None-Match and If-Match (S3 itself does), or a lake in a local folder",
-        )
-
+from flagdata.errors import CorruptError, ErrorKind, FlagdataError
+from flagdata.storage import Place, RemotePath
 
 STORES = {"mcap": ".mcap", "zarr": ".zarr", "model": ".model"}
 STAGING = "staging"
@@ -90,15 +47,14 @@ def check_own(root: Place) -> None:
 
 
 def check_writable(root: Place) -> None:
-    """Checks whether this process may write in the lake at `root`: of a disk, as far as that can be said without
-    writing; of a bucket, see `flagdata.lake.layout`.
+    """Checks whether this process may write in the lake at `root`, as far as that can be said without writing:
+    `flagdata.lake.probing` says the rest.
 
     Raises:
         LinkError: as `check_own`.
-        FlagdataError: the disk is mounted read-only, a permission is missing, or a store does not keep conditions.
+        FlagdataError: the disk is mounted read-only, or a permission is missing.
     """
     if isinstance(root, RemotePath):
-        probe(root / STAGING)
         return
     check_own(root)
     for path in (root / name for name in FOLDERS):

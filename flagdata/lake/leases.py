@@ -23,6 +23,7 @@ from flagdata.documents import from_json
 from flagdata.files import is_beside
 from flagdata.lake.layout import LinkError
 from flagdata.lake.locks import OF_LOCKS, SHARED, Check, FileNote, locks_of
+from flagdata.locks import check_locks
 from flagdata.storage import Place, RemotePath
 
 
@@ -85,6 +86,7 @@ def _scratch() -> Path:
     """Returns where this machine's transactions write what goes into buckets; what those left that died is deleted."""
     folder = user_cache() / "staging"
     folder.mkdir(parents=True, exist_ok=True)
+    check_locks(folder)
     with collecting(folder):
         for state in leases(folder):
             if state.leased and not state.alive:

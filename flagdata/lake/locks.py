@@ -42,9 +42,10 @@ from pathlib import Path
 from typing import IO, Any, Protocol
 
 from flagdata.documents import from_json
-from flagdata.durable import boot, disk_errors
-from flagdata.errors import ConflictError
+from flagdata.durable import boot, disk_errors, make_folders
+from flagdata.errors import ConflictError, FlagdataError
 from flagdata.lake.layout import LinkError
+from flagdata.locks import lock
 from flagdata.storage import Place, RemotePath
 
 LIFE = 240.0
@@ -124,7 +125,7 @@ class KernelLocks:
     def lines(self, folder: Path) -> tuple[list[str], bool]:
         """Reads the lines of a note, see `Locks.lines`."""
         with _plain(folder / LEASE) as file:
-            alive = not _try_lock(file.fileno())
+            alive = not lock(file, fcntl.LOCK_SH | fcntl.LOCK_NB, where=folder)
             return file.read().splitlines(), alive
 
     @contextmanager
@@ -133,9 +134,8 @@ class KernelLocks:
         shared holders cannot keep an exclusive one out for ever. Not to be nested."""
         with ExitStack() as stack:
             with _opened(self.staging / TURN) as turn:
-                fcntl.flock(turn, fcntl.LOCK_EX)
-                lock = stack.enter_context(_opened(self.staging / COLLECT))
-                fcntl.flock(lock, mode)
+                lock(turn, fcntl.LOCK_EX, where=self.staging)
+                lock(stack.enter_context(_opened(self.staging / COLLECT)), mode, where=self.staging)
             yield
 
 
@@ -154,9 +154,9 @@ class FileNote:
             self.folder.mkdir()
             self._file = (self.folder / LEASE).open("wb", buffering=0)
             try:
-                fcntl.flock(self._file, fcntl.LOCK_EX)
+                lock(self._file, fcntl.LOCK_EX, where=self.folder)
                 self._line(json.dumps(owner))
-            except OSError:
+            except (OSError, FlagdataError):
                 self._remove()
                 raise
 
@@ -185,30 +185,27 @@ def _sure() -> None:
     """Checks nothing: the kernel keeps a lock until it is given up."""
 
 
-def _try_lock(descriptor: int) -> bool:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
-
-
 def _opened(path: Path) -> IO[str]:
     with disk_errors("locking the lake", path):
         if not os.path.lexists(path):
-            path.parent.mkdir(exist_ok=True)  # copies of a lake may come without empty folders
+            make_folders(path.parent)  # copies of a lake may come without empty folders
             path.touch()
-        return _plain(path)
+        try:
+            return _plain(path, os.O_RDWR)  # NFS locks for one alone only what that one may write
+        except OSError as error:
+            if error.errno not in (errno.EACCES, errno.EPERM, errno.EROFS):
+                raise
+        return _plain(path)  # of a reader
 
 
-def _plain(path: Path) -> IO[str]:
-    """Opens a file of staging to read; a link is not followed, and a pipe not waited for.
+def _plain(path: Path, mode: int = os.O_RDONLY) -> IO[str]:
+    """Opens a file of staging; a link is not followed, and a pipe not waited for.
 
     Raises:
         LinkError: a link.
     """
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        descriptor = os.open(path, mode | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError as error:
         if error.errno != errno.ELOOP:
             raise

@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.documents import from_json
-from flagdata.durable import put_if_absent, unreadable
+from flagdata.durable import make_folders, put_if_absent, unreadable
 from flagdata.errors import CorruptError, ErrorKind, FlagdataError
 from flagdata.files import open_regular
 from flagdata.provenance import digest, file_hash
@@ -281,7 +281,7 @@ class Log:
 
     def acknowledge(self, version: int) -> None:
         """Notes for good that the entry of `version` is on the disk; durable when it returns."""
-        self.marks.mkdir(parents=True, exist_ok=True)
+        make_folders(self.marks)
         put_if_absent(self.marks / str(version), f"{self.hash(version)}\n".encode())
         for lower in self._marks():
             if lower < version:
@@ -467,7 +467,7 @@ class Summaries:
             "versions": list(history[first:]),
         }
         text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
-        self._folder.mkdir(parents=True, exist_ok=True)
+        make_folders(self._folder)
         put_if_absent(self._folder / f"{first:020d}-{last:020d}-{digest(text)}.json", text.encode())
 
     def _chain(self, head: int) -> list[Summary]:

@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 
 from flagdata.checksums import content_hash, files_of, read_sums, size_of, sums_of
-from flagdata.durable import flush_folder, flush_tree
+from flagdata.durable import flush_folder, flush_tree, make_folders
 from flagdata.errors import CorruptError, FlagdataError, InputError, NotFoundError
 from flagdata.files import is_beside
 from flagdata.lake.artifact import OBJECT_NAME
@@ -144,7 +144,7 @@ class Objects:
             entry.chmod(_READ_ONLY)
         flush_tree(staged)
         target = self._file(name)
-        target.parent.mkdir(exist_ok=True)
+        make_folders(target.parent)
         for attempt in range(_ATTEMPTS):
             if os.path.lexists(target):
                 if self.is_whole(name):

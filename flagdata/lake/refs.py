@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from flagdata.documents import from_json
-from flagdata.durable import SCRATCH, confirming, disk_errors, flush_folder, put_if_absent, unreadable
+from flagdata.durable import SCRATCH, confirming, disk_errors, flush_folder, make_folders, put_if_absent, unreadable
 from flagdata.errors import CorruptError, FlagdataError, NotFoundError, TimeError, UnknownNameError, UsageError
 from flagdata.files import open_regular
 from flagdata.provenance import recipe_hash
@@ -180,10 +180,6 @@ class Refs:
         self._history = history
         self._lives: tuple[int, Mapping[Key, Ref | Deletion]] = (-1, {})
 
-    def make_folders(self) -> None:
-        for kind in ("tags", "branches", "history"):
-            (self.root / kind).mkdir(parents=True)
-
     def tags(self) -> dict[str, Ref]:
         """Lists all tags by name."""
         return self._all("tags")
@@ -250,7 +246,7 @@ class Refs:
             OSError: what the disk refused.
         """
         path = self.root / kind / f"{ref.name}.json"
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folders(path.parent)
         if not put_if_absent(path, _content(ref)) and not self._states(path, ref):
             path.unlink()
             put_if_absent(path, _content(ref))

@@ -25,6 +25,7 @@ from flagdata.lake.lineage import Lineage, with_labels
 from flagdata.lake.locks import Check
 from flagdata.lake.matching import Values, Where, condition, matching
 from flagdata.lake.objects import Objects, RemoteObjects
+from flagdata.lake.probing import probe
 from flagdata.lake.refs import Refs, Slice, View
 from flagdata.lake.rowfiles import ROW_ORDER, Scan, in_order
 from flagdata.printable import SHORT
@@ -61,9 +62,11 @@ class Store:
 
         Raises:
             LinkError: a folder of the lake is a link, so that what is written would lie elsewhere.
+            RefusedError: the place lacks what every commit relies on, see `flagdata.lake.probing`.
             FlagdataError: the lake can only be read.
         """
         check_writable(self.path)
+        probe(self.staging)
 
     @contextmanager
     def changing(self, doing: str, *, alone: bool = False) -> Iterator[Check]:

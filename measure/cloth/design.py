@@ -24,8 +24,8 @@ import numpy as np
 from flagdata import workload
 from flagdata.arrays import FloatArray, IntArray, read_arrays
 from flagdata.console import say_beside_bars
-from flagdata.durable import put_if_absent
 from flagdata.errors import CorruptError, InputError
+from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed, stream
 from flagdata.tables import Range, Scale
@@ -289,7 +289,7 @@ def _make(batch: Simulatable, path: Path) -> int:
     """Simulates a batch into its file; returns how many cloths it has."""
     buffer = BytesIO()
     np.savez_compressed(buffer, readings=batch.read())
-    put_if_absent(path, buffer.getvalue())
+    rewrite(path, buffer.getvalue())
     return len(batch.seeds)
 
 

@@ -17,8 +17,8 @@ import numpy as np
 
 from flagdata.arrays import FloatArray, read_arrays
 from flagdata.console import say_beside_bars
-from flagdata.durable import put_if_absent
 from flagdata.errors import CorruptError, NotFoundError, UsageError
+from flagdata.outputs import rewrite
 from flagdata.provenance import code_version
 from flagdata.rng import child_seed, stream
 from measure.forecasting.calibration import Calibration
@@ -176,7 +176,7 @@ def build(
         return
     with connected(scheduler, workers=min(workers, len(missing)), say=say_beside_bars) as pool:
         for index, content in pool.results((_content_of, (batches[index], index)) for index in missing):
-            put_if_absent(_file(folder, index), content)
+            rewrite(_file(folder, index), content)
             if progress is not None:
                 progress(1)
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from flagdata.durable import LACKS
 from flagdata.errors import ConflictError, FlagdataError, InputError
 from flagdata.manifest import MANIFEST
 from flagdata.outputs import (
@@ -126,9 +127,12 @@ def test_a_new_file_never_takes_a_name_that_was_taken_meanwhile(tmp_path: Path) 
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_a_file_system_without_hard_links_is_written_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("number", sorted(LACKS))
+def test_a_file_system_without_hard_links_is_written_to(
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def no_links(*args: object) -> None:
-        raise PermissionError(1, "Operation not permitted")
+        raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(os, "link", no_links)
     write_file(tmp_path / "a.arrow", b"ours")
