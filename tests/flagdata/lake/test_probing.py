@@ -64,12 +64,12 @@ DISKS: dict[str, tuple[object, str, Callable[..., Any], str]] = {
     "a rename that keeps the old file": (os, "replace", _keeping, "does not replace a name"),
     "no rename over a folder": (os, "rename", _refusing(errno.ENOTEMPTY), "does not replace a name"),
 }
-"""What a disk lacks → what stands for that, and what is said."""
+"""What a disk lacks → what stands for that, and what is reported."""
 
 
 @pytest.fixture(params=DISKS)
 def lack(request: pytest.FixtureRequest, lake: Lake, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A disk that lacks something from now on, with a lake that was copied to it; what is said of it."""
+    """A disk that lacks something from now on, with a lake that was copied to it; what is reported of it."""
     module, name, stand_in, said = DISKS[request.param]
     put_text(lake, "before")
     probing.probe.cache_clear()
