@@ -13,7 +13,7 @@ import hypothesis
 import pytest
 
 from flagdata.errors import NotFoundError
-from flagdata.lake import layout as probing
+from flagdata.lake import probing
 from flagdata.storage import connection
 from sim.blender import environment
 from tests.evidence import REFERENCE
