@@ -15,6 +15,10 @@ MCAP = b"\x89MCAP0\r\n"
 """First bytes of an MCAP file."""
 LEROBOT_INFO = "meta/info.json"
 """File that describes a LeRobot data set, within its folder."""
+LEROBOT_OWN = "flagdata"
+"""Key of that description with what flagdata states beside LeRobot's own: how the sides were decided."""
+LEROBOT_LABEL = "flagdata/label"
+"""Column of a LeRobot data set's table of episodes with what flagdata states of each, as JSON."""
 _SHOWN = 300  # letters of a path in a message
 _OF_WINDOWS = frozenset({"thumbs.db", "ehthumbs.db", "desktop.ini"})
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from flagdata.align.constant import ConstantWind, declared_recording
 from flagdata.align.present import find_made, provenance
-from flagdata.align.recording import RecordingResult, copy_frames, recorded
+from flagdata.align.recording import RecordingResult, copy_frames, data_set_of, recorded
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import UsageError
 from flagdata.findings import Finding, quality_flags
@@ -144,6 +144,7 @@ def _without_wind(
             parents=(camera.id,),
             recipe=recipe,
             session=cloth.fabric,
+            **data_set_of(camera),
             day=iso(start)[:10],
             start=start,
             end=end,

@@ -192,6 +192,11 @@ def truth_window(recipe: Mapping[str, Any]) -> float:
     return float(recipe.get("truth", {}).get("window", TRUTH_WINDOW))
 
 
+def data_set_of(camera: Artifact) -> dict[str, Any]:
+    """Returns what a recording has of the data set that its film came in with: its side, and the simulation's seed."""
+    return {"dataset": camera.dataset, "side": camera.side, "seed": camera.seed}
+
+
 def session_of(pair: Pair, *, session_given: str | None) -> str | None:
     """Returns the session of a recording: the one given, else the one its parents agree on; `None` where neither has
     one.
@@ -415,6 +420,7 @@ def _artifact(
         parents=(pair.camera.id, pair.wind.id),
         recipe=alignment.recipe,
         session=session,
+        **data_set_of(pair.camera),
         day=iso(start)[:10],
         start=start,
         end=end,

@@ -155,9 +155,11 @@ class Exporting(AtVersion, OnLake):
     to: Path | str = option("New folder to write.", type=LocalPath(), metavar="PATH")
     where: str | None = option("SQL condition as in flagdata query; all rows by default.", default=None, metavar="EXPR")
     split: str | None = option(
-        "Only this side of the leakage-safe split: train, validation or test.", default=None, metavar="SIDE"
+        "Only this side: train, validation or test, as data sets state it; of other clips by a hash without leaks.",
+        default=None,
+        metavar="SIDE",
     )
-    salt: str = option("Another text gives another split.", default="", metavar="TEXT", show_default=False)
+    salt: str = option("Another text gives another split by the hash.", default="", metavar="TEXT", show_default=False)
     frames: str | None = option(
         "webdataset: jpg (default) or npy; parquet: none (default) or jpg; lerobot: av1 (default) or png.",
         default=None,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from flagdata.arguments import checked
 from flagdata.dataset.source import AnyLake, Source, opened
@@ -40,7 +41,7 @@ def open(path: Place | str) -> Source:  # noqa: A001  read as flagdata.open
 @checked
 def pairs(
     lake: AnyLake,
-    where: str | None = None,
+    where: str | Mapping[str, Any] | None = None,
     *,
     at: str | None = None,
     split: str | None = None,
@@ -64,7 +65,7 @@ def pairs(
     Raises:
         MissingExtraError: torch is not installed.
         NotFoundError: no such lake or version, or no clip matches.
-        RefusedError: an explicit split leaks, the side is empty, or no pair is within the tolerance.
+        RefusedError: the split, see `Source.pairs`; the side is empty, or no pair is within the tolerance.
         UnknownNameError: no such column or side.
         UsageError: a filter that is not SQL, or a window that is no length of time.
     """

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from flagdata.dataset.clips import clip_rows
     from flagdata.dataset.loader import PairLoader
     from flagdata.dataset.pairs import Pairs
-    from flagdata.dataset.resolve import SideSize, clips_on_side, explicit_sides
     from flagdata.dataset.sample import Batch, Sample, collate
+    from flagdata.dataset.sides import SideSize
     from flagdata.dataset.source import Source
     from flagdata.dataset.splits import ExplicitSplit, HashedSplit
     from flagdata.dataset.table import COLUMNS, PairTable

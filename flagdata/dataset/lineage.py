@@ -14,7 +14,7 @@ from flagdata.lake.matching import matching
 from flagdata.schema import Kind
 
 _TIED = (Kind.CAMERA, Kind.MESHES, Kind.RECORDING)
-_TIES = ["artifact", "kind", "source_hash", "object", "session"]
+_TIES = ["artifact", "kind", "source_hash", "object", "session", "side"]
 
 
 def origins_of(catalog: pa.Table, clips: pa.Table) -> list[Origin]:
@@ -39,8 +39,11 @@ def origins_of(catalog: pa.Table, clips: pa.Table) -> list[Origin]:
 
 
 def _ties(row: Mapping[str, str | None]) -> list[str]:
-    """Lists in words what must not be on two sides because of one artifact of a recording's lineage."""
-    ties = [] if row["kind"] == Kind.RECORDING else [f"{row['kind']} {row['source_hash'] or row['artifact']}"]
+    """Lists in words what must not be on two sides because of one artifact of a recording's lineage. A camera that
+    states a side is one film of many in a data set, whose hash they share: those of one side are tied."""
+    source = f"{row['kind']} {row['source_hash'] or row['artifact']}"
+    own = source if row["side"] is None else f"{source}, {row['side']}"
+    ties = [] if row["kind"] == Kind.RECORDING else [own]
     ties += [f"{column} {row[column]}" for column in ("object", "session") if row[column]]
     return ties
 

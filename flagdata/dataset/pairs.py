@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import torch
@@ -43,6 +43,8 @@ class Pairs(Batchable):
     Attributes:
         table: the pairs' numbers, as arrays.
         refused: the pairs outside the tolerance, each with its reasons.
+        split: side that all pairs are on; `None` where none was asked for.
+        split_by: the rule by which sides were decided, and their sizes, as JSON; `None` where no side was asked for.
         at: the ref the query was resolved at, as it was given.
         seed: of the shuffled orders.
         fingerprint: hash of the pairs and their ground truth, in order; equal means the same data.
@@ -57,9 +59,13 @@ class Pairs(Batchable):
         at: str | None,
         seed: int,
         cache: DecodedCache | None,
+        split: str | None,
+        split_by: Mapping[str, Any] | None,
     ) -> None:
         self.table = table
         self.refused = refused
+        self.split = split
+        self.split_by = split_by
         self.at = at
         self.seed = seed
         self.fingerprint = table.fingerprint()

@@ -16,7 +16,7 @@ from flagdata.storage import Place
 if TYPE_CHECKING:
     from flagdata.dataset.cache import DecodedCache
     from flagdata.dataset.pairs import Pairs
-    from flagdata.dataset.resolve import SideSize
+    from flagdata.dataset.sides import SideSize
     from flagdata.dataset.splits import ExplicitSplit, HashedSplit
     from flagdata.dataset.tolerance import Tolerance
 
@@ -60,7 +60,7 @@ class Source:
     @checked
     def pairs(
         self,
-        where: str | None = None,
+        where: str | Mapping[str, Any] | None = None,
         *,
         at: str | None = None,
         split: str | None = None,
@@ -73,11 +73,13 @@ class Source:
         """Clips with their ground truth, resolved now and for good: later commits change nothing in them.
 
         Args:
-            where: a filter over the catalog's columns, as in `flagdata query --where`; `None` is every clip.
+            where: a filter over the catalog's columns, as in `flagdata query --where`, or values that columns must
+                have; `None` is every clip.
             at: tag, branch, version number or commit; `None` is the head of main.
-            split: side of the split; `None` is all sides.
-            split_by: how sides are made; `None` is `HashedSplit()`. Sides are decided over all clips of the version,
-                before `where`, so that two filters never put one session, day or seed on two sides.
+            split: side of the split; `None` is all sides. The side that a data set states for a clip is its side.
+            split_by: how clips that state no side are divided; `None` is `HashedSplit()`. Sides are decided over all
+                clips of the version, before `where`, so that two filters never put one session, day or seed on two
+                sides.
             window: length of the mean that is the ground truth [s]; other than the catalog's it is computed anew from
                 the records' wind. `None` is the catalog's, which must then be one for all clips.
             tolerance: bounds beyond which a pair is refused; `None` is `Tolerance()`.
@@ -87,7 +89,8 @@ class Source:
         Raises:
             MissingExtraError: torch is not installed.
             NotFoundError: no such ref, or no clip matches.
-            RefusedError: an explicit split leaks, the side is empty, or no pair is within the tolerance.
+            RefusedError: relatives are on two sides, some clips state a side and others none, `split_by` takes clips to
+                another side than they state, the side is empty, or no pair is within the tolerance.
             UnknownNameError: no such column or side.
             UsageError: a filter that is not SQL, a window that is no length of time, clips of several windows where
                 none is named, or a seed that is no whole number.
@@ -95,7 +98,6 @@ class Source:
         with explained():
             from flagdata.dataset.pairs import Pairs
         from flagdata.dataset.resolve import resolve
-        from flagdata.dataset.splits import HashedSplit
         from flagdata.dataset.tolerance import Tolerance
 
         resolved = resolve(
@@ -103,17 +105,26 @@ class Source:
             where=where,
             at=at,
             split=split,
-            split_by=split_by or HashedSplit(),
+            split_by=split_by,
             window=window,
             tolerance=tolerance or Tolerance(),
         )
         openers = self.lake.openers([str(name) for name in resolved.table.objects])
-        return Pairs(resolved.table, openers=openers, refused=resolved.refused, at=at, seed=seed, cache=cache)
+        return Pairs(
+            resolved.table,
+            openers=openers,
+            refused=resolved.refused,
+            at=at,
+            seed=seed,
+            cache=cache,
+            split=split,
+            split_by=resolved.split_by,
+        )
 
     @checked
     def sides(
         self,
-        where: str | None = None,
+        where: str | Mapping[str, Any] | None = None,
         *,
         at: str | None = None,
         split_by: HashedSplit | ExplicitSplit | None = None,
@@ -127,15 +138,14 @@ class Source:
             where, at, split_by: as in `pairs`.
 
         Raises:
-            RefusedError: an explicit split leaks.
+            RefusedError: the split, as in `pairs`.
             NotFoundError: no such ref.
             UnknownNameError: no such column.
             UsageError: a filter that is not SQL.
         """
         from flagdata.dataset.resolve import side_sizes
-        from flagdata.dataset.splits import HashedSplit
 
-        return side_sizes(self.lake, where=where, at=at, split_by=split_by or HashedSplit())
+        return dict(side_sizes(self.lake, where=where, at=at, split_by=split_by))
 
     def __repr__(self) -> str:
         contents = ", ".join(f"{count} {kind}" for kind, count in self._counts().items()) or "empty"

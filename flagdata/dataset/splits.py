@@ -1,4 +1,4 @@
-"""Splits without leaks: by simulation seed, recording session and day, decided when a query is resolved.
+"""Splits without leaks, for rows that state no side: by simulation seed, recording session and day.
 
 Two recordings that share a session, a day, a seed, a camera file or a mesh sequence are connected, and what is
 connected, through however many recordings, stays on one side. (An anemometer log alone does not connect: two clips an
@@ -18,11 +18,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from flagdata.arrays import IntArray
-from flagdata.errors import RefusedError, UnknownNameError, UsageError
+from flagdata.errors import RefusedError, UsageError
 from flagdata.lake.matching import Where
 
 DEFAULT_FRACTIONS: Mapping[str, float] = {"train": 0.7, "validation": 0.15, "test": 0.15}
 _LISTED = 3  # leaks named in an error
+_WHOLE = "split by whole sessions, days and seeds, or use the hashed split, which keeps them together"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,19 +151,12 @@ class ExplicitSplit:
         return tuple(self.where)
 
 
-def check_side(split: str, split_by: HashedSplit | ExplicitSplit) -> None:
-    """Raises:
-    UnknownNameError: `split_by` has no such side.
-    """
-    if split not in split_by.sides:
-        raise UnknownNameError.of("split", split, split_by.sides)
-
-
-def refuse_leaks(sides: Mapping[str, Iterable[Origin]]) -> None:
+def refuse_leaks(sides: Mapping[str, Iterable[Origin]], *, fix: str = _WHOLE) -> None:
     """Check that no two sides share a recording, session, day, seed, camera file or mesh sequence.
 
     Args:
         sides: side → origins of the clips that it takes (with the days of those clips only).
+        fix: what the user can do about it.
 
     Raises:
         RefusedError: they do; it names what is shared, and by which sides.
@@ -177,5 +171,5 @@ def refuse_leaks(sides: Mapping[str, Iterable[Origin]]) -> None:
         further = f"; and {len(leaks) - _LISTED} more" if len(leaks) > _LISTED else ""
         raise RefusedError(
             f"the split leaks: {listed}{further}",
-            fix="split by whole sessions, days and seeds, or use the hashed split, which keeps them together",
+            fix=fix,
         )

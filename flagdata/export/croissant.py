@@ -124,8 +124,17 @@ def _description(manifest: Mapping[str, Any]) -> str:
     return (
         "Films of cloth in the wind with measured or simulated ground truth, exported by flagdata as "
         f"{manifest['format']}: {kinds}{selected}{side}, version {manifest['version']} of the lake. "
-        "manifest.json has the recipe."
+        f"{_sides(manifest['split_by'])}manifest.json has the recipe."
     )
+
+
+def _sides(split_by: Mapping[str, Any] | None) -> str:
+    """Says who decided the sides, and what they hold; nothing where there are none."""
+    if split_by is None:
+        return ""
+    rule = f"stated by {', '.join(split_by['datasets'])}" if split_by["rule"] == "stated" else split_by["rule"]
+    sizes = ", ".join(f"{side} {size['clips']} clips" for side, size in split_by["sides"].items())
+    return f"Sides, {rule}: {sizes}. "
 
 
 def _file_object(entry: Mapping[str, Any]) -> dict[str, Any]:

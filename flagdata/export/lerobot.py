@@ -5,6 +5,8 @@ beside it as the feature `flagdata.time`, and a film whose instants differ from 
 refused. Wind is what the anemometer's newest mean over 1 s said at that instant, with its σ and its age; ground truth,
 clock model and identity stand in the table of episodes.
 
+Episodes of one side follow one another, and the description states which these are.
+
 Source: lerobot 0.6, `lerobot.datasets` (its code: the documentation names another file for tasks).
 """
 
@@ -28,6 +30,7 @@ from PIL import Image
 from flagdata.arrays import AnyArray, Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from flagdata.export.source import FILMED, Entry, ExportRows, label_units
+from flagdata.files import LEROBOT_LABEL, LEROBOT_OWN
 from flagdata.scheduling import kept_scheduling
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
@@ -76,13 +79,13 @@ class LeRobot:
         with ExitStack() as stack:
             data = stack.enter_context(_Data(folder, self.frames))
             film = stack.enter_context(_Films(folder, rate)) if self.frames == "av1" else None
-            data_set = _Made(rate=rate)
-            for entry in source.entries():
+            data_set = _Made(rate=rate, split_by=source.split_by)
+            for entry in source.entries(source.by_side()):
                 if not entry.count:
                     raise InputError(
                         "a record without frames makes no episode", where=entry.key, fix="leave it out by --where"
                     )
-                data_set.add(entry, data, film)
+                data_set.add(entry, source.side_of(entry.row), data, film)
                 advance(1)
         data_set.write(folder, self.frames)
         return {
@@ -111,16 +114,23 @@ def common_rate(rates: Sequence[float]) -> Fraction:
 
 @dataclass(kw_only=True)
 class _Made:
-    """What has been written so far."""
+    """What has been written so far.
+
+    Attributes:
+        split_by: how sides were decided, see `ExportRows`.
+        sides: of each episode; `None` where it is on none.
+    """
 
     rate: Fraction
+    split_by: Mapping[str, Any] | None
+    sides: list[str | None] = field(default_factory=list)
     episodes: list[dict[str, Any]] = field(default_factory=list)
     total: int = 0
     worst: float = 0.0
     size: tuple[int, int] | None = None
     tallies: dict[str, list[_FeatureSums]] = field(default_factory=dict)
 
-    def add(self, entry: Entry, data: _Data, film: _Films | None) -> None:
+    def add(self, entry: Entry, side: str | None, data: _Data, film: _Films | None) -> None:
         """Write an episode."""
         times = entry.frame_times
         number, count = len(self.episodes), entry.count
@@ -146,6 +156,7 @@ class _Made:
         for name, tally in tallies.items():
             self.tallies.setdefault(name, []).append(tally)
         label = entry.label()
+        self.sides.append(side)
         self.episodes.append(
             {
                 "episode_index": number,
@@ -161,7 +172,7 @@ class _Made:
                 "flagdata/wind": label["wind"],
                 "flagdata/wind_sigma": label["wind_sigma"],
                 "flagdata/clock_sigma": label["clock_sigma"],
-                "flagdata/label": json.dumps(label, sort_keys=True, allow_nan=False, ensure_ascii=False),
+                LEROBOT_LABEL: json.dumps(label, sort_keys=True, allow_nan=False, ensure_ascii=False),
                 **{f"stats/{n}/{k}": v for n, tally in tallies.items() for k, v in tally.stats(n == CAMERA).items()},
             }
         )
@@ -200,6 +211,13 @@ class _Made:
                 )
             tally.take(images / 255.0)
             yield from images
+
+    def _splits(self) -> dict[str, str]:
+        """Returns the episodes of each side, "first:end"; where none is on a side, all as "train", as LeRobot does."""
+        ends = {side: end for end, side in enumerate(self.sides, start=1) if side is not None}
+        if not ends:
+            return {"train": f"0:{len(self.sides)}"}
+        return {side: f"{end - self.sides.count(side)}:{end}" for side, end in ends.items()}
 
     def write(self, folder: Path, frames: str) -> None:
         """Writes the tables and documents of meta/."""
@@ -246,7 +264,8 @@ class _Made:
                 "fps": fps,
                 "data_files_size_in_mb": _DATA_BYTES >> 20,
                 "video_files_size_in_mb": _VIDEO_BYTES >> 20,
-                "splits": {"train": f"0:{len(self.episodes)}"},
+                "splits": self._splits(),
+                LEROBOT_OWN: {"split_by": self.split_by},
                 "data_path": f"data/{FILE}.parquet",
                 "video_path": f"videos/{{video_key}}/{FILE}.mp4" if frames == "av1" else None,
                 "features": features,

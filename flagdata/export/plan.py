@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from flagdata.dataset.lineage import superseded
-from flagdata.dataset.resolve import check_divided, clips_on_side
+from flagdata.dataset.sides import Division, divide, selected, stated_sides
 from flagdata.dataset.splits import HashedSplit
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.export.croissant import write_croissant
@@ -33,18 +33,18 @@ from flagdata.registry import Registry
 from flagdata.schema import FORMAT_VERSION, Kind
 
 
-def on_side(catalog: pa.Table, rows: pa.Table, split: str, *, salt: str) -> pa.Table:
-    """Selects the rows on one side: clips, and recordings by their clips. Sides are decided over all clips of the
-    version, so that two exports of one version never put a session, day, seed or camera file on two sides.
+def on_side(catalog: pa.Table, rows: pa.Table, split: str, *, salt: str) -> tuple[pa.Table, Division]:
+    """Selects the rows on one side: clips, and recordings, which go with their clips unless they state a side. Two
+    exports of one version never put a session, day, seed or camera file on two sides.
 
     Raises:
+        RefusedError: see `flagdata.dataset.sides.divide`.
         UnknownNameError: no such side.
         UsageError: rows of another kind, which are on no side.
     """
     check_kinds(rows, "a split", frozenset({Kind.CLIP, Kind.RECORDING}))
-    clips = clips_on_side(catalog, split, HashedSplit(salt=salt))
-    of_clips = catalog.filter(_is_one_of(clips))["recording"].drop_null().to_pylist()
-    return rows.filter(_is_one_of({*clips, *of_clips}))
+    division = divide(catalog, selected(rows), HashedSplit(salt=salt) if salt else None)
+    return rows.filter(_is_one_of(set(division.on(split)))), division
 
 
 def current(catalog: pa.Table, rows: pa.Table) -> tuple[pa.Table, dict[str, str]]:
@@ -115,8 +115,9 @@ class Export:
         format: a name of `FORMATS`.
         where: filter as in `flagdata.lake.selection`; `None` is every row.
         at: ref; `None` is the head of main.
-        split: side of the leakage-safe split: only its clips, and the recordings they are of; `None` is everything.
-        salt: of the split, see `flagdata.dataset.splits.HashedSplit`.
+        split: side of the split: only its clips, and the recordings they are of; `None` is everything. Data sets state
+            their sides; the others are hashed, see `flagdata.dataset.sides.divide`.
+        salt: of the hashed split, see `flagdata.dataset.splits.HashedSplit`.
         options: of the format, by name; what is not named keeps its default.
     """
 
@@ -195,6 +196,7 @@ class Prepared:
                 {
                     "schema": "flagdata.export/1",
                     **recipe,
+                    "split_by": self.source.split_by,
                     "at": request.at,
                     "recipe_hash": recipe_hash(recipe),
                     "code_version": code_version(),
@@ -215,6 +217,7 @@ def prepare(lake: Lake, request: Export) -> Prepared:
 
     Raises:
         NotFoundError: no rows.
+        RefusedError: the split, see `flagdata.dataset.sides.divide`.
         UnknownNameError: no such format, ref or side.
         UsageError: rows of a kind that the format cannot write; options it does not take; SQL that cannot be run.
     """
@@ -223,14 +226,15 @@ def prepare(lake: Lake, request: Export) -> Prepared:
     version = view[0].version
     catalog = lake.table(view)
     rows = Selection(catalog, Request(where=request.where)).table()
+    division = None
     if request.split is not None and rows.num_rows:
         matching = rows.num_rows
-        rows = on_side(catalog, rows, request.split, salt=request.salt)
+        rows, division = on_side(catalog, rows, request.split, salt=request.salt)
         if rows.num_rows in (0, matching):
-            check_divided(catalog, request.split, HashedSplit(salt=request.salt), empty=False, where=request.where)
+            division.warn_whole()
         if not rows.num_rows:
             raise NotFoundError(
-                f"none of the {matching} rows that match is on the side {request.split}, by its clips",
+                f"none of the {matching} rows that match is on the side {request.split}; {division.grouping}",
                 where=f"filter {request.where}, version {version}",
                 fix="choose another side by --split, or leave it out",
             )
@@ -243,7 +247,14 @@ def prepare(lake: Lake, request: Export) -> Prepared:
     labels = labels_of(catalog)
     for name, values in columns(with_labels(rows, labels)).items():
         rows = rows.append_column(name, values)
-    source = ExportRows(lake=lake, rows=rows, labels=labels)
+    division = division or stated_sides(catalog, selected(rows))
+    source = ExportRows(
+        lake=lake,
+        rows=rows,
+        labels=labels,
+        side=request.split,
+        split_by=None if division is None else division.as_dict(),
+    )
     return Prepared(request=request, exporter=exporter, version=version, source=source, superseded=replaced)
 
 

@@ -164,14 +164,30 @@ class ExportRows:
         lake: that they are in.
         rows: with all columns of `schema.CATALOG`.
         labels: artifact → the user's own values.
+        side: that all rows are on; `None` where none was asked for.
+        split_by: the rule by which sides were decided, and their sizes, as JSON; `None` where no side was asked for and
+            no row states one.
     """
 
     lake: Lake
     rows: pa.Table
     labels: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    side: str | None = None
+    split_by: Mapping[str, Any] | None = None
 
     def __len__(self) -> int:
         return self.rows.num_rows
+
+    def side_of(self, row: Mapping[str, Any]) -> str | None:
+        """Returns the side that a row is on: the one that was asked for, or that it states."""
+        return row["side"] if self.side is None else self.side
+
+    def by_side(self) -> np.ndarray:
+        """Orders the rows (n,) so that those of a side follow one another, in their order; those of none come last."""
+        sides = self.rows["side"].to_pylist()
+        order = [] if self.split_by is None else list(self.split_by["sides"])
+        places = [order.index(side) if side in order else len(order) for side in sides]
+        return np.argsort(np.array(places), kind="stable")
 
     def entries(self, order: np.ndarray | None = None) -> Iterator[Entry]:
         """Yields the rows with their records, in order or in the order of the indices given. One record is open at a

@@ -245,8 +245,8 @@ def _unreported(labels: Labels) -> Finding:
     fix = "take it off (flagdata withdraw), then ingest the file in the folder that flagdata export wrote"
     return Finding.of(
         "report-absent",
-        f"there is no {ROWS} with its row beside the record: unknown are its {', '.join(unknown)}"
-        f"{' and ' if unknown else ''}quality flags",
+        f"there is no {ROWS} with its row beside the record: unknown are its {', '.join([*unknown, 'side'])} and "
+        "quality flags",
         fix=fix + (f", or give {' and '.join(f'--{label}' for label in unknown)}" if unknown else ""),
     )
 

@@ -175,7 +175,7 @@ def ingest_camera(
                     times.add(frame.time, frame.stamp_error)
                     if progress:
                         progress(1)
-            info, findings = stream.info, stream.findings
+            info, findings, data_set = stream.info, stream.findings, stream.data_set
         findings = (*findings, *other_readings(_present(lake, Kind.CAMERA, branch), source.hash, recipe))
         if not times.count:
             raise InputError("no frame could be read", where=str(path), fix="check the file")
@@ -194,6 +194,8 @@ def ingest_camera(
             frame_count=times.count,
             stored=transaction.put(staged),
         )
+        given = {"session": labels.session} if labels.session is not None else {}
+        artifact = replace(artifact, **{**data_set, **given})
         transaction.add(artifact)
     return result_of(transaction, artifact, report, labels)
 

@@ -82,7 +82,7 @@ def refuse_learned(catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: s
     Raises:
         RefusedError: one is.
     """
-    from flagdata.dataset.resolve import explicit_sides
+    from flagdata.dataset.sides import explicit_sides
     from flagdata.dataset.splits import ExplicitSplit
     from models.training.recipe import DataSpec
 
@@ -177,6 +177,8 @@ class _Desk:
             reads=self._reads(evaluated, side, data) if linear else (),
             learning=_points([point for point in learned if point[1].label in curves]),
             unseen=side != "train",
+            split=side,
+            split_by=self._side(side).split_by,
         )
 
     def _models(self, names: Sequence[str]) -> list[tuple[Artifact | None, Estimator]]:
@@ -209,7 +211,7 @@ class _Desk:
 
     def _of(self, data: DataSpec, side: str) -> Pairs:
         data.check(self._source.lake, at=self._at)
-        return self._source.pairs(at=self._at, split=side, split_by=data.split("train", "validation", "test"))
+        return self._source.pairs(data.rows, at=self._at, split=side)
 
     def _clips(self, side: str, estimator: Estimator) -> Prepared:
         from models.training.inputs import prepare_clips

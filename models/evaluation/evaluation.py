@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -77,6 +77,7 @@ class Evaluation:
         learning, frames, reads, layout: given, or made of what was given.
         findings: what a reader has to know.
         unseen: whether no model learned from these sequences.
+        split, split_by: the side that was judged, and how sides were decided, see `flagdata.dataset.Pairs`.
     """
 
     data: str
@@ -96,6 +97,8 @@ class Evaluation:
     layout: TsneLayout | None
     findings: tuple[Finding, ...]
     unseen: bool
+    split: str | None
+    split_by: Mapping[str, Any] | None
 
 
 def evaluate(
@@ -110,6 +113,8 @@ def evaluate(
     reads: Sequence[Read] = (),
     tsne_of: str | None = None,
     unseen: bool = True,
+    split: str | None = None,
+    split_by: Mapping[str, Any] | None = None,
 ) -> Evaluation:
     """Scores models that were tested on the same clips.
 
@@ -122,6 +127,7 @@ def evaluate(
         learning, frames, reads: scores of models on other data, shown beside these.
         tsne_of: label whose first run's embedding is laid out; needs scikit-learn.
         unseen: whether no model learned from these sequences.
+        split, split_by: of the pairs that were judged, see `flagdata.dataset.Pairs`.
 
     Raises:
         InputError: predictions that are not of the same clips.
@@ -184,6 +190,8 @@ def evaluate(
             for label, of in varied.items()
         ),
         unseen=unseen,
+        split=split,
+        split_by=split_by,
         learning=tuple(learning),
         frames=tuple(frames),
         reads=tuple(reads),
@@ -204,6 +212,8 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "data": evaluation.data,
+        "split": evaluation.split,
+        "split_by": evaluation.split_by,
         "seed": evaluation.seed,
         "clips": evaluation.clips,
         "groups": evaluation.groups,

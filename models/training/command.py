@@ -35,12 +35,14 @@ PARENTS = 100
 
 
 def data_identity(lake: Lake, train: Pairs, validation: Pairs, *, at: str | None) -> dict[str, Any]:
-    """Identifies what a training learns from: the version of the lake and the pairs' fingerprints."""
+    """Identifies what a training learns from: the version of the lake, the pairs' fingerprints, and how the sides were
+    decided."""
     return {
         "at": at,
         "view": [f"{part.branch}@{part.version}" for part in lake.view(at)],
         "train": train.fingerprint,
         "validation": validation.fingerprint,
+        "split_by": train.split_by,
     }
 
 
@@ -349,5 +351,4 @@ def sides_of(source: Source, recipe: TrainingRecipe, side: str, *, at: str | Non
         NotFoundError, RefusedError: there are none, or the sides leak.
     """
     recipe.data.check(source.lake, at=at)
-    split = recipe.data.split("train", "validation", "test")
-    return source.pairs(at=at, split=side, split_by=split, seed=recipe.seed)
+    return source.pairs(recipe.data.rows, at=at, split=side, seed=recipe.seed)

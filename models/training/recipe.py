@@ -26,7 +26,6 @@ from typing import Annotated, Any, TypeAlias, cast
 import torch
 from msgspec import Meta
 
-from flagdata.dataset.splits import ExplicitSplit
 from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError, UsageError
 from flagdata.lake import Lake
 from flagdata.lake.matching import Values
@@ -86,13 +85,14 @@ class DataSpec:
         datasets = entry["dataset"]
         return cls(datasets=(datasets,) if isinstance(datasets, str) else tuple(datasets), sequences=entry["sequences"])
 
+    @property
+    def rows(self) -> Values:
+        """Returns what rows of the catalog that are of these data sets have in their columns."""
+        return {"dataset": self.datasets}
+
     def where(self, side: str) -> Values:
         """Returns what rows of the catalog that are of a side have in their columns."""
-        return {"dataset": self.datasets, "side": side}
-
-    def split(self, *sides: str) -> ExplicitSplit:
-        """Splits the data sets into these sides, by which pairs are read."""
-        return ExplicitSplit(where={side: self.where(side) for side in sides})
+        return {**self.rows, "side": side}
 
     def check(self, lake: Lake, *, at: str | None) -> None:
         """Checks that a lake has all of these data sets.

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from flagdata.align import methods
+from flagdata.dataset import HashedSplit
+from flagdata.dataset.splits import Origin
 from flagdata.ingest import CameraIngest, CameraOptions, Labels, ingest_camera
-from flagdata.lake import Lake, selection
+from flagdata.lake import Artifact, Lake, selection
+from flagdata.schema import Kind
 from tests.remedies.cases import Case, heal
 from tests.remedies.user import User
 
@@ -80,6 +84,48 @@ def test_sql_that_gives_more_than_can_be_held_is_limited_or_written(
     user.succeeds("query", "--json", "--sql", f"{large} limit 100")
     user.follows("query", "--csv", "--sql", large)
     user.follows("query", "--arrow", "a.arrow", "--sql", large)
+
+
+def film_of(number: int, **columns: Any) -> str:
+    """Commits a recording with a clip, whose data nobody reads."""
+    day = f"2026-06-{number:02d}"
+    recording = Artifact(kind=Kind.RECORDING, name=f"film-{number}", recipe={"number": number}, day=day, **columns)
+    clip = replace(recording, kind=Kind.CLIP, name=f"clip-{number}", parents=(recording.id,), recording=recording.id)
+    with Lake.open("lake").transaction(f"film {number}") as transaction:
+        transaction.add(recording)
+        transaction.add(clip)
+    return recording.name
+
+
+CLIPS = ("export", "parquet", "--to", "out", "--where", "kind = 'clip' and side is not null", "--split", "train")
+
+
+def test_a_salt_beside_stated_sides_is_left_out(user: User) -> None:
+    for number, side in enumerate(["train", "test"], start=1):
+        film_of(number, dataset="made", side=side)
+    user.meets("dataset/sides.py", "leave out --salt", *CLIPS, "--salt", "x")
+    user.again(without="--salt")
+
+
+def test_relatives_on_two_sides_are_withdrawn_from_one(user: User) -> None:
+    for number, side in enumerate(["train", "train", "test"], start=1):
+        film_of(number, dataset="made", side=side, session="barn" if number > 1 else None)
+    user.meets("dataset/sides.py", "take what they share off", *CLIPS)
+    user.follows("withdraw", "film-3", "-m", "of the session of film-2")
+    user.succeeds(*CLIPS)
+
+
+def test_a_field_recording_of_a_data_sets_session_is_left_out_or_withdrawn(user: User) -> None:
+    """Of the others a hash decides."""
+    film_of(1, dataset="made", side="kept", session="barn")
+    film_of(2, session="barn")
+    side, *_ = HashedSplit().assign([Origin(recording="film-3", days=("2026-06-03",))])
+    film_of(3)
+    command = ("export", "parquet", "--to", "out", "--split", side, "--where")
+    user.meets("dataset/sides.py", "leave those that share it out", *command, "kind = 'clip' and side is null")
+    user.succeeds(*command, "kind = 'clip' and side is null and name <> 'clip-2'")
+    user.follows("withdraw", "film-2", "-m", "of the session of film-1")
+    user.succeeds("export", "parquet", "--to", "again", *command[4:], "kind = 'clip' and side is null")
 
 
 def gone_meanwhile(patch: pytest.MonkeyPatch, method: str, name: str) -> None:

@@ -17,8 +17,9 @@ import torch
 
 from flagdata.arrays import FloatArray
 from flagdata.console import LocalPath, progress, say
-from flagdata.dataset import explicit_sides
+from flagdata.dataset.sides import divide, selected
 from flagdata.errors import InputError
+from flagdata.lake.matching import matching
 from flagdata.rng import stream
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
@@ -103,9 +104,10 @@ class FilmsOf(Sequence[Film]):
         import flagdata
 
         self._lake, self._rate = flagdata.open(lake_path).lake, rate
-        explicit_sides(self._lake.table(self._lake.view(at)), data.split("train", "validation", "test"))
-        films = {"kind": Kind.RECORDING, **data.where(side)}
-        rows = self._lake.rows(films, columns=["name", "seed", "object"], at=at).to_pylist()
+        catalog = self._lake.table(self._lake.view(at))
+        films = matching(catalog, {"kind": Kind.RECORDING, **data.rows})
+        of_side = divide(catalog, selected(films)).artifacts.get(side, frozenset())
+        rows = matching(films, {"artifact": of_side}).select(["name", "seed", "object"]).to_pylist()
         if not rows:
             raise InputError(
                 f"no films of the {side} side of {', '.join(data.datasets)}",

@@ -28,10 +28,10 @@ import pyarrow.parquet as pq
 from PIL import Image
 
 from flagdata.arrays import IntArray
-from flagdata.documents import read_json
+from flagdata.documents import from_json, read_json
 from flagdata.errors import CorruptError, InputError, LimitError, NotFoundError, TimeError, UnknownNameError
-from flagdata.files import LEROBOT_INFO, is_beside
-from flagdata.findings import Finding
+from flagdata.files import LEROBOT_INFO, LEROBOT_LABEL, LEROBOT_OWN, is_beside
+from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.container import open_container
 from flagdata.ingest.camera.damage import undecoded
 from flagdata.ingest.camera.geometry import Orientation
@@ -40,10 +40,14 @@ from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import survey
 from flagdata.parquet import read_parquet
+from flagdata.printable import printable
+from flagdata.recipes import is_name
 
 VERSION = "v3.0"
 TIME = "flagdata.time"
 """Feature with each frame's instant [UTC ns]."""
+_TRAIN_ALONE = "its description has one split, train, which LeRobot writes for every data set: no side is taken from it"
+_EPISODES = re.compile(r"(\d{1,18}):(\d{1,18})")
 _NANOSECOND = Fraction(1, 1_000_000_000)
 _FIELD = re.compile(r"\{(\w+)(?::0?(\d?)d)?\}")
 _FARTHEST = 9.2e18  # ns; 64 bits hold a little more
@@ -74,6 +78,83 @@ def description_of(folder: Path) -> Mapping[str, Any]:
         message = "LeRobot's description lacks its features, paths or frame rate"
         raise CorruptError(message, where=str(where), fix="copy it again")
     return info
+
+
+def stated_of(
+    folder: Path, info: Mapping[str, Any], row: Mapping[str, Any]
+) -> tuple[dict[str, Any], tuple[Finding, ...]]:
+    """Reads what a data set states of an episode, as columns of the catalog: data set and side, seed and session.
+
+    The side is the split of its description that the episode is in. One split, train, over all episodes states none:
+    LeRobot writes it for every data set. An export of flagdata says under a key of its own whether its splits are
+    sides, and has seed and session in the label of the episode.
+
+    Args:
+        row: of the table of episodes.
+
+    Raises:
+        CorruptError: splits that are no ranges of episodes, an episode in two of them, or a label that is damaged.
+    """
+    own = info.get(LEROBOT_OWN)
+    label = _label(row, str(folder))
+    columns = {name: label[name] for name in ("seed", "session") if label.get(name) is not None}
+    number = round(_number(row, "episode_index", str(folder)))
+    splits = _splits(info, str(folder / LEROBOT_INFO))
+    if isinstance(own, Mapping):
+        splits = splits if own.get("split_by") is not None else {}
+    elif splits == {"train": (0, info.get("total_episodes"))}:
+        return columns, (Finding(kind="side-not-stated", severity=Severity.NOTE, what=_TRAIN_ALONE),)
+    sides = [side for side, (first, end) in splits.items() if first <= number < end]
+    if len(sides) > 1:
+        raise CorruptError(
+            f"episode {number} is in the splits {' and '.join(map(repr, sides))}",
+            where=str(folder / LEROBOT_INFO),
+            fix="correct its splits, which are ranges of episodes: first:end",
+        )
+    if sides:
+        columns |= {"dataset": label.get("dataset") or printable(folder.resolve().name), "side": sides[0]}
+    return columns, ()
+
+
+def _splits(info: Mapping[str, Any], where: str) -> dict[str, tuple[int, int]]:
+    """Reads the first and one past the last episode of each split.
+
+    Raises:
+        CorruptError: they are not stated so.
+    """
+    stated = info.get("splits") or {}
+    matches = {
+        name: _EPISODES.fullmatch(value)
+        for name, value in (stated.items() if isinstance(stated, Mapping) else [("", "")])
+        if is_name(name) and isinstance(value, str)
+    }
+    found = {name: (int(match[1]), int(match[2])) for name, match in matches.items() if match is not None}
+    if len(found) != len(stated):
+        raise CorruptError(
+            "its splits are no ranges of episodes",
+            where=where,
+            fix="correct its splits, which are ranges of episodes: first:end",
+        )
+    return found
+
+
+def _label(row: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Reads the label that an export of flagdata has for an episode; nothing in another data set.
+
+    Raises:
+        CorruptError: it is damaged.
+    """
+    text = row.get(LEROBOT_LABEL)
+    if text is None:
+        return {}
+    try:
+        label = from_json(text)
+        texts = [label[name] for name in ("dataset", "session") if label[name] is not None]
+        if not all(map(is_name, texts)) or not isinstance(label["seed"], int | None) or isinstance(label["seed"], bool):
+            raise ValueError("values of other types")
+    except (ValueError, KeyError, TypeError) as error:
+        raise CorruptError(f"the label of an episode is damaged: {error}", where=where, fix="export it again") from None
+    return label
 
 
 def cameras(info: Mapping[str, Any]) -> dict[str, str]:
@@ -137,7 +218,8 @@ class EpisodeSource:
         if first is None:
             raise InputError("no picture of the episode can be decoded", where=self._where, fix="copy it again")
         luma = first[0].luma()
-        findings = [] if self._stamped else [_counted()]
+        data_set, side_findings = stated_of(folder, info, row)
+        findings = [*([] if self._stamped else [_counted()]), *side_findings]
         self.facts = SourceFacts(
             container="lerobot",
             codec=self._kind,
@@ -153,6 +235,7 @@ class EpisodeSource:
             sequence=False,
             findings=tuple(findings),
             stamped=timing.origin if self._stamped else None,
+            data_set=data_set,
         )
 
     def pictures(self) -> Iterator[Picture]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Protocol
+from typing import Any, Protocol
 
 from flagdata.findings import Finding
 from flagdata.ingest.camera.geometry import Orientation
@@ -29,6 +29,7 @@ class SourceFacts:
         findings: what opening it found.
         stamped: instant of the first frame [UTC ns], where stamps state the day and the time; else `None`.
         gps: times that the camera's telemetry states by GPS, if it does.
+        data_set: columns of the catalog that a data set states of its film: "dataset" and "side", "seed", "session".
     """
 
     container: str
@@ -46,6 +47,7 @@ class SourceFacts:
     findings: tuple[Finding, ...]
     stamped: int | None = None
     gps: GpsTimes | None = None
+    data_set: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,6 +38,7 @@ class CameraStream:
     Attributes:
         info: the file after its options are settled.
         proposal: the crop found from motion, with its picture; `None` unless `options.crop` is "auto".
+        data_set: what a data set states of its film, see `SourceFacts`.
     """
 
     def __init__(self, source: PictureSource, path: Path, options: CameraOptions) -> None:
@@ -47,6 +48,7 @@ class CameraStream:
         self._closing: list[Finding] = []
         self._started = False
         facts, timing = source.facts, source.facts.timing
+        self.data_set = facts.data_set
         self._scale = Fraction(1)
         if options.true_fps is not None:
             self._scale = timing.mean_rate / exact(options.true_fps)

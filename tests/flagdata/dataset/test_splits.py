@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flagdata.dataset import ExplicitSplit, HashedSplit
-from flagdata.dataset.splits import Origin, check_side, groups, refuse_leaks
-from flagdata.errors import RefusedError, UnknownNameError, UsageError
+from flagdata.dataset.splits import Origin, groups, refuse_leaks
+from flagdata.errors import RefusedError, UsageError
 
 real = st.builds(
     Origin,
@@ -132,7 +132,5 @@ def test_fractions_that_do_not_add_up_and_unknown_sides_are_refused():
     for fractions in ({}, {"train": 0.5}, {"train": 1.5, "test": -0.5}, {"train": float("nan")}):
         with pytest.raises(UsageError):
             HashedSplit(fractions=fractions)
-    with pytest.raises(UnknownNameError, match="did you mean 'validation'"):
-        check_side("validate", HashedSplit())
     with pytest.raises(UsageError):
         ExplicitSplit(where={})

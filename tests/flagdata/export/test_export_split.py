@@ -7,7 +7,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from flagdata.dataset import HashedSplit, clips_on_side
+from flagdata.dataset import HashedSplit, divide
+from flagdata.dataset.sides import clips_of
 from flagdata.errors import NotFoundError, UnknownNameError, UsageError
 from flagdata.export import Export, export
 from flagdata.lake import Artifact, Lake
@@ -108,7 +109,8 @@ def test_an_empty_side_is_an_error_that_names_it(tmp_path: Path) -> None:
         tx.add(recording)
         only = Artifact(kind=Kind.CLIP, name="only", parents=(recording.id,), recording=recording.id, day="2026-05-01")
         tx.add(only)
-    filled = [side for side in SIDES if only.id in clips_on_side(lake.table(lake.view(None)), side, HashedSplit())]
+    catalog = lake.table(lake.view(None))
+    filled = [side for side, on in divide(catalog, clips_of(catalog, None), HashedSplit()).artifacts.items() if on]
     assert len(filled) == 1
     for side in set(SIDES) - set(filled):
         with pytest.raises(NotFoundError, match=side):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
 import pytest
 
-from flagdata.dataset import clips_on_side
+from flagdata.dataset.sides import clips_of, divide
 from flagdata.errors import InputError, NotFoundError, RefusedError, UnknownNameError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind, catalog_schema
@@ -49,7 +50,7 @@ def catalog(*rows: Artifact) -> pa.Table:
     return pa.Table.from_pylist([row.row() for row in rows], schema=catalog_schema())
 
 
-def names(table: pa.Table, clips: set[str]) -> list[str]:
+def names(table: pa.Table, clips: Collection[str]) -> list[str]:
     return sorted(row["name"] for row in table.to_pylist() if row["artifact"] in clips)
 
 
@@ -59,8 +60,8 @@ def names(table: pa.Table, clips: set[str]) -> list[str]:
 )
 def test_a_side_is_that_of_its_own_data_set_alone_whatever_another_is_called(dataset: str, other: str) -> None:
     table = catalog(*films(dataset, seed=0), *films(other, seed=100))
-    split = DataSpec(datasets=(dataset,)).split(*SIDES)
-    taken = {side: names(table, clips_on_side(table, side, split)) for side in SIDES}
+    division = divide(table, clips_of(table, DataSpec(datasets=(dataset,)).rows))
+    taken = {side: names(table, division.on(side)) for side in SIDES}
     assert taken == {
         "train": [f"{dataset}-train-{k:05d}" for k in range(4)],
         "validation": [f"{dataset}-validation-{k:05d}" for k in range(2)],
@@ -70,8 +71,8 @@ def test_a_side_is_that_of_its_own_data_set_alone_whatever_another_is_called(dat
 
 def test_two_data_sets_are_learned_from_together() -> None:
     table = catalog(*films("X", seed=0), *films("X-train", seed=100), *films("other", seed=200))
-    split = DataSpec(datasets=("X", "X-train")).split(*SIDES)
-    assert len(clips_on_side(table, "train", split)) == 8
+    both = DataSpec(datasets=("X", "X-train")).rows
+    assert len(divide(table, clips_of(table, both)).on("train")) == 8
 
 
 def shared(tie: str) -> list[Artifact]:
@@ -93,7 +94,7 @@ def test_sides_that_share_a_sequence_are_refused_in_training_and_in_judging(tie:
     table = catalog(*shared(tie))
     both = DataSpec(datasets=("ours", "theirs"))
     with pytest.raises(RefusedError, match=f"{tie} .* is in train and in test"):
-        clips_on_side(table, "train", both.split(*SIDES))
+        divide(table, clips_of(table, both.rows))
     with pytest.raises(RefusedError, match=f"{tie} .* is in test of theirs and in train of ours"):
         refuse_learned(table, [DataSpec(datasets=("ours",))], dataset="theirs", side="test")
 

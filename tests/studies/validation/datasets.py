@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 import flagdata
-from flagdata.dataset import ExplicitSplit, Tolerance
+from flagdata.dataset import Tolerance
 from flagdata.errors import FlagdataError
 from flagdata.lake import Lake, doctor, object_names, verify
 from flagdata.record import Record
@@ -132,10 +132,10 @@ def compare(one: Lake, other: Lake) -> dict[str, Any]:
 
 def loading(lake: Path, recipe: DatasetRecipe) -> dict[str, Any]:
     """The README's lines for real clips, on each side: pairs, refusals, clips a second."""
-    split = ExplicitSplit(where={side.name: {"dataset": recipe.name, "side": side.name} for side in recipe.sides})
     found: dict[str, Any] = {}
     for side in recipe.sides:
-        pairs = flagdata.open(lake).pairs(split=side.name, split_by=split, tolerance=Tolerance(clock_sigma=0.5), seed=0)
+        sure = Tolerance(clock_sigma=0.5)
+        pairs = flagdata.open(lake).pairs({"dataset": recipe.name}, split=side.name, tolerance=sure, seed=0)
         begun, clips = time.perf_counter(), 0
         for batch in pairs.loader(BATCH, workers=WORKERS):
             clips += len(batch.wind)

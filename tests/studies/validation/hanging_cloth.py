@@ -46,8 +46,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     model = estimator.shipped("wave-cloth")
     source = flagdata.open(place)
     spec = DataSpec(datasets=(_DATASET,))
-    split = spec.split("train", "test")
-    train, test = (source.pairs(split=side, split_by=split) for side in ("train", "test"))
+    train, test = (source.pairs(spec.rows, split=side) for side in ("train", "test"))
     rows = source.lake.rows({"kind": Kind.RECORDING, **spec.where("test")}, columns=["artifact", "parameters"])
     material = {row["artifact"]: json.loads(row["parameters"])["material"] for row in rows.to_pylist()}
     found = model.estimate(

@@ -255,8 +255,7 @@ def _handmade(at: str, seed: int) -> Fitted | None:
     if lake is None:
         return None
     spec = DataSpec(datasets=("flagsim-wide",))
-    split = spec.split("train", "test")
-    train = Source.open(lake).pairs(at=at, split="train", split_by=split)
+    train = Source.open(lake).pairs(spec.rows, at=at, split="train")
     return fitted(train, cache=Path(f"{lake}.inputs"), workers=1, seed=seed, bars=progress)
 
 
