@@ -102,7 +102,9 @@ def divide(catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None) ->
         return _explicit(catalog, rows, split_by)
     stating = rows.filter(_STATES)
     if not stating.num_rows:
-        return _hashed(catalog, rows, split_by or HashedSplit())
+        hashed = _Hashed.of(catalog, split_by or HashedSplit())
+        hashed.refuse_stating_relatives(rows)
+        return hashed.division(rows)
     datasets = _texts(stating, "dataset")
     if stating.num_rows < rows.num_rows:
         raise RefusedError(
@@ -141,6 +143,8 @@ def clips_of(catalog: Catalog, where: Where | None, columns: Sequence[str] = COL
     """
     of_clips = condition({"kind": Kind.CLIP})  # not a part of the filter, which could undo it
     clips = catalog.matching(of_clips) if isinstance(catalog, Scan) else catalog.filter(of_clips)
+    if where is None:
+        return clips.table(columns) if isinstance(clips, Scan) else clips.select(list(columns))
     return Selection(clips, Request(where=where, columns=tuple(columns))).table()
 
 
@@ -221,57 +225,72 @@ def _stated_origins(catalog: Catalog, datasets: Sequence[str]) -> dict[str, list
     }
 
 
-def _hashed(catalog: Catalog, rows: pa.Table, split_by: HashedSplit) -> Division:
-    """Divides rows that state no side. Every clip of the catalog takes part, so that two filters never disagree about a
-    group."""
-    everything = clips_of(catalog, None)
-    origins = origins_of(lineage_of(catalog), everything)
-    sides = dict(zip([origin.recording for origin in origins], split_by.assign(origins), strict=True))
-    _refuse_stating_relatives(everything, rows, origins, sides)
-    by_side = {
-        side: rows.filter(condition({"recording": [recording for recording in sides if sides[recording] == side]}))
-        for side in split_by.sides
-    }
-    count = len(set(groups(origins).tolist()))
-    grouping = f"the catalog has {count} independent groups"
-    if count == 1:
-        grouping = (
-            f"all {everything.num_rows} clips belong together ({_shared(origins)}), and are on the side "
-            f"{next(iter(sides.values()))!r}"
-        )
-    return Division(
-        rule="hashed",
-        about={"salt": split_by.salt, "fractions": dict(split_by.fractions)},
-        artifacts=_artifacts(by_side),
-        sizes=_sizes(by_side, origins),
-        grouping=grouping,
-        is_whole=count == 1,
-    )
+@dataclass(frozen=True, kw_only=True)
+class _Hashed:
+    """What a hash decides. Every clip of the catalog takes part, so that two filters never disagree about a group.
 
-
-def _refuse_stating_relatives(
-    everything: pa.Table, rows: pa.Table, origins: Sequence[Origin], sides: Mapping[str, str]
-) -> None:
-    """Refuses rows that a hash takes to another side than relatives of theirs state.
-
-    Raises:
-        RefusedError: there are some.
+    Attributes:
+        clips: all clips of the catalog.
+        origins: of their recordings.
+        sides: recording → side.
     """
-    stating = everything.filter(_STATES)
-    if not stating.num_rows:
-        return
-    stated = dict(zip(stating["recording"].to_pylist(), stating["side"].to_pylist(), strict=True))
-    chosen = set(rows["recording"].to_pylist())
-    by_group: dict[int, list[Origin]] = {}
-    for label, origin in zip(groups(origins).tolist(), origins, strict=True):
-        by_group.setdefault(label, []).append(origin)
-    compared: dict[str, list[Origin]] = {}
-    for group in by_group.values():
-        if any(origin.recording in chosen for origin in group) and any(origin.recording in stated for origin in group):
-            for origin in group:
-                side = stated.get(origin.recording, sides[origin.recording])
-                compared.setdefault(side, []).append(origin)
-    refuse_leaks(compared, fix="leave those that share it out by the filter, or take them off by flagdata withdraw")
+
+    split_by: HashedSplit
+    clips: pa.Table
+    origins: Sequence[Origin]
+    sides: Mapping[str, str]
+
+    @classmethod
+    def of(cls, catalog: Catalog, split_by: HashedSplit) -> _Hashed:
+        clips = clips_of(catalog, None)
+        origins = origins_of(lineage_of(catalog), clips)
+        sides = dict(zip([origin.recording for origin in origins], split_by.assign(origins), strict=True))
+        return cls(split_by=split_by, clips=clips, origins=origins, sides=sides)
+
+    def division(self, rows: pa.Table) -> Division:
+        """Divides rows that state no side."""
+        by_side = {
+            side: rows.filter(condition({"recording": [name for name, own in self.sides.items() if own == side]}))
+            for side in self.split_by.sides
+        }
+        count = len(set(groups(self.origins).tolist()))
+        grouping = f"the catalog has {count} independent groups"
+        if count == 1:
+            grouping = (
+                f"all {self.clips.num_rows} clips belong together ({_shared(self.origins)}), and are on the side "
+                f"{next(iter(self.sides.values()))!r}"
+            )
+        return Division(
+            rule="hashed",
+            about={"salt": self.split_by.salt, "fractions": dict(self.split_by.fractions)},
+            artifacts=_artifacts(by_side),
+            sizes=_sizes(by_side, self.origins),
+            grouping=grouping,
+            is_whole=count == 1,
+        )
+
+    def refuse_stating_relatives(self, rows: pa.Table) -> None:
+        """Refuses rows of which relatives state another side than the hash's.
+
+        Raises:
+            RefusedError: there are some.
+        """
+        stating = self.clips.filter(_STATES)
+        if not stating.num_rows:
+            return
+        stated = dict(zip(stating["recording"].to_pylist(), stating["side"].to_pylist(), strict=True))
+        chosen = set(rows["recording"].to_pylist())
+        by_group: dict[int, list[Origin]] = {}
+        for label, origin in zip(groups(self.origins).tolist(), self.origins, strict=True):
+            by_group.setdefault(label, []).append(origin)
+        compared: dict[str, list[Origin]] = {}
+        for group in by_group.values():
+            recordings = {origin.recording for origin in group}
+            if recordings & chosen and recordings & stated.keys():
+                for origin in group:
+                    side = stated.get(origin.recording, self.sides[origin.recording])
+                    compared.setdefault(side, []).append(origin)
+        refuse_leaks(compared, fix="leave those that share it out by the filter, or take them off by flagdata withdraw")
 
 
 def _artifacts(by_side: Mapping[str, pa.Table]) -> dict[str, frozenset[str]]:
