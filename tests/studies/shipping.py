@@ -90,7 +90,7 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
     for other in loaded[1:]:
         if (
             _seedless(first.card["recipe"]) != _seedless(other.card["recipe"])
-            or first.card["data"] != other.card["data"]
+            or _learned(first.card["data"]) != _learned(other.card["data"])
         ):
             raise UsageError(
                 f"{other.card['name']} was trained otherwise than {first.card['name']}",
@@ -122,6 +122,11 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
         write_tensors(scratch / CLOUD, {key: torch.from_numpy(value) for key, value in cloud.arrays().items()})
         write_sums(scratch)
     return load(folder)
+
+
+def _learned(data: Any) -> dict[str, Any]:
+    """What a network learned from; how its sides were decided, which older cards do not say, follows from it."""
+    return {key: value for key, value in data.items() if key != "split_by"}
 
 
 def _seedless(recipe: object) -> dict[str, Any]:

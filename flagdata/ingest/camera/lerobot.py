@@ -17,6 +17,7 @@ from fractions import Fraction
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from types import NoneType
 from typing import Any, TypeVar
 
 import av
@@ -149,10 +150,10 @@ def _label(row: Mapping[str, Any], where: str) -> dict[str, Any]:
         return {}
     try:
         label = from_json(text)
-        texts = [label[name] for name in ("dataset", "session") if label[name] is not None]
-        if not all(map(is_name, texts)) or not isinstance(label["seed"], int | None) or isinstance(label["seed"], bool):
+        texts = [label[name] for name in ("dataset", "session") if label.get(name) is not None]
+        if not all(map(is_name, texts)) or type(label.get("seed")) not in (int, NoneType):
             raise ValueError("values of other types")
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, TypeError, AttributeError) as error:
         raise CorruptError(f"the label of an episode is damaged: {error}", where=where, fix="export it again") from None
     return label
 

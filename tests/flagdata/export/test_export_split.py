@@ -7,8 +7,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from flagdata.dataset import HashedSplit, divide
-from flagdata.dataset.sides import clips_of
+from flagdata.dataset import HashedSplit
+from flagdata.dataset.sides import clips_of, divide
 from flagdata.errors import NotFoundError, UnknownNameError, UsageError
 from flagdata.export import Export, export
 from flagdata.lake import Artifact, Lake
