@@ -111,7 +111,7 @@ def test_relatives_on_two_sides_are_withdrawn_from_one(user: User) -> None:
     for number, side in enumerate(["train", "train", "test"], start=1):
         film_of(number, dataset="made", side=side, session="barn" if number > 1 else None)
     user.meets("dataset/sides.py", "take what they share off", *CLIPS)
-    user.follows("withdraw", "film-3", "-m", "of the session of film-2")
+    user.follows("withdraw", "film-3", "--with-descendants", "-m", "of the session of film-2")
     user.succeeds(*CLIPS)
 
 
@@ -124,7 +124,7 @@ def test_a_field_recording_of_a_data_sets_session_is_left_out_or_withdrawn(user:
     command = ("export", "parquet", "--to", "out", "--split", side, "--where")
     user.meets("dataset/sides.py", "leave those that share it out", *command, "kind = 'clip' and side is null")
     user.succeeds(*command, "kind = 'clip' and side is null and name <> 'clip-2'")
-    user.follows("withdraw", "film-2", "-m", "of the session of film-1")
+    user.follows("withdraw", "film-2", "--with-descendants", "-m", "of the session of film-1")
     user.succeeds("export", "parquet", "--to", "again", *command[4:], "kind = 'clip' and side is null")
 
 
