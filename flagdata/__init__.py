@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from flagdata.commands.lake import diff, init, log, merge, withdraw
     from flagdata.commands.looking import du, lineage
     from flagdata.commands.transfer import clone, pull, push
-    from flagdata.commands.upkeep import doctor, expire, gc, recover, verify
+    from flagdata.commands.upkeep import doctor, expire, gc, heal, recover, verify
     from flagdata.examples import example
 
 step_aside()
@@ -58,6 +58,7 @@ __all__ = [
     "export",
     "frames",
     "gc",
+    "heal",
     "ingest",
     "init",
     "label",

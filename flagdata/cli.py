@@ -111,6 +111,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "clone": ("flagdata.commands.transfer:clone", "Make a lake with all versions of another."),
             "verify": ("flagdata.commands.upkeep:verify", "Re-hash every object."),
             "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake, or a data set."),
+            "heal": ("flagdata.commands.upkeep:heal", "Take what is damaged or missing from a clone or a backup."),
             "gc": ("flagdata.commands.upkeep:gc", "Delete unreferenced files."),
             "expire": ("flagdata.commands.upkeep:expire", "Let old versions expire, with a trace."),
         },

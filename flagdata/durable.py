@@ -20,6 +20,8 @@ from flagdata.errors import CorruptError, FlagdataError, RefusedError
 from flagdata.storage import Place, RemotePath, StoreError
 from flagdata.storage.connection import COLOUR
 
+HEAL = "flagdata heal FROM, a clone or a backup of this lake"
+"""What puts back a file of a lake that is damaged or missing."""
 SCRATCH = re.compile(r"\.[0-9a-f]{32}")
 """Names of files that are written before they are linked under their own."""
 _LOG = logging.getLogger("flagdata")
@@ -178,6 +180,29 @@ def link(file: Path, path: Path) -> None:
         raise lacking("has no hard links, as exFAT and FAT32 have none", path.parent, error=error) from error
 
 
+def replace_durably(path: Place, data: bytes) -> None:
+    """Put a file in place of what is there, or of nothing; durable when it returns.
+
+    The bytes are written and flushed beside it, so that the name has all of them or what it had before.
+
+    Raises:
+        OSError: what the disk refused; the name has what it had before.
+    """
+    if isinstance(path, RemotePath):
+        path.write_bytes(data)
+        return
+    scratch = path.with_name(f".{uuid.uuid4().hex}")
+    try:
+        scratch.write_bytes(data)
+        flush_file(scratch)
+        scratch.replace(path)
+    except BaseException:
+        with suppress(OSError):  # what is left is a collection's
+            scratch.unlink(missing_ok=True)
+        raise
+    flush_folder(path.parent)
+
+
 @contextmanager
 def confirming(noun: str, where: Place) -> Iterator[None]:
     """Works on `noun` after it was published: what the disk refuses is a warning, since it stays published."""
@@ -225,7 +250,7 @@ def unreadable(noun: str, where: Place, error: OSError) -> FlagdataError:
     message = f"{noun} cannot be read: {error.strerror}"
     if isinstance(error, StoreError):
         return FlagdataError(message, where=str(where), fix=error.fix)
-    return CorruptError(message, where=str(where), fix="give yourself read permission on it, or restore it from a copy")
+    return CorruptError(message, where=str(where), fix=f"give yourself read permission on it, or {HEAL}")
 
 
 _NUMBER = re.compile(r"\(os error (\d+)\)|\bOs \{ code: (\d+)")  # as the Delta library writes it

@@ -101,7 +101,7 @@ _KINDS = {
     """,
     Severity.ERROR: """
         branch-lost clock-reset corrupt-frames corrupt-packets crooked-clock episodes-missing erasure-unfinished
-        identity-twice link log-damaged messages-missing no-motion no-stamp no-usable-wind pages-not-read
+        identity-twice link log-damaged marker-damaged messages-missing no-motion no-stamp no-usable-wind pages-not-read
         ref-unreadable size-changed stamps-disordered unreadable-stamps
     """,
 }

@@ -26,7 +26,7 @@ from pathlib import Path
 
 from flagdata.caches import user_cache
 from flagdata.checksums import content_hash, size_of
-from flagdata.durable import boot, flush_folder, flush_tree
+from flagdata.durable import HEAL, boot, flush_folder, flush_tree
 from flagdata.errors import CorruptError, InputError, UsageError
 from flagdata.locks import LOCK, alone_in
 
@@ -53,6 +53,11 @@ def copy_of(name: str, suffix: str) -> Path | None:
             os.utime(stamp)
             return path
     return path if is_whole(name, suffix) else None
+
+
+def has_copy(name: str, suffix: str) -> bool:
+    """Checks whether there is a local copy of an object, whole or not."""
+    return os.path.lexists(_cached_path(name, suffix))
 
 
 def is_whole(name: str, suffix: str) -> bool:
@@ -104,7 +109,7 @@ def fetched(name: str, suffix: str, *, size: int, fetch: Callable[[Path], None],
             raise CorruptError(
                 f"the bytes of {name} have changed since they were written",
                 where=where,
-                fix="run flagdata verify: it names what replaces the object; or restore it from a copy",
+                fix=f"run flagdata verify: it names what replaces the object; or {HEAL}",
             )
         try:
             _keep(part, path)

@@ -45,6 +45,17 @@ class OnLake:
 
         return opened(self.lake).lake
 
+    def found(self) -> Lake:
+        """Finds the lake, also one that cannot be opened, for what heals it.
+
+        Raises:
+            NotFoundError: there is none.
+        """
+        from flagdata.dataset.source import Source
+        from flagdata.lake import Lake
+
+        return self.opened() if isinstance(self.lake, Source | Lake) else Lake.found(self.lake)
+
 
 @options
 class AtVersion:

@@ -20,6 +20,7 @@ from torch import Tensor
 
 from flagdata.checksums import SUMS, check_sums, content_hash, renewed_sums
 from flagdata.documents import read_json
+from flagdata.durable import HEAL
 from flagdata.errors import CorruptError, LimitError, NotFoundError
 from flagdata.outputs import rewrite
 
@@ -132,4 +133,4 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
     return tensors
 
 
-_AGAIN = "restore it from a copy, or train again"
+_AGAIN = f"train it again; or, where it is of a lake, {HEAL}"

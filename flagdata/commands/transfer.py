@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from flagdata.console import echo, progress, say, say_finding
@@ -52,12 +53,16 @@ def push(chosen: Pushing) -> Iterator[Result]:
 
 @verb(Pulling, example='flagdata.pull("s3://bucket/field", lake="field.lake")["versions"]')
 def pull(chosen: Pulling) -> Iterator[Result]:
-    """Bring the versions of SOURCE that this lake lacks in, with their tags, branches and data; push's opposite."""
+    """Bring the versions of SOURCE that this lake lacks in, with their tags, branches and data; push's opposite.
+
+    Where SOURCE is behind, as a backup of this lake is, it has nothing new. What this lake lost, or what verify found
+    damaged, is taken from it; flagdata heal compares all data before.
+    """
     from flagdata.lake import Lake
-    from flagdata.lake.copying import transfer
+    from flagdata.lake.copying import pull as pulled
 
     lake = chosen.opened()
-    yield from _reporting("pull", str(lake.path), transfer(Lake.open(chosen.source), lake, bars=progress))
+    yield from _reporting("pull", str(lake.path), pulled(Lake.open(chosen.source), lake, bars=progress))
 
 
 @verb(Cloning, example='flagdata.clone("s3://bucket/field", "field.lake")["head"]')
@@ -84,10 +89,13 @@ def _reporting(tag: str, address: str, done: Transfer) -> Iterator[Result]:
             "bytes": done.size,
             "refs": list(done.refs),
             "findings": [finding.as_dict() for finding in done.findings],
+            "healed": [asdict(taken) for taken in done.healed],
         },
     )
     for finding in done.findings:
         say_finding(finding)
+    for taken in done.healed:
+        say(f"{taken.kind} {taken.name}: {taken.why}")
     refs = f", {counted(len(done.refs), 'ref')} ({', '.join(done.refs)})" if done.refs else ""
     say(f"{counted(done.versions, 'version')}, {counted(len(done.objects), 'object')}, {size_text(done.size)}{refs}")
     echo(f"{address} is at version {done.head}")

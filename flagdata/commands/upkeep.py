@@ -1,4 +1,4 @@
-"""`flagdata verify|doctor|gc|expire|recover`: is the lake whole, and putting it right."""
+"""`flagdata verify|doctor|heal|gc|expire|recover`: is the lake whole, and putting it right."""
 
 from __future__ import annotations
 
@@ -112,6 +112,41 @@ def _examining(source: Path) -> Iterator[Result]:
     ]
     table(header, rows)
     _print_health(found.findings, f"{found.format}: {counted(len(rows), 'stream')} examined")
+
+
+@options
+class Healing(OnLake):
+    """Where what a lake lost is taken from."""
+
+    source: str = argument("A clone or a backup of this lake: a folder, or s3://bucket/prefix.", "FROM")
+
+
+@verb(Healing, example='flagdata.heal("backup.lake", lake="field.lake")["left"]')
+def heal(chosen: Healing) -> Iterator[Result]:
+    """Take what is damaged or missing in this lake from FROM; exits with 3 when something is left.
+
+    FROM is a clone or a backup of this lake, older or newer, or the lake that this one is a clone of. It may be damaged
+    itself: what is right by its hash is taken. What is whole here stays, and nothing newer comes in. All data of this
+    lake are compared with their hashes. A heal that was stopped goes on when it is given again.
+    """
+    from dataclasses import asdict
+
+    from flagdata.lake import Lake
+    from flagdata.lake.restoring import heal as healed
+
+    lake = chosen.found()
+    done = healed(lake, Lake.found(chosen.source), bars=progress)
+    content = {
+        "lake": str(lake.path),
+        "taken": [asdict(taken) for taken in done.taken],
+        "left": [finding.as_dict() for finding in done.left],
+    }
+    yield Result("heal", content, _GATE_NOT_MET if done.left else 0)
+    for taken in done.taken:
+        echo(f"{taken.kind} {taken.name}: {taken.why}")
+    _print(done.left)
+    size = size_text(sum(taken.size for taken in done.taken))
+    say(f"{counted(len(done.taken), 'item')} taken, {size}; {len(done.left) or 'nothing'} still damaged")
 
 
 @options

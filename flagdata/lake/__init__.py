@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from flagdata.lake.artifact import Artifact
     from flagdata.lake.catalog import Catalog
     from flagdata.lake.collection import collect, garbage, usage
-    from flagdata.lake.copying import clone, transfer
+    from flagdata.lake.copying import clone, pull, transfer
     from flagdata.lake.deposit import Deposit
     from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, sampled, verify, verify_catalog
     from flagdata.lake.label_columns import columns
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from flagdata.lake.objects import Objects
     from flagdata.lake.refs import Refs, Slice, View
     from flagdata.lake.removal import expire, last_version, lost
+    from flagdata.lake.restoring import heal
     from flagdata.lake.results import Placed, keep, placed, versions
     from flagdata.lake.rowfiles import Scan, with_data_sets
     from flagdata.lake.selection import Request, Selection, select

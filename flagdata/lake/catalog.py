@@ -34,12 +34,12 @@ import pyarrow.compute as pc
 from deltalake import CommitProperties, DeltaTable
 from deltalake.exceptions import CommitFailedError, DeltaError
 
-from flagdata.durable import confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
+from flagdata.durable import HEAL, confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.files import is_beside, open_regular
 from flagdata.forks import OneProcess
 from flagdata.lake.attempts import Moved
-from flagdata.lake.log import CHECKPOINT, COPY_BACK, FILE_HASH, PREVIOUS_HASH, Entry, Log, Summaries, is_stated
+from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Entry, Log, Summaries, is_stated
 from flagdata.lake.rowfiles import RowFiles, Scan, changed_file, encode_rows
 from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
@@ -281,7 +281,7 @@ class Catalog:
             raise self._refused(error) from None
         if isinstance(self._log, Path):
             flush_file(self._log / f"{version:020d}{CHECKPOINT}")
-            if (hint := self._log / _HINT).exists():
+            if (hint := self._log / HINT).exists():
                 flush_file(hint)
             flush_folder(self._log)
         checkpoint_hash = file_hash(self._log / f"{version:020d}{CHECKPOINT}")
@@ -410,7 +410,7 @@ class Catalog:
         it, and the entries after that. Those that no summary covers were compared when the history was read."""
         newest = max((number for number in self._entries.checkpoints() if number <= version), default=-1)
         checkpoint = self._log / f"{newest:020d}{CHECKPOINT}"
-        for log_file in (self._log / _HINT, checkpoint):
+        for log_file in (self._log / HINT, checkpoint):
             if (
                 isinstance(log_file, Path) and log_file.exists() and not log_file.is_file()
             ):  # of a pipe it would wait for ever
@@ -462,7 +462,7 @@ class Catalog:
             raise CorruptError(
                 f"{'a checkpoint' if saving else 'an entry'} of the catalog's log cannot be read: {first}",
                 where=str(blamed),
-                fix=f"{_DELETE}; if that does not help, {COPY_BACK}" if saving else COPY_BACK,
+                fix=f"{_DELETE}; if that does not help, {HEAL}" if saving else HEAL,
             ) from None
 
     def _blamed(self, version: int) -> Place:
@@ -555,8 +555,8 @@ class Catalog:
 
 
 _FILE_HASH, _PREVIOUS_HASH = (key.removeprefix(_INFO_PREFIX) for key in (FILE_HASH, PREVIOUS_HASH))
-_HINT = "_last_checkpoint"
-_DELETE = f"delete {_HINT} and *{CHECKPOINT} there: they save time, the .json files hold all"
+HINT = "_last_checkpoint"
+_DELETE = f"delete {HINT} and *{CHECKPOINT} there: they save time, the .json files hold all"
 _KERNEL = "Kernel error: "
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
 _NO_ANSWER = re.compile(r"Generic S3 error|Error performing [A-Z]+ ")

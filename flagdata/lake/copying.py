@@ -10,8 +10,7 @@ it was, and of two at once one finds the work done, or is refused.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
 
@@ -21,13 +20,13 @@ from flagdata.findings import Finding, Severity
 from flagdata.lake.lake import Lake
 from flagdata.lake.marking import Marked, mark
 from flagdata.lake.refs import NOUNS, Deletion, deleted_by
+from flagdata.lake.restoring import Bars, Taken, heal_noted
 from flagdata.lake.transaction import Transaction
 from flagdata.printable import counted
 from flagdata.storage import Place
 
 _SHOWN = ("name", "session", "source_name", "code_version", "branch", "kind")
 """Columns of text that commands show."""
-Bars = Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +40,7 @@ class Transfer:
         size: of these [B].
         refs: names of the tags and branches that it did not have, sorted.
         findings: what texts of the versions that came hold which a terminal would obey.
+        healed: what was damaged or missing in a target that is ahead of its source, and was taken from it.
     """
 
     versions: int
@@ -49,6 +49,7 @@ class Transfer:
     size: int
     refs: tuple[str, ...]
     findings: tuple[Finding, ...] = ()
+    healed: tuple[Taken, ...] = ()
 
 
 def clone(source: Lake, target: Place | str, *, bars: Bars) -> tuple[Lake, Transfer]:
@@ -102,7 +103,7 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
     source.catalog.check_entries(min(head, target_head))
     _check_refs(source, target)
     refs_before = target.refs.stored()
-    sizes = _sizes(marked)
+    sizes = marked.sizes
     missing = [name for name in sorted(marked.objects) if not target.objects.is_there(name, sizes.get(name))]
     size = 0
     with (
@@ -134,6 +135,29 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
     )
 
 
+def pull(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
+    """Brings a lake to the newest version of another one, as `transfer`. One that is behind, as a backup of this lake
+    is, has nothing new: what this one lost, or what was found damaged in it, is taken, see `flagdata.lake.restoring`.
+
+    Raises:
+        ConflictError, CorruptError: as `transfer`.
+    """
+    head, target_head = source.catalog.head(), target.catalog.head()
+    if head >= target_head:
+        return transfer(source, target, bars=bars)
+    _check_common(source, target, head)
+    healed = heal_noted(target, source, bars=bars).taken
+    objects = [taken for taken in healed if taken.kind == "object"]
+    return Transfer(
+        versions=0,
+        head=target_head,
+        objects=tuple(taken.name for taken in objects),
+        size=sum(taken.size for taken in objects),
+        refs=(),
+        healed=healed,
+    )
+
+
 def _unprintable(source: Lake, marked: Marked, *, versions: int) -> Iterator[Finding]:
     """Warns where rows, or messages of the newest versions, hold what a terminal would obey. They come as they are:
     each version states the hash of the one before, so that a text that was cleaned would be another history."""
@@ -156,16 +180,6 @@ def _unprintable(source: Lake, marked: Marked, *, versions: int) -> Iterator[Fin
         )
 
 
-def _sizes(marked: Marked) -> dict[str, int]:
-    """Bytes of the objects that the rows of refs point to."""
-    return {
-        row["object"]: row["object_bytes"]
-        for table in marked.refs.values()
-        for row in table.select(["object", "object_bytes"]).to_pylist()
-        if row["object_bytes"] is not None
-    }
-
-
 def _adopt(source: Lake, target: Lake, transaction: Transaction, *, versions: range, bars: Bars) -> None:
     with bars(len(versions), "versions", "version") as advance:
         for version in versions:
@@ -182,7 +196,21 @@ def _check_history(source: Lake, target: Lake, *, head: int, target_head: int) -
     Raises:
         ConflictError: they are not.
     """
-    common = min(head, target_head)
+    _check_common(source, target, min(head, target_head))
+    if target_head > head:
+        raise ConflictError(
+            f"{target.path} is ahead: it has versions up to {target_head}, {source.path} up to {head}",
+            where=str(target.path),
+            fix=f"flagdata pull {target.path} --lake {source.path} brings them here",
+        )
+
+
+def _check_common(source: Lake, target: Lake, common: int) -> None:
+    """Checks whether two lakes have the same versions up to one.
+
+    Raises:
+        ConflictError: they have not.
+    """
     if source.catalog.entry(common)[0] != target.catalog.entry(common)[0]:
         same = source.catalog.entry(0)[0] == target.catalog.entry(0)[0]
         raise ConflictError(
@@ -190,12 +218,6 @@ def _check_history(source: Lake, target: Lake, *, head: int, target_head: int) -
             where=f"{source.path} and {target.path}",
             fix=f"flagdata clone {target.path} NEW, and commit there what it lacks; or write to it directly:"
             f" --lake {target.path}",
-        )
-    if target_head > head:
-        raise ConflictError(
-            f"{target.path} is ahead: it has versions up to {target_head}, {source.path} up to {head}",
-            where=str(target.path),
-            fix="move them the other way: flagdata pull for push, or flagdata push for pull",
         )
 
 

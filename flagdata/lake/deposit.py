@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 import uuid
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
+from flagdata.checksums import files_of
 from flagdata.durable import disk_errors
 from flagdata.lake.leases import Lease
 from flagdata.lake.store import Store
@@ -45,3 +47,19 @@ def deposit(lake: Store, suffix: str, write: Callable[[Path], object]) -> Deposi
         name = lake.objects.name_of(path)
         lease.hold(name)
         return Deposit(name=name, fresh=lake.objects.publish(path, name))
+
+
+def copy_object(source: Path, target: Path) -> None:
+    """Copy the file or folder of an object, without modes: what is read-only could be neither moved nor collected.
+
+    Raises:
+        InputError: there is none, or it holds a link.
+        OSError: what the disk refused.
+    """
+    files = files_of(source)
+    if source.is_dir():
+        target.mkdir()
+    for file in files:
+        copied = target / file.relative_to(source)
+        copied.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, copied)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from flagdata.durable import HEAL
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.refs import MAIN
 from flagdata.lake.store import Store
@@ -41,7 +42,7 @@ class Healing:
         if not self.refs:
             return done
         still = f"{', '.join(self.refs)} still need{'s' if len(self.refs) == 1 else ''} {self.before}"
-        return f"{done}; {still}: restore it from a copy, or delete the ref"
+        return f"{done}; {still}: {HEAL}, or delete the ref"
 
 
 @dataclass(frozen=True, kw_only=True)

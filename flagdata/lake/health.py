@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from flagdata.durable import SCRATCH
+from flagdata.durable import HEAL, SCRATCH
 from flagdata.errors import FlagdataError
 from flagdata.files import is_beside
 from flagdata.findings import Finding, Severity
@@ -54,13 +54,13 @@ def made_again(artifact: Artifact) -> str:
         withdraw = f"flagdata withdraw {artifact.id[:SHORT]}{branch} -m 'its data are lost'"
         return (
             f"give the command that made it again by the same code ({artifact.code_version}), which replaces the "
-            f"object; or flagdata pull a clone of this lake, restore it from a copy, or {withdraw}"
+            f"object; or {HEAL}; or {withdraw}"
         )
     if artifact.source_name is not None:
         how = f"flagdata ingest {shlex.quote(artifact.source_name)}{branch} again, with the options of the first time"
     else:
         how = f"{_BY_KIND.get(artifact.kind, 'give the command that made it again')}{branch and f', with{branch}'}"
-    return f"{how}: it replaces the object; or flagdata pull a clone of this lake, or restore it from a copy"
+    return f"{how}: it replaces the object; or {HEAL}"
 
 
 GRACE = timedelta(hours=24)

@@ -14,7 +14,7 @@ from urllib.parse import unquote
 from flagdata import provenance
 from flagdata.addresses import lake_place
 from flagdata.documents import from_json
-from flagdata.durable import disk_errors, make_folders, put_if_absent
+from flagdata.durable import HEAL, disk_errors, make_folders, put_if_absent
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.files import is_beside, open_regular
 from flagdata.lake.catalog import newer
@@ -22,6 +22,7 @@ from flagdata.lake.label_columns import Value
 from flagdata.lake.labels import put
 from flagdata.lake.layout import FOLDERS, STAGING, scratch_files
 from flagdata.lake.locks import MADE, TimedLocks
+from flagdata.lake.log import names_in
 from flagdata.lake.merging import MergeResult, merge
 from flagdata.lake.objects import Objects
 from flagdata.lake.probing import probe
@@ -33,7 +34,8 @@ from flagdata.lake.transaction import Transaction
 from flagdata.schema import FORMAT_VERSION
 from flagdata.storage import Place, RemotePath
 
-_MARKER = "lake.json"
+MARKER = "lake.json"
+"""The file that says that a folder is a lake, and which."""
 _MARKER_SCHEMA = "flagdata.lake/1"
 _UNUSABLE = re.compile("[\\\\\ud800-\udfff]")  # the Delta library takes a backslash for a separator; no UTF-8
 
@@ -81,10 +83,10 @@ class Lake(Store):
     def _taken(self) -> ConflictError:
         """Returns the error for a lake that cannot be made since something is there."""
         where = str(self.path)
-        if (self.path / _MARKER).exists():
+        if (self.path / MARKER).exists():
             return ConflictError("there is a lake already", where=where, fix="choose an empty or new folder")
         inside = {path.name for path in self._entries()} if self.path.is_dir() else set()
-        if STAGING in inside and inside <= {*FOLDERS, _MARKER}:
+        if STAGING in inside and inside <= {*FOLDERS, MARKER}:
             return ConflictError(
                 "a lake is being made there, or its making was stopped",
                 where=where,
@@ -97,7 +99,7 @@ class Lake(Store):
         lake."""
         if isinstance(self.staging, RemotePath):
             has_more = any(entry != self.staging for entry in self._entries())
-            return has_more and not TimedLocks(self.staging).unfinished(done=self.path / _MARKER)
+            return has_more and not TimedLocks(self.staging).unfinished(done=self.path / MARKER)
         is_file = self.path.exists() and not self.path.is_dir()
         return is_file or (self.path.is_dir() and any(self._entries()))
 
@@ -112,7 +114,7 @@ class Lake(Store):
         """Checks whether this process makes the lake: the one that succeeds in making its staging."""
         if isinstance(self.staging, RemotePath):
             self.check_writable()
-            return TimedLocks(self.staging).claimed(done=self.path / _MARKER)
+            return TimedLocks(self.staging).claimed(done=self.path / MARKER)
         make_folders(self.path)
         try:
             self.staging.mkdir()
@@ -140,7 +142,7 @@ class Lake(Store):
             UsageError: any other address, or a path that the Delta library cannot work in.
         """
         lake = cls(_usable(path))
-        marker = lake.path / _MARKER
+        marker = lake.path / MARKER
         try:
             with _readable(marker), open_regular(marker) as stream:
                 content = from_json(stream.read())
@@ -150,18 +152,34 @@ class Lake(Store):
                 "there is no lake here", where=str(lake.path), fix="make one with flagdata init, or name one by --lake"
             ) from None
         except (ValueError, KeyError, TypeError):
-            raise CorruptError(
-                "the lake's marker cannot be read", where=str(marker), fix="restore it from a copy"
-            ) from None
+            raise CorruptError("the lake's marker cannot be read", where=str(marker), fix=HEAL) from None
         if version > FORMAT_VERSION:
             raise newer(f"it has format {version}", lake.path)
         return lake
 
+    @classmethod
+    def found(cls, path: Place | str) -> Lake:
+        """Finds what there is of the lake at `path`, for what heals it: its marker, or its log, may be damaged or gone.
+
+        Raises:
+            NotFoundError: no lake there.
+            ConflictError, UsageError: as `open`.
+        """
+        try:
+            return cls.open(path)
+        except (CorruptError, NotFoundError):
+            lake = cls(_usable(path))
+            if any(map(names_in, (lake.path / "catalog" / "_delta_log", lake.path / "refs" / "newest"))):
+                return lake
+            if (lake.path / MARKER).exists():
+                return lake
+            raise
+
     def _begin_as(self, source: Lake) -> None:
         self.catalog.adopt(0, *source.catalog.entry(0))
         self.catalog.acknowledge(0)
-        with open_regular(source.path / _MARKER) as stream:
-            put_if_absent(self.path / _MARKER, stream.read())
+        with open_regular(source.path / MARKER) as stream:
+            put_if_absent(self.path / MARKER, stream.read())
 
     def _fill(self) -> None:
         self.catalog.create({"message": "create the lake", "code_version": provenance.code_version()})
@@ -171,7 +189,7 @@ class Lake(Store):
             "lake": uuid.uuid4().hex,
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
         }
-        put_if_absent(self.path / _MARKER, (json.dumps(marker, indent=2) + "\n").encode())
+        put_if_absent(self.path / MARKER, (json.dumps(marker, indent=2) + "\n").encode())
 
     def transaction(self, message: str, *, branch: str = MAIN) -> Transaction:
         """Opens a context manager that collects objects and rows, publishes all when its block ends, nothing when that

@@ -17,6 +17,7 @@ from typing import Any
 import pyarrow as pa
 
 from flagdata.documents import from_json
+from flagdata.durable import HEAL
 from flagdata.errors import CorruptError, NotFoundError
 from flagdata.lake.refs import DELETED, MAIN, Entry, Slice, View, view_from
 
@@ -62,7 +63,7 @@ def _reading(entry: Entry) -> Iterator[None]:
         raise CorruptError(
             f"what version {entry['version']} notes of branches cannot be read",
             where="the catalog's log",
-            fix="run flagdata verify; restore the log entry from a copy",
+            fix=f"run flagdata verify; {HEAL}",
         ) from None
 
 

@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.documents import from_json
-from flagdata.durable import make_folders, put_if_absent, unreadable
+from flagdata.durable import HEAL, make_folders, put_if_absent, unreadable
 from flagdata.errors import CorruptError, ErrorKind, FlagdataError
 from flagdata.files import open_regular
 from flagdata.provenance import digest, file_hash
@@ -43,9 +43,6 @@ FILE_HASH = "flagdata.file_sha256"
 
 PREVIOUS_HASH = "flagdata.previous_sha256"
 """Key of a commit's info: SHA-256 of the log entry before it."""
-
-COPY_BACK = "copy the file of this name from a backup, or from a clone of the lake"
-"""What heals a file of the catalog: a clone has the same under the same name."""
 
 _ACTIONS = {"add", "remove", "metaData", "protocol", "commitInfo", "txn", "cdc", "domainMetadata"}
 _FILE = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
@@ -106,9 +103,9 @@ class Log:
             CorruptError: an entry is empty or cannot be read.
         """
         acknowledged = self.acknowledged()  # first: all entries up to it were on the disk before
-        present = self._present()
+        present = self.present()
         if not present:
-            raise LogGapError("the catalog's log is gone", where=str(self.folder), fix="restore it from a copy")
+            raise LogGapError("the catalog's log is gone", where=str(self.folder), fix=HEAL)
         newest = max(present)
         missing = list(islice(self._missing(present, upto=max(newest, acknowledged)), _NAMED))
         if missing:
@@ -135,7 +132,7 @@ class Log:
             CorruptError: an entry that cannot be read, by its name.
         """
         files: dict[str, str | None] = {}
-        for version in sorted(self._present()):
+        for version in sorted(self.present()):
             added, info = self._content(version)
             for name in added:
                 files.setdefault(name, info.get(FILE_HASH))
@@ -148,9 +145,9 @@ class Log:
             CorruptError: an entry that cannot be read, by its name.
         """
         noted: dict[int, str] = {}
-        if (marked := self._marked(newest := self.acknowledged())) is not None:
+        if (marked := self.marked(newest := self.acknowledged())) is not None:
             noted[newest] = marked
-        present = self._present()
+        present = self.present()
         for version in sorted(present):
             previous = self._content(version)[1].get(PREVIOUS_HASH)
             if previous is not None:
@@ -200,7 +197,7 @@ class Log:
         for version, entry, following in zip(versions, read_entries, read_entries[1:], strict=False):
             if following.info.get(PREVIOUS_HASH, entry.hash) != entry.hash:
                 raise self.disagreeing(version, self.path(version + 1))
-        if versions and versions[-1] == head and self._marked(head) not in (None, read_entries[-1].hash):
+        if versions and versions[-1] == head and self.marked(head) not in (None, read_entries[-1].hash):
             raise self.disagreeing(head, self.marks / str(head))
         return read_entries
 
@@ -209,7 +206,7 @@ class Log:
         files, info = self._parsed(version, text)
         return Entry(files=files, info=info, hash=digest(text))
 
-    def _marked(self, version: int) -> str | None:
+    def marked(self, version: int) -> str | None:
         """Reads the SHA-256 of an entry that its mark notes, if there is one."""
         try:
             return _content_of(self.marks / str(version)).strip() or None
@@ -219,8 +216,8 @@ class Log:
     def disagreeing(self, version: int, noting: Place) -> CorruptError:
         """Returns the error for an entry whose SHA-256 is not the one that the next entry, or its mark, notes."""
         path = self.path(version)
-        fix = f"{COPY_BACK}; if it is the same there, "
-        fix += f"delete {noting}" if noting.parent == self.marks else f"that of {noting.name}"
+        fix = f"{HEAL}; where nothing is taken, "
+        fix += f"delete {noting}" if noting.parent == self.marks else "another one"
         return CorruptError(
             f"the log entry {path.name} is not what {noting.name} says: one of the two has changed since it was "
             "written",
@@ -274,8 +271,8 @@ class Log:
     def damaged(self, version: int) -> CorruptError:
         """Returns the error of a reader to whom the entry of `version` makes no sense."""
         path = self.path(version)
-        fix = "restore it from a copy"
-        if version == max(self._present()) and version - 1 == self.acknowledged():  # as a power cut may leave it
+        fix = HEAL
+        if version == max(self.present()) and version - 1 == self.acknowledged():  # as a power cut may leave it
             fix += ", or delete it: its commit was never acknowledged"
         return CorruptError(f"the log entry {path.name} is damaged", where=str(path), fix=fix)
 
@@ -295,7 +292,7 @@ class Log:
         """Versions at which the Delta library finds all that is in the entries before."""
         return [int(match[1]) for name in _sizes_in(self.folder) if (match := _CHECKPOINT(name))]
 
-    def _present(self) -> dict[int, int | None]:
+    def present(self) -> dict[int, int | None]:
         """Maps the version of each entry to its size, where a listing states it."""
         sizes = _sizes_in(self.folder)
         for name in sizes.keys() - self._numbers.keys():
@@ -311,7 +308,7 @@ class Log:
         names = ", ".join(self.path(version).name for version in missing)
         further = max(newest, acknowledged) + 1 - len(present) - len(missing)
         message = f"an entry of the catalog's log is missing: {names}{f' and {further} more' if further > 0 else ''}"
-        fix = "restore it from a copy, and run neither gc nor another program on the lake before"
+        fix = f"{HEAL}; run neither gc nor another program on the lake before"
         if missing[0] > newest:  # what is left is a whole, older catalog
             mark = next(path for path in self.marks.iterdir() if _MARK(path.name) and int(path.name) == acknowledged)
             message += f"; {mark} says that version {acknowledged} was committed"

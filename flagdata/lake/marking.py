@@ -11,10 +11,11 @@ from math import inf
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from flagdata.durable import HEAL
 from flagdata.errors import CorruptError, FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.lineage import Removal, removals
-from flagdata.lake.log import COPY_BACK, LogGapError
+from flagdata.lake.log import LogGapError
 from flagdata.lake.refs import MAIN, Slice, View
 from flagdata.lake.store import Store
 from flagdata.provenance import file_hash
@@ -38,6 +39,16 @@ class Marked:
     refs: dict[str, pa.Table]
     objects: frozenset[str]
     findings: tuple[Finding, ...]
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Bytes of the objects that the rows of refs point to, as far as these state them."""
+        return {
+            row["object"]: row["object_bytes"]
+            for table in self.refs.values()
+            for row in table.select(["object", "object_bytes"]).to_pylist()
+            if row["object_bytes"] is not None
+        }
 
     def check(self, *further: Finding, outcome: str = "", fix: str | None = None) -> None:
         """Checks that it is known which objects are needed.
@@ -131,7 +142,7 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
 
 
 def _damaged(kind: str, text: str, path: Place) -> Finding:
-    return Finding(kind=kind, severity=Severity.ERROR, what=text, where=str(path), fix=COPY_BACK)
+    return Finding(kind=kind, severity=Severity.ERROR, what=text, where=str(path), fix=HEAL)
 
 
 def _lost(head: pa.Table, identities: list[str], where: str) -> list[Finding]:
@@ -143,7 +154,7 @@ def _lost(head: pa.Table, identities: list[str], where: str) -> list[Finding]:
             where=f"ref {name}",
             count=count,
             fix="give the flagdata push or pull that was stopped again, which goes on with it (for a clone: flagdata "
-            f"pull SOURCE --lake {where}); where there was none, restore refs/branches/{name}.json from a copy",
+            f"pull SOURCE --lake {where}); where there was none, {HEAL}",
         )
         for name, count in sorted(rows.items())
         if name not in identities

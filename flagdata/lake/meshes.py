@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.arrays import AnyArray, Float32Array, FloatArray, IntArray
-from flagdata.durable import disk_errors
+from flagdata.durable import HEAL, disk_errors
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, LimitError
 from flagdata.html import table
 from flagdata.provenance import canonical
@@ -264,7 +264,7 @@ def open_meshes(path: Path) -> xr.Dataset:
         return xr.open_zarr(path, consolidated=False, chunks=None)
 
 
-_RESTORE = "run flagdata verify; import the sequence again or restore it from a copy"
+_RESTORE = f"run flagdata verify; import the sequence again, or {HEAL}"
 _DAMAGED = "the mesh store is damaged"
 
 
@@ -521,7 +521,7 @@ def read_markers(path: Path) -> MarkerSequence:
     """
     from flagdata.lake.sized_chunks import open_group
 
-    restore = "run flagdata verify; ingest the table again or restore it from a copy"
+    restore = f"run flagdata verify; ingest the table again, or {HEAL}"
     with store_errors(path, "the marker store is damaged"):
         group = open_group(path)
         head = check_format(group.attrs.get(_MARKERS_HEAD), MARKERS_FORMAT, path, noun="markers")

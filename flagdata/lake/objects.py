@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 
 from flagdata.checksums import content_hash, files_of, read_sums, size_of, sums_of
-from flagdata.durable import flush_folder, flush_tree, make_folders
+from flagdata.durable import HEAL, flush_folder, flush_tree, make_folders
 from flagdata.errors import CorruptError, FlagdataError, InputError, NotFoundError
 from flagdata.files import is_beside
 from flagdata.lake.artifact import OBJECT_NAME
@@ -31,10 +31,7 @@ from flagdata.storage import Place, RemotePath
 _READ_ONLY = 0o444
 DAMAGED = ".damaged"
 """Ends the name of the note that an object was found damaged, which lies beside it."""
-REMEDY = (
-    "do again what made it: flagdata verify says what that is, and the damaged object is replaced; or flagdata pull a"
-    " clone of this lake, or restore the object from a copy"
-)
+REMEDY = f"do again what made it: flagdata verify says what that is, and the damaged object is replaced; or {HEAL}"
 _AT_ONCE = 8
 """Objects that are compared with their names at the same time."""
 _ATTEMPTS = 5

@@ -28,9 +28,9 @@ import pyarrow.parquet as pq
 from flagdata.buffers import owned
 from flagdata.catalog_sql import dataset_of
 from flagdata.documents import column_json
+from flagdata.durable import HEAL
 from flagdata.errors import CorruptError
 from flagdata.files import open_regular
-from flagdata.lake.log import COPY_BACK
 from flagdata.parquet import check_stated
 from flagdata.schema import CATALOG, Kind, catalog_schema
 from flagdata.storage import Place
@@ -184,7 +184,7 @@ class RowFiles:
             if noted and hashlib.sha256(content).hexdigest() not in noted:
                 raise changed_file(self._folder / name)
             footer = pq.read_metadata(pa.BufferReader(content))
-            check_stated(footer, content.size, where=where, fix=COPY_BACK)
+            check_stated(footer, content.size, where=where, fix=HEAL)
         return content
 
     @contextmanager
@@ -195,7 +195,7 @@ class RowFiles:
             raise CorruptError(
                 f"a file of the catalog cannot be read: {error}",
                 where=str(self._folder / name),
-                fix="restore it from a copy",
+                fix=HEAL,
             ) from None
 
 
@@ -209,7 +209,7 @@ def encode_rows(rows: pa.Table) -> bytes:
 
 def changed_file(path: Place) -> CorruptError:
     """Returns the error for a file that is not what its commit noted."""
-    return CorruptError("a file of the catalog has changed since it was written", where=str(path), fix=COPY_BACK)
+    return CorruptError("a file of the catalog has changed since it was written", where=str(path), fix=HEAL)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,6 @@ that refuses to be read afterwards changes no answer.
 from __future__ import annotations
 
 import secrets
-import shutil
 import uuid
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -18,13 +17,12 @@ from types import TracebackType
 
 import pyarrow as pa
 
-from flagdata.checksums import files_of
 from flagdata.durable import disk_errors
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
-from flagdata.lake.deposit import Deposit
+from flagdata.lake.deposit import Deposit, copy_object
 from flagdata.lake.healing import Healing, healing
 from flagdata.lake.leases import Lease
 from flagdata.lake.refs import Slice
@@ -328,15 +326,8 @@ class Transaction:
                     )
 
     def _copy(self, path: Path) -> Path:
-        inside = self.staging(path.suffix)
-        if path.is_dir():
-            inside.mkdir()
-            for source in files_of(path):  # without their modes: what is read-only could be neither moved nor collected
-                target = inside / source.relative_to(path)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(source, target)
-        elif path.is_file():
-            shutil.copyfile(path, inside)
-        else:
+        if not (path.is_dir() or path.is_file()):
             raise NotFoundError("there is no such file or folder", where=str(path), fix="write the object first")
+        inside = self.staging(path.suffix)
+        copy_object(path, inside)
         return inside

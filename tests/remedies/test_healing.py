@@ -46,7 +46,7 @@ def test_a_film_whose_object_is_lost_is_put_back_by_its_file_or_by_a_clone(user:
     user.succeeds("clone", "lake", "copy.lake")
     lose(the_lake(user), object_of(the_lake(user), "first"))
     user.meets("lake/health.py", ": it replaces the object", "doctor")
-    user.follows("pull", "copy.lake")
+    user.follows("heal", "copy.lake")
     user.succeeds("doctor", shows="(?m)^healthy")
     cut(the_lake(user), object_of(the_lake(user), "first"))
     fix = user.meets("lake/health.py", "again, with the options", "doctor")
@@ -60,7 +60,7 @@ def test_a_measurement_whose_object_is_lost_comes_back_by_a_clone_or_is_withdraw
     user.succeeds("clone", "lake", "copy.lake")
     lose(the_lake(user), object_of(the_lake(user), "wave"))
     user.meets("lake/health.py", "), which replaces the object", "doctor")
-    user.follows("pull", "copy.lake")
+    user.follows("heal", "copy.lake")
     user.succeeds("doctor", shows="(?m)^healthy")
     lose(the_lake(user), object_of(the_lake(user), "wave"))
     fix = user.meets("lake/health.py", "-m 'its data are lost'", "doctor")
@@ -71,13 +71,24 @@ def test_a_measurement_whose_object_is_lost_comes_back_by_a_clone_or_is_withdraw
 def test_a_damaged_object_is_explained_by_verify_and_put_back(user: User) -> None:
     user.succeeds("clone", "lake", "copy.lake")
     export = ("export", "mcap", "--to", "out", "--where", "name = 'first'")
-    for words in (("pull", "copy.lake"), None):
+    for words in (("heal", "copy.lake"), None):
         flip(the_lake(user), object_of(the_lake(user), "first"))
         user.meets("lake/objects.py", "do again what made it: f", *export)
         said = user.follows("verify", code=3, shows="object-changed").out
         again = said.partition("fix: ")[2].partition(" again")[0].split()[1:]
         user.follows(*words) if words else user.succeeds(*again)
         user.succeeds(*export[:3], f"out {words}", *export[4:])
+
+
+def test_a_file_of_the_lake_that_is_damaged_is_taken_from_an_older_clone(user: User) -> None:
+    user.succeeds("clone", "lake", "older.lake")
+    user.succeeds("label", "mast", "later=1")
+    log = user.folder / "lake" / "catalog" / "_delta_log"
+    for path in (user.folder / "lake" / "lake.json", log / f"{1:020d}.json", log / f"{0:020d}.json"):
+        overwrite(path, b"")
+        user.meets("flagdata/durable.py", "flagdata heal FROM, a c", "ls")
+        user.follows("heal", "older.lake", shows="1 item taken, .*; nothing still damaged")
+        user.succeeds("doctor", shows="(?m)^healthy")
 
 
 def test_a_damaged_ref_is_deleted_and_pulled(user: User) -> None:

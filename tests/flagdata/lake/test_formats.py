@@ -15,6 +15,7 @@ import pytest
 from deltalake import DeltaTable
 
 from flagdata.checksums import content_hash
+from flagdata.durable import HEAL
 from flagdata.errors import ConflictError, CorruptError, UsageError
 from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake, Log, collect, doctor, verify_catalog
@@ -138,7 +139,7 @@ def test_the_error_of_a_damaged_log_entry_names_it(lake: Lake) -> None:
         "kind": "corrupt",
         "what": f"the log entry {entry.name} is damaged",
         "where": str(entry),
-        "fix": "restore it from a copy",
+        "fix": HEAL,
     }
     findings = doctor(fresh)
     assert not any("\n" in f.what for f in findings)

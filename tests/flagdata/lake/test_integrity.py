@@ -219,7 +219,7 @@ def test_a_bit_that_flips_in_a_file_of_rows_is_refused_and_a_clone_heals(filled:
             for read in (lambda: Lake.open(filled.path).rows(), lambda: Lake.open(filled.path).rows("kind = 'wind'")):
                 error = refused(read)
                 assert error.where == str(path)
-                assert "clone of the lake" in error.fix
+                assert "flagdata heal FROM" in error.fix
         overwrite(path, (copy / "catalog" / path.name).read_bytes())
     assert Lake.open(filled.path).rows().num_rows == 3
 
@@ -459,7 +459,7 @@ def test_an_entry_that_the_delta_library_cannot_read_is_named(filled: Lake, key:
     error = refused(fresh.rows)
     assert error.where == str(path)
     assert "Kernel" not in error.what
-    assert "clone of the lake" in error.fix
+    assert "flagdata heal FROM" in error.fix
 
 
 def unchained(log: Log, versions: Sequence[int], *, head: int) -> list[Any]:
