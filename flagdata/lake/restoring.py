@@ -13,10 +13,10 @@ the catalog is healed; objects come as any writer's do.
 from __future__ import annotations
 
 import hashlib
+import uuid
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, closing, suppress
 from dataclasses import dataclass
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 
@@ -29,12 +29,13 @@ from flagdata.durable import disk_errors, flush_folder, replace_durably
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.catalog import HINT
-from flagdata.lake.deposit import copy_object, deposit
+from flagdata.lake.deposit import copy_object
 from flagdata.lake.health import object_names, read_refs, verify, verify_catalog
 from flagdata.lake.lake import MARKER, Lake
 from flagdata.lake.layout import FOLDERS, check_own
-from flagdata.lake.leases import collecting
+from flagdata.lake.leases import Lease, collecting
 from flagdata.lake.log import CHECKPOINT, Log, Summaries, names_in
+from flagdata.lake.marking import Marked
 from flagdata.lake.removal import unfinished
 from flagdata.lake.right_entries import are_of_one_history, mending, read_bytes
 from flagdata.storage import Place, RemotePath
@@ -126,24 +127,23 @@ def _healed(lake: Lake, source: Lake, unsound: Unsound, *, bars: Bars) -> Healed
                 check()
                 taken += heal_part(Lake(lake.path), source)
         lake = Lake(lake.path)
-        marked = read_refs(lake)
-        names = object_names(lake, marked)
-        with suppress(FlagdataError):  # of a log that is damaged still; no erasure is undone otherwise
-            erased = unfinished(lake, marked.objects)
-            names = [name for name in names if name not in erased]
+        marked, names = _needed(lake)
         missing = [*unsound(lake, names)]
-        came = {}
-        with bars(len(missing), "objects", "object") as advance:
-            for name in missing:
-                why = _CHANGED if lake.objects.has(name) else _MISSING
-                if (size := _brought(lake, source, name)) is not None:
-                    came[name] = Taken(kind="object", name=name, why=why, size=size)
-                advance(1)
-        taken += came.values()
-        taken += _copies(lake, names)
-    damaged = (*_unmarked(lake), *verify_catalog(lake), *verify(lake, [n for n in missing if n not in came], marked))
+        came = {taken.name: taken for taken in _objects(lake, source, missing, bars=bars)}
+        taken += [*came.values(), *_copies(lake, names)]
+    still_missing = [name for name in missing if name not in came]
+    damaged = (*_unmarked(lake), *verify_catalog(lake, marked), *verify(lake, still_missing, marked))
     left = tuple(finding for finding in damaged if finding.severity is Severity.ERROR)
     return Healed(taken=tuple(taken), left=left)
+
+
+def _needed(lake: Lake) -> tuple[Marked, list[str]]:
+    """Reads what refs show, and lists the objects that are needed or stored, but for what was erased."""
+    marked = read_refs(lake)
+    erased: set[str] = set()
+    with suppress(FlagdataError):  # of a log that is damaged still, so that no erasure is known
+        erased = {*unfinished(lake, marked.objects)}
+    return marked, [name for name in object_names(lake, marked) if name not in erased]
 
 
 def _check_kinship(lake: Lake, source: Lake) -> None:
@@ -285,15 +285,24 @@ def _put_or_deleted(path: Place, content: bytes | None, kind: str) -> Taken:
     return Taken(kind=kind, name=str(path), why=f"{_CHANGED}, and was deleted: it only saves time")
 
 
-def _brought(lake: Lake, source: Lake, name: str) -> int | None:
-    """Takes an object, and returns its size [B]; `None` where the other lake does not have it, or not rightly."""
-    try:
-        found = source.objects.whole(name)
-    except (NotFoundError, CorruptError):
-        return None
-    if deposit(lake, found.suffix, partial(copy_object, found)).name != name:  # it changed between two reads
-        return None
-    return lake.objects.size(name)
+def _objects(lake: Lake, source: Lake, names: Sequence[str], *, bars: Bars) -> Iterator[Taken]:
+    """Takes those of the objects that the other lake has rightly; of what is erased meanwhile, none comes back."""
+    if not names:
+        return
+    with closing(Lease(lake.staging)) as lease, bars(len(names), "objects", "object") as advance:
+        for name in names:
+            lease.hold(name)  # an erasure that begins later sees it
+        needed = {*_needed(Lake(lake.path))[1]}
+        for name in names:
+            with suppress(NotFoundError, CorruptError):  # of the other lake's
+                found = source.objects.whole(name)
+                staged = lease.folder / f"{uuid.uuid4().hex}{found.suffix}"
+                copy_object(found, staged)
+                why = _CHANGED if lake.objects.has(name) else _MISSING
+                if name in needed and lake.objects.name_of(staged) == name:
+                    lake.objects.publish(staged, name)
+                    yield Taken(kind="object", name=name, why=why, size=lake.objects.size(name))
+            advance(1)
 
 
 def _copies(lake: Lake, names: Sequence[str]) -> Iterator[Taken]:
