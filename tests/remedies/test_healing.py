@@ -45,7 +45,7 @@ def keep_measurement(lake: Lake) -> Artifact:
 def test_a_film_whose_object_is_lost_is_put_back_by_its_file_or_by_a_clone(user: User) -> None:
     user.succeeds("clone", "lake", "copy.lake")
     lose(the_lake(user), object_of(the_lake(user), "first"))
-    user.meets("lake/health.py", ": it replaces the object", "doctor")
+    user.meets("flagdata/durable.py", "flagdata heal FROM, a c", "doctor")
     user.follows("heal", "copy.lake")
     user.succeeds("doctor", shows="(?m)^healthy")
     cut(the_lake(user), object_of(the_lake(user), "first"))
@@ -59,7 +59,7 @@ def test_a_measurement_whose_object_is_lost_comes_back_by_a_clone_or_is_withdraw
     keep_measurement(the_lake(user))
     user.succeeds("clone", "lake", "copy.lake")
     lose(the_lake(user), object_of(the_lake(user), "wave"))
-    user.meets("lake/health.py", "), which replaces the object", "doctor")
+    user.meets("flagdata/durable.py", "flagdata heal FROM, a c", "doctor")
     user.follows("heal", "copy.lake")
     user.succeeds("doctor", shows="(?m)^healthy")
     lose(the_lake(user), object_of(the_lake(user), "wave"))
