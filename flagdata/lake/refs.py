@@ -24,7 +24,16 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from flagdata.documents import from_json
-from flagdata.durable import SCRATCH, confirming, disk_errors, flush_folder, make_folders, put_if_absent, unreadable
+from flagdata.durable import (
+    HEAL,
+    SCRATCH,
+    confirming,
+    disk_errors,
+    flush_folder,
+    make_folders,
+    put_if_absent,
+    unreadable,
+)
 from flagdata.errors import CorruptError, FlagdataError, NotFoundError, TimeError, UnknownNameError, UsageError
 from flagdata.files import open_regular
 from flagdata.provenance import recipe_hash
@@ -73,7 +82,6 @@ _SHOWN = 60  # characters of a name in a message
 NOUNS = {"tags": "tag", "branches": "branch"}
 """Kind of a ref, which is the folder of its file → what it is called."""
 _HASH = "sha256"
-_PULL = "delete the file and flagdata pull a clone of this lake, or restore it from a copy"
 _COMMIT = re.compile(r"c[0-9a-f]{16}")
 
 
@@ -207,6 +215,16 @@ class Refs:
                     found[key] = ref
         return found
 
+    def damaged(self) -> dict[Key, Place]:
+        """Lists those of them that cannot be read, or have changed since they were written, by kind and name."""
+        found: dict[Key, Place] = {}
+        for key, path in self._unstated().items():
+            try:
+                self._read(path)
+            except FlagdataError:
+                found[key] = path
+        return found
+
     def _unstated(self) -> dict[Key, Place]:
         """Lists the files of refs that the log does not state, by kind and name."""
         files = {(kind, path.stem): path for kind in NOUNS for path in self._files(kind)}
@@ -237,7 +255,7 @@ class Refs:
 
     def stored(self) -> dict[Key, bytes]:
         """Returns the bytes of the file of each ref, by kind and name."""
-        return {key: _content(ref) for key, ref in self._by_key().items()}
+        return {key: content_of(ref) for key, ref in self._by_key().items()}
 
     def cache(self, kind: str, ref: Ref) -> None:
         """Write the file of a ref that the log states, for earlier versions of flagdata. A file of other content goes.
@@ -247,9 +265,9 @@ class Refs:
         """
         path = self.root / kind / f"{ref.name}.json"
         make_folders(path.parent)
-        if not put_if_absent(path, _content(ref)) and not self._states(path, ref):
+        if not put_if_absent(path, content_of(ref)) and not self._states(path, ref):
             path.unlink()
-            put_if_absent(path, _content(ref))
+            put_if_absent(path, content_of(ref))
 
     def stale_files(self) -> list[Place]:
         """Lists the files of refs that do not say what the log says: missing, changed, or of a ref that was deleted."""
@@ -305,7 +323,7 @@ class Refs:
         if newest > head:
             path = self.root / kind / f"{ref.name}.json"
             message = f"the {NOUNS[kind]} {ref.name!r} shows version {newest}, but the newest is {head}"
-            raise CorruptError(message, where=str(path), fix=_PULL)
+            raise CorruptError(message, where=str(path), fix=HEAL)
         return ref.view
 
     def remove(self, kind: str, name: str) -> None:
@@ -364,7 +382,7 @@ class Refs:
             raise CorruptError(
                 "the ref cannot be read, or has changed since it was written",
                 where=str(path),
-                fix=_PULL,
+                fix=HEAL,
             ) from None
 
 
@@ -384,7 +402,8 @@ def _from_stated(stated: Mapping[str, Any]) -> Ref:
     return Ref(name=stated["name"], created=stated["created"], view=view_from(stated["view"]), notes=notes)
 
 
-def _content(ref: Ref) -> bytes:
+def content_of(ref: Ref) -> bytes:
+    """Writes what the file of a ref holds."""
     content = {"schema": "flagdata.ref/1", **_stated(ref)}
     content[_HASH] = recipe_hash(content)
     return (json.dumps(content, indent=2) + "\n").encode()
@@ -418,7 +437,7 @@ def made_by(entry: Entry) -> dict[Key, Ref]:
         raise CorruptError(
             f"what version {entry['version']} notes of tags and branches cannot be read",
             where="the catalog's log",
-            fix="run flagdata verify; restore the log entry from a copy",
+            fix=f"run flagdata verify; {HEAL}",
         ) from None
     return made
 

@@ -36,6 +36,7 @@ from flagdata.lake.layout import FOLDERS, check_own
 from flagdata.lake.leases import Lease, collecting
 from flagdata.lake.log import CHECKPOINT, Log, Summaries, names_in
 from flagdata.lake.marking import Marked
+from flagdata.lake.refs import MAIN, Deletion, Ref, content_of
 from flagdata.lake.removal import unfinished
 from flagdata.lake.right_entries import are_of_one_history, mending, read_bytes
 from flagdata.storage import Place, RemotePath
@@ -123,7 +124,7 @@ def _healed(lake: Lake, source: Lake, unsound: Unsound, *, bars: Bars) -> Healed
         taken = [*_folders(lake, source)]
         lake.check_writable()
         with collecting(lake.staging) as check:
-            for heal_part in (_marker, _log, _rows, _what_saves_time):
+            for heal_part in (_marker, _log, _rows, _what_saves_time, _refs):
                 check()
                 taken += heal_part(Lake(lake.path), source)
         lake = Lake(lake.path)
@@ -142,7 +143,7 @@ def _needed(lake: Lake) -> tuple[Marked, list[str]]:
     marked = read_refs(lake)
     erased: set[str] = set()
     with suppress(FlagdataError):  # of a log that is damaged still, so that no erasure is known
-        erased = {*unfinished(lake, marked.objects)}
+        erased = {left.name for left in unfinished(lake, marked.objects)}
     return marked, [name for name in object_names(lake, marked) if name not in erased]
 
 
@@ -268,6 +269,28 @@ def _what_saves_time(lake: Lake, source: Lake) -> Iterator[Taken]:
     hint = read_bytes(log / HINT)
     if hint is not None and (changed or not _names_checkpoint(hint, _log_of(lake).checkpoints())):
         yield _put_or_deleted(log / HINT, None, "checkpoint")
+
+
+def _refs(lake: Lake, source: Lake) -> Iterator[Taken]:
+    """Takes tags and branches that files alone state, as earlier versions of flagdata made them: damaged ones, and
+    those that are missing and were not deleted. What the log states is in the log; its files are written anew."""
+    with suppress(FlagdataError):  # of a log, here or there, that is damaged still
+        head, lives = lake.catalog.head(), lake.refs.lives()
+        damaged = lake.refs.damaged()
+        alone = source.refs.enterable(head)
+        stated = {key: ref for key, ref in source.refs.lives().items() if isinstance(ref, Ref)}
+        there = {MAIN, *(name for kind, name in (*lives, *lake.refs.enterable(head)) if kind == "branches")}
+        lost = {*lake.catalog.rows(head)["branch"].to_pylist()} - there
+        for key, ref in {**stated, **alone}.items():
+            kind, name = key
+            life, path = lives.get(key), lake.refs.root / kind / f"{name}.json"
+            is_deleted = isinstance(life, Deletion) and life.ends(ref)
+            is_missing = (kind == "branches" and name in lost) or (key in alone and not path.exists())
+            if not isinstance(life, Ref) and not is_deleted and (key in damaged or is_missing):
+                yield _put(path, content_of(ref), "ref")
+        for path in lake.refs.stale_files():
+            yield Taken(kind="ref", name=str(path), why="did not say what the log says, and was written anew")
+        lake.refs.write_files()
 
 
 def _names_checkpoint(hint: bytes, checkpoints: Sequence[int]) -> bool:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.lake import Artifact, Lake, Objects, Refs, clone, transfer
+from flagdata.lake import Artifact, Catalog, Lake, Objects, clone, transfer
 from flagdata.schema import Kind
-from tests.flagdata.lake.conftest import overwrite
+from tests.flagdata.lake.conftest import overwrite, put_older_ref
 from tests.flagdata.lake.test_healing import cut, flip, lose
 from tests.flagdata.lake.test_transfer import no_bar
 from tests.flagdata.lake.test_unfinished import stopped
@@ -91,25 +91,24 @@ def test_a_file_of_the_lake_that_is_damaged_is_taken_from_an_older_clone(user: U
         user.succeeds("doctor", shows="(?m)^healthy")
 
 
-def test_a_damaged_ref_is_deleted_and_pulled(user: User) -> None:
+def test_a_damaged_ref_of_an_earlier_version_is_taken_from_a_clone(user: User) -> None:
+    path = put_older_ref(the_lake(user), "tags", "v9")
     user.succeeds("clone", "lake", "copy.lake")
-    path = user.folder / "lake" / "refs" / "tags" / "v0.json"
     overwrite(path, b"{")
-    user.meets("lake/refs.py", "delete the file and flag", "doctor")
-    path.unlink()
-    user.follows("pull", "copy.lake")
-    user.succeeds("ls", "--at", "v0", shows="camera +first")
+    user.meets("flagdata/durable.py", "flagdata heal FROM, a c", "doctor")
+    user.follows("heal", "copy.lake", shows="ref .*v9.json: had changed")
+    user.succeeds("ls", "--at", "v9", shows="camera +first")
     user.succeeds("doctor", shows="(?m)^healthy")
 
 
 def test_an_erasure_deletes_nothing_until_what_doctor_names_is_mended(user: User) -> None:
-    path = user.folder / "lake" / "refs" / "branches" / "side.json"
+    path = put_older_ref(the_lake(user), "tags", "v9")
     kept = path.read_bytes()
-    path.unlink()
+    overwrite(path, b"{")
     erase = ("withdraw", "first", "--everywhere", "-m", "asked")
     user.meets("lake/removal.py", "mend what flagdata docto", *erase)
-    user.follows("doctor", code=3, shows="error: branch-lost")
-    path.write_bytes(kept)
+    user.follows("doctor", code=3, shows="error: ref-unreadable")
+    overwrite(path, kept)
     user.succeeds(*erase)
     user.succeeds("doctor", shows="(?m)^healthy")
 
@@ -157,7 +156,6 @@ def test_a_push_or_pull_that_was_killed_is_ended_by_the_same_one(user: User) -> 
         user.succeeds("ingest", "second.csv", "--branch", "later")
         with pytest.MonkeyPatch.context() as patch:
             push = partial(transfer, the_lake(user), the_lake(user, "copy.lake"), bars=no_bar)
-            stopped(patch, Refs, "adopt", push, at=0)
-        user.meets("lake/marking.py", "give the flagdata push o", "doctor", "--lake", "copy.lake")
-        user.follows(*words)
+            stopped(patch, Catalog, "adopt", push, at=1)
+        user.succeeds(*words)
         user.succeeds("doctor", "--lake", "copy.lake", shows="(?m)^healthy")

@@ -7,6 +7,9 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/lake/health.py", "; flagdata gc aborts it"),
         ("flagdata/object_cache.py", "run flagdata verify: it"),
     ),
+    "a lake that a version wrote whose branches were files alone": (
+        ("flagdata/lake/marking.py", "give the flagdata push o"),
+    ),
     "a change of bytes between two reads": (("flagdata/lake/copying.py", "run flagdata verify"),),
     "a definition, no remedy": (("flagdata/pages/glossary.py", "A regression that makes"),),
     "a disk that fails while it confirms": (("flagdata/durable.py", "check the disk, then run"),),

@@ -27,7 +27,7 @@ from flagdata.lake import (
 )
 from flagdata.lake.log import PREVIOUS_HASH
 from flagdata.storage import Place
-from tests.flagdata.lake.conftest import LINKS, overwrite, put_text
+from tests.flagdata.lake.conftest import LINKS, overwrite, put_older_ref, put_text
 from tests.flagdata.lake.test_transfer import is_whole, no_bar
 from tests.flagdata.lake.test_unfinished import stopped
 from tests.program import invoke
@@ -337,3 +337,34 @@ def test_the_command_says_item_by_item_what_it_took_and_what_is_left(lake: Lake,
     assert "1 item taken" in ended.err
     document = invoke("heal", older.path, "--lake", lake.path, "--json").document
     assert (document["taken"], [left["kind"] for left in document["left"]]) == ([], ["object-missing"])
+
+
+def test_refs_of_earlier_versions_that_are_damaged_or_lost_come_from_an_older_lake(lake: Lake, tmp_path: Path) -> None:
+    put_text(lake, "first")
+    paths = [put_older_ref(lake, kind, name) for kind, name in (("tags", "v1"), ("tags", "v2"), ("branches", "side"))]
+    older, _ = clone(lake, tmp_path / "older", bars=no_bar)
+    right = [path.read_bytes() for path in paths]
+    overwrite(paths[0], b"{")
+    overwrite(paths[1], right[1].replace(b'"v2"', b'"v3"'))
+    paths[2].unlink()
+    done = healed(lake.path, older.path)
+    assert ([taken.kind for taken in done.taken], done.left) == (["ref"] * 3, ())
+    assert [path.read_bytes() for path in paths] == right
+    lake.delete_tag("v1")
+    assert healed(lake.path, older.path) == restoring.Healed(taken=(), left=())
+    assert set(Lake.open(lake.path).refs.tags()) == {"v2"}
+
+
+def test_a_tag_that_the_log_states_needs_no_other_lake_and_is_pulled_from_none(lake: Lake, tmp_path: Path) -> None:
+    put_text(lake, "first")
+    lake.tag("v1")
+    older, _ = clone(lake, tmp_path / "older", bars=no_bar)
+    put_text(lake, "second")
+    path = lake.refs.root / "tags" / "v1.json"
+    right = path.read_bytes()
+    for damage in (lambda: overwrite(path, b"{"), path.unlink):
+        damage()
+        assert lake.rows(at="v1").num_rows == 1
+        done = pull(older, lake, bars=no_bar)
+        assert [taken.kind for taken in done.healed] == ["ref"]
+        assert path.read_bytes() == right

@@ -20,6 +20,7 @@ from flagdata.lake import (
     clone,
     collect,
     doctor,
+    heal,
     expire,
     garbage,
     is_healthy,
@@ -410,7 +411,7 @@ def test_a_ref_of_an_earlier_version_is_entered_into_the_log_by_the_next_commit(
 
 
 @pytest.mark.parametrize("kind", ["tags", "branches"])
-def test_a_damaged_ref_of_an_earlier_version_that_is_deleted_comes_back_by_a_pull(
+def test_a_damaged_ref_of_an_earlier_version_comes_back_by_the_heal_that_is_named(
     lake: Lake, tmp_path: Path, kind: str
 ) -> None:
     put_text(lake, "first")
@@ -419,9 +420,8 @@ def test_a_damaged_ref_of_an_earlier_version_that_is_deleted_comes_back_by_a_pul
     overwrite(path, b"{")
     found = [finding for finding in doctor(lake) if finding.kind == "ref-unreadable"]
     assert found
-    assert all("delete the file and flagdata pull a clone" in str(finding.fix) for finding in found)
-    path.unlink()
-    transfer(copy, lake, bars=no_bar)
+    assert all("flagdata heal FROM" in str(finding.fix) for finding in found)
+    assert heal(lake, copy, bars=no_bar).left == ()
     assert lake.refs.stored() == copy.refs.stored()
     assert is_whole(lake)
 
