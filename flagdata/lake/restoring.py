@@ -25,7 +25,7 @@ import pyarrow.parquet as pq
 
 from flagdata import object_cache
 from flagdata.documents import from_json
-from flagdata.durable import disk_errors, flush_folder, replace_durably
+from flagdata.durable import disk_errors, flush_folder, make_folders, replace_durably
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.catalog import HINT
@@ -177,8 +177,7 @@ def _folders(lake: Lake, source: Lake) -> Iterator[Taken]:
         return
     for folder in (root / name for name in FOLDERS if (source.path / name).is_dir()):
         if not folder.exists():
-            folder.mkdir(parents=True)
-            flush_folder(folder.parent)
+            make_folders(folder)
             yield Taken(kind="folder", name=str(folder), why=_MISSING)
 
 
