@@ -101,14 +101,13 @@ def test_a_damaged_ref_of_an_earlier_version_is_taken_from_a_clone(user: User) -
     user.succeeds("doctor", shows="(?m)^healthy")
 
 
-def test_an_erasure_deletes_nothing_until_what_doctor_names_is_mended(user: User) -> None:
+def test_an_erasure_is_refused_until_a_damaged_ref_is_healed(user: User) -> None:
     path = put_older_ref(the_lake(user), "tags", "v9")
-    kept = path.read_bytes()
+    user.succeeds("clone", "lake", "copy.lake")
     overwrite(path, b"{")
     erase = ("withdraw", "first", "--everywhere", "-m", "asked")
-    user.meets("lake/removal.py", "mend what flagdata docto", *erase)
-    user.follows("doctor", code=3, shows="error: ref-unreadable")
-    overwrite(path, kept)
+    user.meets("flagdata/durable.py", "flagdata heal FROM, a c", *erase)
+    user.follows("heal", "copy.lake")
     user.succeeds(*erase)
     user.succeeds("doctor", shows="(?m)^healthy")
 

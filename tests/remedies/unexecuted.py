@@ -9,6 +9,7 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "a lake that a version wrote whose branches were files alone": (
         ("flagdata/lake/marking.py", "give the flagdata push o"),
+        ("flagdata/lake/removal.py", "mend what flagdata docto"),
     ),
     "a change of bytes between two reads": (("flagdata/lake/copying.py", "run flagdata verify"),),
     "a definition, no remedy": (("flagdata/pages/glossary.py", "A regression that makes"),),
