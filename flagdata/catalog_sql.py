@@ -7,7 +7,6 @@ more than one statement. What it gives is handed on in parts of at most `PART` b
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Iterator, Sequence
@@ -20,6 +19,7 @@ import pyarrow as pa
 from flagdata.errors import LimitError, UnknownNameError, UsageError
 from flagdata.retired_names import present_sql
 from flagdata.schema import CATALOG, Field, Kind, catalog_schema
+from flagdata.workload import cores
 
 if TYPE_CHECKING:
     import pyarrow.compute as pc
@@ -53,7 +53,7 @@ _SEALED: dict[str, str | bool | int | float | list[str]] = {
     "autoload_known_extensions": "false",
     "python_enable_replacements": "false",
     "temp_directory": "",
-    "threads": min(8, len(os.sched_getaffinity(0))),  # each has a stack of some MB, which counts
+    "threads": min(8, cores()),  # each has a stack of some MB, which counts
 }
 _MISSING_COLUMN = re.compile(r'Referenced column "([^"]+)" (?:was )?not found|does not have a column named "([^"]+)"')
 _MISSING_TABLE = re.compile(r"Table with name (\S+) does not exist")

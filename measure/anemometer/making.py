@@ -19,6 +19,7 @@ from flagdata.lake import Artifact, Lake, results
 from flagdata.lake.results import Placed
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
+from flagdata.workload import one_thread
 from measure.anemometer.calibration import ANSWER, ENOUGH, LEAST, Calibrated, Recording, calibrated, recorded
 from measure.anemometer.features import VERSION
 from measure.anemometer.networks import CALIBRATED, network
@@ -99,6 +100,7 @@ class Made:
         return {"name": self.name, "artifact": self.artifact, **self.result.as_dict()}
 
 
+@one_thread()
 def made(
     sources: Sequence[str],
     size: FlagSize,

@@ -13,6 +13,7 @@ import numpy as np
 from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
+from flagdata.workload import one_thread
 from measure.cloth.design import CalibrationOptions, designs_of, simulated
 from measure.cloth.emulator import TAKEN_APART, Emulator, informative
 from measure.cloth.numerics import Correction, corrected, with_errors
@@ -244,6 +245,7 @@ class Calibration:
         }
 
 
+@one_thread()
 def calibrate(
     recordings: Sequence[Observed],
     options: CalibrationOptions,

@@ -17,6 +17,7 @@ from flagdata.lake import Lake
 from flagdata.lake.naming import COLUMNS, meant
 from flagdata.sources import FILMED
 from flagdata.stated import Stated
+from flagdata.workload import one_thread
 from measure.cloth.recording import LONGEST, Excerpt, Observed, check_duration, check_in_all, cut, first_part, usable
 from measure.cloth.simulation import OBSERVED
 from measure.cloth.table_clock import joined
@@ -182,6 +183,7 @@ class Sources:
         check_in_all(usable_sources, left_out=left_out)
         return cls(opened=tuple(usable_sources), left_out=left_out)
 
+    @one_thread()
     def read(self, size: FlagSize, *, advance: Callable[[int], object] | None = None) -> Gathered:
         """Read them, and leave out what cannot be used; as `Opened.read`."""
 

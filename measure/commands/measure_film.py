@@ -17,6 +17,7 @@ from flagdata.lake import Lake
 from flagdata.measured import Answer, Estimate, Measured, Windows
 from flagdata.stated import Stated
 from flagdata.wind_elsewhere import WindComparison, compared
+from flagdata.workload import one_thread
 from measure.anemometer.measuring import measure_by
 from measure.anemometer.networks import Network, gate_beside, network
 from measure.estimate.answer import Quantity
@@ -27,6 +28,7 @@ from measure.estimate.measuring import Measurement, Options, measure
 from measure.film.source import FilmReading, Subject, size_of, subjects
 
 
+@one_thread()
 def run(
     subject: Subject, network: Network, options: Options, *, advance: Callable[[int, int], None] | None = None
 ) -> Measurement:

@@ -12,6 +12,7 @@ from flagdata.examples import check_without_lake
 from flagdata.options import AsJson, command, option, options
 from flagdata.printable import SHORT
 from flagdata.shared_options import WRITTEN, Keeping
+from flagdata.workload import one_thread
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -104,6 +105,7 @@ def observed(chosen: Observing) -> Rows:
     return Rows(table.arrow())
 
 
+@one_thread()
 def _table(chosen: Observing, lake: Lake | None, *, at: str | None) -> tuple[ObservableTable, Subject, FilmReading]:
     """Returns the observables of a film, with where it is from and how it was read."""
     from measure.film.similarity import FlagSize

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import time
 from dataclasses import replace
@@ -18,6 +17,7 @@ import numpy as np
 from flagdata.console import progress, say
 from flagdata.lake import Lake
 from flagdata.pages.pictures import data_url, figure_url, moving
+from flagdata.workload import cores
 from measure.commands.measurement_artifact import read
 from measure.demo.cards import Card, Judgement, Truth
 from measure.demo.page import recovered, write_page
@@ -149,7 +149,7 @@ def _film_options(recording: Recording) -> tuple[str, ...]:
         "--simulations",
         str(SIMULATIONS),
         "--workers",
-        str(_cores()),
+        str(cores()),
         "--cache",
         "simulations",
         "--lake",
@@ -234,7 +234,7 @@ def _film(shell: Transcript, recipe: RecordingRecipe) -> Recording:
     )
     with _Step(shell, "A film and a log", done, alt="The film") as step:
         with progress(2 * round(recipe.duration * recipe.rate), label="film", unit="frame") as advance:
-            recording = make_recording(recipe, shell.folder, workers=_cores(), advance=advance)
+            recording = make_recording(recipe, shell.folder, workers=cores(), advance=advance)
         step.picture = _moving(recording.video, recipe.rate)
     return recording
 
@@ -338,10 +338,6 @@ def _moving(video: Path, rate: int) -> str:
             if len(frames) == 2 * _SHOWN:
                 break
     return moving(np.stack(frames[::2]), rate=rate / 2, side=320)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0))
 
 
 def _judgement(text: str, true: float) -> Judgement:

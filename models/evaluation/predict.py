@@ -13,6 +13,7 @@ from flagdata.arrays import UInt8Array
 from flagdata.dataset.pairs import Pairs
 from flagdata.rng import child_seed
 from flagdata.stated import Stated
+from flagdata.workload import one_thread
 from models.estimator import Estimator
 from models.evaluation.predictions import Predictions
 from models.learner import Learner, Loss
@@ -138,15 +139,11 @@ def time_a_clip(estimator: Estimator, pairs: Pairs) -> float:
 
 def milliseconds(work: Callable[[UInt8Array], object], pairs: Pairs) -> float:
     """Times what one clip (1, frames, height, width) costs on one core: the median of some, decoded before [ms]."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
     clips = [pairs[index].clip.numpy() for index in range(min(_TIMED, len(pairs)))]
     times = []
-    try:
+    with one_thread():
         for clip in clips:
             begun = time.perf_counter()
             work(clip)
             times.append(time.perf_counter() - begun)
-    finally:
-        torch.set_num_threads(threads)
     return 1e3 * float(np.median(times))

@@ -35,6 +35,7 @@ from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest
 from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS
+from flagdata.workload import one_thread
 from models import targets
 from models.conditioning.conditioning import VERSION
 from models.crops import Cropping
@@ -381,19 +382,17 @@ def _fill(
     workers: int,
     advance: Advance,
 ) -> None:
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
     pool = ThreadPoolExecutor(workers, thread_name_prefix="inputs")
-    try:
-        todo = [
-            pool.submit(lambda row, path: _write(path, compute(row), front_end), row, path) for row, path in missing
-        ]
-        for finished in as_completed(todo):
-            finished.result()
-            advance(1)
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-        torch.set_num_threads(threads)
+    with one_thread():
+        try:
+            todo = [
+                pool.submit(lambda row, path: _write(path, compute(row), front_end), row, path) for row, path in missing
+            ]
+            for finished in as_completed(todo):
+                finished.result()
+                advance(1)
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _write(path: Path, clips: Sequence[Tensor], front_end: FrontEnd) -> None:

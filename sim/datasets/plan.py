@@ -17,13 +17,12 @@ from flagdata.errors import FlagdataError
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, write_meshes
 from flagdata.schema import CLIP_FRAMES
-from flagdata.workload import announced
+from flagdata.workload import announced, one_thread
 from sim.datasets import jobs
 from sim.datasets.cast import Cast, Roll, casts, recall_failures
 from sim.datasets.films import Sequences
 from sim.datasets.recipe import DatasetRecipe
 from sim.datasets.shard import Shard
-from sim.run.publish import one_thread
 
 T = TypeVar("T")
 _FEW, _MORE = 3, 9  # frames of the two runs between which costs are linear

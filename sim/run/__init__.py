@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sim.run.arrays import recipe_of
     from sim.run.batch import CRUMPLED, BatchOutcome, Stepper, principal_strains, run
     from sim.run.members import Crew
-    from sim.run.publish import member_artifact, one_thread, simulate
+    from sim.run.publish import member_artifact, simulate
     from sim.run.reading import of_content, parse
     from sim.run.recipe import IntegratorSpec, MaterialSpec, Recipe, Shape
 

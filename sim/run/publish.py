@@ -7,7 +7,6 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import islice
@@ -22,6 +21,7 @@ from flagdata.lake.healing import Healing, unsound
 from flagdata.lake.meshes import write_meshes
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
+from flagdata.workload import one_thread
 from sim.compiler import library
 from sim.run.batch import BatchOutcome, Stepper, run
 from sim.run.members import Crew
@@ -178,17 +178,6 @@ def outcomes(
         finally:
             ticks.stop()
             executor.shutdown(cancel_futures=True)
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Limits torch to one thread: the order of its sums, and so their last bits, depends on how many it has."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, step: float, branch: str) -> CommitResult:

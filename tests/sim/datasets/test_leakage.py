@@ -11,8 +11,8 @@ import pytest
 from flagdata.lake import MeshSequence
 from flagdata.record import Record
 from flagdata.rng import stream
+from flagdata.workload import one_thread
 from sim.datasets import DatasetRecipe, Roll, Sequences, casts, jobs
-from sim.run import one_thread
 from tests.sim.datasets.leakage import FEATURES, Surroundings, accuracies, dealt_anew, features_of
 
 SEQUENCES, FILMS = 40, 80

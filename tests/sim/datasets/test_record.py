@@ -13,8 +13,9 @@ import pytest
 from flagdata.dataset import clip_rows
 from flagdata.lake import Artifact
 from flagdata.record import CAMERA, PROVENANCE, Record
+from flagdata.workload import one_thread
 from sim.datasets import DatasetRecipe, PlannedFilm, Sequences, anemometer, casts, jobs
-from sim.run import Crew, one_thread
+from sim.run import Crew
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,109 @@
+"""Commands that read films take the processor time of their work, also on a machine that is busy or has a quota."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from unittest.mock import Mock
+
+import pytest
+import torch
+
+import flagdata
+from flagdata.workload import cores
+from measure.anemometer.making import made
+from measure.cloth.calibration import calibrate
+from measure.cloth.sources import Sources
+from measure.commands.measure_film import run
+
+MOST = 1.5
+"""Processor time on a busy machine, of that on an idle one."""
+FILM = ("measure", "example:flag")
+POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def _processor_time(environment: dict[str, str], folder: Path) -> float:
+    """Runs the command; the processor time that its process took [s]."""
+    before = os.times()
+    subprocess.run(
+        [sys.executable, "-m", "flagdata", *FILM], env=environment, cwd=folder, check=True, capture_output=True
+    )
+    after = os.times()
+    return after.children_user + after.children_system - before.children_user - before.children_system
+
+
+@pytest.fixture
+def busy() -> Iterator[None]:
+    """Twice as many processes as cores that do nothing but turn; their time is no child's that was waited for."""
+    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * cores())]
+    yield
+    for loop in loops:
+        loop.kill()
+    for loop in loops:
+        loop.wait()
+
+
+def test_measuring_on_a_busy_machine_takes_the_processor_time_of_its_work(busy: None, tmp_path: Path) -> None:
+    """The work is what one thread takes, whose time is nearly that of an idle machine on a busy one, too."""
+    plain = {name: value for name, value in os.environ.items() if name not in POOLS}
+    plain["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
+    work = _processor_time(plain | dict.fromkeys(POOLS, "1"), tmp_path)
+    assert _processor_time(plain, tmp_path) < MOST * work
+
+
+class _ReachedError(Exception):
+    """The first step of the work."""
+
+
+ENTRIES: dict[str, tuple[str, Callable[[], object]]] = {
+    "measure": (
+        "measure.commands.measure_film.gate_beside",
+        lambda: run(Mock(), Mock(reading=None), Mock()),
+    ),
+    "observe": ("measure.film.source.subjects", lambda: flagdata.observe("flag.mp4", flag_size=(1.5, 1.0))),
+    "calibrate, films": ("measure.cloth.sources.usable", lambda: Sources(opened=(), left_out=()).read(Mock())),
+    "calibrate, weight": (
+        "measure.cloth.calibration.designs_of",
+        lambda: calibrate((), Mock(), folder=Path("unused")),
+    ),
+    "calibrate, anemometer": (
+        "measure.anemometer.making.usable",
+        lambda: made(
+            ["a"],
+            Mock(),
+            Mock(),
+            name=None,
+            model=None,
+            lake=None,
+            at="main",
+            branch=None,
+            first=0,
+            last=None,
+            level=0.9,
+        ),
+    ),
+}
+"""What reads films → its first step, and a call."""
+
+
+@pytest.mark.parametrize("entry", ENTRIES)
+def test_films_are_read_by_one_thread_and_the_callers_threads_stay(entry: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    place, call = ENTRIES[entry]
+    seen: list[int] = []
+
+    def reach(*_: object, **__: object) -> None:
+        seen.append(torch.get_num_threads())
+        raise _ReachedError
+
+    monkeypatch.setattr(place, reach)
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        with pytest.raises(_ReachedError):
+            call()
+        assert (seen, torch.get_num_threads()) == ([1], 2)
+    finally:
+        torch.set_num_threads(before)
