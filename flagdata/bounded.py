@@ -16,8 +16,10 @@ import threading
 import time
 import weakref
 from contextlib import suppress
+from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import IO, Any, cast
 
 from flagdata.errors import FlagdataError
@@ -28,22 +30,38 @@ _LOOK = 1.0
 """Seconds between looks of a child whether its parent is still there."""
 _BY_MEMORY = 3
 """Exit code of a child that was refused memory."""
+_OF_MEMORY = ("bad_alloc", "memory allocation", "MemoryError")
+"""What libraries of C++, Rust and Python write last where they end their process for want of memory."""
+_SHOWN = 200  # letters of what a child wrote last
+
+
+class End(StrEnum):
+    """Names how a child ended."""
+
+    LATE = "its time was up"
+    MEMORY = "it was refused memory"
+    SIGNAL = "it was ended by a signal"
+    EXIT = "it ended by itself"
+    CLOSED = "it was closed"
 
 
 class EndedError(Exception):
-    """The child is no more: its time was up, or it was refused memory, which may make a library end its process.
+    """The child is no more.
 
     Attributes:
-        late: whether its time was up.
+        end: how it ended.
+        detail: the signal's name, or the exit code and what the child wrote last.
     """
 
-    def __init__(self, *, late: bool) -> None:
-        self.late = late
-        super().__init__(
-            "the child process was stopped, as its time was up"
-            if late
-            else "the child process has ended: it was refused memory, failed, or was closed"
-        )
+    def __init__(self, end: End, detail: str = "") -> None:
+        self.end = end
+        self.detail = detail
+        super().__init__(f"the child process has ended: {end}{detail and f' ({detail})'}")
+
+    @property
+    def late(self) -> bool:
+        """Returns whether its time was up."""
+        return self.end is End.LATE
 
 
 class Child:
@@ -59,16 +77,17 @@ class Child:
 
     def __init__(self, serve: str, *, memory: int) -> None:
         code = f"import sys; sys.path[:] = {sys.path!r}; from flagdata.bounded import run; run({serve!r}, {memory})"
+        self._said: IO[bytes] = TemporaryFile()  # noqa: SIM115  closed with the pipes
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", code],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            stderr=self._said,
         )
         self._pipes = cast(tuple[IO[bytes], IO[bytes]], (self._process.stdin, self._process.stdout))
         self._owner = os.getpid()
         self._ready = False
-        self._end = weakref.finalize(self, _end, self._process, self._pipes, self._owner)
+        self._end = weakref.finalize(self, _end, self._process, (*self._pipes, self._said), self._owner)
 
     @property
     def usable(self) -> bool:
@@ -101,7 +120,7 @@ class Child:
 
     def _exchange(self, message: object, seconds: float) -> Any:
         if not self.usable:
-            raise EndedError(late=False)
+            raise EndedError(End.CLOSED)
         questions, answers = self._pipes
         late = threading.Event()
         timer = threading.Timer(min(seconds, threading.TIMEOUT_MAX), self._stop, [late])
@@ -112,8 +131,9 @@ class Child:
             questions.flush()
             answered, value = pickle.load(answers)
         except (EOFError, OSError, pickle.UnpicklingError):
+            end, detail = (End.LATE, "") if late.is_set() else self._ended()
             self.close()
-            raise EndedError(late=late.is_set()) from None
+            raise EndedError(end, detail) from None
         except BaseException:  # an interrupt: what it answers later would be taken for the next answer
             self.close()
             raise
@@ -122,17 +142,31 @@ class Child:
             timer.join()
         if late.is_set():  # its time was up just as the answer came: it was ended all the same
             self.close()
-            raise EndedError(late=True)
+            raise EndedError(End.LATE)
         if not answered:
             raise value
         return value
+
+    def _ended(self) -> tuple[End, str]:
+        """Finds out how it ended without having been asked to: a library that is refused memory may say so last."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout=_LOOK)
+        code = self._process.poll()
+        self._said.seek(0)
+        lines = self._said.read().decode(errors="replace").split("\n")
+        said = " ".join(line for line in lines if line.strip())[-_SHOWN:]
+        if code == _BY_MEMORY or any(word in said for word in _OF_MEMORY):
+            return End.MEMORY, said
+        if code is not None and code < 0:
+            return End.SIGNAL, signal.Signals(-code).name
+        return End.EXIT, f"exit code {code}{said and f': {said}'}"
 
     def _stop(self, late: threading.Event) -> None:
         late.set()
         self._process.kill()
 
 
-def _end(process: subprocess.Popen[bytes], pipes: tuple[IO[bytes], IO[bytes]], owner: int) -> None:
+def _end(process: subprocess.Popen[bytes], pipes: tuple[IO[bytes], ...], owner: int) -> None:
     if owner != os.getpid():
         return
     process.kill()

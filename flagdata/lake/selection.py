@@ -16,9 +16,9 @@ from typing import Any, Protocol
 
 import pyarrow as pa
 
-from flagdata.bounded import EndedError
+from flagdata.bounded import End, EndedError
 from flagdata.catalog_sql import COLUMNS, Question
-from flagdata.errors import LimitError, UnknownNameError, UsageError
+from flagdata.errors import FlagdataError, LimitError, UnknownNameError, UsageError
 from flagdata.lake.label_columns import PREFIX, columns
 from flagdata.lake.matching import Where, condition, matching
 from flagdata.lake.refs import View
@@ -192,11 +192,12 @@ class Selection:
         Raises:
             LimitError: there is none left, or there was not enough.
             UsageError: the SQL cannot be run, or needs too much memory.
+            FlagdataError: its process was killed, crashed or ended.
             CorruptError: a file of the catalog cannot be read.
         """
         try:
             if self._left <= 0:
-                raise EndedError(late=True)
+                raise EndedError(End.LATE)
             self._process.started()
             begun = time.monotonic()
             answer = self._process.ask((verb, self._number, *rest), seconds=self._left)
@@ -209,16 +210,35 @@ class Selection:
                     fix="narrow it down; `flagdata query --time-limit SECONDS` allows more",
                 ) from None
             self._check_rows()
-            raise UsageError(
-                "it needs more memory than there is",
-                where=_sql_of(self.request),
-                fix=f"narrow it down, or aggregate in SQL: it may take {MEMORY / 1e9:g} GB",
+            raise self._broken(ended) from None
+        except RuntimeError as error:
+            self._check_rows()
+            raise FlagdataError(
+                f"the SQL could not be run: {error}", where=_sql_of(self.request), fix="write it in another way"
             ) from None
         self._left -= time.monotonic() - begun
         if isinstance(answer, UsageError):
             self._check_rows()
             raise answer
         return answer
+
+    def _broken(self, ended: EndedError) -> FlagdataError:
+        """Returns the error for a process that ended before its time was up."""
+        where = _sql_of(self.request)
+        if ended.end is End.MEMORY:
+            fix = f"narrow it down, or aggregate in SQL: it may take {MEMORY / 1e9:g} GB"
+            return UsageError("it needs more memory than there is", where=where, fix=fix)
+        if ended.end is End.SIGNAL and ended.detail == "SIGKILL":
+            message = (
+                "the process that runs SQL was killed (SIGKILL), by another program or for want of the machine's memory"
+            )
+            return FlagdataError(message, where=where, fix="end other programs, or narrow it down, and do it again")
+        if ended.end is End.SIGNAL:
+            message = f"the process that runs SQL crashed ({ended.detail}): DuckDB cannot run this"
+            return FlagdataError(message, where=where, fix="write it in another way, or narrow it down")
+        return FlagdataError(
+            f"the process that runs SQL has ended: {ended.detail or ended.end}", where=where, fix="do it again"
+        )
 
     def _check_rows(self) -> None:
         """Raise CorruptError where a file of the catalog is to blame."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from flagdata.bounded import Child, EndedError
+from flagdata.bounded import Child, End, EndedError
 from flagdata.errors import InputError
 
 MEMORY = 256 << 20
@@ -25,6 +25,14 @@ def _act(message: tuple[str, Any]) -> Any:
         return len(bytes(value))
     if what == "abort":
         os.abort()
+    if what == "kill":
+        os.kill(os.getpid(), 9)
+    if what == "bad_alloc":
+        os.write(2, b"terminate called after throwing an instance of 'std::bad_alloc'\n")
+        os.abort()
+    if what == "leave":
+        os.write(2, b"for no reason\n")
+        os._exit(value)
     if what == "sleep":
         time.sleep(value)
     if what == "print":
@@ -63,15 +71,40 @@ def test_a_child_answers_until_it_is_closed() -> None:
     assert not _is_running(pid)
 
 
-@pytest.mark.parametrize("message", [("take", MEMORY + (64 << 20)), ("abort", None)])
-def test_a_child_that_takes_too_much_memory_or_aborts_has_ended(message: tuple[str, Any]) -> None:
+@pytest.mark.parametrize(
+    ("message", "end", "detail"),
+    [
+        (("take", MEMORY + (64 << 20)), End.MEMORY, ""),
+        (("bad_alloc", None), End.MEMORY, "std::bad_alloc"),
+        (("abort", None), End.SIGNAL, "SIGABRT"),
+        (("kill", None), End.SIGNAL, "SIGKILL"),
+        (("leave", 5), End.EXIT, "exit code 5: for no reason"),
+    ],
+)
+def test_how_a_child_ended_is_told_apart(message: tuple[str, Any], end: End, detail: str) -> None:
     child = _child()
     with pytest.raises(EndedError) as caught:
         child.ask(message, seconds=LONG)
-    assert not caught.value.late
+    assert (caught.value.end, caught.value.late) == (end, False)
+    assert detail in caught.value.detail
     assert not child.usable
-    with pytest.raises(EndedError):
+    with pytest.raises(EndedError) as again:
         child.ask(("", None), seconds=LONG)
+    assert again.value.end is End.CLOSED
+
+
+def test_an_interrupt_ends_the_child_and_is_handed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    child = _child()
+    assert child.ask(("", None), seconds=LONG)
+
+    def interrupt(_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("flagdata.bounded.pickle.load", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            child.ask(("", None), seconds=LONG)
+    assert not child.usable
 
 
 def test_a_child_is_ended_when_its_time_is_up_whatever_it_does() -> None:

@@ -11,10 +11,11 @@ import time
 import pyarrow as pa
 import pytest
 
+from flagdata.bounded import Child, End, EndedError
 from flagdata.catalog_sql import PART
 from flagdata.commands.query import as_document
 from flagdata.commands.query import query as command
-from flagdata.errors import LimitError, UsageError
+from flagdata.errors import FlagdataError, LimitError, UsageError
 from flagdata.lake import Request, Selection, selection
 from flagdata.schema import catalog_schema
 from tests.refusals import unrefused
@@ -70,7 +71,8 @@ MOST = 400_000_000
 READ_LARGE = """
 import json, resource, sys
 from flagdata import sql_process
-from flagdata.errors import LimitError, UsageError
+from flagdata.bounded import Child, End, EndedError
+from flagdata.errors import FlagdataError, LimitError, UsageError
 from flagdata.lake import Request, Selection, selection
 from flagdata.schema import catalog_schema
 sql_process.MEMORY = selection.MEMORY = int(sys.argv[1])
@@ -130,6 +132,32 @@ def test_a_query_after_one_that_was_ended_has_a_process_of_its_own() -> None:
     assert first.table()["a"].to_pylist() == [1]
     assert second.table()["a"].to_pylist() == [0, 1, 2]
     assert first.total() == 1
+
+
+ENDS: dict[str, tuple[Exception, str]] = {
+    "memory": (EndedError(End.MEMORY), "needs more memory.*narrow it down"),
+    "killed": (EndedError(End.SIGNAL, "SIGKILL"), r"was killed \(SIGKILL\).*do it again"),
+    "crashed": (EndedError(End.SIGNAL, "SIGSEGV"), r"crashed \(SIGSEGV\).*another way"),
+    "left": (EndedError(End.EXIT, "exit code 1: no module"), "has ended: exit code 1: no module.*do it again"),
+    "closed": (EndedError(End.CLOSED), "it was closed.*do it again"),
+    "late": (EndedError(End.LATE), "longer than .*--time-limit"),
+    "raised": (RuntimeError("its process raised KeyError: 'x'"), "KeyError.*another way"),
+}
+"""How the process of a query may end → what is reported."""
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_each_end_of_the_process_has_its_own_sentence(end: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    raised, reported = ENDS[end]
+    asked = Selection(EMPTY, Request(sql="select 1 a"))
+
+    def fail(*_: object, **__: object) -> None:
+        raise raised
+
+    monkeypatch.setattr(Child, "ask", fail)
+    with pytest.raises(FlagdataError, match=reported) as refused:
+        asked.total()
+    assert ("memory" in refused.value.what) == (end in ("memory", "killed"))
 
 
 def test_a_filter_without_an_end_is_stopped() -> None:

@@ -11,8 +11,8 @@ import zipfile
 from importlib.util import find_spec
 from pathlib import Path
 
-from flagdata.bounded import Child, EndedError
-from flagdata.errors import InputError, LimitError
+from flagdata.bounded import Child, End, EndedError
+from flagdata.errors import FlagdataError, InputError, LimitError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
@@ -67,6 +67,9 @@ def _read(where: str, limits: Limits) -> Sheet | None:
     except EndedError as ended:
         if ended.late:
             raise LimitError(f"reading it takes longer than {_SECONDS:g} s", where=where, fix=_FIX) from None
+        if ended.end is not End.MEMORY:
+            message = f"the process that reads it has ended: {ended.detail or ended.end}"
+            raise FlagdataError(message, where=where, fix=f"do it again, or {_FIX}") from None
         message = (
             f"its sheets take more than {_MEMORY >> 20} MiB: cells count from the first to the last, filled or not"
         )
