@@ -6,6 +6,7 @@ The options of each call are stated in a class, from which the command of the sa
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,6 +94,8 @@ class Naming(AtVersion, OnLake):
 def tag(chosen: Naming) -> tuple[Ref, ...]:
     """Names a version of a lake for good, as `flagdata tag` does; without a name, lists the tags.
 
+    A tag keeps how the clips of its version are divided: its note "split".
+
     ```python
     (v2,) = flagdata.tag("v2", lake="field.lake")
     rows = flagdata.query("field.lake", at="v2")
@@ -106,8 +109,10 @@ def tag(chosen: Naming) -> tuple[Ref, ...]:
         NotFoundError: no such lake, version or tag.
         UsageError: options that contradict each other.
     """
+    from flagdata.dataset.tagged import tag
+
     lake = chosen.opened()
-    return _named(chosen, lake.refs.tags, put=lake.tag, delete=lake.delete_tag)
+    return _named(chosen, lake.refs.tags, put=partial(tag, lake), delete=lake.delete_tag)
 
 
 @called(Naming)

@@ -80,14 +80,17 @@ class NamingCommand(AsJson, Naming):
 def tag(chosen: NamingCommand) -> None:
     """Name what REF shows, for good; without NAME, list the tags.
 
-    The name of a tag that was deleted never shows anything else.
+    The name of a tag that was deleted never shows anything else. A tag keeps how the clips of its version are divided;
+    --json shows it.
     """
+    from flagdata.dataset import tagged
+
     lake = chosen.opened()
     if chosen.name is not None and chosen.delete:
         version = lake.delete_tag(chosen.name, chosen.message, discard=chosen.discard)
         _report_deletion("tag", chosen.name, version, as_json=chosen.as_json)
         return
-    refs = lake.refs.tags().values() if chosen.name is None else [lake.tag(chosen.name, at=chosen.at)]
+    refs = lake.refs.tags().values() if chosen.name is None else [tagged.tag(lake, chosen.name, at=chosen.at)]
     _print_refs("tags", refs, as_json=chosen.as_json)
 
 
@@ -256,6 +259,7 @@ def _print_refs(noun: str, refs: Collection[Ref], *, as_json: bool) -> None:
             "name": ref.name,
             "created": ref.created,
             "view": [{"branch": part.branch, "version": part.version} for part in ref.view],
+            "notes": dict(ref.notes),
         }
         for ref in refs
     ]

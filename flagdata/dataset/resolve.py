@@ -16,6 +16,7 @@ from flagdata.dataset.clips import TRUTH_SPEED, clip_truth, truth_series
 from flagdata.dataset.lineage import superseded
 from flagdata.dataset.sides import SideSize, SplitBy, clips_of, divide, lineage_of
 from flagdata.dataset.table import COLUMNS, PairTable
+from flagdata.dataset.tagged import hashed_split
 from flagdata.dataset.tolerance import Refusal, Tolerance, judge
 from flagdata.documents import column_json
 from flagdata.errors import NotFoundError, RefusedError, UsageError
@@ -43,7 +44,7 @@ class Resolved:
 def side_sizes(lake: Lake, *, where: Where | None, at: str | None, split_by: SplitBy | None) -> Mapping[str, SideSize]:
     """Sizes of all sides; arguments as in `Source.sides`, which see for what it raises."""
     catalog = lake.scan(lake.view(at))
-    return divide(catalog, clips_of(catalog, where), split_by).sizes
+    return divide(catalog, clips_of(catalog, where), split_by, hashed=hashed_split(lake, at)).sizes
 
 
 def resolve(
@@ -70,7 +71,7 @@ def resolve(
     table = PairTable.of(clips, labels={} if isinstance(catalog, Scan) else labels_of(catalog))
     statement = None
     if split is not None:
-        division = divide(catalog, clips, split_by)
+        division = divide(catalog, clips, split_by, hashed=hashed_split(lake, at))
         wanted = division.on(split)
         if not wanted:
             raise RefusedError(

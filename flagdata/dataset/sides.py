@@ -84,7 +84,7 @@ class Division:
         return {"rule": self.rule, **self.about, "sides": {side: asdict(size) for side, size in self.sizes.items()}}
 
 
-def divide(catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None) -> Division:
+def divide(catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None, *, hashed: HashedSplit) -> Division:
     """Decides on which side each row of a selection is.
 
     All clips of the catalog, or of the data sets that the selection is of, take part, so that two filters never put
@@ -92,7 +92,8 @@ def divide(catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None) ->
 
     Args:
         rows: of the selection: clips, or what `selected` returns.
-        split_by: the split that the user gives; `None` is the one that data sets state, else `HashedSplit()`.
+        split_by: the split that the user gives; `None` is the one that data sets state, else `hashed`.
+        hashed: the hashed split of this version, see `flagdata.dataset.tagged.hashed_split`.
 
     Raises:
         RefusedError: relatives are on two sides; some of the rows state a side and others none; or `split_by` takes
@@ -102,9 +103,9 @@ def divide(catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None) ->
         return _explicit(catalog, rows, split_by)
     stating = rows.filter(_STATES)
     if not stating.num_rows:
-        hashed = _Hashed.of(catalog, split_by or HashedSplit())
-        hashed.refuse_stating_relatives(rows)
-        return hashed.division(rows)
+        decided = _Hashed.of(catalog, split_by or hashed)
+        decided.refuse_stating_relatives(rows)
+        return decided.division(rows)
     datasets = _texts(stating, "dataset")
     if stating.num_rows < rows.num_rows:
         raise RefusedError(
@@ -127,6 +128,11 @@ def stated_sides(catalog: Catalog, rows: pa.Table) -> Division | None:
     """Describes the sides that rows state, whether or not relatives are on two of them; None where none states one."""
     stating = rows.filter(_STATES & condition({"kind": _DIVIDED}))
     return _stated(stating, _stated_origins(catalog, _texts(stating, "dataset"))) if stating.num_rows else None
+
+
+def hashed_sides(catalog: Catalog, rows: pa.Table, split_by: HashedSplit) -> Division:
+    """Describes the sides that a hash gives rows that state none, whether or not relatives of theirs state others."""
+    return _Hashed.of(catalog, split_by).division(rows)
 
 
 def selected(rows: pa.Table) -> pa.Table:

@@ -19,6 +19,7 @@ import pyarrow.compute as pc
 from flagdata.dataset.lineage import superseded
 from flagdata.dataset.sides import Division, divide, selected, stated_sides
 from flagdata.dataset.splits import HashedSplit
+from flagdata.dataset.tagged import hashed_split
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.export.croissant import write_croissant
 from flagdata.export.source import ExportRows
@@ -33,7 +34,9 @@ from flagdata.registry import Registry
 from flagdata.schema import FORMAT_VERSION, Kind
 
 
-def on_side(catalog: pa.Table, rows: pa.Table, split: str, *, salt: str) -> tuple[pa.Table, Division]:
+def on_side(
+    catalog: pa.Table, rows: pa.Table, split: str, *, salt: str, hashed: HashedSplit
+) -> tuple[pa.Table, Division]:
     """Selects the rows on one side: clips, and recordings, which go with their clips unless they state a side. Two
     exports of one version never put a session, day, seed or camera file on two sides.
 
@@ -43,7 +46,7 @@ def on_side(catalog: pa.Table, rows: pa.Table, split: str, *, salt: str) -> tupl
         UsageError: rows of another kind, which are on no side.
     """
     check_kinds(rows, "a split", frozenset({Kind.CLIP, Kind.RECORDING}))
-    division = divide(catalog, selected(rows), HashedSplit(salt=salt) if salt else None)
+    division = divide(catalog, selected(rows), HashedSplit(salt=salt) if salt else None, hashed=hashed)
     return rows.filter(_is_one_of(set(division.on(split)))), division
 
 
@@ -229,7 +232,8 @@ def prepare(lake: Lake, request: Export) -> Prepared:
     division = None
     if request.split is not None and rows.num_rows:
         matching = rows.num_rows
-        rows, division = on_side(catalog, rows, request.split, salt=request.salt)
+        hashed = hashed_split(lake, request.at)
+        rows, division = on_side(catalog, rows, request.split, salt=request.salt, hashed=hashed)
         if rows.num_rows in (0, matching):
             division.warn_whole()
         if not rows.num_rows:

@@ -223,7 +223,11 @@ def of_groups(folder: Path) -> set[str]:
 
 def of_winds(folder: Path) -> set[str]:
     tables = [pd.read_csv(path) for path in folder.glob("*.csv")]
-    return {side for table in tables for side in winds(table[next(c for c in map(str, table) if c.startswith("wind_speed"))])}
+    return {
+        side
+        for table in tables
+        for side in winds(table[next(c for c in map(str, table) if c.startswith("wind_speed"))])
+    }
 
 
 READERS: dict[str, tuple[Callable[[Path], set[str]], Kind, tuple[str, ...]]] = {
@@ -336,6 +340,7 @@ def by_masks(lake: Path, side: str, folder: Path) -> set[str]:
 
 CALLERS = {
     "flagdata/api/lakes.py": ("pairs",),
+    "flagdata/dataset/tagged.py": ("the note of a tag, of all clips",),
     "flagdata/dataset/resolve.py": ("Source.pairs", "Source.sides"),
     "flagdata/export/plan.py": ("flagdata export",),
     "measure/demo/page.py": ("the one recording of the demo, of which no side is asked for",),
@@ -351,7 +356,7 @@ CALLERS = {
 }
 """Module that takes clips or sides → the way by which it does, or why it asks for no side."""
 TAKING = {
-    "flagdata.dataset.sides": {"divide", "stated_sides"},
+    "flagdata.dataset.sides": {"divide", "hashed_sides", "stated_sides"},
     "models.training": {"sides_of"},
     "tests.studies.gate": {"FilmsOf"},
     "tests.studies.masks.examples": {"batches"},

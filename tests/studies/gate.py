@@ -17,6 +17,7 @@ import torch
 
 from flagdata.arrays import FloatArray
 from flagdata.console import LocalPath, progress, say
+from flagdata.dataset import HashedSplit
 from flagdata.dataset.sides import divide, selected
 from flagdata.errors import InputError
 from flagdata.lake.matching import matching
@@ -106,7 +107,7 @@ class FilmsOf(Sequence[Film]):
         self._lake, self._rate = flagdata.open(lake_path).lake, rate
         catalog = self._lake.table(self._lake.view(at))
         films = matching(catalog, {"kind": Kind.RECORDING, **data.rows})
-        of_side = divide(catalog, selected(films)).artifacts.get(side, frozenset())
+        of_side = divide(catalog, selected(films), hashed=HashedSplit()).artifacts.get(side, frozenset())
         rows = matching(films, {"artifact": of_side}).select(["name", "seed", "object"]).to_pylist()
         if not rows:
             raise InputError(

@@ -88,10 +88,9 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
     loaded = [load(member) for member in members]
     first = loaded[0]
     for other in loaded[1:]:
-        if (
-            _seedless(first.card["recipe"]) != _seedless(other.card["recipe"])
-            or _learned(first.card["data"]) != _learned(other.card["data"])
-        ):
+        if _seedless(first.card["recipe"]) != _seedless(other.card["recipe"]) or _learned(
+            first.card["data"]
+        ) != _learned(other.card["data"]):
             raise UsageError(
                 f"{other.card['name']} was trained otherwise than {first.card['name']}",
                 where=str(members),

@@ -43,7 +43,7 @@ def catalog(*rows: Artifact) -> pa.Table:
 
 def of(rows: list[Artifact], where: Any = None, split_by: Any = None) -> Division:
     table = catalog(*rows)
-    return divide(table, clips_of(table, where), split_by)
+    return divide(table, clips_of(table, where), split_by, hashed=HashedSplit())
 
 
 def test_each_clip_is_on_the_side_that_it_states() -> None:
@@ -73,7 +73,7 @@ def test_a_narrower_filter_moves_nothing_and_still_names_every_side() -> None:
 def test_a_recording_is_on_its_own_side_with_or_without_clips() -> None:
     rows = [row for row in data_set() if row.kind is Kind.RECORDING]
     table = catalog(*rows)
-    assert len(divide(table, selected(table)).on("train")) == COUNTS["train"]
+    assert len(divide(table, selected(table), hashed=HashedSplit()).on("train")) == COUNTS["train"]
 
 
 def test_a_side_that_no_data_set_states_is_unknown() -> None:

@@ -110,7 +110,9 @@ def test_an_empty_side_is_an_error_that_names_it(tmp_path: Path) -> None:
         only = Artifact(kind=Kind.CLIP, name="only", parents=(recording.id,), recording=recording.id, day="2026-05-01")
         tx.add(only)
     catalog = lake.table(lake.view(None))
-    filled = [side for side, on in divide(catalog, clips_of(catalog, None), HashedSplit()).artifacts.items() if on]
+    filled = [
+        side for side, on in divide(catalog, clips_of(catalog, None), hashed=HashedSplit()).artifacts.items() if on
+    ]
     assert len(filled) == 1
     for side in set(SIDES) - set(filled):
         with pytest.raises(NotFoundError, match=side):

@@ -10,6 +10,7 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
+from flagdata.dataset import HashedSplit
 from flagdata.dataset.sides import clips_of, divide
 from flagdata.errors import InputError, NotFoundError, RefusedError, UnknownNameError
 from flagdata.lake import Artifact, Lake
@@ -60,7 +61,7 @@ def names(table: pa.Table, clips: Collection[str]) -> list[str]:
 )
 def test_a_side_is_that_of_its_own_data_set_alone_whatever_another_is_called(dataset: str, other: str) -> None:
     table = catalog(*films(dataset, seed=0), *films(other, seed=100))
-    division = divide(table, clips_of(table, DataSpec(datasets=(dataset,)).rows))
+    division = divide(table, clips_of(table, DataSpec(datasets=(dataset,)).rows), hashed=HashedSplit())
     taken = {side: names(table, division.on(side)) for side in SIDES}
     assert taken == {
         "train": [f"{dataset}-train-{k:05d}" for k in range(4)],
@@ -72,7 +73,7 @@ def test_a_side_is_that_of_its_own_data_set_alone_whatever_another_is_called(dat
 def test_two_data_sets_are_learned_from_together() -> None:
     table = catalog(*films("X", seed=0), *films("X-train", seed=100), *films("other", seed=200))
     both = DataSpec(datasets=("X", "X-train")).rows
-    assert len(divide(table, clips_of(table, both)).on("train")) == 8
+    assert len(divide(table, clips_of(table, both), hashed=HashedSplit()).on("train")) == 8
 
 
 def shared(tie: str) -> list[Artifact]:
@@ -94,7 +95,7 @@ def test_sides_that_share_a_sequence_are_refused_in_training_and_in_judging(tie:
     table = catalog(*shared(tie))
     both = DataSpec(datasets=("ours", "theirs"))
     with pytest.raises(RefusedError, match=f"{tie} .* is in train and in test"):
-        divide(table, clips_of(table, both.rows))
+        divide(table, clips_of(table, both.rows), hashed=HashedSplit())
     with pytest.raises(RefusedError, match=f"{tie} .* is in test of theirs and in train of ours"):
         refuse_learned(table, [DataSpec(datasets=("ours",))], dataset="theirs", side="test")
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import flagdata
-from flagdata.dataset import clip_rows
+from flagdata.dataset import HashedSplit, clip_rows
 from flagdata.dataset.sides import clips_of, divide
 from flagdata.errors import CorruptError
 from flagdata.export import Export, export
@@ -135,7 +135,10 @@ def test_sides_come_in_and_stay_with_the_recordings_and_clips_that_are_made(data
     catalog = lake.table(lake.view(None))
     clips = clips_of(catalog, None)
     assert clips.num_rows == 3
-    assert {side: len(on) for side, on in divide(catalog, clips).artifacts.items()} == {"train": 2, "test": 1}
+    assert {side: len(on) for side, on in divide(catalog, clips, hashed=HashedSplit()).artifacts.items()} == {
+        "train": 2,
+        "test": 1,
+    }
 
 
 def test_the_splits_of_another_program_are_sides_of_the_folder(data_set: Path, tmp_path: Path) -> None:
