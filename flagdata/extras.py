@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 
 from flagdata.errors import MissingExtraError
+from flagdata.shell import command_line
 
 EXTRAS = {
     "torch": "physics",
@@ -44,7 +45,8 @@ def missing(error: ImportError) -> MissingExtraError | None:
     extra = EXTRAS[module]
     first = _CPU if extra in _OF_TORCH and not _is_installed(_TORCH) else ""
     return MissingExtraError(
-        f"{PURPOSES[extra]} {module}, which is not installed", fix=f"{first}pip install 'flagdata[{extra}]'"
+        f"{PURPOSES[extra]} {module}, which is not installed",
+        fix=first + command_line("pip", "install", f"flagdata[{extra}]"),
     )
 
 

@@ -17,6 +17,7 @@ from flagdata.options import Result, argument, options, verb
 from flagdata.parts import attribute
 from flagdata.recipes import Shelf
 from flagdata.registry import PlugInError, Registry
+from flagdata.shell import command_line
 
 
 @options
@@ -86,7 +87,7 @@ def recipe_of(kind: str, name: str) -> str:
         raise UsageError(
             f"{kind} have no recipes: each is code",
             where=f"{kind}: {name}",
-            fix=f"flagdata catalog {kind} says what each is",
+            fix=f"{command_line('flagdata', 'catalog', kind)} says what each is",
         )
     return shelf.named(name).text.rstrip("\n")
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from flagdata.console import ask, say
 from flagdata.errors import FlagdataError, RefusedError, ZoneMissingError
+from flagdata.shell import command_line
 
 if TYPE_CHECKING:
     from flagdata.ingest.anemometer.confirm import Answers, Drafted
@@ -43,7 +44,7 @@ class OnCommandLine:
         if not self.quiet:
             say(drafted.preview())
         if self.accept is not None:
-            say(f"--accept {self.accept} was given for another file, another draft or other answers")
+            say(f"{command_line('--accept', self.accept)} was given for another file, another draft or other answers")
         if not self.asks or self.accept is not None:
             raise UnconfirmedError.of(drafted)
         for sentence in drafted.sentences():

@@ -17,6 +17,7 @@ from flagdata.commands.ingest_options import KINDS, IngestRequest, check_applies
 from flagdata.console import document, echo, echo_lines, fail, progress, say
 from flagdata.errors import FlagdataError, InputError, UsageError
 from flagdata.findings import Finding
+from flagdata.shell import command_line
 
 if TYPE_CHECKING:
     from flagdata.ingest.anemometer import Guess
@@ -145,7 +146,7 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
         for note in guess["notes"]:
             echo(f"    not taken or odd: {note}")
         if len(guess["winds"]) > 1:
-            how = "" if guess is entry["guesses"][0] else f" with --as {guess['format']}"
+            how = "" if guess is entry["guesses"][0] else f" with {command_line('--as', guess['format'])}"
             winds = ", ".join(guess["winds"])
             echo(f"    {len(guess['winds'])} anemometers, each becomes an artifact{how}: {winds}")
         for doubt in guess["doubts"]:
@@ -265,7 +266,7 @@ def _check_joined(paths: Sequence[Path], kind_of: Callable[[Path], Guess]) -> No
             raise UsageError(
                 f"{_NOT_JOINED.get(kind, 'what is no film')} cannot be joined with others, only video files can",
                 where=str(path),
-                fix=f"ingest each by itself: flagdata ingest {' '.join(map(str, paths))}",
+                fix=f"ingest each by itself: {command_line('flagdata', 'ingest', *paths)}",
             )
 
 

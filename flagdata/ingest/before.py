@@ -19,6 +19,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.printable import SHORT
 from flagdata.record import Record
 from flagdata.schema import Kind
+from flagdata.shell import command_line
 from flagdata.signals import WindSeries
 
 _CHOOSES = ("wind", "talker", "session")
@@ -49,7 +50,8 @@ def other_readings(artifacts: Sequence[Artifact], source_hash: str, recipe: Mapp
             message = f"the same file was understood otherwise before, as {artifact.id[:SHORT]}{mean_speed}; both stay"
         else:
             continue
-        fix = f"if that one is wrong, take it off: flagdata withdraw {artifact.id[:SHORT]} -m 'read otherwise'"
+        withdraw = command_line("flagdata", "withdraw", artifact.id[:SHORT], "-m", "read otherwise")
+        fix = f"if that one is wrong, take it off: {withdraw}"
         findings.append(Finding.of("ingested-before", message, fix=fix))
     return tuple(findings)
 

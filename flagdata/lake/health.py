@@ -6,7 +6,6 @@ How an artifact is made again whose object is damaged or missing: the remedy tha
 from __future__ import annotations
 
 import random
-import shlex
 from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from datetime import timedelta
@@ -34,6 +33,7 @@ from flagdata.lake.removal import Unfinished, erased_objects, unfinished
 from flagdata.lake.removal import left as rows_left
 from flagdata.printable import SHORT, counted
 from flagdata.schema import FORMAT_VERSION, Kind
+from flagdata.shell import command_line
 from flagdata.storage import Place, StoreError
 from flagdata.storage.uploads import Upload
 
@@ -49,17 +49,21 @@ _BY_KIND = {
 
 def made_again(artifact: Artifact) -> str:
     """Names what replaces the object of an artifact that is damaged or missing."""
-    branch = "" if artifact.branch == MAIN else f" --branch {artifact.branch}"
+    branch = () if artifact.branch == MAIN else ("--branch", artifact.branch)
     if artifact.kind in (Kind.MEASUREMENT, Kind.MODEL):
-        withdraw = f"flagdata withdraw {artifact.id[:SHORT]}{branch} -m 'its data are lost'"
+        withdraw = command_line("flagdata", "withdraw", artifact.id[:SHORT], *branch, "-m", "its data are lost")
         return (
             f"give the command that made it again by the same code ({artifact.code_version}), which replaces the "
             f"object; or {HEAL}; or {withdraw}"
         )
     if artifact.source_name is not None:
-        how = f"flagdata ingest {shlex.quote(artifact.source_name)}{branch} again, with the options of the first time"
+        how = (
+            f"{command_line('flagdata', 'ingest', artifact.source_name, *branch)} again, with the options of the first "
+            "time"
+        )
     else:
-        how = f"{_BY_KIND.get(artifact.kind, 'give the command that made it again')}{branch and f', with{branch}'}"
+        on_branch = f", with {command_line(*branch)}" if branch else ""
+        how = f"{_BY_KIND.get(artifact.kind, 'give the command that made it again')}{on_branch}"
     return f"{how}: it replaces the object; or {HEAL}"
 
 
@@ -376,7 +380,7 @@ def _orphan(stored: StoredObject, limit: float, grace: timedelta) -> Finding:
         what=f"no row refers to {stored.name} ({stored.size} B): its ingest did not finish, or its rows were withdrawn",
         where=str(stored.path),
         value=float(stored.size),
-        fix="run flagdata gc" if old else f"none needed; flagdata gc takes it {_later(grace)}",
+        fix="run flagdata gc" if old else f"none needed; flagdata gc takes it, {_later(grace)}",
     )
 
 
@@ -402,7 +406,7 @@ def _left_upload(upload: Upload, limit: float, grace: timedelta) -> Finding:
         severity=Severity.WARNING if old else Severity.NOTE,
         what="a multipart upload was cut off: its parts show nowhere, and are paid for",
         where=str(upload),
-        fix="run flagdata gc" if old else f"none needed; flagdata gc aborts it {_later(grace)}",
+        fix="run flagdata gc" if old else f"none needed; flagdata gc aborts it, {_later(grace)}",
     )
 
 
@@ -492,12 +496,14 @@ def _system_files(lake: Lake) -> list[Finding]:
 
 def _abandoned(state: LeaseState) -> Finding:
     records = sorted(state.folder.glob("*.mcap"))
-    saved = f"; to save its unfinished record first: flagdata recover {records[0]}" if records else ""
+    fix = "run flagdata gc"
+    if records:
+        fix = f"run flagdata gc; to save its unfinished record first: {command_line('flagdata', 'recover', records[0])}"
     return Finding.of(
         "staging-left",
         f"a transaction ended without finishing ({state.owner})",
         where=str(state.folder),
-        fix=f"run flagdata gc{saved}",
+        fix=fix,
     )
 
 
@@ -510,7 +516,7 @@ def _unleased(path: Place, written: float, limit: float, grace: timedelta) -> Fi
         where=str(path),
         fix="move it away, or let flagdata gc delete it"
         if old
-        else f"none needed; flagdata gc takes it {_later(grace)}",
+        else f"none needed; flagdata gc takes it, {_later(grace)}",
     )
 
 
@@ -521,5 +527,5 @@ def _unpublished(path: Place, limit: float, grace: timedelta) -> Finding:
         severity=Severity.WARNING if old else Severity.NOTE,
         what="written by a process that ended before it could publish it",
         where=str(path),
-        fix="run flagdata gc" if old else f"none needed; flagdata gc takes it {_later(grace)}",
+        fix="run flagdata gc" if old else f"none needed; flagdata gc takes it, {_later(grace)}",
     )

@@ -19,6 +19,7 @@ from flagdata.lake.log import LogGapError
 from flagdata.lake.refs import MAIN, Slice, View
 from flagdata.lake.store import Store
 from flagdata.provenance import file_hash
+from flagdata.shell import command_line
 from flagdata.storage import Place
 
 _BEHIND = 86_400.0
@@ -153,8 +154,8 @@ def _lost(head: pa.Table, identities: list[str], where: str) -> list[Finding]:
             f"{count} rows are on branch {name!r}, which is not among the refs: no ref shows them",
             where=f"ref {name}",
             count=count,
-            fix="give the flagdata push or pull that was stopped again, which goes on with it (for a clone: flagdata "
-            f"pull SOURCE --lake {where}); where there was none, {HEAL}",
+            fix="give the flagdata push or pull that was stopped again, which goes on with it (for a clone: "
+            f"{command_line('flagdata', 'pull', 'SOURCE', '--lake', where)}); where there was none, {HEAL}",
         )
         for name, count in sorted(rows.items())
         if name not in identities

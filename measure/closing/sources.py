@@ -15,6 +15,7 @@ from flagdata.errors import UsageError
 from flagdata.ingest.anemometer import WindOptions
 from flagdata.ingest.anemometer.confirm import UNASKED, Confirm
 from flagdata.lake import Lake
+from flagdata.shell import command_line
 from measure.observe import Observation, Up
 from measure.observe.recipe import RecordingSource, WindSource, blown, opened
 from measure.observe.wind import LogPlacement
@@ -175,7 +176,9 @@ def _wind(text: str, reading: SourceOptions) -> WindSource:
         return WindSource(log=text, placement=placement, options=options, confirm=reading.confirm)
     speed = float(text)
     if reading.axis is None:
-        raise UsageError("the speed has no direction", where=f"--wind {text}", fix="give --axis, not --north")
+        raise UsageError(
+            "the speed has no direction", where=command_line("--wind", text), fix="give --axis, not --north"
+        )
     x, y, z = (speed * np.array(reading.axis) / float(np.linalg.norm(reading.axis))).tolist()
     return WindSource(velocity=(x, y, z))
 

@@ -17,6 +17,7 @@ from flagdata.findings import Severity
 from flagdata.options import AsJson, argument, command, described, option, options, typed
 from flagdata.printable import SHORT
 from flagdata.shared_options import FLAG, HOW, WRITTEN, Keeping, Shared
+from flagdata.shell import command_line
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -197,7 +198,7 @@ def _check_only(chosen: CalibrateCommand) -> None:
     ignored = {"weight": {"name", "model"}, "anemometer": _OF_WEIGHT}.get(chosen.only or "", set())
     if chosen.area_weight is not None:
         ignored = set(described(CalibrateCommand)) - _OF_DRAPES
-    other = "--area-weight" if chosen.area_weight is not None else f"--only {chosen.only}"
+    other = "--area-weight" if chosen.area_weight is not None else command_line("--only", chosen.only)
     for name in sorted(ignored & typed(chosen)):
         spelled = described(CalibrateCommand)[name][1].spelled(name)
         raise UsageError(f"{spelled} cannot be combined with {other}", where=spelled, fix=f"leave {spelled} out")
@@ -261,7 +262,7 @@ def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: FilmReading, 
             say_finding(finding)
     if done.placed is not None:
         say(f"{done.placed.artifact.id[:SHORT]}  reading model, {done.placed.sentence}")
-        say(f"for flagdata measure: --model {done.name}")
+        say(f"for flagdata measure: {command_line('--model', done.name)}")
     return done
 
 
@@ -324,7 +325,7 @@ def _print(calibration: Calibration, *, verbose: bool) -> None:
     for finding in calibration.findings:
         say_finding(finding)
     if calibration.stated is not None:
-        say(f"for flagdata measure: --area-weight {calibration.stated}")
+        say(f"for flagdata measure: {command_line('--area-weight', calibration.stated)}")
 
 
 def _print_fit(calibration: Calibration) -> None:

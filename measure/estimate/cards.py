@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from flagdata.errors import CorruptError, InputError
+from flagdata.shell import command_line
 
 if TYPE_CHECKING:
     from models.estimator import Estimator
@@ -35,5 +36,5 @@ def card_entry(
         raise CorruptError(
             f"the card's {key} cannot be used: {error}",
             where=f"model {model.name!r}",
-            fix=f"measure it anew, in a checkout of flagdata: python -m tests.studies {study}",
+            fix="measure it anew, in a checkout of flagdata: " + command_line("python", "-m", "tests.studies", study),
         ) from None

@@ -36,6 +36,7 @@ from scipy.special import ndtr, ndtri
 from flagdata.arrays import FloatArray
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
 from flagdata.findings import Finding
+from flagdata.shell import command_line
 from measure.gate.reasons import REASONS
 from models.targets import ASPECT, Cloth, Target
 
@@ -307,7 +308,7 @@ def length_first(stated_size: FlagSize | None) -> str:
         return ""
     return (
         f"; the length comes first: of a flag {stated_size.length:g} m high and {stated_size.height:g} m long give "
-        f"--flag-size {stated_size.height:g}x{stated_size.length:g}"
+        + command_line("--flag-size", f"{stated_size.height:g}x{stated_size.length:g}")
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from flagdata.shell import command_line
 from measure.forecasting.regressors import FieldColumn, library
 from measure.forecasting.segments import Cut
 from measure.loop.corrective_field import Mode
@@ -75,7 +76,8 @@ def by_draw(test: NullTest) -> tuple[str, ...]:
     if test.settling is None:
         return (f"The evidence is borderline; more than {MOST_KINDS} numerical set-ups would be needed to decide.",)
     nulls = banks.WINDS * test.settling
-    return (f"The evidence is borderline; rerun with --nulls {nulls} ({test.settling} numerical set-ups) to decide.",)
+    more = command_line("--nulls", nulls)
+    return (f"The evidence is borderline; rerun with {more} ({test.settling} numerical set-ups) to decide.",)
 
 
 def bounds(ended: Sequence[str]) -> tuple[str, ...]:

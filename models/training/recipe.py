@@ -33,6 +33,7 @@ from flagdata.provenance import recipe_hash
 from flagdata.recipes import Shelf, is_name, parsed
 from flagdata.retired_names import NAMES, hashed_name
 from flagdata.schema import Kind
+from flagdata.shell import command_line
 from flagdata.tables import WHOLE_LIMIT, Count, Named, Whole, read
 from models.conditioning.conditioning import VERSION
 from models.crops import Cropping
@@ -105,7 +106,8 @@ class DataSpec:
         for dataset in self.datasets:
             if not available:
                 message = f"the lake has no clips of a data set, and the recipe learns from {dataset!r}"
-                raise NotFoundError(message, where=str(lake.path), fix=f"build it first: flagdata build {dataset}")
+                fix = f"build it first: {command_line('flagdata', 'build', dataset)}"
+                raise NotFoundError(message, where=str(lake.path), fix=fix)
             if dataset not in available:
                 raise UnknownNameError.of("data set", dataset, available, where=str(lake.path))
 

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from flagdata.caches import user_cache
 from flagdata.errors import ErrorKind, FlagdataError, NotFoundError
+from flagdata.shell import command_line
 
 SETTING = "FLAGDATA_BLENDER"
 SERIES = "4.5"
@@ -232,5 +233,5 @@ def _not_importable(python: Path, output: str) -> BlenderError:
     if library:
         fix = f"install the library {library[1]} of the system"
         if library[1] in _DEBIAN:
-            fix += f"; Debian: apt-get install {' '.join(DEBIAN_PACKAGES)}"
+            fix += f"; Debian: {command_line('apt-get', 'install', *DEBIAN_PACKAGES)}"
     return BlenderError(f"Blender cannot be imported: {reason}", where=str(python), fix=fix)

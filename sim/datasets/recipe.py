@@ -15,6 +15,7 @@ from flagdata.errors import UsageError
 from flagdata.provenance import canonical, digest, file_hash, recipe_hash
 from flagdata.record.writer import Coding
 from flagdata.rng import child_seed
+from flagdata.shell import command_line
 from flagdata.tables import Count, NotNegative, NotNegativeQuantity, Positive, Quantity, plain
 from sim.assets.photos import Photos
 from sim.render.prior import RenderPrior
@@ -258,13 +259,14 @@ def with_counts(recipe: DatasetRecipe, *, sequences: int | None, films: int | No
         raise UsageError(
             f"{sequences} sequences cannot be on {len(recipe.sides)} sides",
             where="--sequences",
-            fix=f"give --sequences {len(recipe.sides)} or more: {', '.join(side.name for side in recipe.sides)}",
+            fix=f"give {command_line('--sequences', len(recipe.sides))} or more: "
+            + ", ".join(side.name for side in recipe.sides),
         )
     if films < sequences:
         raise UsageError(
             f"{films} films are fewer than the {sequences} sequences, and each sequence is filmed",
             where="--films",
-            fix=f"give --films {sequences} or more, or --sequences {films} or fewer",
+            fix=f"give {command_line('--films', sequences)} or more, or {command_line('--sequences', films)} or fewer",
         )
     of_sides = _dealt(sequences, [side.sequences for side in recipe.sides], least=[1] * len(recipe.sides))
     filmed = _dealt(films, [side.renders for side in recipe.sides], least=of_sides)

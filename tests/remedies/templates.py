@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -70,7 +71,7 @@ def others() -> Iterator[Remedy]:
         source = tree(path)
         aside = {id(part) for node in ast.walk(source) for part in _aside(node)}
         for node in ast.walk(source):
-            if id(node) not in aside and isinstance(node, ast.Constant | ast.JoinedStr):
+            if id(node) not in aside and (isinstance(node, ast.Constant | ast.JoinedStr) or is_command_line(node)):
                 for text in list(strings(node))[:1]:
                     yield Remedy(str(path.relative_to(ROOT)), text)
 
@@ -80,6 +81,7 @@ def _aside(node: ast.AST) -> Iterator[ast.AST]:
         yield node.value
     elif isinstance(node, ast.JoinedStr):
         yield from node.values
+        yield from (part.value for part in node.values if isinstance(part, ast.FormattedValue))
     elif isinstance(node, ast.keyword) and node.arg == "help":
         yield from ast.walk(node.value)
     elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("option", "argument"):
@@ -125,15 +127,36 @@ def _assigned(source: ast.Module) -> dict[str, list[ast.expr]]:
     return values
 
 
+def is_command_line(node: ast.AST) -> bool:
+    """Whether an expression writes words as a shell takes them."""
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "command_line"
+
+
+def template(node: ast.AST) -> str:
+    """The text of an expression, a `HOLE` for what is put into it, and the words of a command line as they stand."""
+    if isinstance(node, ast.Constant):
+        return str(node.value)
+    if isinstance(node, ast.JoinedStr):
+        return "".join(map(template, node.values))
+    if isinstance(node, ast.FormattedValue):
+        return template(node.value) if is_command_line(node.value) else HOLE
+    if is_command_line(node):
+        words = node.args if isinstance(node, ast.Call) else ()
+        return " ".join(shlex.quote(str(w.value)) if isinstance(w, ast.Constant) else template(w) for w in words)
+    return HOLE
+
+
 def strings(value: ast.AST) -> Iterator[str]:
     """The texts of an expression: whole literals, holes for what is put into them, and the literals of these."""
     if isinstance(value, ast.Constant):
         if isinstance(value.value, str) and value.value.strip():
             yield value.value
+    elif is_command_line(value):
+        yield template(value)
     elif isinstance(value, ast.JoinedStr):
-        yield "".join(str(part.value) if isinstance(part, ast.Constant) else HOLE for part in value.values)
+        yield template(value)
         for part in value.values:
-            if isinstance(part, ast.FormattedValue):
+            if isinstance(part, ast.FormattedValue) and not is_command_line(part.value):
                 yield from strings(part.value)
     else:
         for child in ast.iter_child_nodes(value):

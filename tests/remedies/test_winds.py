@@ -380,7 +380,7 @@ def test_a_site_of_a_table_is_chosen_by_the_recipe_that_sniff_prints(user: User)
 def test_a_log_that_was_read_by_a_wrong_option_is_taken_off_by_the_id_that_is_named(user: User) -> None:
     (user.folder / "a.csv").write_text(NAKED)
     user.succeeds("ingest", "a.csv", "--zone", "+01:00")
-    fix = user.meets("ingest/before.py", "take it off: flagdata withdraw", "ingest", "a.csv", "--zone", "+02:00")
+    fix = user.meets("ingest/before.py", "flagdata withdraw", "ingest", "a.csv", "--zone", "+02:00")
     user.follows(*shlex.split(fix.partition("flagdata ")[2]))
     user.succeeds("show", "a")
 

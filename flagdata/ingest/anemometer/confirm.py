@@ -15,6 +15,7 @@ from typing import Protocol, TypeVar
 from flagdata.errors import ErrorKind, RefusedError
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.provenance import canonical, digest
+from flagdata.shell import command_line
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
 
@@ -89,8 +90,8 @@ class UnconfirmedError(RefusedError):
             accept=drafted.accept,
             preview=drafted.preview(),
             fix=f"compare the rows above with what you know of the wind; if they are right, repeat the command with "
-            f"--accept {drafted.accept}; if not, describe the file by a recipe: --sensor FILE.toml (flagdata ingest "
-            "--sniff prints a recipe to begin with)",
+            f"{command_line('--accept', drafted.accept)}; if not, describe the file by a recipe: --sensor FILE.toml "
+            "(flagdata ingest --sniff prints a recipe to begin with)",
         )
 
     def as_dict(self) -> dict[str, str | None]:

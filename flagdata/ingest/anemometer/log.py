@@ -30,6 +30,7 @@ from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.provenance import digest
 from flagdata.schema import CHANNELS, UNUSABLE, SampleFlag
+from flagdata.shell import command_line
 from flagdata.signals import LogRow, Series, WindLog, WindSeries
 
 _SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed", "wind_speed_estimate")
@@ -131,7 +132,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
             lacking = "dates without a year" if day else "times of day without a date"
             message = f"the lines of an instrument stand after {lacking}"
             example = f"YYYY-{day}, with its year in place of YYYY" if day else "2026-05-01"
-            fix = f"give the day of the first: --date {example}, and its --zone"
+            fix = f"give the day of the first: {command_line('--date', example)}, and its --zone"
             raise TimeError(message, where=str(path), fix=fix)
         source, options = untimed.dated(source, options.date), replace(options, date=None)
     name, options, reasons = _choose(source, options)

@@ -23,6 +23,7 @@ from flagdata.ingest.anemometer.instants.stamps import ENGLISH, HOUR, NEXT_DAY
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
 from flagdata.ingest.anemometer.text.rows import cells_of_lines
 from flagdata.ingest.anemometer.text.source import RATE_GIVEN, TableText, TextFile
+from flagdata.shell import command_line
 from flagdata.timebase import NANOSECONDS, iso
 
 _NUMBER = re.compile(r"\s*[-+]?(\d+([.,]\d*)?|[.,]\d+)\s*")
@@ -129,7 +130,8 @@ def _of_year(match: re.Match[str], before: dt.date, *, first: bool, where: str) 
         raise TimeError(message, where=where, fix="give --date with the year in which the log began") from None
     if first and date != before:
         message = f"the first line is of {match['month']} {match['day']}, not of {before.isoformat()}"
-        raise TimeError(message, where=where, fix=f"give its day with its year, such as --date {date.isoformat()}")
+        fix = f"give its day with its year, such as {command_line('--date', date)}"
+        raise TimeError(message, where=where, fix=fix)
     return date
 
 

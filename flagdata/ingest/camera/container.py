@@ -29,6 +29,7 @@ from flagdata.ingest.camera.boxes import edited, edits, is_cut, is_mp4, whole_pa
 from flagdata.ingest.camera.clock import COUNTERS, Counter, restart, restarted
 from flagdata.ingest.camera.options import CameraOptions, Limits, exact
 from flagdata.ingest.camera.stamps import Timing, survey
+from flagdata.shell import command_line
 
 _EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"
 
@@ -296,7 +297,7 @@ def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoS
         raise UsageError(
             f"stream {wanted} is no video that can be decoded",
             where=str(path),
-            fix=f"give --stream {' or '.join(streams)}",
+            fix=f"give --stream {' or '.join(map(command_line, streams))}",
         )
     kinds = sorted({stream.type for stream in container.streams if stream.type != "video"})
     if is_cut(path) and is_mp4(path):

@@ -25,6 +25,7 @@ from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import Timing
 from flagdata.ingest.camera.video import VideoSource
 from flagdata.ingest.mcap.bags import to_join
+from flagdata.shell import command_line
 from flagdata.timebase import NANOSECONDS, parse
 
 _ROUNDED = 2.5
@@ -66,7 +67,7 @@ def check_films(paths: Sequence[Path]) -> None:
     for path in paths:
         noun = "a folder" if is_folder(path) else "an MCAP file" if is_mcap(path) else None
         if noun is not None:
-            alone = f"ingest each by itself: flagdata ingest {' '.join(map(str, paths))}"
+            alone = f"ingest each by itself: {command_line('flagdata', 'ingest', *paths)}"
             raise UsageError(
                 f"{noun} cannot be joined with others, only video files can",
                 where=str(path),

@@ -25,6 +25,7 @@ from flagdata.ingest.camera.stamps import StampRepair, nanoseconds
 from flagdata.ingest.camera.start import find_start
 from flagdata.ingest.camera.video import VideoSource
 from flagdata.ingest.mcap.bags import is_bag
+from flagdata.shell import command_line
 from flagdata.signals import CameraInfo, Frame
 from flagdata.timebase import NANOSECONDS
 
@@ -128,7 +129,7 @@ class CameraStream:
                 "crop-cuts-motion",
                 f"what moves reaches beyond the crop, by {edges}: a part of it is cut off",
                 value=float(max(beyond.values())),
-                fix=f"--crop {proposal.box} takes it whole",
+                fix=f"{command_line('--crop', proposal.box)} takes it whole",
             )
         ]
 

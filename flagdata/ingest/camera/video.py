@@ -54,6 +54,7 @@ from flagdata.ingest.camera.luma import luma_of_frame
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import Timing
+from flagdata.shell import command_line
 
 CONTAINER = "gif"
 SHORTEST = 2
@@ -276,7 +277,7 @@ class VideoSource:
                 f"the file says that the camera took {taken:g} frames a second, its time stamps say {stamp_rate:.4g}: "
                 f"time runs {taken / stamp_rate:.3g} times too slow in it",
                 value=taken,
-                fix=f"give the camera's rate: --true-fps {taken:g}",
+                fix=f"give the camera's rate: {command_line('--true-fps', f'{taken:g}')}",
             )
         ]
 

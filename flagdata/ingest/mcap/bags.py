@@ -12,6 +12,7 @@ import zstandard
 
 from flagdata.errors import InputError
 from flagdata.files import MCAP, is_beside, is_folder, is_mcap, open_regular
+from flagdata.shell import command_line
 
 _DESCRIPTION = "metadata.yaml"
 _NAMED = "rosbag2_bagfile_information"
@@ -50,7 +51,7 @@ def parts_of(path: Path) -> tuple[Path, ...]:
             raise InputError(
                 f"the bag's {_DESCRIPTION} names {part.name}, which is not there",
                 where=str(path),
-                fix=f"copy it again; or read the parts that are there: rm {path / _DESCRIPTION}",
+                fix=f"copy it again; or read the parts that are there: {command_line('rm', path / _DESCRIPTION)}",
             )
         if not is_mcap(part):
             reason, fix = other_bag(part) or (f"{part.name} is no MCAP file", "copy it again")
@@ -68,20 +69,20 @@ def other_bag(path: Path) -> tuple[str, str] | None:
             head = stream.read(_HEAD)
     except (OSError, ValueError):
         return None
-    name, bare = path.name, path.with_suffix("").name
+    bare, new = path.with_suffix(""), path.with_suffix(".mcap")
+    convert = f"convert it: {command_line('mcap', 'convert', path, new)}; then {command_line('ingest', new)}"
     if head.startswith(_SQLITE) and b"serialization_format" in head:
-        new = path.with_suffix(".mcap").name
-        return "a ROS 2 bag kept in SQLite (.db3)", f"convert it: mcap convert {name} {new}; then ingest {new}"
+        return "a ROS 2 bag kept in SQLite (.db3)", convert
     if head.startswith(_ROS_1):
-        new = path.with_suffix(".mcap").name
-        return "a ROS 1 bag", f"convert it: mcap convert {name} {new}; then ingest {new}"
+        return "a ROS 1 bag", convert
     if head.startswith(_ZSTD) and _inside_zstd(head).startswith((MCAP, _SQLITE)):
         return (
             "a bag that was compressed as a whole by zstd",
-            f"unpack it: zstd -d {name} -o {bare}; then ingest {bare}",
+            f"unpack it: {command_line('zstd', '-d', path, '-o', bare)}; then {command_line('ingest', bare)}",
         )
     if head.startswith(_GZIP) and _inside_gzip(path).startswith(MCAP):
-        return "a bag that was compressed as a whole by gzip", f"unpack it: gunzip -k {name}; then ingest {bare}"
+        unpack = f"unpack it: {command_line('gunzip', '-k', path)}; then {command_line('ingest', bare)}"
+        return "a bag that was compressed as a whole by gzip", unpack
     return None
 
 
@@ -89,9 +90,9 @@ def to_join(paths: Sequence[Path]) -> str:
     """Advises on MCAP files that are the parts of one recording: a folder of them alone is read as one."""
     (folder, *other_folders) = {path.parent for path in paths}
     if not other_folders and is_described(folder):
-        return f"the folder of the parts is read as one recording: flagdata ingest {folder}"
-    names = " ".join(map(str, paths))
-    return f"a folder of the parts alone is read as one recording: mkdir whole; mv {names} whole; flagdata ingest whole"
+        return f"the folder of the parts is read as one recording: {command_line('flagdata', 'ingest', folder)}"
+    move = command_line("mv", *paths, "whole")
+    return f"a folder of the parts alone is read as one recording: mkdir whole; {move}; flagdata ingest whole"
 
 
 def by_number(paths: Sequence[Path]) -> list[Path]:

@@ -26,6 +26,7 @@ from flagdata.findings import Finding
 from flagdata.record.container import CHUNK_HEAD, RECORD_HEAD, parse
 from flagdata.record.salvage import CHUNK_LIMIT
 from flagdata.record.unpacking import check_stated, unpacked
+from flagdata.shell import command_line
 
 _RUN = 1 << 20
 """Bytes of messages outside chunks that are read at once, and one message more."""
@@ -265,12 +266,12 @@ class _Scan:
         rest = self.size - end
         if not rest:
             return
-        cut = f"head -c {end} {self.path.name} > first.mcap"
+        cut = f"{command_line('head', '-c', end, self.path)} > first.mcap"
         if self.stream.read(len(MCAP)) == MCAP:
             raise CorruptError(
                 f"a second MCAP file begins at byte {end}: files were written one behind another",
                 where=str(self.path),
-                fix=f"cut them apart: {cut}; tail -c {rest} {self.path.name} > second.mcap",
+                fix=f"cut them apart: {cut}; {command_line('tail', '-c', rest, self.path)} > second.mcap",
             )
         raise CorruptError(f"{rest} bytes follow the end of the MCAP file", where=str(self.path), fix=f"cut it: {cut}")
 

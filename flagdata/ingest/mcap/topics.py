@@ -32,6 +32,7 @@ from flagdata.ingest.mcap import cdr
 from flagdata.ingest.mcap.bags import is_described, parts_of
 from flagdata.ingest.mcap.instants import Stamp, checked, clock_findings, few_without_date, order_of, stamp_of
 from flagdata.ingest.mcap.layout import Layout, Message, Messages, layout_of
+from flagdata.shell import command_line
 from flagdata.timebase import NANOSECONDS
 
 STILL, MOVING, RAW = "compressed images", "compressed video", "plain pixels"
@@ -211,7 +212,7 @@ def choose(candidates: Sequence[Topic], wanted: str | None, *, where: str, noun:
         if not typed:
             raise UnknownNameError.of(f"topic of {noun}", wanted, [topic.name for topic in candidates], where=where)
         message = f"messages of several types are on {wanted}, which are no one series: {', '.join(map(str, typed))}"
-        raise InputError(message, where=where, fix=f"choose one by its type: --topic {typed[0].name}")
+        raise InputError(message, where=where, fix=f"choose one by its type: {command_line('--topic', typed[0].name)}")
     if len(candidates) == 1:
         return candidates[0]
     listed = ", ".join(map(str, candidates))
@@ -334,7 +335,7 @@ def _check_successive(path: Path, topic: str, places: IntArray, logged: IntArray
                 f"{topic} begins there {overlap:.1f} s before its end in {parts[before[2]].name}: not successive parts "
                 "of one recording",
                 where=str(parts[after[2]]),
-                fix=f"ingest each by itself: flagdata ingest {path}/*.mcap",
+                fix=f"ingest each by itself: {command_line('flagdata', 'ingest', path)}/*.mcap",
             )
 
 

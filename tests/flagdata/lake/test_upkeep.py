@@ -470,7 +470,7 @@ def test_staged_files_without_a_lease_are_reported_and_collected_after_the_grace
     assert [(f.kind, f.severity, f.where) for f in young] == [
         ("staging-unleased", Severity.NOTE, str(path)) for path in (folder, file)
     ]
-    assert {f.fix for f in young} == {"none needed; flagdata gc takes it once it is 24 h old"}
+    assert {f.fix for f in young} == {"none needed; flagdata gc takes it, once it is 24 h old"}
     assert collect(lake, grace=DAY).leftovers == ()
     age(file, timedelta(days=3))
     age(folder, timedelta(days=3))

@@ -35,6 +35,7 @@ from flagdata.ingest.anemometer.samples.platform import settled
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
+from flagdata.shell import command_line
 from flagdata.signals import Sensor
 from flagdata.units import UNITS
 
@@ -110,7 +111,7 @@ class Canboat:
             raise InputError(
                 f"several devices send wind: {listed}; they are different instruments",
                 where=where,
-                fix=f"choose one by its address, e.g. --talker {min(network.devices, key=int)}",
+                fix=f"choose one by its address, e.g. {command_line('--talker', min(network.devices, key=int))}",
             )
         kept_findings = tuple(finding for finding in reading.findings if finding.kind != "non-data-lines")
         knots = [speed / UNITS["kn"].scale for speed in network.speeds]

@@ -46,6 +46,7 @@ from flagdata.ingest.anemometer.text.rows import RowReader, cells_of_lines
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.recipes import Shelf
 from flagdata.schema import CHANNELS
+from flagdata.shell import command_line
 from flagdata.timebase import NANOSECONDS
 from flagdata.units import UNITS, spelled, unit
 
@@ -362,7 +363,10 @@ def _with_units(
     if strange and (short > 0 or any("wind" in strange_text for strange_text in strange)):
         fewer = f", {short} fewer of them," if short > 0 else ""
         message = f"the units{fewer} do not stand below their names: {', '.join(strange[:3])}"
-        fix = f'mend the line of units; or, since they are the same in every such file: --columns "{",".join(always)}"'
+        fix = (
+            "mend the line of units; or, since they are the same in every such file: "
+            f"{command_line('--columns', ','.join(always))}"
+        )
         raise InputError(message, where=f"{where}, line {heading.at + 2}", fix=fix)
     notes: list[Finding] = []
     if borrowed:

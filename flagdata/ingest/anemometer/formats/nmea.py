@@ -52,6 +52,7 @@ from flagdata.ingest.anemometer.samples.platform import settled
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
+from flagdata.shell import command_line
 from flagdata.signals import Instants, Sensor, Series
 from flagdata.timebase import NANOSECONDS
 from flagdata.units import UNITS
@@ -176,7 +177,7 @@ def gathered(
     talkers = Counter(stream.talkers)
     if len(talkers) > 1:
         message = f"several talkers send wind: {', '.join(sorted(talkers))}; they are different instruments"
-        fix = f"choose one, e.g. --talker {talkers.most_common(1)[0][0]}"
+        fix = f"choose one, e.g. {command_line('--talker', talkers.most_common(1)[0][0])}"
         if not timed and not stream.times.line:
             raise InputError(f"{message}, and the lines have no time", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
         raise InputError(message, where=where, fix=fix)
@@ -358,7 +359,7 @@ def no_wind(lines: Sequence[str], format_name: str) -> str:
             kinds.update([] if sentence is None else [sentence.kind])
     return (
         f"its first {len(lines)} lines hold no sentence of wind ({', '.join(WINDS)}){_others_seen(kinds)}: have the "
-        f"instrument send MWV; if winds come later in the file: --as {format_name}"
+        f"instrument send MWV; if winds come later in the file: {command_line('--as', format_name)}"
     )
 
 

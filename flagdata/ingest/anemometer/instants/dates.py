@@ -20,6 +20,7 @@ from flagdata.errors import TimeError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants import stamps
 from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, NEXT_DAY, Stamps
+from flagdata.shell import command_line
 from flagdata.timebase import NANOSECONDS, iso
 
 Order = Literal["ymd", "dmy", "mdy"]
@@ -119,7 +120,7 @@ def date_form(texts: Sequence[str], *, given_order: Order | None, where: str) ->
     if len(chosen) > 1 and not points:
         readings = " or ".join(_WORDS[order_of_date] for order_of_date in chosen)
         message = f"{first} may be {readings}, and nothing in the log decides it"
-        raise TimeError(message, where=where, fix=f"give --date-order {' or '.join(chosen)}")
+        raise TimeError(message, where=where, fix=f"give --date-order {' or '.join(map(command_line, chosen))}")
     reason = f"no other order fits the first {len(dated)} dates"
     if given_order is not None or points:
         reason = (
@@ -200,7 +201,8 @@ def completed(
     if not given_day <= int(time[0]) <= given_day + DAY:  # 24:00 is of the day that ends
         date_of_first = np.datetime64(int(time[0]), "ns").astype("datetime64[D]")
         message = f"the first row is of {date_of_first}, if of {date.year}, and not of {date.isoformat()}"
-        raise TimeError(message, where=where_first, fix=f"give its day with its year, such as --date {date_of_first}")
+        fix = f"give its day with its year, such as {command_line('--date', date_of_first)}"
+        raise TimeError(message, where=where_first, fix=fix)
     return time, _date_given("stamps without a year", date, f"{int(passed.sum())} new years")
 
 
@@ -243,6 +245,6 @@ def since_start(
     message = f"the stamps count from a start; the first row was at {iso(start)}, as given"
     if int(count[0]) > max(int(np.diff(count[:2]).max(initial=0)), NANOSECONDS):
         message += f", its count being {count[0] / NANOSECONDS:g} s; if that was the zero of the count instead, "
-        message += f"give --start {iso(start + int(count[0]))}"
+        message += f"give {command_line('--start', iso(start + int(count[0])))}"
     findings.append(Finding.of("elapsed-time", message))
     return count - count[0] + start, tuple(findings)

@@ -22,6 +22,7 @@ from flagdata.errors import FlagdataError, TimeError, ZoneMissingError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer.instants.clock import usual
 from flagdata.ingest.anemometer.instants.stamps import HOUR
+from flagdata.shell import command_line
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS, zone
 
@@ -168,7 +169,8 @@ class Statement:
 
     def advice(self) -> str:
         """Advises a user who named no zone."""
-        return f"line {self.line} says {self.text!r}: if that is the zone of the stamps, --zone {self.name}"
+        option = command_line("--zone", self.name)
+        return f"line {self.line} says {self.text!r}: if that is the zone of the stamps, {option}"
 
 
 def stated_zone(lines: Sequence[str]) -> Statement | None:
@@ -214,5 +216,5 @@ def contradiction(says: str, theirs: str, given_zone: str, time: Instants) -> tu
     message = (
         f"{says} that the stamps are of {theirs}; {given_zone} was given and is used, {abs(hours_between):g} h away"
     )
-    fix = f"give --zone {theirs}, unless the file is known to be wrong"
+    fix = f"give {command_line('--zone', theirs)}, unless the file is known to be wrong"
     return (Finding.of("zone-contradicts", message, value=hours_between, fix=fix),)

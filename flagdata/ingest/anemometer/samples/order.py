@@ -34,6 +34,7 @@ from flagdata.ingest.anemometer.instants.stamps import DAY
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.text.source import RATE_GIVEN
 from flagdata.schema import SampleFlag
+from flagdata.shell import command_line
 from flagdata.timebase import NANOSECONDS, iso
 
 _FEW, _SHARE = 10, 4
@@ -78,7 +79,8 @@ def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None)
     if choice is not None and {"rows-sorted", "clock-set-back", "clock-set-on"}.isdisjoint(
         finding.kind for finding in reading.findings
     ):
-        message = f"the rows are in the order of their stamps, and no clock was set: --clock {choice} is not used"
+        unused = command_line("--clock", choice)
+        message = f"the rows are in the order of their stamps, and no clock was set: {unused} is not used"
         reading = reading.with_findings((Finding.of("clock-not-set", message),))
     return _distinct(reading, where)
 

@@ -12,6 +12,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import ZeroOffset
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.schema import SampleFlag
+from flagdata.shell import command_line
 from flagdata.timebase import NANOSECONDS
 
 _WINDOW = 2.0
@@ -161,7 +162,7 @@ def _reported(reading: Reading, zero: Zero, shift: float) -> Reading:
     settled = abs(zero.offset - shift) <= _BAND
     done, fix = "subtracted" if shift else f"left as it is, within {_BAND:g} m/s of zero", None
     if not settled:
-        ways = f"--zero-offset estimate, or --zero-offset {zero.offset:.3g}"
+        ways = f"--zero-offset estimate, or {command_line('--zero-offset', f'{zero.offset:.3g}')}"
         fix = f"correct it: {ways}" if shift else f"subtract it: {ways}"
         rest = zero.offset - shift
         done = (
