@@ -29,7 +29,7 @@ State: TypeAlias = dict[str, str | int | None]
 
 _AHEAD = 2  # batches that each thread reads ahead, as many as torch's worker processes do
 _MOVING = ("epoch", "before", "cursor", "share", "at")  # parts of a state that may differ from the loader that goes on
-_SHARE = re.compile(r"(\d+) of ([1-9]\d*)")
+_SHARE = re.compile(r"([0-9]{1,9}) of ([1-9][0-9]{0,8})")
 
 
 class Batchable(Dataset[Sample], ABC):

@@ -146,7 +146,9 @@ class Lake(Store):
         try:
             with _readable(marker), open_regular(marker) as stream:
                 content = from_json(stream.read())
-            version = int(content["format_version"])
+            version = content["format_version"]
+            if type(version) is not int or version < 1:
+                raise ValueError("it states no version of the format")
         except (FileNotFoundError, NotADirectoryError):
             raise NotFoundError(
                 "there is no lake here", where=str(lake.path), fix="make one with flagdata init, or name one by --lake"

@@ -27,7 +27,7 @@ import stat
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import islice
+from itertools import count, islice, pairwise, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ from flagdata.documents import from_json
 from flagdata.durable import HEAL, make_folders, put_if_absent, unreadable
 from flagdata.errors import CorruptError, ErrorKind, FlagdataError
 from flagdata.files import open_regular
+from flagdata.numbered import bounded
 from flagdata.provenance import digest, file_hash
 from flagdata.storage import Place
 
@@ -54,6 +55,8 @@ CHECKPOINT = ".checkpoint.parquet"
 
 _CHECKPOINT = re.compile(r"([0-9]{20})" + re.escape(CHECKPOINT)).fullmatch
 _MARK = re.compile(r"[0-9]{1,20}").fullmatch
+_NEWEST = 10**20 - 1
+"""Highest version that the name of an entry, a checkpoint or a mark states."""
 _COUNT = re.compile(r"[0-9]{1,18}").fullmatch
 _LATEST = 253_402_300_800_000  # ms since 1970: the year 10000
 _NAMED = 3  # missing entries that a message names
@@ -122,8 +125,12 @@ class Log:
 
     def _missing(self, present: Mapping[int, object], *, upto: int) -> Iterator[int]:
         """Yields the versions that have no entry, each looked for as it is asked for."""
-        # A listing may leave out an entry that came while it was made, hence the second look.
-        return (version for version in range(upto + 1) if version not in present and not self.path(version).exists())
+        if len(present) == upto + 1:
+            return
+        for before, after in pairwise([-1, *sorted(present), upto + 1]):
+            for version in takewhile(after.__gt__, count(before + 1)):
+                if not self.path(version).exists():  # a listing may leave out an entry that came while it was made
+                    yield version
 
     def files(self) -> dict[str, str | None]:
         """Name of each file that some version is made of → the SHA-256 that its commit noted, `None` in older lakes.
@@ -290,18 +297,24 @@ class Log:
 
     def checkpoints(self) -> list[int]:
         """Versions at which the Delta library finds all that is in the entries before."""
-        return [int(match[1]) for name in _sizes_in(self.folder) if (match := _CHECKPOINT(name))]
+        matches = map(_CHECKPOINT, _sizes_in(self.folder))
+        return [version for match in matches if match and (version := bounded(match[1], most=_NEWEST)) is not None]
 
     def present(self) -> dict[int, int | None]:
         """Maps the version of each entry to its size, where a listing states it."""
         sizes = _sizes_in(self.folder)
         for name in sizes.keys() - self._numbers.keys():
             match = _ENTRY(name)
-            self._numbers[name] = int(match[1]) if match else -1
+            version = bounded(match[1], most=_NEWEST) if match else None
+            self._numbers[name] = -1 if version is None else version
         return {version: size for name, size in sizes.items() if (version := self._numbers[name]) >= 0}
 
     def _marks(self) -> list[int]:
-        return [int(name) for name in _sizes_in(self.marks) if _MARK(name)]
+        return [version for name in _sizes_in(self.marks) if (version := self._marked_by(name)) is not None]
+
+    @staticmethod
+    def _marked_by(name: str) -> int | None:
+        return bounded(name, most=_NEWEST) if _MARK(name) else None
 
     def _gap(self, missing: Sequence[int], present: Mapping[int, object], *, acknowledged: int) -> LogGapError:
         newest = max(present)
@@ -310,7 +323,7 @@ class Log:
         message = f"an entry of the catalog's log is missing: {names}{f' and {further} more' if further > 0 else ''}"
         fix = f"{HEAL}; run neither gc nor another program on the lake before"
         if missing[0] > newest:  # what is left is a whole, older catalog
-            mark = next(path for path in self.marks.iterdir() if _MARK(path.name) and int(path.name) == acknowledged)
+            mark = next(path for path in self.marks.iterdir() if self._marked_by(path.name) == acknowledged)
             message += f"; {mark} says that version {acknowledged} was committed"
             fix += f"; if it never was, or to give up what was committed after version {newest}, delete {mark}"
         elif newest - missing[0] >= len(present):  # more of them than there are: rather is the last name wrong
@@ -472,10 +485,9 @@ class Summaries:
         does."""
         names: dict[int, list[tuple[int, str]]] = {}
         for name in names_in(self._folder):
-            first, _, rest = name.partition("-")
-            last = rest.partition("-")[0]
-            if first.isdecimal() and last.isdecimal() and int(last) <= head:
-                names.setdefault(int(first), []).append((int(last), name))
+            covered = _covered(name, head)
+            if covered is not None:
+                names.setdefault(covered[0], []).append((covered[1], name))
         chain: list[Summary] = []
         following, before = 0, ""
         while following in names:
@@ -502,10 +514,14 @@ class Summaries:
                 raise ValueError("its checksum is wrong")
             content = from_json(text)
             versions = content["versions"]
-            first, last = (int(number) for number in name.split("-")[:2])
-            if len(versions) != last + 1 - first or not all(map(is_stated, versions, range(first, last + 1))):
+            covered = _covered(name, _NEWEST)
+            if covered is None or len(versions) != covered[1] + 1 - covered[0]:
+                raise ValueError("it states other versions than its name")
+            if not all(map(is_stated, versions, count(covered[0]))):
                 raise ValueError("it states other versions than its name, or none")
-            checkpoints = {int(number): str(noted) for number, noted in content.get("checkpoints", {}).items()}
+            noted = content.get("checkpoints", {})
+            numbers = [version for number in noted if (version := bounded(number, most=_NEWEST)) is not None]
+            checkpoints = dict(zip(numbers, map(str, noted.values()), strict=True))
             return Summary(
                 name=name, before=content["before"], end=content["end"], checkpoints=checkpoints, versions=versions
             )
@@ -517,3 +533,10 @@ class Summaries:
                 where=str(path),
                 fix="delete it: it saves time, the entries of the log hold all",
             ) from None
+
+
+def _covered(name: str, head: int) -> tuple[int, int] | None:
+    """Reads the first and the last version of a summary of its file's name; None of others, and of later than
+    `head`."""
+    first, last = (bounded(number, most=head) for number in f"{name}-".split("-")[:2])
+    return None if first is None or last is None else (first, last)

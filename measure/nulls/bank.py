@@ -18,9 +18,11 @@ import numpy as np
 from flagdata.arrays import FloatArray, read_arrays
 from flagdata.console import say_beside_bars
 from flagdata.errors import CorruptError, NotFoundError, UsageError
+from flagdata.numbered import bounded
 from flagdata.outputs import rewrite
 from flagdata.provenance import code_version
 from flagdata.rng import child_seed, stream
+from flagdata.tables import SEED_LIMIT
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import Column, columns, names
@@ -252,10 +254,10 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
 
 
 def _number(path: Path) -> int:
-    number = path.stem.partition("-")[2]
-    if not number.isdecimal():
+    number = bounded(path.stem.partition("-")[2], most=SEED_LIMIT)
+    if number is None:
         raise CorruptError("it is not a file of a bank", where=str(path), fix="move it out of the folder")
-    return int(number)
+    return number
 
 
 def files(folder: Path) -> list[Path]:

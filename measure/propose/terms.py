@@ -14,6 +14,7 @@ from typing import Annotated
 from torch import Tensor
 
 from flagdata.errors import UsageError
+from flagdata.numbered import bounded
 from measure.forecasting.regressors import EffectColumn
 from sim.cloth import Cloth
 from sim.effects import Effect
@@ -80,8 +81,9 @@ def shape_named(name: str) -> TermShape:
     if name in SHAPES:
         return TermShape(method=name, words=SHAPES[name])
     match = _LOCAL.fullmatch(name)
-    arguments = () if match is None else tuple(int(part) / 100 for part in match.groups()[1:] if part is not None)
-    if match is None or len(arguments) != (2 if match[1] == "near" else 1) or max(arguments) > 1:
+    numbers = [] if match is None else [bounded(part, most=100) for part in match.groups()[1:] if part is not None]
+    arguments = tuple(number / 100 for number in numbers if number is not None)
+    if match is None or len(arguments) != (2 if match[1] == "near" else 1):
         raise UsageError(
             f"there is no shape {name!r}",
             where="terms",

@@ -14,6 +14,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from flagdata.arrays import UInt8Array
+from flagdata.numbered import bounded
 from flagdata.pages.pictures import figure_url, moving, still
 from flagdata.pages.render import render
 from measure.refine.evaluator import Evaluator
@@ -160,11 +161,11 @@ def _rows(refinement: Refinement) -> list[dict[str, str]]:
     rows = []
     for entry in refinement.intervals:
         name, _, clip = entry.name.partition(".")
-        quantity = about[name]
+        quantity, number = about[name], bounded(clip, most=_CLIPS)
         note = "the clip hardly narrows the prior" if entry.prior_share > 0.9 else ""
         rows.append(
             {
-                "about": quantity.about + (f", clip {int(clip) + 1}" if clip else ""),
+                "about": quantity.about + (f", clip {number + 1}" if number is not None else ""),
                 "unit": quantity.unit,
                 "refined": entry.phrase(quantity.digits),
                 "note": note,

@@ -22,6 +22,7 @@ from flagdata.checksums import SUMS, check_sums, files_of, write_sums
 from flagdata.durable import flush_file
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, RefusedError
 from flagdata.locks import LOCK
+from flagdata.numbered import bounded
 from models.learner import Learner
 from models.storage import CARD, WEIGHTS, read_card, read_tensors, write_card, write_tensors
 from models.training.progress import LossCourse
@@ -181,8 +182,11 @@ def _take_moments(standing: Standing, tensors: dict[str, Tensor]) -> None:
     shapes = {index: tuple(weights.shape) for index, weights in enumerate(standing.learner.parameters())}
     moments: dict[int, dict[str, Tensor]] = {}
     for name, tensor in tensors.items():
-        index, _, kind = name.partition(".")
-        moments.setdefault(int(index), {})[kind] = tensor
+        digits, _, kind = name.partition(".")
+        index = bounded(digits, most=len(shapes))
+        if index not in shapes:
+            raise ValueError(f"moments are of parameter {digits!r}, which is none of the model")
+        moments.setdefault(index, {})[kind] = tensor
     for index, values in moments.items():
         wanted = {kind: () if kind == "step" else shapes[index] for kind in _KINDS}
         if {kind: tuple(tensor.shape) for kind, tensor in values.items()} != wanted:

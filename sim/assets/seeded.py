@@ -9,7 +9,9 @@ import numpy as np
 
 from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
+from flagdata.numbered import bounded
 from flagdata.rng import stream
+from flagdata.tables import SEED_LIMIT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +35,8 @@ class Seeded:
         Raises:
             InputError: the member is no seed.
         """
-        if not member.isascii() or not member.isdigit():
+        seed = bounded(member, most=SEED_LIMIT)
+        if seed is None:
             raise InputError(f"{member!r} is no seed", where=f"{self.kind}/…", fix=f"write {self.kind}/ and a number")
-        values = self.paint(stream(int(member), "assets", self.kind))
+        values = self.paint(stream(seed, "assets", self.kind))
         return np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)

@@ -15,6 +15,7 @@ from PIL import Image
 from flagdata.arrays import UInt8Array
 from flagdata.documents import column_json
 from flagdata.lake import Lake
+from flagdata.numbered import by_numbers
 from flagdata.outputs import check_file, rewrite, write_file
 from flagdata.pages.pictures import still
 from flagdata.pages.render import render
@@ -148,12 +149,7 @@ def distributions(parameters: Sequence[dict[str, Any]], *, rendered: bool) -> li
                 name=name.removeprefix("render."), low=low, middle=float(np.median(values)), high=high, counts=counts
             )
         )
-    return sorted(histograms, key=lambda distribution: _in_order(distribution.name))
-
-
-def _in_order(name: str) -> tuple[tuple[bool, int, str], ...]:
-    """Sorts "bending.2" before "bending.10"."""
-    return tuple((part.isdigit(), int(part) if part.isdigit() else 0, part) for part in name.split("."))
+    return sorted(histograms, key=lambda distribution: by_numbers(distribution.name))
 
 
 def _names(parameters: Sequence[dict[str, Any]]) -> list[tuple[str, list[tuple[str, int]]]]:

@@ -18,10 +18,13 @@ from flagdata.errors import FlagdataError
 from flagdata.findings import Finding
 from flagdata.ingest.camera.container import open_container
 from flagdata.ingest.camera.options import Limits
+from flagdata.numbered import bounded
 
-_NEW = re.compile(r"(?P<head>G[HXLS])(?P<chapter>\d\d)(?P<file>\d{4}\.\w+)", re.IGNORECASE)
-_OLD = re.compile(r"(?P<head>GP)(?P<chapter>\d\d)(?P<file>\d{4}\.\w+)", re.IGNORECASE)
+_NEW = re.compile(r"(?P<head>G[HXLS])(?P<chapter>[0-9]{2})(?P<file>\d{4}\.\w+)", re.IGNORECASE)
+_OLD = re.compile(r"(?P<head>GP)(?P<chapter>[0-9]{2})(?P<file>\d{4}\.\w+)", re.IGNORECASE)
 _FIRST = re.compile(r"GOPR(?P<file>\d{4}\.\w+)", re.IGNORECASE)
+_CHAPTERS = 99  # that two digits count
+_MOST = 10**18
 # The last number of a name, of as many digits as cameras count with.
 _COUNTED = re.compile(r"(?P<head>.*?)(?P<number>\d{3,})(?P<rest>\D*\.\w+)")
 
@@ -48,8 +51,11 @@ def chapter_of(path: Path) -> Chapter | None:
         return None
     earlier = _earlier(path.name)
     if not earlier:
-        number = counted["number"]
-        former = f"{counted['head']}{int(number) - 1:0{len(number)}}{counted['rest']}"
+        digits = counted["number"]
+        number = bounded(digits, most=_MOST)
+        if not number:
+            return None
+        former = f"{counted['head']}{number - 1:0{len(digits)}}{counted['rest']}"
         other_header = _header(path.with_name(former))
         text = f"{former} beside it states the same creation time: if both are of one recording, this one starts later"
         return (
@@ -83,21 +89,25 @@ def _not_placed(text: str, *, fix: str) -> Chapter:
 def place_by_name(name: str) -> tuple[str, int] | None:
     """Reads the recording that a GoPro's file name states, and its chapter from 1 on; None for any other name."""
     if match := _NEW.fullmatch(name):
-        return f"{match['head']}{match['file']}".upper(), int(match["chapter"])
+        return f"{match['head']}{match['file']}".upper(), _chapter(match)
     if match := _OLD.fullmatch(name):
-        return match["file"].upper(), int(match["chapter"]) + 1
+        return match["file"].upper(), _chapter(match) + 1
     if match := _FIRST.fullmatch(name):
         return match["file"].upper(), 1
     return None
 
 
+def _chapter(match: re.Match[str]) -> int:
+    return bounded(match["chapter"], most=_CHAPTERS) or 0
+
+
 def _earlier(name: str) -> list[str]:
     """Names of the chapters before a file; empty where its name does not say that it is a later chapter."""
     if match := _NEW.fullmatch(name):
-        return [f"{match['head']}{k:02}{match['file']}" for k in range(1, int(match["chapter"]))]
+        return [f"{match['head']}{k:02}{match['file']}" for k in range(1, _chapter(match))]
     if match := _OLD.fullmatch(name):
         first = "GOPR" if match["head"].isupper() else "gopr"
-        later = [f"{match['head']}{k:02}{match['file']}" for k in range(1, int(match["chapter"]))]
+        later = [f"{match['head']}{k:02}{match['file']}" for k in range(1, _chapter(match))]
         return [f"{first}{match['file']}", *later]
     return []
 

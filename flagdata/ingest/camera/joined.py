@@ -7,7 +7,6 @@ before, to within the whole seconds in which both are stated.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -25,6 +24,7 @@ from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import Timing
 from flagdata.ingest.camera.video import VideoSource
 from flagdata.ingest.mcap.bags import to_join
+from flagdata.numbered import by_numbers
 from flagdata.shell import command_line
 from flagdata.timebase import NANOSECONDS, parse
 
@@ -33,7 +33,6 @@ _ROUNDED = 2.5
 a camera takes up to a second to open a file."""
 _RATE, _VARIES = Fraction(1, 100), Fraction(1, 4)
 """Parts by which the frame rates of one recording's chapters differ at most: of constant rates, and of varying ones."""
-_DIGITS = re.compile(r"(\d+)")
 
 
 def in_order(paths: Sequence[Path]) -> tuple[Path, ...]:
@@ -52,8 +51,7 @@ def in_order(paths: Sequence[Path]) -> tuple[Path, ...]:
         recording = place_by_name(path.name)
         if recording is not None:
             return (0, recording)
-        parts = _DIGITS.split(path.name)
-        return (1, *(int(part) if part.isdigit() else part.lower() for part in parts))
+        return (1, by_numbers(path.name))
 
     return tuple(sorted(paths, key=key))
 
@@ -155,9 +153,8 @@ class JoinedSource:
         chapters_by_name = [chapter for chapter in by_name if chapter is not None]
         if len(chapters_by_name) == len(by_name) and len(set(created)) == 1 and created[0] is not None:
             chapters = [chapter for _, chapter in chapters_by_name]
-            if len({recording for recording, _ in chapters_by_name}) > 1 or chapters != list(
-                range(chapters[0], chapters[-1] + 1)
-            ):
+            successive = all(after - before == 1 for before, after in pairwise(chapters))
+            if len({recording for recording, _ in chapters_by_name}) > 1 or not successive:
                 raise UsageError(
                     f"by their names {names} are not successive chapters of one recording",
                     where="--join",

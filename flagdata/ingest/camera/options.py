@@ -13,7 +13,7 @@ from flagdata.errors import UsageError
 from flagdata.schema import FRAME_RATE, FRAME_SIZE
 from flagdata.timebase import zone
 
-_BOX = re.compile(r"^\s*(\d+)\s*,\s*(\d+)\s*,\s*(\d+)\s*,\s*(\d+)\s*$")
+_BOX = re.compile(r"^\s*([0-9]{1,9})\s*,\s*([0-9]{1,9})\s*,\s*([0-9]{1,9})\s*,\s*([0-9]{1,9})\s*$")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,6 +22,7 @@ from statistics import median
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding
+from flagdata.numbered import Ordinal, bounded
 from flagdata.timebase import NANOSECONDS
 
 _FRACTION = 3  # digits from which on a number behind the seconds is a fraction of one
@@ -51,7 +52,7 @@ class Clock:
     """
 
     times: tuple[int, ...]
-    counts: tuple[int, ...]
+    counts: tuple[Ordinal, ...]
     first: int
     last: int
     dated: bool
@@ -88,7 +89,7 @@ def clock_of(stems: Sequence[str]) -> Clock | None:
     first, count = places.pop()
     return Clock(
         times=tuple(second * NANOSECONDS + part for second, part in zip(seconds, fractions, strict=True)),
-        counts=tuple(0 if exact or not part else int(part) for part in parts),
+        counts=tuple(Ordinal.read("0" if exact or not part else part) for part in parts),
         first=first,
         last=first + count,
         dated=all(dated),
@@ -135,6 +136,11 @@ _NUMBER = re.compile(r"(\d+)")
 _COPY = re.compile(r"\s*\((\d+)\)$")
 _MINUS = re.compile(r"(?:^|[ _=(])-$")
 _RENAME = "name the pictures of one recording alike, with one number that counts the frames, and keep others elsewhere"
+_COUNT = "number the pictures by frames, 1, 2, 3, …; a number that is left out is a missing frame"
+_LARGEST = 10**40
+"""Largest number of a name that is calculated with: a date, a time of day and a fraction have 23 digits."""
+_LAST = 2**53
+"""Last place of a picture: its time is a fraction's multiple of it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -222,8 +228,29 @@ def ordered(names: Sequence[str], *, rate: Fraction, where: str) -> Ordered:
     columns = _columns(stems, names, where)
     clock = clock_of(stems)
     if clock is not None:
-        return _by_clock(clock, columns, names, rate, where)
-    return _by_number(_with_fractions(columns), names, rate, where)
+        taken = _by_clock(clock, columns, names, rate, where)
+    else:
+        taken = _by_number(_with_fractions(columns), names, rate, where)
+    _check_gaps(taken, names, where)
+    return taken
+
+
+def _check_gaps(taken: Ordered, names: Sequence[str], where: str) -> None:
+    """Refuse places that no clock counts up to.
+
+    Raises:
+        InputError: the last is beyond.
+    """
+    if taken.places[-1] <= _LAST:
+        return
+    steps = [b - a for a, b in pairwise(taken.places)]
+    wide = next(k for k, step in enumerate(steps) if step > 1)
+    raise InputError(
+        f"by the numbers in the names {sum(steps) - len(steps)} frames are missing, the first after "
+        f"{names[taken.order[wide]]}: they do not count frames",
+        where=where,
+        fix=_COUNT,
+    )
 
 
 def _with_copies(stems: list[str]) -> list[str]:
@@ -266,7 +293,7 @@ def _columns(stems: Sequence[str], names: Sequence[str], where: str) -> list[_Co
     columns = []
     for k, before in enumerate(texts[0][:-1]):
         digits = tuple(parts[2 * k + 1] for parts in split)
-        values = tuple(sign[k] * int(text) for sign, text in zip(signs, digits, strict=True))
+        values = tuple(sign[k] * value for sign, value in zip(signs, _values(digits, names, where), strict=True))
         column = _Column(before=before, values=values, digits=digits, tick=_epoch(values))
         unpadded = not any(len(text) > 1 and text[0] == "0" for text in digits)
         dash = (k == 0 or before != "-") and _MINUS.search(before) is not None and column.varies and unpadded
@@ -276,6 +303,24 @@ def _columns(stems: Sequence[str], names: Sequence[str], where: str) -> list[_Co
             )
         columns.append(column)
     return columns
+
+
+def _values(digits: Sequence[str], names: Sequence[str], where: str) -> list[int]:
+    """Numbers of a column; 0 of one that is the same in all names and longer than any count or time.
+
+    Raises:
+        InputError: they are longer, and vary.
+    """
+    values = [value for text in digits if (value := bounded(text, most=_LARGEST)) is not None]
+    if len(values) == len(digits):
+        return values
+    if len(set(digits)) > 1:
+        raise InputError(
+            f"the numbers in the names, as of {names[0]} and {names[1]}, are longer than any count or time",
+            where=where,
+            fix=_COUNT,
+        )
+    return [0 for _ in digits]
 
 
 def _epoch(values: Sequence[int]) -> Fraction | None:
@@ -329,7 +374,7 @@ def _by_number(columns: Sequence[_Column], names: Sequence[str], rate: Fraction,
             f"the numbers in the names, as of {first} and {second}, rise by steps that are neither one nor even: they "
             "do not count frames",
             where=where,
-            fix="number the pictures by frames, 1, 2, 3, …; a number that is left out is a missing frame",
+            fix=_COUNT,
         )
     reading, column, instants = min(readings, key=lambda candidate: candidate[0].places[-1])
     _check_passed_end(column, reading, names, where)

@@ -12,6 +12,7 @@ import zstandard
 
 from flagdata.errors import InputError
 from flagdata.files import MCAP, is_beside, is_folder, is_mcap, open_regular
+from flagdata.numbered import by_numbers
 from flagdata.shell import command_line
 
 _DESCRIPTION = "metadata.yaml"
@@ -22,7 +23,6 @@ _LONGEST = 1 << 20  # of a description [B]
 _SQLITE, _ROS_1 = b"SQLite format 3\0", b"#ROSBAG V"
 _ZSTD, _GZIP = b"\x28\xb5\x2f\xfd", b"\x1f\x8b"
 _HEAD = 16 << 10
-_DIGITS = re.compile(r"(\d+)")
 
 
 def is_bag(path: Path) -> bool:
@@ -97,12 +97,7 @@ def to_join(paths: Sequence[Path]) -> str:
 
 def by_number(paths: Sequence[Path]) -> list[Path]:
     """Paths by the numbers in their names: part 10 comes after part 9."""
-
-    def key(path: Path) -> list[tuple[int, int, str]]:
-        parts = _DIGITS.split(path.name)
-        return [(1, int(part[-18:]), part) if part.isdigit() else (0, 0, part.lower()) for part in parts]
-
-    return sorted(paths, key=key)
+    return sorted(paths, key=lambda path: by_numbers(path.name))
 
 
 def _description(path: Path) -> str | None:

@@ -35,7 +35,7 @@ _NUMBERS = {
     "float64": "d",
 }
 _BYTES = frozenset({"byte", "char", "octet", "uint8"})
-_FIELD = re.compile(r"^([\w/]+)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+(\w+)(?!\s*=)(?:\s+\S.*)?$")
+_FIELD = re.compile(r"^([\w/]+)(?:<=\d+)?(\[(?:<=)?[0-9]{0,18}\])?\s+(\w+)(?!\s*=)(?:\s+\S.*)?$")
 _NOTHING = re.compile(r"\[0+\]")  # ROS 2 knows no such list; messages of no bytes could be without end
 _CONSTANT = re.compile(r"^[\w/]+(?:<=\d+)?\s+\w+\s*=")
 _BUILT_IN = {

@@ -18,9 +18,16 @@ from flagdata.files import check_input, is_beside
 from flagdata.ingest.meshes.obj import Obj, obj_text, read_obj
 from flagdata.ingest.meshes.others import FIX
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
+from flagdata.numbered import Ordinal, gap
 from flagdata.timebase import NANOSECONDS
 
 FRAME_LIMIT = 100_000
+_LATEST = 1e9
+"""Latest frame [s]: the times of a sequence are counted in nanoseconds."""
+_LAST = 2**53
+"""Highest number of a frame: its time is a float's multiple of it."""
+_ONLY = Ordinal.read("0")
+"""The number of a folder's one cloth."""
 _FRAME = re.compile(r"(\d{4,})_(\d{2,})\.obj")
 _CONFIGURATION = "conf.json"
 
@@ -86,7 +93,7 @@ def read_folder(
         frames.append(frame)
         if progress is not None:
             progress(1)
-    return _sequence(frames, [n for n, _ in numbered], frame_time, metre, configuration)
+    return _sequence(frames, [n for n, _ in numbered], frame_time, metre, configuration, where=str(path))
 
 
 def frame_files(path: Path) -> list[tuple[int, Path]]:
@@ -98,7 +105,11 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
         LimitError: more than `FRAME_LIMIT`.
     """
     entries = sorted(entry for entry in path.iterdir() if entry.is_file() and not is_beside(entry.name))
-    frames_of_cloths = [(int(m[1]), int(m[2]), entry) for entry in entries if (m := _FRAME.fullmatch(entry.name))]
+    frames_of_cloths = [
+        (Ordinal.read(m[1]), Ordinal.read(m[2]), entry)
+        for entry in entries
+        if (m := _FRAME.fullmatch(entry.name)) is not None
+    ]
     if not frames_of_cloths:
         frames_of_cloths = _numbered([entry for entry in entries if entry.suffix.lower() == ".obj"], path)
     if len(frames_of_cloths) > FRAME_LIMIT:
@@ -106,28 +117,36 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
             f"the folder has {len(frames_of_cloths)} frames", where=str(path), fix=f"at most {FRAME_LIMIT} are read"
         )
     cloths = {cloth for _, cloth, _ in frames_of_cloths}
-    if cloths != {0}:
+    if cloths != {_ONLY}:
         raise InputError(
             f"{len(cloths)} cloths, numbered {', '.join(f'{c:02d}' for c in sorted(cloths))}",
             where=str(path),
             fix="keep one cloth's files, NNNN_00.obj, in a folder",
         )
-    frames = sorted((number, entry) for number, _, entry in frames_of_cloths)
-    numbers = [number for number, _ in frames]
-    missing = sorted(set(range(numbers[0], numbers[-1] + 1)) - set(numbers))
-    if missing:
+    ordered = sorted((number, entry) for number, _, entry in frames_of_cloths)
+    numbers = [number for number, _ in ordered]
+    if (missing := gap(numbers)) is not None:
         raise InputError(
-            f"{len(missing)} frames are missing", where=f"{path}, frame {missing[0]:04d}", fix="copy them, or cut there"
+            f"{missing.count} frames are missing, the first after frame {missing.after:04d}",
+            where=str(path),
+            fix="copy them, or cut there; number the files 1, 2, 3, … if their numbers do not count frames",
         )
     if len(set(numbers)) < len(numbers):
         twice = next(a for a, b in pairwise(numbers) if a == b)
         raise InputError(
             "there are two files for one frame", where=f"{path}, frame {twice:04d}", fix="keep one of them"
         )
+    frames = [(frame, entry) for number, entry in ordered if (frame := number.up_to(_LAST)) is not None]
+    if len(frames) < len(ordered):
+        raise LimitError(
+            f"the last frame is numbered {numbers[-1]}, beyond {_LAST}",
+            where=str(path),
+            fix="number the frames from 0 or 1 on",
+        )
     return frames
 
 
-def _numbered(entries: list[Path], path: Path) -> list[tuple[int, int, Path]]:
+def _numbered(entries: list[Path], path: Path) -> list[tuple[Ordinal, Ordinal, Path]]:
     """Frames of other programs: names that differ in one number."""
     if not entries:
         raise NotFoundError("there are no .obj files", where=str(path), fix=FIX)
@@ -141,7 +160,7 @@ def _numbered(entries: list[Path], path: Path) -> list[tuple[int, int, Path]]:
             where=str(path),
             fix="name them alike, with one number that counts the frames",
         )
-    columns = list(zip(*(map(int, parts[1::2]) for parts in split), strict=True))
+    columns = list(zip(*(map(Ordinal.read, parts[1::2]) for parts in split), strict=True))
     varying = [column for column in columns if len(set(column)) > 1] or columns[-1:]
     if len(varying) > 1:
         raise InputError(
@@ -150,7 +169,7 @@ def _numbered(entries: list[Path], path: Path) -> list[tuple[int, int, Path]]:
             where=str(path),
             fix="name the files of one cloth alike, with one number that counts the frames",
         )
-    return [(number, 0, entry) for number, entry in zip(varying[0], entries, strict=True)]
+    return [(number, _ONLY, entry) for number, entry in zip(varying[0], entries, strict=True)]
 
 
 def _frame_time(configuration: Mapping[str, Any], path: Path) -> float:
@@ -163,8 +182,20 @@ def _frame_time(configuration: Mapping[str, Any], path: Path) -> float:
 
 
 def _sequence(
-    frames: list[Obj], numbers: list[int], frame_time: float, metre: float, configuration: Mapping[str, Any] | None
+    frames: list[Obj],
+    numbers: list[int],
+    frame_time: float,
+    metre: float,
+    configuration: Mapping[str, Any] | None,
+    *,
+    where: str,
 ) -> MeshSequence | RaggedMeshSequence:
+    if numbers[-1] * frame_time > _LATEST:
+        raise LimitError(
+            f"frame {numbers[-1]} would be {numbers[-1] * frame_time:.3g} s after the first",
+            where=where,
+            fix="number the frames from 0 or 1 on",
+        )
     time = np.array([round(n * frame_time * NANOSECONDS) for n in numbers], dtype=np.int64)
     attributes = {"source": "obj"} if configuration is None else {"source": "arcsim", "scene": configuration}
     first = frames[0]

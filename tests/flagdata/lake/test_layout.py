@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable
 from datetime import timedelta
@@ -267,6 +268,14 @@ def test_a_marker_that_is_a_pipe_is_refused_at_once(lake: Lake) -> None:
     (lake.path / "lake.json").unlink()
     os.mkfifo(lake.path / "lake.json")
     with pytest.raises(FlagdataError, match="not a regular file"):
+        Lake.open(lake.path)
+
+
+@pytest.mark.parametrize("version", ["-1", "0", "1e999", "true", "2.5", '"1"', "null", "9" * 5000])
+def test_a_marker_without_a_version_of_the_format_is_refused(lake: Lake, version: str) -> None:
+    marker = lake.path / "lake.json"
+    marker.write_text(re.sub(r'("format_version": )\d+', lambda match: match[1] + version, marker.read_text()))
+    with pytest.raises(CorruptError, match="marker cannot be read"):
         Lake.open(lake.path)
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer.draft.shape import TableShape
 from flagdata.ingest.anemometer.instants.stamps import ELAPSED
+from flagdata.numbered import bounded
 from flagdata.schema import CHANNELS
 from flagdata.units import canonical
 
@@ -109,6 +110,7 @@ def _index(column: str, shape: TableShape) -> int:
         if shape.names.count(column) > 1:
             raise InputError(f"{column!r} heads several columns", where=_WHERE, fix="give its number (from 1)")
         return shape.names.index(column)
-    if column.isdigit() and 1 <= int(column) <= len(shape.names):
-        return int(column) - 1
+    number = bounded(column, most=len(shape.names))
+    if number:
+        return number - 1
     raise UnknownNameError.of("column", column, [name for name in shape.names if name], where=_WHERE)

@@ -14,7 +14,9 @@ from flagdata.ingest.anemometer.formats.headings import Column, Heading
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.numbered import bounded
 
+_CHANNELS = 99_999
 _NAME = re.compile(r"Ch(?P<channel>\d+)_(?:.*_)?(?P<statistic>Avg|Samples)_(?P<unit>[^_]*|deg_[CF])", re.IGNORECASE)
 _SPEEDS = {"m/s", "mph", "km/h", "knots", "kn", "kts"}
 _SPELLED = {"deg_c": "degC", "deg_f": "degF", "deg": "deg"}
@@ -84,4 +86,5 @@ def _column(column: Column, history: Mapping[str, Mapping[str, str]]) -> Column:
 
 def _hundred(name: str) -> int | None:
     match = re.match(r"Ch(\d+)", name)
-    return int(match[1]) // 100 if match else None
+    number = bounded(match[1], most=_CHANNELS) if match else None
+    return None if number is None else number // 100

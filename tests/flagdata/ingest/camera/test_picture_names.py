@@ -124,6 +124,9 @@ def test_what_is_missing_between_numbers_or_times_are_missing_frames(names: list
         ([f"cam{c}_{name}" for c in (1, 2) for name in clocked("%Y%m%d_%H%M%S_MS.png")], "several numbers vary"),
         ([f"{c}_{name}" for name in clocked("%Y%m%d_%H%M%S_MS.png") for c in ("a", "b")], "of 2 kinds"),
         (clocked("%M-%S-MS.png"), "several numbers vary"),
+        ([f"f_{k}.png" for k in (1, 2, 3, 10**30)], f"{10**30 - 4} frames are missing, the first after f_3.png"),
+        ([f"f_{k}.png" for k in (1, 2, 3, 2**63)], "the first after f_3.png"),
+        ([f"f_{k}.png" for k in (10**60, 1 + 10**60)], "longer than any count"),
     ],
     ids=lambda one: one if isinstance(one, str) else one[0],
 )
@@ -131,6 +134,10 @@ def test_names_that_leave_the_order_open_are_refused(names: list[str], why: str)
     with pytest.raises(InputError, match=why) as refused:
         placed(names)
     assert refused.value.where == "folder"
+
+
+def test_a_long_number_that_all_names_have_is_passed_over() -> None:
+    assert placed([f"scan{10**60}_{k}.png" for k in (7, 8, 10)])[:2] == ([0, 1, 2], [0, 1, 3])
 
 
 def test_the_fix_of_a_refusal_gives_the_order() -> None:

@@ -130,13 +130,13 @@ def test_bags_of_other_kinds_are_refused_by_name(tmp_path: Path) -> None:
     other = tmp_path / "a.bag"
     other.write_bytes(b"#ROSBAG V2.0\n" + bytes(4000))
     for path, what, fix in (
-        (sqlite_bag(tmp_path / "a.db3"), "SQLite", "mcap convert a.db3 a.mcap"),
-        (other, "ROS 1", "mcap convert a.bag a.mcap"),
+        (sqlite_bag(tmp_path / "a.db3"), "SQLite", "mcap convert {folder}/a.db3 {folder}/a.mcap"),
+        (other, "ROS 1", "mcap convert {folder}/a.bag {folder}/a.mcap"),
     ):
         for look in (classify, examine):
             with pytest.raises(FlagdataError, match=what) as raised:
                 look(path)
-            assert fix in raised.value.fix
+            assert fix.format(folder=tmp_path) in raised.value.fix
     folder = tmp_path / "bag"
     folder.mkdir()
     sqlite_bag(folder / "bag_0.db3")

@@ -102,8 +102,8 @@ def test_files_written_one_behind_another_are_refused_with_the_commands_that_cut
     with pytest.raises(CorruptError, match="second MCAP file") as raised:
         topics(both)
     end = first.stat().st_size
-    assert f"head -c {end} both.mcap" in raised.value.fix
-    assert f"tail -c {second.stat().st_size} both.mcap" in raised.value.fix
+    assert f"head -c {end} {both}" in raised.value.fix
+    assert f"tail -c {second.stat().st_size} {both}" in raised.value.fix
 
 
 def test_a_channel_that_is_defined_twice_is_refused(tmp_path: Path) -> None:

@@ -68,6 +68,11 @@ def test_a_rate_goes_before_the_scenes(make_folder: Callable[..., Path]) -> None
 def test_what_is_wrong_is_refused(make_folder: Callable[..., Path]) -> None:
     cases = [
         ({"0000_00.obj": UNIT, "0002_00.obj": UNIT, "0005_00.obj": UNIT}, None, InputError, "3 frames are missing"),
+        ({"0.obj": UNIT, f"{10**12}.obj": UNIT}, None, InputError, f"{10**12 - 1} frames are missing, the first after"),
+        ({"0.obj": UNIT, f"{10**200}.obj": UNIT}, None, InputError, "frames are missing, the first after frame 0000"),
+        ({f"{10**15}.obj": UNIT}, None, LimitError, "s after the first"),
+        ({f"{10**200}.obj": UNIT}, None, LimitError, "the last frame is numbered 1000"),
+        ({f"0000_{10**30}.obj": UNIT}, None, InputError, "1 cloths"),
         ({"0000_00.obj": UNIT, "0000_01.obj": UNIT}, None, InputError, "2 cloths"),
         ({"a_1.obj": UNIT, "b_2.obj": UNIT}, None, InputError, "no sequence: a_1.obj and b_2.obj"),
         ({"a_1.obj": UNIT, "flag.obj": UNIT}, None, InputError, "no sequence: a_1.obj and flag.obj"),
