@@ -25,6 +25,8 @@ from measure.refine.trace import Trace
 STEPS = (0, 10, 20, 40)
 """Steps that are shown: Runia et al. 2020, figure 8."""
 SIDE = 200  # px of a frame on the page
+_CLIPS = 10**9
+"""Above the number of clips of any answer."""
 _OWN, _TARGET, _OTHER = "#c4622d", "#2b6f8f", "#7a7a7a"
 
 
