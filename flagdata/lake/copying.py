@@ -23,6 +23,7 @@ from flagdata.lake.refs import NOUNS, Deletion, deleted_by
 from flagdata.lake.restoring import Bars, Taken, heal_noted
 from flagdata.lake.transaction import Transaction
 from flagdata.printable import counted
+from flagdata.shell import command_line
 from flagdata.storage import Place
 
 _SHOWN = ("name", "session", "source_name", "code_version", "branch", "kind")
@@ -80,7 +81,8 @@ def _with_push(error: ConflictError, source: Lake, target: Place | str) -> Confl
     return ConflictError(
         "there is a clone of this lake already",
         where=str(lake.path),
-        fix=f"flagdata push {lake.path} --lake {source.path} brings it up to date, also where a clone was stopped",
+        fix=f"{command_line('flagdata', 'push', lake.path, '--lake', source.path)} brings it up to date, also where a "
+        "clone was stopped",
     )
 
 
@@ -216,8 +218,8 @@ def _check_common(source: Lake, target: Lake, common: int) -> None:
         raise ConflictError(
             "each of the two lakes has versions that the other lacks" if same else "the lakes share no history",
             where=f"{source.path} and {target.path}",
-            fix=f"flagdata clone {target.path} NEW, and commit there what it lacks; or write to it directly:"
-            f" --lake {target.path}",
+            fix=f"{command_line('flagdata', 'clone', target.path, 'NEW')}, and commit there what it lacks; or write to "
+            f"it directly: {command_line('--lake', target.path)}",
         )
 
 

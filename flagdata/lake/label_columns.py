@@ -17,6 +17,7 @@ import pyarrow as pa
 from flagdata.errors import ConflictError
 from flagdata.lake.lineage import labels_of
 from flagdata.lake.refs import MAIN
+from flagdata.shell import command_line
 
 Value: TypeAlias = bool | int | float | str
 Labels: TypeAlias = Mapping[str, Mapping[str, Value]]
@@ -54,9 +55,9 @@ class Clash:
         for branch, labels in homes.items():
             here = [artifact for artifact in rest if self.name in labels.get(artifact, {})]
             rest = [artifact for artifact in rest if artifact not in here]
-            where = "" if branch == MAIN else f" --branch {branch}"
+            where = () if branch == MAIN else ("--branch", branch)
             if here:
-                commands.append(f"flagdata label {' '.join(here[:_NAMED])} {self.name}={where}")
+                commands.append(command_line("flagdata", "label", *here[:_NAMED], f"{self.name}=", *where))
         done = f"; {' and '.join(commands)} takes the other off" if commands else ""
         more = f"; then repeat this, for the rest of the {len(self.holders)}" if len(self.holders) > _NAMED else ""
         return f"{self.advice}{done}{more}"

@@ -5,7 +5,6 @@ last had the same counts. What both changed, to different values, is refused: no
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Collection
 from typing import TypeAlias
 
@@ -13,6 +12,7 @@ from flagdata.errors import ConflictError
 from flagdata.lake.label_columns import Labels, Value, kind
 from flagdata.lake.refs import MAIN, Slice
 from flagdata.lake.store import Store
+from flagdata.shell import command_line
 
 Merged: TypeAlias = dict[str, dict[str, Value]]
 """Artifact → name → value."""
@@ -99,12 +99,13 @@ def _both_changed(
     artifact: str, name: str, mine: Value | None, its: Value | None, *, ours: str, theirs: str
 ) -> ConflictError:
     """Returns the refusal of a merge of two branches that changed a label to different values."""
-    given = shlex.quote(f"{name}={'' if mine is None else json.dumps(mine, ensure_ascii=False)}")
-    where = "" if theirs == MAIN else f" --branch {theirs}"
+    given = f"{name}={'' if mine is None else json.dumps(mine, ensure_ascii=False)}"
+    where = () if theirs == MAIN else ("--branch", theirs)
     return ConflictError(
         f"both branches changed the label {name}: on {ours!r} it is {_shown(mine)}, on {theirs!r} {_shown(its)}",
         where=f"artifact {artifact}",
-        fix=f"give both the value of {ours!r}, or another: flagdata label {artifact} {given}{where}; then merge again",
+        fix=f"give both the value of {ours!r}, or another: "
+        f"{command_line('flagdata', 'label', artifact, given, *where)}; then merge again",
     )
 
 

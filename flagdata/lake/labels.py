@@ -18,6 +18,7 @@ from flagdata.lake.commits import Change, commit
 from flagdata.lake.label_columns import Value
 from flagdata.lake.removal import CLIP_COLUMNS, clips_of
 from flagdata.lake.store import Store
+from flagdata.shell import command_line
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 _LONGEST = 1000  # characters of a text
@@ -73,7 +74,7 @@ def put(
             raise NotFoundError(
                 f"{', '.join(absent)} is not on branch {branch!r}",
                 where=str(lake.path),
-                fix=f"give ids of rows that flagdata ls --at {branch} shows",
+                fix=f"give ids of rows that {command_line('flagdata', 'ls', '--at', branch)} shows",
             )
         labelled = sorted(frozenset(artifacts) | clips_of(rows, artifacts))
         change = Change(message=message, branch=branch, labels=dict.fromkeys(labelled, values))

@@ -10,7 +10,6 @@ what changed between any two refs.
 from __future__ import annotations
 
 import secrets
-import shlex
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,6 +28,7 @@ from flagdata.lake.removal import left
 from flagdata.lake.store import Store
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
+from flagdata.shell import command_line
 
 _COLUMNS = ["artifact", "kind", "name", "parents"]
 
@@ -197,8 +197,8 @@ def _check_parents(
 def _ways_to_agree(parent: str, *, gone: str, branch: str) -> str:
     """Explains how two branches agree again on an artifact that one withdrew and the other made something from."""
     return (
-        f"flagdata withdraw {parent} --with-descendants --branch {branch} -m {shlex.quote(f'as on {gone}')}, or ingest "
-        f"its source again with --branch {gone}"
+        command_line("flagdata", "withdraw", parent, "--with-descendants", "--branch", branch, "-m", f"as on {gone}")
+        + f", or ingest its source again with {command_line('--branch', gone)}"
     )
 
 

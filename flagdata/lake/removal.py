@@ -38,6 +38,7 @@ from flagdata.lake.matching import made_from, matching
 from flagdata.lake.refs import MAIN
 from flagdata.lake.store import Store
 from flagdata.schema import Kind
+from flagdata.shell import command_line
 
 BEYOND = (
     "exports that were made of them",
@@ -120,7 +121,7 @@ def check_leaving(rows: pa.Table, leaving: Collection[str], *, branch: str, wher
         raise NotFoundError(
             f"{', '.join(sorted(foreign))} is not on branch {branch!r}",
             where=where,
-            fix=f"give ids of rows that flagdata ls --at {branch} shows",
+            fix=f"give ids of rows that {command_line('flagdata', 'ls', '--at', branch)} shows",
         )
     made_from_leaving = made_from(rows, leaving).select(CLIP_COLUMNS).to_pylist()
     staying = [row for row in made_from_leaving if row["artifact"] not in leaving]

@@ -30,6 +30,7 @@ from flagdata.lake.refs import Refs, Slice, View
 from flagdata.lake.rowfiles import ROW_ORDER, Scan, in_order
 from flagdata.printable import SHORT
 from flagdata.schema import CATALOG, Kind
+from flagdata.shell import command_line
 from flagdata.storage import Place, RemotePath
 
 _ORDER = ", ".join(ROW_ORDER)
@@ -169,7 +170,7 @@ class Store:
         if len(meant_rows) == 1:
             return self.matching(view, {"artifact": meant_rows[0]["artifact"]})
         where = str(self.path)
-        listed = "flagdata ls lists them" if at is None else f"flagdata ls --at {at} lists them"
+        listed = "flagdata ls lists them" if at is None else f"{command_line('flagdata', 'ls', '--at', at)} lists them"
         if not meant_rows:
             names = self.columns(view, ["name"])["name"].unique().to_pylist()
             close = difflib.get_close_matches(artifact, filter(None, names[:_NAMES]), n=1)

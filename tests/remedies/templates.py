@@ -90,13 +90,21 @@ def _aside(node: ast.AST) -> Iterator[ast.AST]:
 
 def _texts(source: ast.Module) -> Iterator[str]:
     given = list(_given(source))
-    names = {node.id for value in given for node in ast.walk(value) if isinstance(node, ast.Name)} | {"fix"}
+    names = {node.id for value in given for node in _beside_words(value) if isinstance(node, ast.Name)} | {"fix"}
     names |= {name for name in _assigned(source) if name.endswith("FIX")}
     for name, values in _assigned(source).items():
         if name in names:
             given += values
     for value in given:
         yield from strings(value)
+
+
+def _beside_words(value: ast.AST) -> Iterator[ast.AST]:
+    """All nodes of an expression, but for the words of command lines."""
+    yield value
+    if not is_command_line(value):
+        for child in ast.iter_child_nodes(value):
+            yield from _beside_words(child)
 
 
 def _given(source: ast.Module) -> Iterator[ast.expr]:
