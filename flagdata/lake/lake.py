@@ -31,6 +31,7 @@ from flagdata.lake.refs import MAIN, Ref
 from flagdata.lake.removal import Erasure, Withdrawal, descendants, erase, explained, withdraw
 from flagdata.lake.store import Store
 from flagdata.lake.transaction import Transaction
+from flagdata.printable import printable
 from flagdata.schema import FORMAT_VERSION
 from flagdata.storage import Place, RemotePath
 
@@ -38,6 +39,7 @@ MARKER = "lake.json"
 """The file that says that a folder is a lake, and which."""
 _MARKER_SCHEMA = "flagdata.lake/1"
 _UNUSABLE = re.compile("[\\\\\ud800-\udfff]")  # the Delta library takes a backslash for a separator; no UTF-8
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")  # the Delta library leaves tabs and line breaks out of a path
 
 
 class Lake(Store):
@@ -397,6 +399,12 @@ def _usable(path: Place | str) -> Place:
         absolute = location.resolve()
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a null byte
         raise UsageError(f"this is not a path: {error}", where=repr(str(path)), fix="name another folder") from None
+    if _CONTROL.search(str(absolute)):
+        raise UsageError(
+            "the path of a lake cannot have a line break, a tab or another control character",
+            where=printable(str(absolute)),
+            fix="rename the folder",
+        )
     if _UNUSABLE.search(str(absolute)):
         raise UsageError(
             "the path of a lake cannot have a backslash, or a byte that is not UTF-8",

@@ -93,6 +93,17 @@ def test_a_folder_that_the_catalog_cannot_work_in_is_refused_by_name(tmp_path: P
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("name", ["a\nb", "a\tb", "a\rb", "a\x1b]0;x\x07", "a\x9bb", "a\u2028b"], ids=ascii)
+def test_a_folder_with_a_control_character_is_refused_by_every_verb_that_makes_a_lake(
+    tmp_path: Path, name: str
+) -> None:
+    source = Lake.create(tmp_path / "source").path
+    for words in (("init", tmp_path / name), ("clone", source, tmp_path / name), ("init", tmp_path / name / "lake")):
+        ended = invoke(*map(str, words))
+        assert (ended.code, "a tab or another control character" in ended.err) == (2, True), ended.err
+    assert list(tmp_path.iterdir()) == [source]
+
+
 def test_a_path_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     for path in (tmp_path / "loop" / "lake", f"{tmp_path}/a\0b"):
