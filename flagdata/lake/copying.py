@@ -203,7 +203,7 @@ def _check_history(source: Lake, target: Lake, *, head: int, target_head: int) -
         raise ConflictError(
             f"{target.path} is ahead: it has versions up to {target_head}, {source.path} up to {head}",
             where=str(target.path),
-            fix=f"flagdata pull {target.path} --lake {source.path} brings them here",
+            fix=f"{command_line('flagdata', 'pull', target.path, '--lake', source.path)} brings them here",
         )
 
 
