@@ -6,7 +6,7 @@ Needs scikit-learn.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,8 @@ from models.ridge import require_table
 
 LEVELS = (0.025, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.975)
 """Levels of the quantiles: the ends of central intervals of 95, 90, 80 and 50 %, and the median."""
+ENSEMBLES = 1 + len(LEVELS)
+"""Ensembles of each target: of its mean, and of each level."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,6 +87,7 @@ def fit_boosting(
     rate: float = 0.05,
     leaves: int = 15,
     levels: Sequence[float] = LEVELS,
+    advance: Callable[[int], None] = lambda done: None,
 ) -> Boosting:
     """Fits trees to clips.
 
@@ -99,6 +102,7 @@ def fit_boosting(
         rate: by which each tree counts.
         leaves: of each tree, at most.
         levels: of the quantiles, ascending, at least two.
+        advance: called with 1 after each ensemble, `ENSEMBLES` times for each target where the levels are `LEVELS`.
 
     Raises:
         InputError: sizes that differ, numbers that are not finite, or a number out of its range.
@@ -115,7 +119,7 @@ def fit_boosting(
         raise InputError(f"the levels are {ascending}", fix="give at least two between 0 and 1, ascending")
 
     def fitted(target: FloatArray, loss: str, level: float | None) -> HistGradientBoostingRegressor:
-        return HistGradientBoostingRegressor(
+        trees = HistGradientBoostingRegressor(
             loss=loss,
             quantile=level,
             learning_rate=rate,
@@ -124,6 +128,8 @@ def fit_boosting(
             early_stopping=False,  # pyright: ignore[reportArgumentType]  (its default is a string)
             random_state=seed,
         ).fit(x, target)
+        advance(1)
+        return trees
 
     return Boosting(
         means=tuple(fitted(target, "squared_error", None) for target in y.T),

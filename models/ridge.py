@@ -70,9 +70,8 @@ def fit_ridge(features: NDArray[np.floating], targets: NDArray[np.floating], *, 
     """
     x, y = np.asarray(features, dtype=np.float64), np.asarray(targets, dtype=np.float64)
     require_table(x, y, group)
-    names, sequence = np.unique(group, return_inverse=True)
-    if len(names) < FOLDS:
-        raise InputError(f"{len(names)} sequences cannot be dealt out to {FOLDS} folds", fix="give more sequences")
+    check_folds(group)
+    sequence = np.unique(group, return_inverse=True)[1]
     fold = sequence % FOLDS
     error = np.zeros((len(PENALTIES), y.shape[1]))
     for left_out in range(FOLDS):
@@ -88,6 +87,16 @@ def fit_ridge(features: NDArray[np.floating], targets: NDArray[np.floating], *, 
         intercept=path[0].intercept,
         penalty=np.array(PENALTIES)[best],
     )
+
+
+def check_folds(group: NDArray[np.integer]) -> None:
+    """Checks that clips of these sequences (n,) can be dealt out.
+
+    Raises:
+        InputError: fewer sequences than folds.
+    """
+    if (sequences := len(np.unique(group))) < FOLDS:
+        raise InputError(f"{sequences} sequences cannot be dealt out to {FOLDS} folds", fix="give more sequences")
 
 
 def require_table(features: FloatArray, targets: FloatArray, group: NDArray[np.integer]) -> None:

@@ -159,11 +159,29 @@ def truth(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> FloatAr
     return np.stack([_target_values(parameters, name) for name in names], axis=1)
 
 
-def _target_values(parameters: Mapping[str, FloatArray], name: str) -> FloatArray:
+def stated(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> tuple[str, ...]:
+    """Selects the targets of these names that every clip states; parameters as in `truth`.
+
+    Raises:
+        UnknownNameError: a name that is none.
+    """
+    return tuple(
+        name
+        for name in names
+        if all(key in parameters and np.isfinite(parameters[key]).all() for key in _made_of(name))
+    )
+
+
+def _made_of(name: str) -> tuple[str, ...]:
+    """Lists the parameters that a target is made of."""
     if name not in TARGETS:
         raise UnknownNameError.of("target", name, TARGETS)
+    return _STATED.get(TARGETS[name].name, tuple(f"bending.{index}" for index in range(_BENDING)))
+
+
+def _target_values(parameters: Mapping[str, FloatArray], name: str) -> FloatArray:
+    needed = _made_of(name)
     quantity = TARGETS[name].name
-    needed = list(_STATED.get(quantity, [f"bending.{index}" for index in range(_BENDING)]))
     missing = [key for key in needed if key not in parameters or not np.isfinite(parameters[key]).any()]
     if missing:
         raise InputError(

@@ -125,6 +125,7 @@ def train(chosen: Training) -> Mapping[str, Any]:
 
     Raises:
         ConflictError: another training is under way in the folder.
+        InputError, UsageError: the recipe does not fit the clips; the fix is a line of the recipe.
         MissingExtraError: torch is not installed.
         NotFoundError: no such lake or version.
         RefusedError: the sides of the data set leak, or one is empty.
@@ -190,6 +191,7 @@ def evaluate(chosen: Evaluating) -> Mapping[str, Any]:
         What `flagdata evaluate --json` prints.
 
     Raises:
+        InputError: films too short or too slow for a network, or that state none of its targets.
         MissingExtraError: torch is not installed.
         NotFoundError: no such lake or version.
         RefusedError: a clip that a network has learned from.

@@ -20,7 +20,8 @@ from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 from models.estimator import Estimator
 from models.frontend import FrontEnd
-from models.training.conditioned import LEAST_RATE, FitFilm
+from models.training.conditioned import FitFilm
+from models.training.timed_film import LEAST_RATE
 
 COMPARED = 48
 """Clips of the lake that are looked at, drawn at random: each costs a third of a second, most of it conditioning."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from flagdata.addresses import local_path
 from flagdata.api.learning import Evaluating
@@ -14,11 +17,14 @@ from flagdata.errors import InputError
 from flagdata.options import Result, verb
 from flagdata.provenance import canonical
 from flagdata.stated import Stated
+from flagdata.timebase import NANOSECONDS
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from flagdata.arrays import FloatArray, IntArray
     from flagdata.dataset import Pairs, Source
+    from flagdata.dataset.table import PairTable
     from flagdata.lake import Artifact
     from models.crops import Cropping
     from models.estimator import Estimator
@@ -38,8 +44,10 @@ def evaluate(chosen: Evaluating) -> Iterator[Result]:
     """Judge trained networks on one side of a data set and write the table.
 
     MODEL is a network of the lake by its name (all seeds of it) or the beginning of its id, or "shipped" for the one
-    of flags that comes with the package, "shipped/NAME" for another. Networks that were trained on a part of the
-    sequences make the learning curve.
+    of flags that comes with the package, "shipped/NAME" for another. The clips are those of --at; networks are taken
+    from the heads of main and of the branch of --at, so that a tag older than a network can be judged. Clips are cut
+    and resampled to what each network takes. Networks that were trained on a part of the sequences make the learning
+    curve.
 
     \b
       flagdata evaluate flow sdn --at v1 --lake lake --out evaluation
@@ -129,6 +137,7 @@ class _Desk:
         self._known = {} if area_weight is None else {"area_weight": area_weight}
         self._cache, self._workers, self._seed = cache, workers, seed
         self._pairs: dict[str, Pairs] = {}
+        self._head_of: dict[str, str] = {}
         self._prepared: dict[tuple[str, str], Prepared] = {}
 
     def evaluation(
@@ -146,13 +155,14 @@ class _Desk:
         from models.training.recipe import DataSpec
 
         evaluated: list[Predictions] = []
-        learned: list[tuple[int, Predictions]] = []
+        learned: list[tuple[Artifact, DataSpec, Predictions]] = []
         curves: set[str] = set()
         chosen = self._models(names)
-        catalog = self._source.lake.table(self._source.lake.view(self._at))
         trained_on = [DataSpec.of_identity(_card(estimator)["recipe"]["data"]) for _, estimator in chosen]
-        refuse_learned(catalog, trained_on, dataset=self._dataset, side=side)
-        # First: lengths that no film has and networks that are none on maps are refused before the rest is computed.
+        refuse_learned(self._catalog(), trained_on, dataset=self._dataset, side=side)
+        # First: what cannot be judged, lengths that no film has and networks that are none on maps are refused before
+        # the rest is computed.
+        self._check([estimator for _, estimator in chosen], side, handmade=handmade, linear=linear)
         triplets = self._triplets([estimator for _, estimator in chosen], frames, side)
         for row, estimator in chosen:
             predictions = self._predictions(estimator, side)
@@ -162,10 +172,10 @@ class _Desk:
             else:
                 curves.add(predictions.label)
             if row is not None:
-                learned.append((data.sequences or self._sequences(data), predictions))
+                learned.append((row, data, predictions))
         if handmade:
             evaluated += self._handmade(side)
-        evaluated = evaluated or [predictions for _, predictions in learned]
+        evaluated = evaluated or [predictions for *_, predictions in learned]
         data = f"{self._dataset}, {side} side, at {self._at or 'head'}{self._statement_text}"
         return scored(
             evaluated,
@@ -175,11 +185,61 @@ class _Desk:
             tsne_of=tsne,
             frames=triplets,
             reads=self._reads(evaluated, side, data) if linear else (),
-            learning=_points([point for point in learned if point[1].label in curves]),
+            learning=_points(
+                [
+                    (data.sequences or self._sequences(row, data), predictions)
+                    for row, data, predictions in learned
+                    if predictions.label in curves
+                ]
+            ),
             unseen=side != "train",
             split=side,
             split_by=self._side(side).split_by,
         )
+
+    @cached_property
+    def _heads(self) -> tuple[str, ...]:
+        """Branches at whose heads networks are sought: main, to which `train` commits, and the one that is judged."""
+        from flagdata.lake.refs import MAIN
+
+        lake = self._source.lake
+        shown = lake.view(self._at)[0].branch
+        return (MAIN, shown) if shown in lake.refs.branches() else (MAIN,)
+
+    def _catalog(self) -> pa.Table:
+        """Reads the rows of the version that is judged and of the heads that networks come from, each once."""
+        import pyarrow as pa
+
+        lake = self._source.lake
+        views = dict.fromkeys(lake.view(at) for at in (self._at, *self._heads))
+        rows = pa.concat_tables([lake.table(view) for view in views])
+        return rows.take(np.sort(np.unique(rows["artifact"].to_numpy(zero_copy_only=False), return_index=True)[1]))
+
+    def _check(self, chosen: Sequence[Estimator], side: str, *, handmade: bool, linear: bool) -> None:
+        """Checks that the clips of a side can be judged, before any is prepared.
+
+        Raises:
+            InputError: their films are too short or too slow for a model, or state none of its targets.
+        """
+        from models.evaluation.embeddings import quantities
+        from models.evaluation.handmade import check_stated
+        from models.evaluation.predict import judged_targets
+        from models.learner import Loss
+        from models.training.stated_films import StatedFilms
+
+        pairs = self._side(side)
+        parameters = pairs.table.parameter_columns()
+        films = StatedFilms.of(self._source.lake, pairs, at=self._at)
+        for estimator in chosen:
+            films.check_judged(estimator.front_end, estimator.cropping, model=estimator.name)
+            fitted_on = []
+            if estimator.learners[0].objective is Loss.CONTRASTIVE:
+                fitted_on.append(self._side("train").table.parameter_columns())
+            judged_targets(estimator, parameters, *fitted_on)
+        if handmade:
+            check_stated(self._side("train"), pairs)
+        if linear:
+            quantities(parameters)
 
     def _models(self, names: Sequence[str]) -> list[tuple[Artifact | None, Estimator]]:
         from flagdata.errors import UnknownNameError
@@ -188,17 +248,21 @@ class _Desk:
         from models import estimator
 
         lake = self._source.lake
-        rows = lake.rows({"kind": Kind.NETWORK}, at=self._at, columns=COLUMNS).to_pylist()
+        rows: dict[str, Mapping[str, Any]] = {}
+        for head in self._heads:
+            of_head = lake.rows({"kind": Kind.NETWORK}, at=head, columns=COLUMNS).to_pylist()
+            rows |= {row["artifact"]: {**row, "head": head} for row in of_head if row["artifact"] not in rows}
         chosen: list[tuple[Artifact | None, Estimator]] = []
         for name in names:
             if name == "shipped" or name.startswith("shipped/"):
                 ours = estimator.shipped(name.partition("/")[2] or estimator.DEFAULT)
                 chosen.append((None, replace(ours, name=f"{ours.name}, as shipped")))  # beside its seeds, if they are
                 continue
-            same = [row["artifact"] for row in meant(rows, name)]
+            same = {row["artifact"]: row["head"] for row in meant(rows.values(), name)}
             if not same:
-                raise UnknownNameError.of("network", name, sorted({row["name"] for row in rows} | {"shipped"}))
-            found = [lake.artifact(artifact, at=self._at) for artifact in sorted(same)]
+                raise UnknownNameError.of("network", name, sorted({row["name"] for row in rows.values()} | {"shipped"}))
+            self._head_of |= same
+            found = [lake.artifact(artifact, at=same[artifact]) for artifact in sorted(same)]
             chosen += labelled([(row, estimator.load(lake.object_path(str(row.object)))) for row in found])
         return chosen
 
@@ -239,7 +303,7 @@ class _Desk:
             estimator,
             self._clips(side, estimator),
             label=estimator.name,
-            note=_note(estimator),
+            note=_note(estimator, self._side(side).table),
             seed=self._seed,
             milliseconds=time_a_clip(estimator, self._side(side)),
             known=self._known,
@@ -289,9 +353,10 @@ class _Desk:
             for statement in self._known.values()
         )
 
-    def _sequences(self, data: DataSpec) -> int:
-        """Counts the sequences that a model of these data sets was trained on."""
-        return len(set(self._of(data, "train").table.seed.tolist()))
+    def _sequences(self, network: Artifact, data: DataSpec) -> int:
+        """Counts the sequences of these data sets that a network learned from, at the head that it comes from."""
+        pairs = self._source.pairs(data.rows, at=self._head_of[network.id], split="train")
+        return len(set(pairs.table.seed.tolist()))
 
     def _handmade(self, side: str) -> list[Predictions]:
         from models.evaluation.handmade import predictions
@@ -310,13 +375,30 @@ def _card(estimator: Estimator) -> Any:
     return estimator.card
 
 
-def _note(estimator: Estimator) -> str:
+def _note(estimator: Estimator, table: PairTable) -> str:
     card = _card(estimator)
     shape = estimator.front_end
-    size = f"{shape.frames}×{shape.size}×{shape.size}"
+    size = f"{shape.frames}×{shape.size}×{shape.size}{_cut_out_of(table, shape)}"
     best = card.get("best") or {}
     epochs = f", {card['epochs']} epochs, best {best['number'] + 1}" if best else ""
     return f"{size}, {shape.maps}{epochs}, seed {card['seed']}"
+
+
+def _cut_out_of(table: PairTable, shape: FrontEnd) -> str:
+    """Says which clips the network's are cut out of; nothing where they are the catalog's as they are."""
+    from models.training.timed_film import frame_rate, has_rate
+
+    seconds = (table.end - table.start) / NANOSECONDS
+    of = "" if (table.frame_count == shape.frames).all() else f" of clips of {_from_to(table.frame_count)} frames"
+    if has_rate(table.frame_count, seconds, shape.rate).all():
+        return of
+    rates = _from_to(frame_rate(table.frame_count, seconds))
+    return f" at {shape.rate:g} Hz{of or ' of clips'} at {rates} Hz"
+
+
+def _from_to(values: FloatArray | IntArray) -> str:
+    low, high = f"{values.min():.3g}", f"{values.max():.3g}"
+    return low if low == high else f"{low} to {high}"
 
 
 def _points(learned: Sequence[tuple[int, Predictions]]) -> list[LearningPoint]:

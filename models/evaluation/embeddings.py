@@ -61,6 +61,16 @@ def takes_any_length(estimator: Estimator) -> bool:
     return estimator.front_end.maps in ("spectral-maps", "wave-maps", "flow-maps", "flow-maps-3")
 
 
+def quantities(parameters: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Returns what is read out of embeddings, of clips with these parameters: name → (n,).
+
+    Raises:
+        InputError: no clip states it.
+    """
+    area_weight, bending = truth(parameters, ("area_weight", "bending_scale")).T
+    return {"area_weight": area_weight, "stiffness": 10**bending}
+
+
 def readouts(
     predictions: Sequence[Predictions], parameters: Mapping[str, FloatArray], *, data: str, seed: int
 ) -> list[Read]:
@@ -76,12 +86,11 @@ def readouts(
     Raises:
         InputError: too few clips, or a quantity that they do not state or that is the same in all of them.
     """
-    area_weight, bending = truth(parameters, ("area_weight", "bending_scale")).T
-    quantities = {"area_weight": area_weight, "stiffness": 10**bending}
+    wanted = quantities(parameters)
     reads: dict[str, Read] = {}
     for run in predictions:
         if run.embedding is not None and run.label not in reads:
             generator = stream(seed, "evaluation", "readout", run.label)
-            readout = bouman(run.embedding, quantities, group=run.group, generator=generator)
+            readout = bouman(run.embedding, wanted, group=run.group, generator=generator)
             reads[run.label] = Read(label=run.label, data=data, readout=readout)
     return list(reads.values())

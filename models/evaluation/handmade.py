@@ -13,15 +13,17 @@ from torch import Tensor
 
 from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.dataset.pairs import Pairs
+from flagdata.errors import InputError
 from flagdata.rng import child_seed
-from models.boosting import Boosting, fit_boosting
+from models.boosting import ENSEMBLES, Boosting, fit_boosting
 from models.crops import Cropping
-from models.evaluation.predict import DRAWS, milliseconds
+from models.evaluation.predict import DRAWS, milliseconds, timed_clips
 from models.evaluation.predictions import Predictions
 from models.frontend import FrontEnd
 from models.handmade import FEATURES, features
-from models.ridge import Ridge, fit_ridge
-from models.training.inputs import Prepared, prepare_clips, prepare_films
+from models.ridge import Ridge, check_folds, fit_ridge
+from models.targets import stated
+from models.training.inputs import Prepared, film_rows, prepare_clips, prepare_films, simulations
 
 TARGETS = ("wind_speed", "area_weight", "bending_scale", "anisotropy")
 _FRONT_END = FrontEnd(maps="handmade")
@@ -33,8 +35,13 @@ Bars = Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fitted:
-    """Both models, fitted on the same crops of a data set's films; they predict `TARGETS`, in this order."""
+    """Both models, fitted on the same crops of a data set's films.
 
+    Attributes:
+        targets: what they predict, in this order: those of `TARGETS` that all clips state.
+    """
+
+    targets: tuple[str, ...]
     ridge: Ridge
     boosting: Boosting
 
@@ -43,29 +50,56 @@ class Fitted:
         return self.boosting.predict_quantiles(_features(film).double().numpy())[0]
 
 
-def fitted(train: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars) -> Fitted:
-    """Fits ridge and gradient boosting on crops of the training side's films."""
+def check_stated(train: Pairs, *judged: Pairs) -> tuple[str, ...]:
+    """Returns the targets that all clips state, once both models can be fitted to them.
+
+    Raises:
+        InputError: there is none, or the training side has too few simulations.
+    """
+    targets = TARGETS
+    for pairs in (train, *judged):
+        targets = stated(pairs.table.parameter_columns(), targets)
+    if not targets:
+        raise InputError(
+            "not all clips state any of the targets of hand-made features",
+            where="--handmade",
+            fix=f"leave it out, or choose by --dataset clips that state one of {', '.join(TARGETS)}",
+        )
+    check_folds(simulations(train, film_rows(train, sequences=None, seed=0)))
+    return targets
+
+
+def fitted(train: Pairs, *judged: Pairs, cache: Path, workers: int, seed: int, bars: Bars) -> Fitted:
+    """Fits ridge and gradient boosting on crops of the training side's films, to what the judged clips state, too.
+
+    Raises:
+        InputError: see `check_stated`.
+    """
+    targets = check_stated(train, *judged)
     with bars(len(set(train.table.recording.tolist())), "hand-made features to fit on", "film") as advance:
         inputs = prepare_films(
             train, _FRONT_END, _CROPPING, variants=_VARIANTS, folder=cache, workers=workers, advance=advance
         )
-    x, y = _table(inputs, _VARIANTS), np.tile(inputs.truth(TARGETS), (_VARIANTS, 1))
+    x, y = _table(inputs, _VARIANTS), np.tile(inputs.truth(targets), (_VARIANTS, 1))
     group = np.tile(inputs.sequence, _VARIANTS)
-    return Fitted(
-        ridge=fit_ridge(x, y, group=group), boosting=fit_boosting(x, y, seed=child_seed(seed, "boosting") % 2**32)
-    )
+    ridge = fit_ridge(x, y, group=group)
+    with bars(ENSEMBLES * len(targets), "gradient boosting", "ensemble") as advance:
+        boosting = fit_boosting(x, y, seed=child_seed(seed, "boosting") % 2**32, advance=advance)
+    return Fitted(targets=targets, ridge=ridge, boosting=boosting)
 
 
 def predictions(train: Pairs, pairs: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars) -> list[Predictions]:
     """Predicts the targets of another side's clips by both models."""
-    models = fitted(train, cache=cache, workers=workers, seed=seed, bars=bars)
-    ridge, boosting = models.ridge, models.boosting
+    models = fitted(train, pairs, cache=cache, workers=workers, seed=seed, bars=bars)
+    targets, ridge, boosting = models.targets, models.ridge, models.boosting
     with bars(len(pairs), "hand-made features to judge", "clip") as advance:
         inputs = prepare_clips(pairs, _FRONT_END, _CROPPING, folder=cache, workers=workers, advance=advance)
-    wanted, truth = _table(inputs, 1), inputs.truth(TARGETS)
-    spent = milliseconds(lambda clip: _features(clip[0]), pairs)
-    common = {"targets": TARGETS, "truth": truth, "group": inputs.sequence, "embedding": None}
+    wanted, truth = _table(inputs, 1), inputs.truth(targets)
+    spent = milliseconds(lambda clip: _features(clip[0]), timed_clips(pairs, _FRONT_END))
+    common = {"targets": targets, "truth": truth, "group": inputs.sequence, "embedding": None}
     note = f"{len(FEATURES)} hand-made features, {_VARIANTS} crops of each film"
+    if len(targets) < len(TARGETS):
+        note += f"; not judged by {', '.join(sorted({*TARGETS} - {*targets}))}, which not all clips state"
     return [
         Predictions(
             label="ridge",

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import UInt8Array
+from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.dataset.pairs import Pairs
+from flagdata.errors import InputError
 from flagdata.rng import child_seed
 from flagdata.stated import Stated
 from flagdata.workload import one_thread
 from models.estimator import Estimator
 from models.evaluation.predictions import Predictions
+from models.frontend import FrontEnd
 from models.learner import Learner, Loss
 from models.restriction import Known
-from models.training.inputs import Prepared
+from models.targets import Scaling, stated
+from models.training.inputs import Prepared, clip_as_taken
 
 DRAWS = 200
 _TOGETHER = 64
@@ -26,6 +29,28 @@ _TIMED = 12  # clips
 _RIDGE = 1e-3  # of the mean eigenvalue of the embeddings' covariance
 READ_FROM = ("wind_speed", "area_weight", "bending_scale", "anisotropy")
 """Targets that a model without a head is read for, by ridge regression of its embeddings of training clips."""
+
+
+def judged_targets(estimator: Estimator, *clips: Mapping[str, FloatArray]) -> tuple[str, ...]:
+    """Selects the targets that a model is judged by: those that every clip states, by their keys.
+
+    Args:
+        clips: name → (n,) parameters of the clips that are judged, and of those that embeddings are read by.
+
+    Raises:
+        InputError: there is none.
+    """
+    learner = estimator.learners[0]
+    names = READ_FROM if learner.objective is Loss.CONTRASTIVE else learner.scaling.names
+    for parameters in clips:
+        names = stated(parameters, names)
+    if not names:
+        raise InputError(
+            f"not all clips state any of the targets of the model {estimator.name!r}",
+            where="the clips' parameters",
+            fix="leave the model out, or judge it on a data set that flagdata build made, by --dataset",
+        )
+    return names
 
 
 def predict(
@@ -42,23 +67,33 @@ def predict(
     """Predicts the targets of prepared clips by a model.
 
     Args:
-        note: what tables say beside the model; clips whose truth lies beyond the model's ranges are added to it.
+        note: what tables say beside the model; targets that are not judged, since not all clips state them, and clips
+            whose truth lies beyond the model's ranges are added to it.
         known: statements about quantities of all clips, by name; only distributions use it.
         fitted_on: clips of the training side, needed by a model without a head, whose embeddings are then read by ridge
             regression.
+
+    Raises:
+        InputError: see `judged_targets`.
     """
     learner = estimator.learners[0]
     if learner.objective is Loss.CONTRASTIVE:
-        targets = names = READ_FROM
+        fitted_on = fitted_on if fitted_on is not None else prepared
+        names = targets = judged_targets(estimator, prepared.parameters, fitted_on.parameters)
         embedding = embedded(learner, prepared)
-        mean = _read(embedding, prepared, fitted_on if fitted_on is not None else prepared, learner, targets)
-        samples = None
+        mean = _read(embedding, prepared, fitted_on, learner, names)
+        samples, truth, left_out = None, prepared.truth(names), set(READ_FROM) - set(names)
     else:
-        targets, names = learner.scaling.quantities, learner.scaling.names
+        names = judged_targets(estimator, prepared.parameters)
+        judged = Scaling(names=names)
+        columns = [learner.scaling.names.index(name) for name in names]
         samples, mean, embedding = _predicted(estimator, prepared, seed=seed, known=known)
-    truth = prepared.truth(names)
-    if learner.objective is not Loss.CONTRASTIVE:
-        note = "; ".join([note, *learner.scaling.beyond(truth)])
+        samples, mean = None if samples is None else samples[:, :, columns], mean[:, columns]
+        targets, truth = judged.quantities, prepared.truth(names)
+        left_out = set(learner.scaling.quantities) - set(targets)
+        note = "; ".join([note, *judged.beyond(truth)])
+    if left_out:
+        note = f"{note}; not judged by {', '.join(sorted(left_out))}, which not all clips state"
     return Predictions(
         label=label,
         targets=targets,
@@ -125,6 +160,11 @@ def _batch(prepared: Prepared, first: int) -> Tensor:
     return prepared.batch(entries, np.zeros(len(entries), dtype=np.int64))
 
 
+def timed_clips(pairs: Pairs, front_end: FrontEnd) -> list[UInt8Array]:
+    """Decodes some clips (1, frames, height, width) to time a model by."""
+    return [clip_as_taken(pairs, row, front_end)[None] for row in range(min(_TIMED, len(pairs)))]
+
+
 @torch.no_grad()
 def time_a_clip(estimator: Estimator, pairs: Pairs) -> float:
     """Milliseconds a clip takes on one core from its pixels: the median of some clips, one at a time."""
@@ -134,12 +174,11 @@ def time_a_clip(estimator: Estimator, pairs: Pairs) -> float:
         for learner in estimator.learners:
             learner.head(learner.network(inputs))
 
-    return milliseconds(work, pairs)
+    return milliseconds(work, timed_clips(pairs, estimator.front_end))
 
 
-def milliseconds(work: Callable[[UInt8Array], object], pairs: Pairs) -> float:
-    """Times what one clip (1, frames, height, width) costs on one core: the median of some, decoded before [ms]."""
-    clips = [pairs[index].clip.numpy() for index in range(min(_TIMED, len(pairs)))]
+def milliseconds(work: Callable[[UInt8Array], object], clips: Sequence[UInt8Array]) -> float:
+    """Times what one clip costs on one core: the median of some [ms]."""
     times = []
     with one_thread():
         for clip in clips:

@@ -55,6 +55,11 @@ class Standing:
     batches: dict[str, Any]
     running: tuple[float, int] = (0.0, 0)
 
+    @property
+    def has_begun(self) -> bool:
+        """Returns whether a step was taken."""
+        return bool(self.course.epochs or self.running[1])
+
 
 def check_folder(folder: Path) -> None:
     """Refuses a folder in which checkpoints would be kept beside, or in place of, anything else.

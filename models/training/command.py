@@ -135,6 +135,7 @@ if TYPE_CHECKING:
 
     from flagdata.dataset import Pairs, Source
     from flagdata.lake import Artifact
+    from models.training.checkpoint import Standing
     from models.training.recipe import TrainingRecipe
 
 
@@ -188,11 +189,9 @@ def trained(
     from flagdata.locks import alone_in
     from flagdata.provenance import digest
     from models.storage import read_card
-    from models.targets import Scaling
+    from models.training.beginning import check_clips
     from models.training.checkpoint import check_folder
-    from models.training.inputs import complete_truth, film_rows, prepare_clips, prepare_films
-
-    # FOLD
+    from models.training.inputs import film_rows, prepare_clips, prepare_films
     from models.training.steps import Training as Steps
 
     recipe.check()
@@ -213,12 +212,7 @@ def trained(
             return _report(existing.whole, read_card(source.lake.object_path(str(existing.whole.object))))
         say("this model was trained before, but its object is damaged or missing: it is trained again")
     films = film_rows(train_pairs, sequences=recipe.data.sequences, seed=recipe.seed)
-    if names := recipe.loss.targets:
-        for side, table, rows in (
-            ("training", train_pairs.table, films),
-            ("validation", validation_pairs.table, slice(None)),
-        ):
-            Scaling(names=names).check(complete_truth(table.parameter_columns(rows), names), where=f"the {side} side")
+    check_clips(recipe, source.lake, train_pairs, validation_pairs, films=films, at=at)
     torch.set_num_threads(max(1, workers))
     several = "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
     if several:
@@ -273,15 +267,20 @@ def trained(
         )
         if first:
             say(f"order of the first epoch: {training.batches.order_hash(0)}")
-            say(
-                announced(
-                    f"training for up to {recipe.optimiser.epochs} epochs",
-                    training.length() * workers,
-                    workers=workers,
-                    kept="an interrupted training goes on from its last checkpoint",
+        standing = training.begin()
+        if first:
+            if standing.has_begun:
+                say(f"the training goes on from its checkpoint: {_place(standing, recipe.optimiser.epochs)}")
+            if left := recipe.optimiser.epochs - len(standing.course.epochs):
+                say(
+                    announced(
+                        f"training for up to {left} {'more ' if standing.has_begun else ''}epochs",
+                        training.length(left) * workers,
+                        workers=workers,
+                        kept="an interrupted training goes on from its last checkpoint",
+                    )
                 )
-            )
-        done = training.complete()
+        done = training.complete(standing)
         if several:
             ranks.barrier()  # no rank leaves while another still talks to it
         if not first:
@@ -296,6 +295,14 @@ def trained(
         if several:
             ranks.destroy_process_group()
     return _report(row, card)
+
+
+def _place(standing: Standing, epochs: int) -> str:
+    """Says where a training stands that was taken up."""
+    done, steps = len(standing.course.epochs), standing.running[1]
+    if steps:
+        return f"from step {steps + 1} of epoch {done + 1} of {epochs}"
+    return f"from epoch {done + 1} of {epochs}" if done < epochs else f"all {epochs} epochs are done"
 
 
 def device_of_rank(device: str) -> str:

@@ -42,9 +42,9 @@ from models.crops import Cropping
 from models.frontend import FrontEnd, standardised
 from models.training.augment import Augment
 from models.training.conditioned import FitFilm
+from models.training.timed_film import TimedFilm, has_rate
 
 _LOG = logging.getLogger("flagdata")
-_RATE_ERROR = 0.01
 _VERSION = {"conditioning": VERSION}
 Advance = Callable[[int], None]
 
@@ -189,13 +189,13 @@ def prepare_films(
         InputError: films that are too short, or too few sequences.
         FlagdataError: the disk is full.
     """
-    rows = film_rows(pairs, sequences=sequences, seed=seed)
+    rows, own_rate = film_rows(pairs, sequences=sequences, seed=seed), _of_own_rate(pairs, front_end)
     disturbed = augment if augment is not None else Augment()
 
     def key(row: int) -> dict[str, Any]:
         key_parts = {"film": pairs.table.recording[row], "variants": variants, "crops": cropping.as_dict()}
         if not cropping.conditioned:
-            return key_parts
+            return key_parts if own_rate[row] else {**key_parts, **_VERSION}
         key_parts |= {"augment": disturbed.identity(), **_VERSION}
         if disturbed.happens("second-flag", str(pairs.table.recording[row])):
             key_parts["beside"] = pairs.table.recording[_row_of_second_film(pairs, row)]
@@ -205,12 +205,12 @@ def prepare_films(
         if cropping.conditioned:
             return _conditioned_crops(pairs, row, front_end, cropping, variants=variants, augment=disturbed)
         film, recording = pairs.film(row), str(pairs.table.recording[row])
+        if not own_rate[row]:
+            film = TimedFilm(frames=film, times=pairs.film_times(row)).whole(front_end.rate)
         drawn = [cropping.draw(stream(0, "crop", recording, variant), _shape(film)) for variant in range(variants)]
         return [cropping.cut(film, crop) for crop in drawn]
 
-    return _prepared(
-        pairs, rows, front_end, key, crops, variants, folder, workers, advance, conditioned=cropping.conditioned
-    )
+    return _prepared(pairs, rows, front_end, key, crops, variants, folder, workers, advance)
 
 
 def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> IntArray:
@@ -226,37 +226,48 @@ def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> IntArray:
 def prepare_clips(
     pairs: Pairs, front_end: FrontEnd, cropping: Cropping, *, folder: Path, workers: int, advance: Advance
 ) -> Prepared:
-    """Prepares the catalog's clips as they are, the largest square of each, for validation and tests: entries are
-    clips.
+    """Prepares the catalog's clips, the largest square of each, for validation and tests: entries are clips.
 
-    A conditioned clip is as long as the front end takes, from the first frame of the catalog's on, or from as early as
-    its film has to be entered to be long enough.
+    A clip of another rate or length than the front end takes is cut to it, see `clip_as_taken`; so is a conditioned
+    one, of its conditioned film.
 
     Raises:
-        InputError: clips of another length than the front end takes.
+        InputError: films that are too short or too slow.
         FlagdataError: the disk is full.
     """
+    as_stored = _of_own_rate(pairs, front_end) & (pairs.table.frame_count >= front_end.frames)
 
     def key(row: int) -> dict[str, Any]:
         key_parts = {"clip": pairs.table.artifact[row], "size": cropping.size, "frames": cropping.frames}
-        return {**key_parts, **_VERSION} if cropping.conditioned else key_parts
+        return {**key_parts, **_VERSION} if cropping.conditioned or not as_stored[row] else key_parts
 
     def crops(row: int) -> list[Tensor]:
-        clip = _conditioned_clip(pairs, row, front_end) if cropping.conditioned else pairs[row].clip[0].numpy()
+        clip = (
+            _conditioned_clip(pairs, row, front_end) if cropping.conditioned else clip_as_taken(pairs, row, front_end)
+        )
         return [cropping.cut(clip, cropping.whole(_shape(clip)))]
 
-    return _prepared(
-        pairs,
-        np.arange(len(pairs)),
-        front_end,
-        key,
-        crops,
-        1,
-        folder,
-        workers,
-        advance,
-        conditioned=cropping.conditioned,
-    )
+    return _prepared(pairs, np.arange(len(pairs)), front_end, key, crops, 1, folder, workers, advance)
+
+
+def clip_as_taken(pairs: Pairs, row: int, front_end: FrontEnd) -> UInt8Array:
+    """Returns the clip of a row as long as the front end takes, at its rate: (frames, height, width) gray.
+
+    A clip of that rate is cut after so many frames. A shorter one goes on in its film, or begins as early as its film
+    has to be entered; one of another rate is shown at the front end's instants, as conditioned films are.
+
+    Raises:
+        InputError: its film is too short or too slow.
+    """
+    frames, first = front_end.frames, int(pairs.table.frame_first[row])
+    own_rate = _of_own_rate(pairs, front_end)[row]
+    if own_rate and pairs.table.frame_count[row] >= frames:
+        return pairs[row].clip[0, :frames].numpy()
+    film = pairs.film(row)
+    if own_rate and len(film) >= frames:
+        first = min(first, len(film) - frames)
+        return film[first : first + frames]
+    return TimedFilm(frames=film, times=pairs.film_times(row)).clip_near(first, frames, front_end.rate)
 
 
 def _conditioned_crops(
@@ -287,8 +298,7 @@ def _row_of_second_film(pairs: Pairs, row: int) -> int:
 def _conditioned_clip(pairs: Pairs, row: int, front_end: FrontEnd) -> UInt8Array:
     """Returns the clip of a row, of its conditioned film: (frames, size, size)."""
     film = FitFilm.of(pairs.film(row), pairs.film_times(row))
-    starts = film.starts(front_end.frames, front_end.rate)
-    return film.clip(min(int(pairs.table.frame_first[row]), int(starts[-1])), front_end.frames, front_end.rate)[0]
+    return film.clip_near(int(pairs.table.frame_first[row]), front_end.frames, front_end.rate)
 
 
 def _prepared(
@@ -301,11 +311,7 @@ def _prepared(
     folder: Path,
     workers: int,
     advance: Advance,
-    *,
-    conditioned: bool,
 ) -> Prepared:
-    if not conditioned:
-        _check_rate(pairs, rows, front_end)
     subfolder = folder / f"{front_end.maps}-{front_end.hash}"
     names = [_name(key(row), front_end, str(pairs.table.objects[pairs.table.object[row]])) for row in rows.tolist()]
     paths = tuple(subfolder / name[:2] / f"{name}.npy" for name in names)
@@ -329,29 +335,26 @@ def _prepared(
             where=str(folder),
             fix="free some space or name another folder by --cache; what was done is kept",
         ) from error
-    alone = -1 - np.unique(pairs.table.recording[rows], return_inverse=True)[1]
     return Prepared(
         maps=Files(paths=paths, shape=(len(rows), variants, *front_end.shape)),
         parameters=pairs.table.parameter_columns(rows),
-        sequence=np.where(pairs.table.seeded[rows], pairs.table.seed[rows], alone),
+        sequence=simulations(pairs, rows),
         fingerprint=digest("\n".join([pairs.fingerprint, *names])),
         front_end=front_end,
     )
 
 
-def _check_rate(pairs: Pairs, rows: IntArray, front_end: FrontEnd) -> None:
-    """Refuses clips of another frame rate than the front end's frequencies assume."""
+def simulations(pairs: Pairs, rows: IntArray) -> IntArray:
+    """Returns the seed of the simulation of each of some clips, or a number of its own for each recording that has
+    none."""
+    alone = -1 - np.unique(pairs.table.recording[rows], return_inverse=True)[1]
+    return np.where(pairs.table.seeded[rows], pairs.table.seed[rows], alone)
+
+
+def _of_own_rate(pairs: Pairs, front_end: FrontEnd) -> BoolArray:
+    """Returns whether each clip (n,) has the frame rate that the front end's frequencies assume."""
     table = pairs.table
-    seconds = (table.end[rows] - table.start[rows]) / NANOSECONDS
-    rate = (table.frame_count[rows] - 1) / np.maximum(seconds, 1e-9)
-    wrong = np.flatnonzero(np.abs(rate / front_end.rate - 1) > _RATE_ERROR)
-    if len(wrong):
-        raise InputError(
-            f"{len(wrong)} of {len(rows)} clips have another rate than {front_end.rate:g} Hz; "
-            f"the first has {rate[wrong[0]]:g}",
-            where=f"clip {table.artifact[rows[wrong[0]]]}",
-            fix="ingest or build at that rate, or select by rate",
-        )
+    return has_rate(table.frame_count, (table.end - table.start) / NANOSECONDS, front_end.rate)
 
 
 def _name(key: dict[str, Any], front_end: FrontEnd, content: str) -> str:

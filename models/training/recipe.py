@@ -48,6 +48,8 @@ RECIPE_VERSION = 1
 """Raised whenever the same recipe and data give other weights."""
 FILM_LIMIT = 1 << 28
 """Most values that are prepared of a film: 512 MiB of maps."""
+LEAST_BATCH = 2
+"""Least clips of a step."""
 _LARGEST_STEP = 10.0
 """Largest learning rate and weight decay; the catalog's are of 10⁻³ and 10⁻⁴."""
 _Side: TypeAlias = Annotated[int, Meta(ge=4, le=WHOLE_LIMIT)]
@@ -160,7 +162,7 @@ class OptimiserSpec:
 
     rate: Annotated[float, Meta(gt=0.0, le=_LARGEST_STEP)] = 1e-2
     decay: Annotated[float, Meta(ge=0.0, le=_LARGEST_STEP)] = 2e-3
-    batch: Annotated[int, Meta(ge=2, le=WHOLE_LIMIT)] = 32
+    batch: Annotated[int, Meta(ge=LEAST_BATCH, le=WHOLE_LIMIT)] = 32
     epochs: Count = 40
     schedule: Schedule = Schedule.STEPS
     drop_after: Count = 20

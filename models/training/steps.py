@@ -34,7 +34,7 @@ from models.training import checkpoint
 from models.training.checkpoint import Standing
 from models.training.inputs import Prepared
 from models.training.progress import Epoch, LossCourse
-from models.training.recipe import OptimiserSpec, Precision, Schedule, TrainingRecipe
+from models.training.recipe import LEAST_BATCH, OptimiserSpec, Precision, Schedule, TrainingRecipe
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,15 +73,7 @@ class Batches:
     _variants: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
-        if self.size % self.share[1]:
-            raise UsageError(
-                f"batches of {self.size} cannot be shared by {self.share[1]} processes",
-                fix="choose a multiple of their number",
-            )
-        if len(self.prepared) < self.size:
-            raise UsageError(
-                f"{len(self.prepared)} films do not make a batch of {self.size}", fix="take a smaller batch"
-            )
+        check_batch(len(self.prepared), self.size, ranks=self.share[1])
         self._variants = self.prepared.maps.shape[1]
 
     def __len__(self) -> int:
@@ -166,6 +158,28 @@ class Batches:
         self.epoch, self.cursor = epoch, cursor
 
 
+def check_batch(films: int, size: int, *, ranks: int = 1) -> None:
+    """Checks that so many films make batches of this size, which so many processes share.
+
+    Raises:
+        UsageError: they do not.
+    """
+    if size % ranks:
+        raise UsageError(
+            f"batches of {size} cannot be shared by {ranks} processes",
+            where="[optimiser] batch",
+            fix="choose a multiple of their number",
+        )
+    if films < size:
+        raise UsageError(
+            f"{films} films do not make a batch of {size}",
+            where="[optimiser] batch",
+            fix=f"write batch = {films} in [optimiser], or less"
+            if films >= LEAST_BATCH
+            else f"learn from {LEAST_BATCH} films or more",
+        )
+
+
 _TRIED = 2  # steps before the first, of which the second is timed
 CHECKPOINT_SECONDS = 60.0
 """A checkpoint is written after this time, and at the end of each epoch."""
@@ -219,35 +233,43 @@ class Training:
     bars: Bars
     checkpoint_seconds: float = CHECKPOINT_SECONDS
 
-    def complete(self) -> Trained:
-        """Trains from the beginning, or from the checkpoint, to the end.
+    def begin(self) -> Standing:
+        """Stands at the beginning, or where the checkpoint was taken.
 
         Raises:
-            DivergedError: the loss is not finite.
             RefusedError, CorruptError: a checkpoint that does not fit.
-            FlagdataError: the disk is full.
         """
-        spec, share, batches = self.recipe.optimiser, _share(), self.batches
-        learner = self._fresh()
-        values = self._values(self.train, learner)
-        self._values(self.validation, learner)  # what cannot be learned is refused before the first step
+        spec, batches, learner = self.recipe.optimiser, self.batches, self._fresh()
         optimiser = torch.optim.Adam(learner.parameters(), lr=spec.rate, weight_decay=spec.decay)
         standing = Standing(
             learner=learner, best=None, optimiser=optimiser, course=LossCourse(), batches=batches.state()
         )
         if checkpoint.restore(self.run, standing, identity=self.identity):
             batches.take_up(standing.batches)
+        return standing
+
+    def complete(self, standing: Standing | None = None) -> Trained:
+        """Trains from where `begin` stands to the end.
+
+        Raises:
+            TrainingDivergedError: the loss is not finite.
+            RefusedError, CorruptError: a checkpoint that does not fit.
+            FlagdataError: the disk is full.
+        """
+        standing = standing if standing is not None else self.begin()
+        spec, batches, learner, course = self.recipe.optimiser, self.batches, standing.learner, standing.course
+        values = self._values(self.train, learner)
+        self._values(self.validation, learner)  # what cannot be learned is refused before the first step
         module = _Loss(learner)
-        stepped: nn.Module = module if share[1] == 1 else DistributedDataParallel(module)
-        course = standing.course
+        stepped: nn.Module = module if _share()[1] == 1 else DistributedDataParallel(module)
         while len(course.epochs) < spec.epochs and not course.stalled(spec.patience):
             self._epoch(standing, batches, stepped, values)
         if standing.best is not None:
             learner.load_state_dict(standing.best)
         return Trained(learner=learner.eval(), course=course, seconds=sum(epoch.seconds for epoch in course.epochs))
 
-    def length(self) -> float:
-        """Predicts how long all epochs take on this machine, validation left out, by a step that changes nothing
+    def length(self, epochs: int) -> float:
+        """Predicts how long so many epochs take on this machine, validation left out, by a step that changes nothing
         [s]."""
         spec = self.recipe.optimiser
         with torch.random.fork_rng(devices=[]):
@@ -262,7 +284,7 @@ class Training:
                     loss = learner.loss(inputs, values, sequence[: len(entries)].to(self.device))
                 loss.backward()
                 float(loss.detach())  # waits for the device
-            return (time.monotonic() - begun) * len(self.batches) * spec.epochs
+            return (time.monotonic() - begun) * len(self.batches) * epochs
 
     @cached_property
     def batches(self) -> Batches:

@@ -7,6 +7,7 @@ import re
 import shutil
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -20,6 +21,7 @@ from flagdata.cli import root
 from flagdata.errors import (
     ConflictError,
     CorruptError,
+    FlagdataError,
     InputError,
     NotFoundError,
     UnknownNameError,
@@ -31,7 +33,9 @@ from models import estimator
 from models.storage import WEIGHTS, read_card
 from models.targets import Cloth
 from models.training import command, inputs, load, parse, prepare_clips, prepare_films, sides_of
+from models.training.inputs import clip_as_taken
 from models.training.recipe import TRAININGS
+from models.training.stated_films import StatedFilms
 from tests.small import TRAINING
 from tests.studies import shipping
 
@@ -130,6 +134,52 @@ def test_models_are_judged_with_intervals_over_simulations(lake: Path, tmp_path:
     text = json.dumps(found)
     assert '"small"' in text
     assert '"rmse"' in text
+
+
+def test_networks_are_of_today_and_the_clips_of_a_version_that_is_older(lake: Path, tmp_path: Path) -> None:
+    found = run("evaluate", "small", "--dataset", "made", "--at", "v1", "--lake", str(lake), "--out", str(tmp_path))
+    assert not Lake.open(lake).rows("kind = 'network'", at="v1").num_rows
+    assert [row["label"] for row in found["models"] if row["run"] is not None] == ["small", "small"]
+    assert found["data"] == "made, test side, at v1"
+
+
+def test_a_network_of_the_branch_that_is_judged_is_found_at_its_head(lake: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "lake"
+    shutil.copytree(lake, copy)
+    opened = Lake.open(copy)
+    opened.branch("other", at="v1")
+    opened.withdraw(opened.rows("kind = 'network'")["artifact"].to_pylist(), "of another test")
+    recipe = str(lake.parent / "small.toml")
+    arguments = ["--at", "v1", "--lake", str(copy), "--workers", "1", "--seed", "9"]
+    trained = run("train", recipe, *arguments, "--branch", "other")
+    where = ["--dataset", "made", "--lake", str(copy)]
+    with pytest.raises(UnknownNameError, match="small"):
+        run("evaluate", "small", "--at", "v1", *where, "--out", str(tmp_path / "main"))
+    found = run("evaluate", trained["artifact"][:8], "--at", "other", *where, "--out", str(tmp_path / "other"))
+    assert [row["label"] for row in found["models"]] == ["small"]
+
+
+def test_a_clip_is_cut_to_what_a_network_takes_and_a_short_one_goes_on_in_its_film(lake: Path) -> None:
+    recipe = load(str(lake.parent / "small.toml"))
+    pairs = sides_of(flagdata.open(lake), recipe, "test", at="v1")
+    stored, film = pairs[3].clip[0].numpy(), pairs.film(3)
+    assert np.array_equal(clip_as_taken(pairs, 3, recipe.front_end), stored)
+    assert np.array_equal(clip_as_taken(pairs, 3, replace(recipe.front_end, frames=8)), stored[:8])
+    assert np.array_equal(clip_as_taken(pairs, 3, replace(recipe.front_end, frames=14)), film)
+    with pytest.raises(InputError, match="film of 14 frames at 25 Hz cannot give clips of 15"):
+        clip_as_taken(pairs, 3, replace(recipe.front_end, frames=15))
+
+
+def test_a_clip_of_another_rate_is_shown_at_the_networks_instants(lake: Path) -> None:
+    """At half the film's rate its instants are those of every second frame."""
+    recipe = load(str(lake.parent / "small.toml"))
+    pairs = sides_of(flagdata.open(lake), recipe, "test", at="v1")
+    slow = replace(recipe.front_end, frames=6, rate=12.5)
+    assert np.array_equal(clip_as_taken(pairs, 3, slow), pairs.film(3)[:12:2])
+    films = StatedFilms.of(flagdata.open(lake).lake, pairs, at="v1")
+    films.check_judged(slow, recipe.cropping, model="slow")
+    with pytest.raises(InputError, match="12 of 12 films cannot give clips of 12 frames at 32 Hz"):
+        films.check_judged(replace(slow, frames=12, rate=32.0), recipe.cropping, model="fast")
 
 
 def test_triplets_are_scored_on_clips_of_other_lengths_and_cloth_is_read_from_embeddings(
@@ -368,15 +418,37 @@ def test_a_part_of_the_sequences_is_the_beginning_of_one_order(lake: Path, tmp_p
         sequences(11)
 
 
-def test_clips_of_another_rate_are_refused(tmp_path: Path) -> None:
-    from tests.models.conftest import fill
-
-    lake = Lake.create(tmp_path / "lake")
-    fill(lake, period=33_333_333)
-    recipe = parse(TRAINING, name="small", where="test")
-    pairs = sides_of(flagdata.open(tmp_path / "lake"), recipe, "validation", at=None)
-    with pytest.raises(InputError, match="another rate than 25 Hz"):
-        prepare_clips(pairs, recipe.front_end, recipe.cropping, folder=tmp_path, workers=1, advance=lambda n: None)
+@pytest.mark.parametrize(
+    ("old", "new", "told", "fix"),
+    [
+        (
+            "frames = 12",
+            "frames = 20",
+            "clips of 20 frames at 25 Hz; the first has 14 frames",
+            "write frames = 14 in [input]",
+        ),
+        (
+            "frames = 12",
+            "frames = 12\nrate = 30.0",
+            "another rate than the recipe's 30 Hz",
+            "write rate = 25 in [input]",
+        ),
+        ("size = 24", "size = 56", "pictures of 56 px, and the films have 40 px", "write size = 40 in [input]"),
+        ("batch = 4", "batch = 24", "20 films do not make a batch of 24", "write batch = 20 in [optimiser]"),
+        ('"wind_speed"', '"log_aspect"', "no clip states its width", "leave the target out"),
+    ],
+)
+def test_a_recipe_that_does_not_fit_the_clips_is_refused_before_anything_is_prepared(
+    lake: Path, tmp_path: Path, old: str, new: str, told: str, fix: str
+) -> None:
+    assert old in TRAINING
+    (tmp_path / "small.toml").write_text(TRAINING.replace(old, new))
+    recipe, cache = str(tmp_path / "small.toml"), tmp_path / "cache"
+    done = CliRunner().invoke(root, ["train", recipe, "--at", "v1", "--lake", str(lake), "--cache", str(cache)])
+    assert isinstance(done.exception, FlagdataError)
+    assert told in done.exception.what
+    assert fix in done.exception.fix
+    assert not cache.exists()
 
 
 def test_clips_that_the_network_does_not_take_are_refused_before_they_are_prepared(lake: Path, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from flagdata.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake import Lake
 from models.training import FitFilm, Prepared, TrainingRecipe, parse, prepare_clips, prepare_films, sides_of
+from models.training.stated_films import StatedFilms
 from tests.models.conftest import fill
 from tests.small import TRAINING
 
@@ -98,8 +99,10 @@ def films(path: Path, folder: Path, of: TrainingRecipe) -> Prepared:
 
 
 def test_films_of_another_rate_are_learned_from_once_they_are_conditioned(fast: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="another rate than 25 Hz"):
-        films(fast, tmp_path, recipe(extra="variants = 2\n"))
+    plain, source = recipe(extra="variants = 2\n"), flagdata.open(fast)
+    stated = StatedFilms.of(source.lake, sides_of(source, plain, "train", at=None), at=None)
+    with pytest.raises(InputError, match="another rate than the recipe's 25 Hz"):
+        stated.check_learned(plain.front_end, plain.cropping)
     conditioned = recipe(extra=CONDITIONED.replace("2", "2\nrate = 25.0", 1))
     with pytest.raises(InputError, match=r"the film of 14 frames at 30 Hz cannot give clips of 12 at 25 Hz"):
         films(fast, tmp_path, conditioned)  # 0.43 s of film, 0.44 s of clip
