@@ -350,12 +350,11 @@ class LakeModel:
         return Outcome(state=replace(head, tags=tags, branches=branches, deleted=deleted), stored=self.stored)
 
     def mergeable(self) -> list[tuple[str, str]]:
-        """The pairs of branches of which the second has commits that the first does not know."""
-        return [
-            (into, branch)
-            for into, branch in itertools.permutations(sorted(self.head.branches), 2)
-            if self.head.tip(branch) not in self.graph.ancestors(self.head.tip(into))
-        ]
+        """The pairs of branches that each have commits which the other does not know."""
+        tips = {branch: self.head.tip(branch) for branch in sorted(self.head.branches)}
+        known = {branch: self.graph.ancestors(tip) for branch, tip in tips.items()}
+        pairs = itertools.permutations(tips, 2)
+        return [(one, other) for one, other in pairs if tips[one] not in known[other] and tips[other] not in known[one]]
 
     def merge(self, into: str, branch: str) -> Outcome:
         """Three ways, for rows and for the labels of each.

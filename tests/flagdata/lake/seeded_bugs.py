@@ -37,12 +37,12 @@ class Bug:
     Attributes:
         put: puts it into the product.
         among: names of the operations that are tried.
-        in_bucket: whether it shows in a bucket, too.
+        seed: of operations among which it shows early.
     """
 
     put: Callable[[pytest.MonkeyPatch], None]
     among: frozenset[str]
-    in_bucket: bool = True
+    seed: int = 1
 
 
 def _unchecked_at_a_merge(names: int) -> Callable[[pytest.MonkeyPatch], None]:
@@ -126,10 +126,10 @@ BUGS = {
     "labels-by-capitals": Bug(put=_unchecked_at_a_merge(2), among=frozenset({"label", "merge"})),
     "labels-by-type": Bug(put=_unchecked_at_a_merge(1), among=frozenset({"label", "merge"})),
     "last-label-wins": Bug(put=_last_label_wins, among=frozenset({"label", "merge"})),
-    "made-again": Bug(put=_made_again_is_another, among=frozenset({"branch", "tag", "delete", "transfer"})),
+    "made-again": Bug(put=_made_again_is_another, among=frozenset({"branch", "delete", "transfer"})),
     "erased-by-branch": Bug(put=_erased_branch_by_branch, among=frozenset({"erase", "ingest"})),
     "deleted-by-two": Bug(put=_deleted_by_two_commits, among=frozenset({"ingest", "branch", "delete"})),
-    "not-flushed": Bug(put=_deletions_not_flushed, among=frozenset({"erase", "ingest"}), in_bucket=False),
+    "not-flushed": Bug(put=_deletions_not_flushed, among=frozenset({"erase", "ingest"})),
     "refs-are-files": Bug(put=_refs_are_files, among=frozenset({"branch", "tag", "lose_refs"})),
     "tag-names-free": Bug(put=_tag_names_are_free_again, among=frozenset({"ingest", "tag", "delete"})),
     "never-tidied": Bug(put=_never_tidied, among=frozenset({"label", "withdraw"})),
