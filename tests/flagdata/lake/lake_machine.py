@@ -149,6 +149,7 @@ class LakeMachine(RuleBasedStateMachine):
         self.has_leftovers = {HERE: False}
         self.ingest(HERE, 0, ["clip", "other"], False, None)
         self.branch(HERE, 0, 0, 2, None)
+        self.ingest(HERE, 1, ["twin"], False, None)
         self.clone()
 
     def place(self) -> Place | str:
