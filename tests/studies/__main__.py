@@ -119,6 +119,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "failing": ("tests.studies.failing.campaign", "Every call of every writing command fails in turn."),
             "failing-buckets": ("tests.studies.failing.buckets", "Commands on a lake in a bucket that are killed."),
             "power-cut": ("tests.studies.failing.power_cut", "Power cuts beside every verb that writes."),
+            "state-machine": ("tests.studies.failing.sequences", "Lakes beside a plain model, with kills."),
             "flips-drawn": ("tests.studies.hostile.flips", "Flip as many single bits as are asked for."),
         },
     ),

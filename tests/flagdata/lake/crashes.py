@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -38,11 +39,14 @@ class Steps:
     """The steps of a process.
 
     Attributes:
+        dies_at: the step before which it dies, if any.
+        for_good: whether the process itself is killed.
         taken: how many it took.
         unflushed: stores from which something was deleted, and which were not flushed since.
     """
 
     dies_at: int | None
+    for_good: bool = False
     taken: int = 0
     dead: bool = False
     unflushed: set[Path] = field(default_factory=set)
@@ -57,6 +61,8 @@ class Steps:
         """
         with self.guard:
             self.dead = self.dead or self.taken == self.dies_at
+            if self.dead and self.for_good:
+                os.kill(os.getpid(), signal.SIGKILL)
             if self.dead:
                 raise Killed
             self.taken += 1
@@ -72,13 +78,13 @@ class Steps:
 
 
 @contextmanager
-def dying(at: int | None) -> Iterator[Steps]:
+def dying(at: int | None, *, for_good: bool = False) -> Iterator[Steps]:
     """Kill what runs in the block before a step; `None` only counts them.
 
-    Raises:
-        AssertionError: a thread went on.
+    Args:
+        for_good: kill the process itself, by a signal.
     """
-    steps = Steps(dies_at=at)
+    steps = Steps(dies_at=at, for_good=for_good)
     with pytest.MonkeyPatch.context() as patches:
         for name in _CALLS:
             patches.setattr(os, name, _stepping(steps, getattr(os, name), name))

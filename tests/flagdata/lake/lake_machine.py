@@ -592,7 +592,7 @@ def try_machine(machine: type[LakeMachine], *, examples: int, steps: int, number
         database=None,
         phases=[Phase.generate, *([Phase.shrink] if shrinking else [])],
         report_multiple_bugs=False,
-        suppress_health_check=list(HealthCheck),
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much],
     )
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "unclosed file", ResourceWarning)  # a process that dies closes none

@@ -246,8 +246,12 @@ class LakeModel:
     def unfinished(self) -> frozenset[str]:
         """Data that are there though they were given up: all items of them were erased, or they expired, and no version
         showed them since."""
+        given_up = data_of(self.head.erased) | self.head.expired.keys()
+        return (self.stored & given_up) - self._wanted()
+
+    def _wanted(self) -> frozenset[str]:
+        """The data of rows that a version showed since they were given up, if ever they were."""
         head = self.head
-        given_up = self.stored & (data_of(head.erased) | head.expired.keys())
         shown = {
             data
             for version, state in enumerate(self.versions)
@@ -255,7 +259,7 @@ class LakeModel:
             for data in data_of(self.unerased(self.graph.rows(state.tip(branch)), Shown(commit=0, version=version)))
             if version >= head.expired.get(data, 0)
         }
-        return frozenset(given_up - shown - self.needed())
+        return self.needed() | shown
 
     def _committed(self, branch: str, rows: Rows, *merged: int, stored: Collection[str] = ()) -> Outcome:
         commit = self.graph.add(_without_orphans(rows), self.head.tip(branch), *merged)
@@ -289,14 +293,19 @@ class LakeModel:
         return self._committed(branch, {name: labels for name, labels in rows.items() if name not in going})
 
     def erase(self, items: Collection[str], *, with_descendants: bool) -> Outcome:
-        """Off all branches at once; tags go on to list the rows, without data."""
+        """Off all branches at once; tags go on to list the rows, without data. What was erased before, and did not come
+        again, is erased again only as far as its data are still there, and what was erased with it.
+        """
         refs = self.refs()
         going = set(items)
         for rows in refs.values():
             going |= clips_of(items, rows)
             going |= made_from(items, rows) if with_descendants else set()
-        if not set(items) <= {name for rows in refs.values() for name in rows}:
+        unseen = set(items) - {name for rows in refs.values() for name in rows}
+        if not unseen <= self.head.erased.keys() or data_of(unseen) & self._wanted():
             raise Refused("no ref shows it")
+        together = {self.head.erased[name] for name in {*items} & self.head.erased.keys()}
+        rest = self.unfinished() & data_of(name for name, version in self.head.erased.items() if version in together)
         for rows in refs.values():
             if made_from(going & rows.keys(), rows) - going:
                 raise Refused("something that was made from it would stay")
@@ -313,8 +322,8 @@ class LakeModel:
         is_new = state is not self.head or any(
             self.unerased(going & rows.keys(), self.shown(ref)) for ref, rows in refs.items()
         )
-        stored = self.stored - (data_of(erased) - after.needed() if is_new else self.unfinished() & data_of(going))
-        return Outcome(state=after.head if is_new else None, stored=frozenset(stored))
+        going_data = (data_of(going) - after.needed()) | rest
+        return Outcome(state=after.head if is_new else None, stored=self.stored - going_data)
 
     def _check_new(self, name: str, shown: Shown) -> None:
         if name in self.head.branches or name in self.head.tags:
