@@ -134,5 +134,4 @@ BUGS = {
     "tag-names-free": Bug(put=_tag_names_are_free_again, among=frozenset({"ingest", "tag", "delete"})),
     "never-tidied": Bug(put=_never_tidied, among=frozenset({"label", "withdraw"})),
     "silent-erasure": Bug(put=_silent("erasure"), among=frozenset({"erase", "ingest"})),
-    "silent-expiry": Bug(put=_silent("expiry"), among=frozenset({"withdraw", "ingest", "expire"})),
 }
