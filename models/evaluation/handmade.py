@@ -63,7 +63,7 @@ def check_stated(train: Pairs, *judged: Pairs) -> tuple[str, ...]:
         raise InputError(
             "not all clips state any of the targets of hand-made features",
             where="--handmade",
-            fix=f"leave it out, or choose by --dataset clips that state one of {', '.join(TARGETS)}",
+            fix=f"leave it out, or judge on clips that state one of {', '.join(TARGETS)}",
         )
     check_folds(simulations(train, film_rows(train, sequences=None, seed=0)))
     return targets

@@ -48,7 +48,7 @@ def judged_targets(estimator: Estimator, *clips: Mapping[str, FloatArray]) -> tu
         raise InputError(
             f"not all clips state any of the targets of the model {estimator.name!r}",
             where="the clips' parameters",
-            fix="leave the model out, or judge it on a data set that flagdata build made, by --dataset",
+            fix="leave the model out, or judge it on simulated clips",
         )
     return names
 

@@ -62,7 +62,7 @@ class StatedFilms:
         self._refuse(
             ~self._gives(front_end, cropping),
             f"cannot give clips of {frames} frames at {rate:g} Hz, which the model {model!r} takes",
-            fix="leave the model out, or name by --dataset one whose films have "
+            fix="leave the model out, or judge it on a data set whose films have "
             f"{(frames - 1) / rate:.3g} s or more, of {LEAST_RATE * rate:.3g} Hz or more",
         )
 
