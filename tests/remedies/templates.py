@@ -149,9 +149,19 @@ def template(node: ast.AST) -> str:
     if isinstance(node, ast.FormattedValue):
         return template(node.value) if is_command_line(node.value) else HOLE
     if is_command_line(node):
-        words = node.args if isinstance(node, ast.Call) else ()
-        return " ".join(shlex.quote(str(w.value)) if isinstance(w, ast.Constant) else template(w) for w in words)
+        words = node.args if isinstance(node, ast.Call) else []
+        return "".join(map(_word, words)).removeprefix(" ")
     return HOLE
+
+
+def _word(node: ast.AST) -> str:
+    """A word of a command line, with the blank before it; of several words, of which there may be none, a `HOLE`."""
+    if isinstance(node, ast.Starred):
+        return HOLE
+    if isinstance(node, ast.Constant):
+        return f" {shlex.quote(str(node.value))}"
+    word = template(node)
+    return f" {HOLE if ' ' in word else word}"  # quoted as a whole
 
 
 def strings(value: ast.AST) -> Iterator[str]:
