@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 from tests.flagdata.conftest import write_video
-from tests.studies.failing.commands import COMMANDS, Scene, core_scene
 from tests.studies.failing.groups import grouped
 from tests.studies.failing.injector import Fault, Injector, injecting
+from tests.studies.failing.scenes import Scene, core_scene
 from tests.studies.failing.trial import Trials
+from tests.studies.failing.verbs import COMMANDS
 
 BEFORE, AFTER = 2, 2
 """How many of a command's calls fail in turn before and after it has published, spread evenly; all of them with

@@ -151,7 +151,7 @@ from pathlib import Path
 from flagdata.ingest import ingest_camera
 from flagdata.lake import Lake
 from tests.studies.failing import power_cut, recorder, verbs
-from tests.studies.failing.commands import Scene
+from tests.studies.failing.scenes import Scene
 scratch = Path(sys.argv[1])
 def scene(folder):
     lake = Lake.create(folder / "lake")

@@ -37,8 +37,8 @@ from flagdata.lake.objects import SUMS
 from flagdata.storage import RemotePath, connection
 from tests.evidence import circumstances
 from tests.s3 import BUCKET, SECRETS, moto
-from tests.studies.failing.commands import Scene
 from tests.studies.failing.forked import Child, invoked, stand_in
+from tests.studies.failing.scenes import Scene
 from tests.studies.failing.store import FAULTY, LOST, PATIENCE, failing, planned
 from tests.studies.failing.verbs import SCENES, State, Verb, state
 

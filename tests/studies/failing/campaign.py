@@ -20,11 +20,12 @@ from typing import Any
 import numpy as np
 
 from tests.evidence import circumstances
-from tests.studies.failing import slow
-from tests.studies.failing.commands import COMMANDS, Scene, made_scene
+from tests.studies.failing import scenes, slow
 from tests.studies.failing.groups import grouped
 from tests.studies.failing.injector import Fault, Injector, injecting
+from tests.studies.failing.scenes import Scene
 from tests.studies.failing.trial import Command, Trials
+from tests.studies.failing.verbs import COMMANDS
 
 _ABOUT = (
     "One call on a file of the work folder (open, read, stat, map, write, flush, rename, link, remove, lock) fails, "
@@ -34,17 +35,18 @@ _ABOUT = (
     "publication; with 1 every call is. Where `drawn_of` is given, the trials were drawn at random from so many. "
     "Threads make their calls in another order each time: counted is what did fail, and a kind whose every call was "
     "made at another place is untried. The JSON file beside this page states of each kind how many calls there are "
-    "and how many failed. A report is right where exit code 0 means that all is "
-    "published, and exit code 1, with a fix, that it is not. Of every fourth failure the command is given once more, "
-    "of every kill always, and must end as an undisturbed one. After each trial the lake is examined (doctor, "
-    "verify). For close-loop, propose and build the computing was done once and its result taken; their reads and "
-    "writes are their own."
+    "and how many failed. A report is right where exit code 0 means that all is published, and exit code 1, with a "
+    "fix, that it is not. Of every fourth failure the command is given once more, of every kill always, and must end "
+    "as an undisturbed one, once what it says that has to go is deleted. After each trial the lake is examined "
+    "(doctor, verify); silent is a command that has begun to erase, expire or delete, has not done it, and of which "
+    "doctor reports nothing. For close-loop, propose and build the computing was done once and its result taken; "
+    "their reads and writes are their own."
 )
-_KINDS = ("unhealthy", "unforeseen")
+_KINDS = ("silent", "unhealthy", "unforeseen")
 REPEATED = 4
 """Of so many commands that failed one is given once more, without the fault."""
 SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Command]]] = {
-    "core": (made_scene, COMMANDS),
+    "core": (scenes.core, COMMANDS),
     **slow.SCENES,
 }
 """Scenes, each with its commands."""
@@ -204,7 +206,7 @@ def page(known: Mapping[str, Any]) -> str:
             "unforeseen",
             "code",
         ),
-        "Commands that are killed": ("calls", "points", "wrong", "unhealthy", "code"),
+        "Commands that are killed": ("calls", "points", "wrong", "silent", "unhealthy", "code"),
     }
     lines = [
         "# Calls that fail and commands that are killed",

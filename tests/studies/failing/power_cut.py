@@ -34,11 +34,12 @@ from flagdata.lake import Lake, collect, doctor, object_names, read_refs, verify
 from flagdata.lake.layout import STORES
 from tests.evidence import circumstances
 from tests.program import Ended, invoke
+from tests.studies.failing import disk
 from tests.studies.failing.campaign import kept_scene
-from tests.studies.failing.commands import Scene
 from tests.studies.failing.disk import Disk, Tree, read, write
 from tests.studies.failing.forked import Child, stand_in
 from tests.studies.failing.recorder import Recorder
+from tests.studies.failing.scenes import Scene
 from tests.studies.failing.verbs import OUTSIDE, SCENES, State, Verb, state
 
 POINTS = 12
@@ -168,7 +169,7 @@ class Trials:
         """
         folder = scratch / "whole"
         shutil.copytree(scene.folder, folder, symlinks=True)
-        disk, first = Disk(folder), read(folder)
+        model, first = Disk(folder), read(folder)
         arguments = given(verb.arguments, folder, scene)
         program = ("-m", "flagdata", *arguments)
         if verb.stand_in is not None:
@@ -183,15 +184,15 @@ class Trials:
         for number in range(len(done.calls) + 1):
             if number in chosen:
                 answered = number >= done.answered
-                for one in disk.states(rng):
+                for one in model.states(rng):
                     cut = Cut(call=number, answered=answered, kind=one.kind, ordered=one.ordered, tree=one.tree)
                     key = hash(frozenset(one.tree.items()))
                     if key not in cuts or (answered and not cuts[key].answered):
                         cuts[key] = cut
             if number < len(done.calls):
-                disk.make(done.calls[number])
+                model.make(done.calls[number])
         last = read(folder)
-        assert disk.seen() == last, "files were changed by calls that are not recorded"
+        assert model.seen() == last, "files were changed by calls that are not recorded"
         target = verb.target.format(**places(folder))
 
         def states() -> tuple[State, State]:
@@ -232,14 +233,18 @@ class Trials:
         if self.verb.deletes and cut.answered:
             wrong += self._back(cut)
         there = (target / "lake.json").exists() or self.verb.target == "{lake}"
-        begun = shown(target, deletes=self.verb.deletes)
+        begun = self._own(shown(target, deletes=self.verb.deletes))
         first, commands, left = heal(target, backup) if there else ([], [], [])
         wrong += [f"not healed: {one.kind}: {one.what} (fix: {one.fix})" for one in left]
         healed = self._own(shown(target, deletes=self.verb.deletes))
+        if self.verb.unfinished and begun not in (None, self.before, self.after) and not first:
+            wrong.append("silent: it has begun what it has not done, and nothing is found")
         if healed is None:
             wrong.append("lost: the lake cannot be read")
-        elif cut.answered and healed != self.after:
-            wrong.append(f"lost: answered, and not there: {sorted(self.after ^ healed)[:4]}")
+        elif cut.answered and self.after - healed:
+            wrong.append(f"lost: answered, and not there: {sorted(self.after - healed)[:4]}")
+        elif cut.answered and healed - self.after:
+            wrong.append(f"erasure: answered, and still there: {sorted(healed - self.after)[:4]}")
         elif lost := (self.before & self.after) - healed:
             wrong.append(f"lost: {sorted(lost)[:4]}")
         elif self.verb.one_step and healed not in (self.before, self.after):
@@ -258,7 +263,6 @@ class Trials:
         return {
             "wrong": wrong,
             "found": sorted({one.kind for one in first}),
-            "readable": begun is not None,
             "typed": sorted(commands),
         }
 
@@ -357,7 +361,7 @@ def tried(trials: Trials, *, points: int, rng: np.random.Generator) -> dict[str,
             commands.update(found["typed"])
             place = f"after call {cut.call} of {trials.calls}{', answered' if cut.answered else ''}"
             order = "ordered" if cut.ordered else "any order"
-            examples += [f"{place}, {cut.kind} ({order}): {one}" for one in found["wrong"]]
+            examples += [f"{place}, {cut.kind} ({order}): {' '.join(one.split())}" for one in found["wrong"]]
     return {
         "calls": trials.calls,
         "states": len(trials.cuts),
@@ -412,6 +416,7 @@ def page(known: Mapping[str, Any]) -> str:
     shown_kinds = {
         "lost": ("lost",),
         "erasures undone": ("erasure",),
+        "silent": ("silent",),
         "a part": ("a part is published",),
         "not healed": ("not healed",),
         "repeats that fail": ("repeat", "unhealthy after the repeat"),
@@ -420,8 +425,8 @@ def page(known: Mapping[str, Any]) -> str:
         "other": ("the examination failed",),
     }
     columns = ("calls", "states", "examined", "answered", "with findings", "wrong", "wrong in order")
-    about = " ".join(" ".join((__doc__ or "").split("\n\n")[1:2]).split())
-    model = " ".join(" ".join(Disk.__module__ and _model().split("\n\n")[1:]).split())
+    about = " ".join((__doc__ or "").split("\n\n")[1].split())
+    model = " ".join("".join((disk.__doc__ or "").split("\n\n", 1)[1:]).split())
     lines = [
         "# Power cuts beside every verb that writes",
         "",
@@ -449,12 +454,6 @@ def page(known: Mapping[str, Any]) -> str:
         machine = f"{where['processor']}, {where['cores']} cores; Python {where['python']}"
         lines += ["", f"{machine}, {versions}; seed {where['seed']}."]
     return "\n".join([*lines, ""])
-
-
-def _model() -> str:
-    from tests.studies.failing import disk
-
-    return disk.__doc__ or ""
 
 
 if __name__ == "__main__":

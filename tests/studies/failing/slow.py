@@ -34,7 +34,7 @@ from sim.effects import EFFECTS
 from sim.material import named
 from sim.mesh import grid
 from tests.small import DATA_SET, SIMULATION, TRAINING
-from tests.studies.failing.commands import Scene, artifacts, files, rows
+from tests.studies.failing.scenes import Scene, artifacts, files, rows
 from tests.studies.failing.trial import Command
 
 WIDTH, HEIGHT, RATE, SECONDS, NOISE = 0.75, 0.5, 25.0, 4.6, 5e-4

@@ -5,13 +5,13 @@ from __future__ import annotations
 import shutil
 import signal
 from collections import Counter
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
-from flagdata.findings import Severity
+from flagdata.findings import Finding, Severity
 from flagdata.lake import Lake, doctor, object_names, read_refs, verify, verify_catalog
 from tests.studies.failing.groups import PUBLISHING, kinds
 from tests.studies.failing.injector import Done, Fault, Injector
@@ -27,19 +27,26 @@ class Command:
         lake: the lake that must stay healthy, in that folder; it may be absent.
         stand_in: "module:function" that puts something in the place of its computing, called with the scene's id "kept"
             in the process that it is forked from.
+        again: what goes on where it was killed and that lake is there; `None` is the same once more.
         one_step: whether it changes all or nothing; else what it has done before an error stays, and a repeat goes on.
-        unfinished: kind of the finding by which doctor reports that it was cut off; empty where it leaves none.
+        unfinished: kind of the finding by which doctor reports what it has begun and not done; empty where it begins
+            nothing that it would have to finish.
     """
 
     arguments: tuple[str, ...]
     state: Callable[[Path], object]
     lake: str = "lake"
+    again: tuple[str, ...] | None = None
     stand_in: str | None = None
     one_step: bool = True
     unfinished: str = ""
 
     def given(self, folder: Path, ids: Mapping[str, str]) -> list[str]:
         return [argument.format(folder=folder, **ids) for argument in self.arguments]
+
+    def given_again(self, folder: Path, ids: Mapping[str, str]) -> list[str]:
+        there = (folder / self.lake / "lake.json").exists()
+        return replace(self, arguments=self.again if self.again and there else self.arguments).given(folder, ids)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,12 +104,16 @@ class Trials:
         self.failed[met] += 1
         state = command.state(folder)
         problems = self._lost(done, state) if fault.kills else self._report_against(done, state)
-        problems += _health(folder / command.lake, unfinished=command.unfinished)
+        found = _health(folder / command.lake)
+        problems += _unhealthy(found, right=command.unfinished)
+        if command.unfinished and state not in (self.whole.before, self.whole.after):
+            reported = command.unfinished in {finding.kind for finding in found}
+            problems += ["silent: it has begun what it has not done, and doctor reports nothing"] * (not reported)
         if done.code and (repeated or fault.kills):
-            again = self._injector.run(folder, command.given(folder, self._ids))
-            if again.code or command.state(folder) != self.whole.after:
+            again = self._repeat(folder)
+            if (again.code and state != self.whole.after) or command.state(folder) != self.whole.after:
                 problems.append(f"the repeat fails or ends otherwise: {again.stderr}")
-            problems += [f"after the repeat: {problem}" for problem in _health(folder / command.lake)]
+            problems += [f"after the repeat: {problem}" for problem in _unhealthy(_health(folder / command.lake))]
         shutil.rmtree(folder)
         if not problems:
             return None
@@ -116,6 +127,14 @@ class Trials:
             "problems": problems,
             "stderr": done.stderr,
         }
+
+    def _repeat(self, folder: Path) -> Done:
+        """Give the command again; where it says that what is there has to go, do that and give it once more."""
+        again = self._injector.run(folder, self._command.given_again(folder, self._ids))
+        if again.code and "delete what is there" in " ".join(again.stderr.split()):
+            shutil.rmtree(folder / self._command.lake)
+            return self._injector.run(folder, self._command.given(folder, self._ids))
+        return again
 
     def _report_against(self, done: Done, state: object) -> list[str]:
         problems: list[str] = []
@@ -149,23 +168,23 @@ class Trials:
         return folder
 
 
-def _health(path: Path, *, unfinished: str = "") -> list[str]:
-    """What is wrong with a lake, if there is one.
-
-    Args:
-        unfinished: kind of a finding that is right before the command is given once more.
-    """
+def _health(path: Path) -> tuple[Finding, ...]:
+    """What doctor and verify find in a lake, if there is one."""
     if not (path / "lake.json").exists():
-        return []
+        return ()
     lake = Lake.open(path)
     refs = read_refs(lake)
-    found = (
+    return (
         *doctor(lake, grace=timedelta(0)),
         *verify_catalog(lake, refs),
         *verify(lake, object_names(lake, refs)),
     )
+
+
+def _unhealthy(found: Iterable[Finding], *, right: str = "") -> list[str]:
+    """The errors among findings, but those of a kind that is right before the command is given once more."""
     return [
         f"unhealthy: {finding.kind}: {finding.what}"
         for finding in found
-        if finding.severity is Severity.ERROR and finding.kind != unfinished
+        if finding.severity is Severity.ERROR and finding.kind != right
     ]

@@ -5,14 +5,14 @@ A study gives the places: `{lake}`, `{new}` and `{out}` of a verb's arguments ar
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flagdata.lake import Lake, labels_of
-from tests.studies.failing import slow
-from tests.studies.failing.commands import Scene, made_scene
+from tests.studies.failing import scenes, slow
+from tests.studies.failing.scenes import Scene, files
+from tests.studies.failing.trial import Command
 
 State = frozenset[tuple[str, ...]]
 
@@ -27,8 +27,8 @@ class Verb:
         one_step: whether it changes all or nothing.
         deletes: whether data go, so that the state is of objects too.
         target: what it writes to, {lake} or {new}.
-        again: what goes on where it was killed, if that is another command.
-        stand_in: as of `tests.studies.failing.trial.Command`.
+        again: what goes on where it was killed and the target is there, if that is another command.
+        stand_in, unfinished: as of `tests.studies.failing.trial.Command`.
     """
 
     arguments: tuple[str, ...]
@@ -37,6 +37,7 @@ class Verb:
     target: str = "{lake}"
     again: tuple[str, ...] | None = None
     stand_in: str | None = None
+    unfinished: str = ""
 
 
 _LAKE = ("--lake", "{lake}")
@@ -82,10 +83,15 @@ CORE = {
     "merge": Verb(arguments=("merge", "side", *_LAKE)),
     "withdraw": Verb(arguments=("withdraw", "{single}", "-m", "wrong", *_LAKE)),
     "withdraw --everywhere": Verb(
-        arguments=("withdraw", "{single}", "--everywhere", "-m", "wrong", *_LAKE), one_step=False, deletes=True
+        arguments=("withdraw", "{single}", "--everywhere", "-m", "wrong", *_LAKE),
+        one_step=False,
+        deletes=True,
+        unfinished="erasure-unfinished",
     ),
     "gc": Verb(arguments=("gc", "--older-than", "0s", *_LAKE), one_step=False, deletes=True),
-    "expire": Verb(arguments=("expire", "--keep", "1", *_LAKE), one_step=False, deletes=True),
+    "expire": Verb(
+        arguments=("expire", "--keep", "1", *_LAKE), one_step=False, deletes=True, unfinished="expiry-unfinished"
+    ),
     "simulate": Verb(arguments=("simulate", "{folder}/small.toml", "--workers", "1", *_LAKE)),
 }
 OUTSIDE = {
@@ -95,21 +101,23 @@ OUTSIDE = {
 """Verbs of the same scene that write outside of a lake."""
 
 
-def core(folder: Path) -> Scene:
-    """Make the scene of the commands of the core, with markers, a record and a lake ahead beside it."""
-    from flagdata.ingest import ingest_camera
+def command(verb: Verb) -> Command:
+    """A verb in a folder, with the lake `lake` there."""
+    places = {"lake": "{folder}/lake", "new": "{folder}/new", "out": "{folder}/out"}
 
-    scene = made_scene(folder)
-    (folder / "markers.csv").write_text(
-        "time,marker,u,v,x,y,z\n"
-        + "".join(f"{k / 25},m{m},{m},0,{m},{k / 100},0\n" for k in range(30) for m in range(3))
+    def placed(arguments: Sequence[str]) -> tuple[str, ...]:
+        for name, place in places.items():
+            arguments = [argument.replace(f"{{{name}}}", place) for argument in arguments]
+        return tuple(arguments)
+
+    return Command(
+        arguments=placed(verb.arguments),
+        state=lambda folder: state(folder / verb.target.strip("{}"), deletes=verb.deletes),
+        lake=verb.target.strip("{}"),
+        again=verb.again and placed(verb.again),
+        one_step=verb.one_step,
+        unfinished=verb.unfinished,
     )
-    shutil.copytree(folder / "lake", folder / "ahead")
-    ahead = Lake.open(folder / "ahead")
-    film = ingest_camera(ahead, folder / "film.mp4").artifact
-    (folder / "record.mcap").write_bytes(ahead.object_path(str(film.object)).read_bytes())
-    ahead.tag("later")
-    return scene
 
 
 _OF_A_TRIAL = {
@@ -133,7 +141,7 @@ def _slow(make: Callable[[Path], Scene], names: Sequence[str]) -> tuple[Callable
 
 
 SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Verb]]] = {
-    "core": (core, CORE),
+    "core": (scenes.core, CORE),
     "train": _slow(slow.train_scene, ["train"]),
     "measure": _slow(slow.measure_scene, ["measure"]),
     "build": _slow(slow.build_scene, ["build"]),
@@ -157,3 +165,10 @@ def state(folder: Path, *, deletes: bool) -> State:
     if deletes:
         found |= {("object", stored.name) for stored in lake.objects}
     return frozenset(found)
+
+
+COMMANDS = {
+    **{name: command(verb) for name, verb in CORE.items()},
+    **{name: replace(command(verb), state=files("out", "out.mcap")) for name, verb in OUTSIDE.items()},
+}
+"""The verbs of the core, and those that write outside of a lake, in a folder."""

@@ -1,8 +1,9 @@
-"""The commands of the core that write, each with a scene small enough to try every call of it."""
+"""The scene of the verbs of the core, small enough to try every call of each, and what commands change in it."""
 
 from __future__ import annotations
 
 import hashlib
+import shutil
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -13,9 +14,8 @@ import numpy as np
 
 from flagdata.cli import main
 from flagdata.ingest import ingest_camera, ingest_wind
-from flagdata.lake import Lake, columns
+from flagdata.lake import Lake
 from tests.small import SCENE
-from tests.studies.failing.trial import Command
 
 CLOTHS = "film,fabric,area_weight,wind_speed,wind_sigma\nthird.mp4,felt,0.3,2.0,0.2\nfourth.mp4,silk,0.1,,\n"
 
@@ -29,7 +29,8 @@ class Scene:
 
 
 def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callable[..., Path]) -> Scene:
-    """A lake with a film, a log, a branch, a tag and garbage; beside it films, logs, meshes, a cut record, recipes."""
+    """A lake with films, a log, a branch, a tag and garbage, and one that is ahead of it; beside them what commands
+    read: films, logs, markers, meshes, records, of which one is cut off, and recipes."""
     lake = Lake.create(folder / "lake")
     camera = ingest_camera(lake, write_video(folder / "first.mp4", frames=30)).artifact
     wind = ingest_wind(lake, wind_log).artifact
@@ -65,11 +66,20 @@ def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callab
         ]
         text = "\n".join([*corners, "f 1/1 2/2 3/3", "f 2/2 4/4 3/3", ""]).format(z=0.1 * frame)
         (folder / "meshes" / f"{frame:04d}_00.obj").write_text(text)
+    (folder / "markers.csv").write_text(
+        "time,marker,u,v,x,y,z\n"
+        + "".join(f"{k / 25},m{m},{m},0,{m},{k / 100},0\n" for k in range(30) for m in range(3))
+    )
+    shutil.copytree(folder / "lake", folder / "ahead")
+    ahead = Lake.open(folder / "ahead")
+    film = ingest_camera(ahead, write_video(folder / "film.mp4", frames=34)).artifact
+    (folder / "record.mcap").write_bytes(ahead.object_path(str(film.object)).read_bytes())
+    ahead.tag("later")
     ids = {"camera": camera.id, "wind": wind.id, "recording": recording, "single": single.id}
     return Scene(folder=folder, ids=ids)
 
 
-def made_scene(folder: Path) -> Scene:
+def core(folder: Path) -> Scene:
     """The same of films and a log that are made for it."""
 
     def write_video(path: Path, *, frames: int = 40) -> Path:
@@ -88,7 +98,7 @@ def made_scene(folder: Path) -> Scene:
     log = folder / "mast.csv"
     lines = [f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}+02:00,5.{k % 10},{200 + k % 9}" for k in range(120)]
     log.write_text("\n".join(["time,wind_speed (m/s),wind_direction (deg)", *lines, ""]))
-    return core_scene(folder, video=write_video(folder / "film.mp4"), wind_log=log, write_video=write_video)
+    return core_scene(folder, video=write_video(folder / "video.mp4"), wind_log=log, write_video=write_video)
 
 
 def rows(folder: Path) -> frozenset[object]:
@@ -96,12 +106,6 @@ def rows(folder: Path) -> frozenset[object]:
     lake = Lake.open(folder / "lake")
     columns = ["artifact", "kind", "name", "branch", "object"]
     return frozenset(tuple(row.values()) for row in lake.rows(columns=columns).to_pylist())
-
-
-def labels(folder: Path) -> frozenset[object]:
-    """Every artifact of the lake with its labels."""
-    table = columns(Lake.open(folder / "lake").rows())
-    return frozenset((name, *values.to_pylist()) for name, values in table.items())
 
 
 def artifacts(folder: Path) -> frozenset[object]:
@@ -121,71 +125,3 @@ def files(*places: str) -> Callable[[Path], frozenset[object]]:
         )
 
     return found
-
-
-_LAKE = ("--lake", "{folder}/lake")
-COMMANDS = {
-    "ingest camera": Command(arguments=("ingest", "{folder}/second.mp4", *_LAKE), state=rows),
-    "ingest wind": Command(arguments=("ingest", "{folder}/second.csv", *_LAKE), state=rows),
-    "ingest meshes": Command(arguments=("ingest", "{folder}/meshes", "--rate", "25", *_LAKE), state=rows),
-    "align": Command(
-        arguments=(
-            "align",
-            "{camera}",
-            "{wind}",
-            "--by",
-            "given",
-            "--clock-offset",
-            "0",
-            "--offset-sigma",
-            "0.1",
-            *_LAKE,
-        ),
-        state=rows,
-    ),
-    "declare": Command(arguments=("declare", "{camera}", "--speed", "3", "--sigma", "0.2", *_LAKE), state=rows),
-    "declare-cloths": Command(arguments=("declare-cloths", "{folder}/cloths.csv", *_LAKE), state=rows, one_step=False),
-    "realign": Command(
-        arguments=(
-            *("realign", "{recording}", "--by", "given", "--clock-offset", "0", "--offset-sigma", "0.3"),
-            *_LAKE,
-        ),
-        state=rows,
-    ),
-    "label": Command(arguments=("label", "{camera}", "operator=me", *_LAKE), state=labels),
-    "merge": Command(arguments=("merge", "side", *_LAKE), state=rows),
-    "withdraw": Command(arguments=("withdraw", "{camera}", "-m", "wrong", *_LAKE), state=rows),
-    "withdraw --everywhere": Command(
-        arguments=("withdraw", "{single}", "--everywhere", "-m", "a person asked", *_LAKE),
-        state=lambda folder: rows(folder) | files("lake/mcap")(folder),
-        one_step=False,
-        unfinished="erasure-unfinished",
-    ),
-    "expire": Command(
-        arguments=("expire", "--keep", "1", *_LAKE),
-        state=files("lake/mcap", "lake/zarr"),
-        one_step=False,
-    ),
-    "tag": Command(arguments=("tag", "v1", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.tags()}),
-    "tag --delete": Command(
-        arguments=("tag", "v0", "--delete", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.tags()}
-    ),
-    "branch": Command(
-        arguments=("branch", "more", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.branches()}
-    ),
-    "branch --delete": Command(
-        arguments=("branch", "side", "--delete", "--discard", *_LAKE),
-        state=lambda folder: {*Lake.open(folder / "lake").refs.branches()},
-    ),
-    "init": Command(
-        arguments=("init", "{folder}/new"), state=lambda folder: (folder / "new" / "lake.json").exists(), lake="new"
-    ),
-    "simulate": Command(arguments=("simulate", "{folder}/small.toml", "--workers", "1", *_LAKE), state=rows),
-    "gc": Command(
-        arguments=("gc", "--older-than", "0s", *_LAKE),
-        state=files("lake/mcap", "lake/zarr", "lake/staging"),
-        one_step=False,
-    ),
-    "recover": Command(arguments=("recover", "{folder}/cut.mcap", "{folder}/whole.mcap"), state=files("whole.mcap")),
-    "export": Command(arguments=("export", "parquet", "--to", "{folder}/out", *_LAKE), state=files("out")),
-}
