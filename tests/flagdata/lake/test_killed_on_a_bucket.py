@@ -15,7 +15,7 @@ def test_a_branch_whose_command_is_killed_beside_faults_is_made_by_the_same_comm
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     page = results.with_suffix(".md").read_text()
     (row,) = (line.split("|") for line in page.splitlines() if line.startswith("| branch |"))
-    points, killed, *_, lost, wrong, repeats, unhealthy, left, _, _, _ = row[3:]
+    points, killed, *_, lost, silent, wrong, repeats, unhealthy, left, _, _, _ = row[3:]
     assert int(points) == 3
     assert int(killed) >= 2, ended.stdout  # of the last request there may be none, where fewer were repeated
-    assert [int(cell) for cell in (lost, wrong, repeats, unhealthy, left)] == [0] * 5, ended.stdout
+    assert [int(cell) for cell in (lost, silent, wrong, repeats, unhealthy, left)] == [0] * 6, ended.stdout

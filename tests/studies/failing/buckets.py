@@ -162,6 +162,12 @@ class Trials:
         copied(target, self.scratch / "copy")
         return state(self.scratch / "copy", deletes=self.verb.deletes)
 
+    def _reports(self) -> bool:
+        """Whether doctor reports of the copied lake what the verb leaves if it is cut off."""
+        copy = self.scratch / "copy"
+        found = doctor(Lake.open(copy), grace=NOW) if self.verb.unfinished and (copy / "lake.json").exists() else ()
+        return self.verb.unfinished in {one.kind for one in found}
+
     def whole(self) -> tuple[State, State, int]:
         """The state before and after the verb without a fault, and how many requests it made."""
 
@@ -203,13 +209,14 @@ class Trials:
             faults = planned(self.proxy)["faults"]
             target = self._target(prefix)
             middle = self._state(target)
+            reported = self._reports()
             planned(self.proxy, share=FAULTY, lost=LOST, seed=1000 * number + call + 1)
             again = self.verb.again if self.verb.again and middle != frozenset({("no lake",)}) else None
             code = invoked(self.given(prefix, again))
             faults = Counter(faults) + Counter(planned(self.proxy)["faults"])
             end = self._state(target)
             seen = examine(target, self.scratch / "copy", remotely=number % 5 == 0)
-            return {"faults": faults, "middle": middle, "again": code, "end": end, **seen}
+            return {"faults": faults, "middle": middle, "reported": reported, "again": code, "end": end, **seen}
 
         code, ended, said = Child(first, self.scratch / prefix / "first").ended()
         failed, found, told = Child(second, self.scratch / prefix / "second").ended()
@@ -231,6 +238,8 @@ class Trials:
             wrong.append(f"report: ended by {code}: {said[-800:]}")
         elif self.verb.one_step and middle not in (before, after):
             wrong.append(f"report: a part is published: {sorted(middle ^ before)[:4]}")
+        if self.verb.unfinished and middle not in (before, after) and not found["reported"]:
+            wrong.append("silent: it has begun what it has not done, and doctor reports nothing")
         if found["again"] and middle != after:
             wrong.append(f"repeat: exit code {found['again']}: {told[-800:]}")
         if end != after:
@@ -354,6 +363,7 @@ def page(known: Mapping[str, Any]) -> str:
         "rows acknowledged",
         "leftovers collected",
         "lost",
+        "silent",
         "wrong reports",
         "repeats that fail",
         "unhealthy",
@@ -362,6 +372,7 @@ def page(known: Mapping[str, Any]) -> str:
     )
     shown = {
         "lost": "lost",
+        "silent": "silent",
         "wrong reports": "report",
         "repeats that fail": "repeat",
         "unhealthy": "unhealthy",

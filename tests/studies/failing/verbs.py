@@ -79,7 +79,7 @@ CORE = {
     "tag": Verb(arguments=("tag", "v1", *_LAKE)),
     "tag --delete": Verb(arguments=("tag", "v0", "--delete", *_LAKE)),
     "branch": Verb(arguments=("branch", "more", *_LAKE)),
-    "branch --delete": Verb(arguments=("branch", "side", "--delete", "--discard", *_LAKE), one_step=False),
+    "branch --delete": Verb(arguments=("branch", "side", "--delete", "--discard", *_LAKE)),
     "merge": Verb(arguments=("merge", "side", *_LAKE)),
     "withdraw": Verb(arguments=("withdraw", "{single}", "-m", "wrong", *_LAKE)),
     "withdraw --everywhere": Verb(
