@@ -81,7 +81,7 @@ def test_a_child_answers_until_it_is_closed() -> None:
         (("leave", 5), End.EXIT, "exit code 5: for no reason"),
     ],
 )
-def test_how_a_child_ended_is_told_apart(message: tuple[str, Any], end: End, detail: str) -> None:
+def test_each_end_of_a_child_is_reported_as_what_it_was(message: tuple[str, Any], end: End, detail: str) -> None:
     child = _child()
     with pytest.raises(EndedError) as caught:
         child.ask(message, seconds=LONG)

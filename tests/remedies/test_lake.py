@@ -93,7 +93,7 @@ def test_a_merge_that_lacks_a_parent_goes_on_after_either_way(user: User) -> Non
 
 
 def test_a_branch_that_alone_shows_rows_is_tagged_or_given_up(user: User) -> None:
-    user.meets("lake/removal.py", "add --discard", "branch", "side", "--delete")
+    user.meets("lake/ref_commits.py", "add --discard", "branch", "side", "--delete")
     user.again("--discard")
 
 

@@ -16,7 +16,7 @@ import torch
 import flagdata
 from flagdata.workload import cores
 from measure.anemometer.making import made
-from measure.cloth.calibration import calibrate
+from measure.cloth import calibrate
 from measure.cloth.sources import Sources
 from measure.commands.measure_film import run
 
