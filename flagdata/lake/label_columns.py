@@ -34,15 +34,13 @@ class Clash:
     Attributes:
         names: that SQL takes for one, or the one name whose values are of two types; sorted.
         what: the clash, as a sentence.
-        name: the label that is to be taken off some artifacts.
-        holders: these, sorted.
+        ways: label → artifacts that it may be taken off, sorted, each of which ends the clash; the best first.
         advice: what is to be achieved.
     """
 
     names: tuple[str, ...]
     what: str
-    name: str
-    holders: tuple[str, ...]
+    ways: tuple[tuple[str, tuple[str, ...]], ...]
     advice: str
 
     def fix(self, homes: Mapping[str, Labels]) -> str:
@@ -51,16 +49,18 @@ class Clash:
         Args:
             homes: branch → the labels of its artifacts, in the order in which branches are to be changed.
         """
-        commands, rest = [], [*self.holders]
-        for branch, labels in homes.items():
-            here = [artifact for artifact in rest if self.name in labels.get(artifact, {})]
-            rest = [artifact for artifact in rest if artifact not in here]
-            where = () if branch == MAIN else ("--branch", branch)
-            if here:
-                commands.append(command_line("flagdata", "label", *here[:_NAMED], f"{self.name}=", *where))
-        done = f"; {' and '.join(commands)} takes the other off" if commands else ""
-        more = f"; then repeat this, for the rest of the {len(self.holders)}" if len(self.holders) > _NAMED else ""
-        return f"{self.advice}{done}{more}"
+        for name, holders in self.ways:
+            commands, rest = [], [*holders]
+            for branch, labels in homes.items():
+                here = [artifact for artifact in rest if name in labels.get(artifact, {})]
+                rest = [artifact for artifact in rest if artifact not in here]
+                where = () if branch == MAIN else ("--branch", branch)
+                if here:
+                    commands.append(command_line("flagdata", "label", *here[:_NAMED], f"{name}=", *where))
+            more = f"; then repeat this, for the rest of the {len(holders)}" if len(holders) > _NAMED else ""
+            if commands:
+                return f"{self.advice}; {' and '.join(commands)} takes the other off{more}"
+        return self.advice
 
 
 def clashes(labels: Labels) -> Iterator[Clash]:
@@ -77,8 +77,7 @@ def clashes(labels: Labels) -> Iterator[Clash]:
             yield Clash(
                 names=(first, other),
                 what=f"the labels {other} and {first} are one column in SQL, which takes capitals for small letters",
-                name=other,
-                holders=tuple(sorted(holders[other])),
+                ways=tuple((name, tuple(sorted(holders[name]))) for name in (other, first)),
                 advice="keep one of the two names",
             )
     for name in sorted(holders):
@@ -91,8 +90,7 @@ def clashes(labels: Labels) -> Iterator[Clash]:
             yield Clash(
                 names=(name,),
                 what=f"{name} is a {one} on some artifacts, as {first}, and a {other} on others, as {second}",
-                name=name,
-                holders=tuple(sorted(others)),
+                ways=((name, tuple(sorted(others))), (name, tuple(sorted(ones)))),
                 advice="give all of them values of one type",
             )
 
@@ -109,7 +107,7 @@ def check_labels(before: Labels, after: Labels, *, homes: Mapping[str, Labels]) 
     present = {clash.names for clash in clashes(before)}
     for clash in clashes(after):
         if clash.names not in present:
-            raise ConflictError(clash.what, where=clash.holders[0], fix=clash.fix(homes))
+            raise ConflictError(clash.what, where=clash.ways[0][1][0], fix=clash.fix(homes))
 
 
 def kind(value: Value) -> str:

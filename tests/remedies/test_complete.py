@@ -37,6 +37,7 @@ OF_PARTS = {
     "measure/observables": ("observe",),
     "measure/closing": ("close-loop",),
     "measure/observe": ("close-loop",),
+    "models/training/stated_films": ("evaluate", "train"),
     "models/training": ("train",),
     "models/evaluation": ("evaluate",),
     "sim/blender": ("blender-setup", "build"),

@@ -48,7 +48,7 @@ def test_versions_before_the_first_are_listed(user: User) -> None:
 def test_the_older_of_two_labels_of_one_column_is_taken_off(user: User) -> None:
     for old, new in (("A", "a"), ("b", "B")):
         user.succeeds("label", "mast", f"{old}=1")
-        fix = user.meets("lake/labels.py", "takes the other off", "label", "first", f"{new}=1")
+        fix = user.meets("lake/label_columns.py", "flagdata label", "label", "first", f"{new}=1")
         command = fix.partition("flagdata ")[2].partition(" takes")[0]
         user.follows(*command.split())
         user.succeeds("label", "first", f"{new}=1")
@@ -219,12 +219,22 @@ def test_what_was_erased_is_left_out_of_an_export(user: User) -> None:
     )
 
 
-def test_labels_that_a_merge_brought_into_one_column_are_taken_off_as_the_fix_says(user: User) -> None:
+def test_labels_that_a_merge_would_bring_into_one_column_are_taken_off_as_the_fix_says(user: User) -> None:
     user.succeeds("branch", "other")
     user.succeeds("label", "mast", "A=1")
     user.succeeds("label", "first", "a=1", "--branch", "other")
-    user.succeeds("merge", "other")
-    fix = user.meets("lake/labels.py", "takes the other off", "query", "--where", "kind = 'wind'")
+    fix = user.meets("lake/label_columns.py", "flagdata label", "merge", "other")
     command = fix.partition("flagdata ")[2].partition(" takes")[0]
     user.follows(*command.split())
+    user.succeeds("merge", "other")
     user.succeeds("query", "--where", "kind = 'wind'", shows="mast")
+
+
+def test_a_label_that_two_branches_changed_is_made_the_same_as_the_fix_says(user: User) -> None:
+    user.succeeds("branch", "other")
+    user.succeeds("label", "mast", "note=as seen")
+    user.succeeds("label", "mast", "note=otherwise", "--branch", "other")
+    fix = user.meets("lake/label_merging.py", "or another: flagdata label", "merge", "other")
+    command = fix.partition("flagdata ")[2].partition("; then")[0]
+    user.follows(*shlex.split(command))
+    user.succeeds("merge", "other")

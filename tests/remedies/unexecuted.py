@@ -44,7 +44,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/console.py", "what was finished before"),
     ),
     "a log entry that is no JSON of ours under its right hash: one of another program": (
-        ("flagdata/lake/lineage.py", "run flagdata verify; res"),
+        ("flagdata/lake/lineage.py", "run flagdata verify; "),
+        ("flagdata/lake/refs.py", "run flagdata verify; "),
     ),
     "a log that a reader accepts for its other channels, beside a film of markers": (
         ("measure/observe/wind.py", "see what flagdata ingest"),
