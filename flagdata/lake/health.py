@@ -314,15 +314,21 @@ def _erased(lake: Lake, marked: Marked) -> list[Finding]:
     return findings
 
 
+_ENDED_BY = {
+    "erasure": "run flagdata gc, which deletes it at once; or the same flagdata withdraw --everywhere again",
+    "expiry": "run flagdata gc: what expired goes at once, whatever its age",
+}
+"""What ends a commit that was cut off, by its kind."""
+
+
 def _unfinished(lake: Lake, left: Unfinished) -> Finding:
-    again = {"erasure": "; or the same flagdata withdraw --everywhere again", "expiry": ""}[left.kind]
     done = {"erasure": "erased", "expiry": "let expire"}[left.kind]
     return Finding.of(
         f"{left.kind}-unfinished",
         f"version {left.version} {done} what {left.name} holds ({left.reason}), and its bytes are still there: the "
         f"{left.kind} was interrupted, or the disk refused it",
         where=str(lake.objects.path(left.name)),
-        fix=f"run flagdata gc, which deletes it at once{again}",
+        fix=_ENDED_BY[left.kind],
     )
 
 

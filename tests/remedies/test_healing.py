@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.lake import Artifact, Catalog, Lake, Objects, clone, transfer
+from flagdata.lake import Artifact, Catalog, Lake, Objects, clone, expire, transfer
 from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import overwrite, put_older_ref
 from tests.flagdata.lake.test_healing import cut, flip, lose
@@ -121,6 +121,18 @@ def test_an_erasure_that_was_killed_is_ended_by_gc_or_by_the_same_command(user: 
         user.meets("lake/health.py", "run flagdata gc, which d", "doctor")
         user.follows(*words)
         user.succeeds("doctor", shows="(?m)^healthy")
+
+
+def test_an_expiry_that_was_killed_is_ended_by_gc(user: User) -> None:
+    user.succeeds("ingest", "second.csv")
+    gone = object_of(the_lake(user), "second")
+    user.succeeds("withdraw", "second", "-m", "wrong")
+    lake = the_lake(user)
+    with pytest.MonkeyPatch.context() as patch:
+        stopped(patch, Objects, "delete", partial(expire, lake, lake.catalog.head() - 1), at=0)
+    user.meets("lake/health.py", "what expired goes at once", "doctor")
+    user.follows("gc")
+    assert not the_lake(user).objects.has(gone)
 
 
 def test_a_disk_that_lets_nothing_be_deleted_keeps_what_gc_or_the_same_command_deletes_later(user: User) -> None:
