@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import timedelta
 
-from flagdata.durable import disk_errors
+from flagdata.durable import confirming, disk_errors
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.lake import Lake
@@ -122,16 +123,16 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
                 )
             size += transaction.hold(name)
             advance(1)
+        older, refs = source.refs.older(), source.refs.stored()
+        findings = tuple(_unprintable(source, marked, versions=head - target_head))
         _adopt(source, target, transaction, versions=range(target_head + 1, head + 1), bars=bars)
-        older = source.refs.older()
-        for (kind, name), stored in source.refs.stored().items():
-            if (kind, name) in older:
-                target.refs.adopt(kind, name, stored)
-        target.refs.write_files()
-        with transaction.keeping_collectors_out():
+        for kind, name in refs.keys() & older.keys():
+            target.refs.adopt(kind, name, refs[kind, name])
+        with confirming("what the log says of tags and branches", target.refs.root):
+            target.refs.write_files()
+        with suppress(OSError, FlagdataError), transaction.keeping_collectors_out():  # it saves time only
             target.catalog.summarise()
-    names = tuple(sorted(name for kind, name in target.refs.stored().keys() - refs_before.keys()))
-    findings = tuple(_unprintable(source, marked, versions=head - target_head))
+    names = tuple(sorted(name for _, name in refs.keys() - refs_before.keys()))
     return Transfer(
         versions=head - target_head, head=head, objects=tuple(missing), size=size, refs=names, findings=findings
     )

@@ -265,6 +265,8 @@ class Transaction:
         return {row["artifact"]: Artifact.from_row(row) for row in rows.to_pylist()}
 
     def _publish(self) -> CommitResult:
+        if not (self._pending or self._existing or self._moved):
+            return CommitResult(version=self._seen or 0, commit=None, added=(), existing=())
         if self._pending:
             self._lake.tidy()
         created = datetime.now(UTC)

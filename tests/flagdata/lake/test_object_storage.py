@@ -355,8 +355,8 @@ def test_a_copy_has_its_name_after_its_bytes_are_on_the_disk_and_a_deletion_is_c
     name = str(put_folder(remote_lake, "sheet").object)
     shutil.rmtree(tmp_path / "cache" / "objects")
     done: list[str] = []
-    rename, flush = Path.rename, durable.flush_file
-    monkeypatch.setattr(durable, "flush_file", lambda path: (done.append(path.name), flush(path)))
+    rename, flush = Path.rename, durable._flush
+    monkeypatch.setattr(durable, "_flush", lambda path, noun: (done.append(path.name), flush(path, noun)))
 
     def renamed(path: Path, target: Path) -> Path:
         done.append(f"{target.name} takes its name")
