@@ -14,6 +14,7 @@ from flagdata.arrays import UInt8Array
 from flagdata.documents import column_json
 from flagdata.errors import CorruptError
 from flagdata.lake import Lake
+from flagdata.lake.artifact import ARTIFACT_ID
 from flagdata.record import Coding, Record
 from flagdata.record.writer import encode_jpeg
 from flagdata.schema import CATALOG, TRUTH_WINDOW, Kind
@@ -158,7 +159,7 @@ def _strict(value: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class ExportRows:
-    """The rows of one export, in their order.
+    """The rows of one export, in their order. Their identities name files: each is one that an artifact can have.
 
     Attributes:
         lake: that they are in.
@@ -174,6 +175,18 @@ class ExportRows:
     labels: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     side: str | None = None
     split_by: Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        """Checks the identities.
+
+        Raises:
+            CorruptError: one could name a file elsewhere, as a path does.
+        """
+        for identity in self.rows["artifact"].to_pylist():
+            if identity is None or not ARTIFACT_ID.fullmatch(identity):
+                raise CorruptError(
+                    f"{identity!r} is not the id of an artifact", where=str(self.lake.path), fix="run flagdata doctor"
+                )
 
     def __len__(self) -> int:
         return self.rows.num_rows

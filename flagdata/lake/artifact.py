@@ -20,7 +20,7 @@ from flagdata.errors import CorruptError, InputError
 from flagdata.schema import CATALOG, FORMAT_VERSION, Kind
 
 OBJECT_NAME = re.compile(r"(mcap|zarr|model)/[0-9a-f]{64}")
-_IDENTITY = re.compile(r"[0-9a-f]{32}")
+ARTIFACT_ID = re.compile(r"[0-9a-f]{32}")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _DERIVED = ("artifact", "recipe", "recipe_hash", "format_version")
 _INTEGERS = [name for name, f in CATALOG.items() if pa.types.is_integer(f.type) and name not in _DERIVED]
@@ -96,7 +96,7 @@ class Artifact:
         if self.object is not None and not OBJECT_NAME.fullmatch(self.object):
             raise self._bad("object", self.object, "what Transaction.put returned")
         for parent in (*self.parents, *([self.recording] if self.recording else [])):
-            if not _IDENTITY.fullmatch(parent):
+            if not ARTIFACT_ID.fullmatch(parent):
                 raise self._bad("parents", parent, "full artifact ids (32 hexadecimal digits)")
         if self.source_hash is not None and not _SHA256.fullmatch(self.source_hash):
             raise self._bad("source_hash", self.source_hash, "a SHA-256 in hexadecimal")

@@ -39,7 +39,7 @@ from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.files import is_beside, open_regular
 from flagdata.forks import OneProcess
 from flagdata.lake.attempts import Moved
-from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Entry, Log, Summaries, is_stated
+from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Entry, Log, Summaries, is_stated, names_in
 from flagdata.lake.rowfiles import RowFiles, Scan, changed_file, encode_rows
 from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
@@ -455,6 +455,12 @@ class Catalog:
                 with disk_errors("reading the catalog", self._log):
                     raise OSError(str(error).splitlines()[0]) from error
             self._entries.files()  # raises, where an entry is to blame
+            if (odd := next(filter(_UNLISTED.search, names_in(self._log)), None)) is not None:
+                raise CorruptError(
+                    "the catalog's log cannot be listed: the Delta library takes no such name",
+                    where=str(self._log / odd),
+                    fix="move it away: it is no part of the lake",
+                ) from None
             first = str(error).splitlines()[0].removeprefix(_KERNEL)  # without the Delta library's stack
             first = plain(first) if isinstance(self._log, RemotePath) else first
             blamed = self._blamed(version)
@@ -559,6 +565,7 @@ HINT = "_last_checkpoint"
 _DELETE = f"delete {HINT} and *{CHECKPOINT} there: they save time, the .json files hold all"
 _KERNEL = "Kernel error: "
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
+_UNLISTED = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # in names of files; the latter stand for what is no UTF-8
 _NO_ANSWER = re.compile(r"Generic S3 error|Error performing [A-Z]+ ")
 """What it writes where a store refused a request or did not answer; all else concerns what the store gave."""
 _BROKEN = 4

@@ -117,7 +117,8 @@ def left_uploads(lake: Lake, states: Sequence[LeaseState]) -> tuple[Upload, ...]
     """
     if not isinstance(lake.path, RemotePath):
         return ()
-    protected = {str(lake.path / path_in_lake(name)) for state in states if state.alive for name in state.objects}
+    held = {name for state in states if state.alive for name in state.objects if OBJECT_NAME.fullmatch(name)}
+    protected = {str(lake.path / path_in_lake(name)) for name in held}
     return tuple(
         upload
         for upload in lake.path.uploads()

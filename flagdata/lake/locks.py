@@ -212,7 +212,7 @@ def _plain(path: Path, mode: int = os.O_RDONLY) -> IO[str]:
         raise LinkError(
             "there is a link where a lock of the lake belongs", where=str(path), fix="delete the link"
         ) from None
-    return os.fdopen(descriptor, encoding="utf-8")
+    return os.fdopen(descriptor, encoding="utf-8", errors="replace")
 
 
 class TimedLocks:

@@ -535,6 +535,11 @@ class Summaries:
             ) from None
 
 
+def summaries_in(folder: Place) -> list[str]:
+    """Names of the summaries in a folder; what else is there is no part of the lake."""
+    return [name for name in names_in(folder) if _covered(name, _NEWEST) is not None]
+
+
 def _covered(name: str, head: int) -> tuple[int, int] | None:
     """Reads the first and the last version of a summary of its file's name; None of others, and of later than
     `head`."""

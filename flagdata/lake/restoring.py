@@ -34,7 +34,7 @@ from flagdata.lake.health import object_names, read_refs, verify, verify_catalog
 from flagdata.lake.lake import MARKER, Lake
 from flagdata.lake.layout import FOLDERS, check_own
 from flagdata.lake.leases import Lease, collecting
-from flagdata.lake.log import CHECKPOINT, Log, Summaries, names_in
+from flagdata.lake.log import CHECKPOINT, Log, Summaries, summaries_in
 from flagdata.lake.marking import Marked
 from flagdata.lake.refs import MAIN, Deletion, Ref, content_of
 from flagdata.lake.removal import unfinished
@@ -245,7 +245,7 @@ def _is_table(content: bytes) -> bool:
 
 def _what_saves_time(lake: Lake, source: Lake) -> Iterator[Taken]:
     """Takes summaries and checkpoints that have changed, or deletes them: the entries of the log hold all."""
-    for name in names_in(lake.path / "refs" / "history"):
+    for name in summaries_in(lake.path / "refs" / "history"):
         summary_hash = name.removesuffix(".json").rpartition("-")[2]
         content, instead = (read_bytes(one.path / "refs" / "history" / name) for one in (lake, source))
         if content is not None and hashlib.sha256(content).hexdigest() != summary_hash:

@@ -9,17 +9,20 @@ import shutil
 import signal
 import subprocess
 import sys
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import polars as pl
+import pyarrow as pa
 import pytest
 
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.export import FORMATS, Export, export
-from flagdata.lake import Artifact, Lake
+from flagdata.export.source import ExportRows
+from flagdata.lake import Artifact, Lake, doctor
 from flagdata.outputs import fresh_folder
-from flagdata.schema import Kind
+from flagdata.schema import Kind, catalog_schema
 
 CLIPS = "kind = 'clip'"
 FILMED_FORMATS = [name for name in FORMATS if Kind.CLIP in Export(format=name).exporter().kinds]
@@ -140,6 +143,30 @@ def test_bytes_that_have_changed_in_the_lake_do_not_leave_it(name: str, known: A
     with pytest.raises(CorruptError, match="changed"):
         export(lake, Export(format=name, where=CLIPS), tmp_path / "out")
     assert [path.name for path in tmp_path.iterdir()] == ["lake"]
+
+
+NO_IDS = ("../elsewhere", "/elsewhere", "a/b", "..", ".hidden", "-x", "", "index", "a\nb", "A" * 32, "a" * 300, None)
+"""What a catalog of somebody else may state in place of an id; files would be called by it."""
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_an_id_that_could_name_a_file_elsewhere_leaves_no_lake(name: str, known: Any, tmp_path: Path) -> None:
+    row = known.lake.artifact(known.recording).row() | {"kind": min(Export(format=name).exporter().kinds).value}
+    table = known.lake.rows()
+    for identity in NO_IDS:
+        rows = pa.concat_tables([table, pa.Table.from_pylist([row | {"artifact": identity}], schema=table.schema)])
+        with pytest.raises(CorruptError, match="is not the id of an artifact") as error:
+            ExportRows(lake=known.lake, rows=rows)
+        assert repr(identity) in error.value.what
+
+    shutil.copytree(known.lake.path, tmp_path / "lake")
+    lake = Lake.open(tmp_path / "lake")
+    odd = pa.Table.from_pylist([row | {"artifact": "../elsewhere", "name": "odd"}], schema=catalog_schema())
+    lake.catalog.append(odd, base=lake.catalog.head(), info={"commit": "c" * 17, "branch": "main", "rows": "1"})
+    with pytest.raises(CorruptError, match="is not the id of an artifact"):
+        export(lake, Export(format=name, where="name = 'odd'"), tmp_path / "out" / "of it")
+    assert [path.name for path in tmp_path.iterdir()] == ["lake"]
+    assert "row-malformed" in {finding.kind for finding in doctor(lake, grace=timedelta(0))}
 
 
 def test_nothing_to_export_is_an_error(known: Any, tmp_path: Path) -> None:

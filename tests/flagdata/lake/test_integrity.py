@@ -30,6 +30,7 @@ from flagdata.lake import (
     locks,
     object_names,
     transfer,
+    usage,
     verify,
     verify_catalog,
 )
@@ -499,3 +500,29 @@ def test_a_pipe_in_place_of_what_the_delta_library_reads_is_named_and_nobody_wai
     assert str(error.value.fix).startswith("delete _last_checkpoint")
     hint.unlink()
     assert Lake.open(lake.path).rows()["name"].to_pylist() == ["gusts"]
+
+
+@pytest.mark.disk("names of files that a bucket does not take")
+@pytest.mark.parametrize("name", ["a\nb", "\x1b[2J.json", "\x7f", os.fsdecode(b"\xff")])
+def test_a_name_in_the_log_that_the_delta_library_does_not_take_is_named_and_moving_it_away_heals(
+    filled: Lake, tmp_path: Path, name: str
+) -> None:
+    stray = filled.path / "catalog" / "_delta_log" / name
+    stray.write_bytes(b"{}")
+    for read in (lambda: Lake.open(filled.path).rows(), lambda: clone(filled, tmp_path / "copy", bars=no_bar)):
+        error = refused(read)
+        assert (error.where, error.fix.startswith("move it away")) == (str(stray), True)
+    assert str(stray) in {finding.where for finding in doctor(Lake.open(filled.path), grace=NOW)}
+    stray.unlink()
+    assert is_healthy(doctor(Lake.open(filled.path), grace=NOW))
+
+
+@pytest.mark.disk("a bucket has no locks of the kernel")
+def test_a_lease_of_any_bytes_is_that_of_a_dead_owner(filled: Lake) -> None:
+    folder = filled.staging / "\x1b[2J"
+    folder.mkdir()
+    (folder / "lease").write_bytes(b"\xff\xfe\n../../x\n\x1b[2J")
+    for look in (doctor, usage, collect):
+        look(Lake.open(filled.path), grace=NOW)
+    assert not folder.exists()
+    assert is_healthy(doctor(Lake.open(filled.path), grace=NOW))

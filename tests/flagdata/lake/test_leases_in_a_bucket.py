@@ -53,6 +53,14 @@ def test_a_lease_of_another_machine_counts_until_it_was_not_renewed_for_its_life
     ]
 
 
+def test_a_lease_that_names_no_objects_stops_no_collection(remote_lake: Lake) -> None:
+    lease = remote_lake.staging / ("0" * 32) / "lease"
+    lease.write_bytes(json.dumps(locks.owner()).encode() + b"\n../../x\n\xff\x1b[2J\nmcap/01")
+    put_text(remote_lake, "gusts")
+    assert [state.alive for state in leases(remote_lake.staging)] == [True]
+    assert collect(remote_lake, grace=NOW).objects == ()
+
+
 def test_who_was_cut_off_for_long_publishes_nothing(remote_lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
     put = Transaction.put
 

@@ -368,3 +368,12 @@ def test_a_tag_that_the_log_states_needs_no_other_lake_and_is_pulled_from_none(l
         done = pull(older, lake, bars=no_bar)
         assert [taken.kind for taken in done.healed] == ["ref"]
         assert path.read_bytes() == right
+
+
+@pytest.mark.disk("it makes a folder in a lake")
+def test_what_is_no_summary_stays_beside_them(lakes: Path, damaged: Path) -> None:
+    history = damaged / "refs" / "history"
+    (history / "\x1b[2J").mkdir(parents=True)
+    (history / "notes.txt").write_text("not of the lake")
+    assert healed(damaged, lakes / "newer") == restoring.Healed(taken=(), left=())
+    assert {"\x1b[2J", "notes.txt"} <= {path.name for path in history.iterdir()}
