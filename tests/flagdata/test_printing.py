@@ -150,6 +150,7 @@ def calls(folder: Path, identity: str) -> dict[tuple[str, ...], list[list[str]]]
         ("verify",): [lake],
         ("doctor",): [lake, ["--deep", *lake], [film]],
         ("gc",): [["--dry-run", *lake]],
+        ("heal",): [[EVIL, *lake], [str(folder / "lake"), *lake]],
         ("expire",): [["--keep", "1", "--dry-run", *lake]],
         ("demo",): [["--out", film]],
         ("blender-setup",): [["--python", EVIL]],

@@ -356,7 +356,7 @@ def test_a_table_that_is_drafted_by_a_remedy_is_read_once_it_is_confirmed(case: 
 def test_units_that_lack_a_cell_are_read_by_the_columns_that_are_named(user: User) -> None:
     (user.folder / "a.csv").write_text(eddypro([unit for name, unit in EDDYPRO.items() if name != "DOY"]))
     fix = user.meets("formats/described.py", "mend the line of units;", "ingest", "a.csv", "--zone", "UTC")
-    (columns,) = re.findall(r'--columns "([^"]*)"', fix)
+    (columns,) = re.findall(r"--columns '([^']*)'", fix)
     command = ("ingest", "a.csv", "--zone", "UTC", "--columns", columns, "--expect", "coarse")
     ended = user.follows(*command, code=3, shows="--accept")
     user.succeeds(*command, "--accept", re.findall(r"--accept (\w+)", ended.err)[0])

@@ -7,6 +7,7 @@ program's.
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -178,7 +179,7 @@ def test_a_log_of_a_table_is_in_a_lake(user: User, monkeypatch: pytest.MonkeyPat
 def test_the_weight_that_was_found_is_given_to_a_measurement(user: User) -> None:
     (user.folder / "t.csv").write_text(GUSTY)
     said = user.meets("commands/calibrate.py", "measure: --area-weight", "calibrate", "t.csv", *SIZED.split())
-    weight = said.partition("--area-weight ")[2].split()[0]
+    weight = shlex.split(said.partition("--area-weight ")[2].splitlines()[0])[0]
     user.follows("measure", "second.mp4", "--area-weight", weight, code=1, shows="s of film, a measurement takes")
 
 

@@ -131,8 +131,9 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
             day = untimed.year_alone(source)
             lacking = "dates without a year" if day else "times of day without a date"
             message = f"the lines of an instrument stand after {lacking}"
-            example = f"YYYY-{day}, with its year in place of YYYY" if day else "2026-05-01"
-            fix = f"give the day of the first: {command_line('--date', example)}, and its --zone"
+            example = f"YYYY-{day}" if day else "2026-05-01"
+            year = ", with its year in place of YYYY" if day else ""
+            fix = f"give the day of the first: {command_line('--date', example)}{year}, and its --zone"
             raise TimeError(message, where=str(path), fix=fix)
         source, options = untimed.dated(source, options.date), replace(options, date=None)
     name, options, reasons = _choose(source, options)

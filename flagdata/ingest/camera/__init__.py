@@ -11,8 +11,8 @@ Kinds of findings, by severity:
   frames-not-shown, frames-undecoded, stamps-missing, stamps-duplicate, stamps-disordered, stamps-synthetic (of LeRobot
   data sets), true-rate-of-variable, start-unsure, start-unknown, chapter-not-placed, chapters-unproven, interlaced,
   odd-rotation, hdr-transfer, alpha-ignored, gif-delays, damaged-references, index-damaged, stream-appeared,
-  order-by-name, order-by-time, rate-unlike-names, depth-by-content, orientation-changed, edit-list-passed-over,
-  capture-rate, truncated (within a transport packet);
+  side-not-stated, order-by-name, order-by-time, rate-unlike-names, depth-by-content, orientation-changed,
+  edit-list-passed-over, capture-rate, truncated (within a transport packet);
 - errors: truncated, corrupt-packets, corrupt-frames, size-changed, clock-reset, pages-not-read.
 
 Names are imported when they are first used: ingesting an anemometer's log needs no video decoder.

@@ -33,6 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, field_lake: Lake) -> Path:
     flagdata.ingest(made / "tunnel.mp4", lake=made / "field.lake", session="tunnel")
     flagdata.branch("trial", lake=made / "field.lake")
     flagdata.label(["tunnel", "usable=true"], lake=made / "field.lake", branch="trial")
+    shutil.copytree(made / "field.lake", made / "backup.lake")
     record = next((made / "field.lake" / "mcap").glob("*.mcap")).read_bytes()
     (made / "cut.mcap").write_bytes(record[: 3 * len(record) // 4])
     (made / "flag.toml").write_text("[scene]\ncolumns = 4\n[wind]\nspeed = 3\n[time]\nsettle = 0\nframes = 2\n")

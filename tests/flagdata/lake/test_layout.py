@@ -18,7 +18,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.lake import Artifact, Lake, collect, doctor, garbage, object_names, verify, verify_catalog
 from flagdata.lake.layout import FOLDERS, LinkError
 from flagdata.schema import Kind
-from tests.flagdata.lake.conftest import LINKS, put_text
+from tests.flagdata.lake.conftest import LINKS, put_older_ref, put_text
 from tests.program import invoke
 
 pytestmark = pytest.mark.disk(LINKS)
@@ -205,7 +205,7 @@ def test_a_file_of_the_catalog_or_refs_that_cannot_be_opened_is_a_finding_and_a_
     lake: Lake, part: str, kind: str
 ) -> None:
     put_text(lake, "a")
-    lake.tag("v1")
+    put_older_ref(lake, "tags", "v1")
     paths = {
         "entry": lake.path / "catalog" / "_delta_log" / f"{1:020d}.json",
         "rows": next((lake.path / "catalog").glob("*.parquet")),
@@ -255,8 +255,7 @@ def test_a_ref_whose_values_are_of_another_type_is_a_finding_and_a_clear_error(
     stated: dict[str, object], lake: Lake
 ) -> None:
     put_text(lake, "a")
-    lake.tag("v1")
-    path = lake.path / "refs" / "tags" / "v1.json"
+    path = put_older_ref(lake, "tags", "v1")
     path.write_text(json.dumps({**json.loads(path.read_text()), **stated}))
     with pytest.raises(CorruptError, match="the ref cannot be read") as caught:
         lake.rows(at="v1")

@@ -328,7 +328,7 @@ def test_eddypro_units_that_lack_a_cell_are_refused_with_the_line_that_reads_the
     text = eddypro([unit for name, unit in EDDYPRO.items() if name != lost])
     with pytest.raises(InputError, match="1 fewer of them, do not stand below their names") as caught:
         read(text, zone="UTC")
-    (line,) = re.findall(r'--columns "([^"]*)"', caught.value.fix or "")
+    (line,) = re.findall(r"--columns '([^']*)'", caught.value.fix or "")
     found = read(text, zone="UTC", columns=line)
     winds = {"wind_speed": [2 + at / 10 for at in range(10)], "wind_direction": np.radians(range(200, 210)).tolist()}
     shows(found, "delimited", "2026-05-01T12:00:00Z", air_temperature=[289.5] * 10, **winds)
