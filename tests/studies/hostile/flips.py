@@ -32,6 +32,7 @@ from flagdata.schema import Kind
 from measure.cloth import design
 from measure.nulls import bank
 from measure.refine import evaluator
+from tests.flagdata.lake.conftest import put_older_ref
 
 OUTCOMES = ("refused", "same")
 
@@ -71,6 +72,8 @@ def lake(folder: Path) -> Lake:
     made.withdraw([added[1]], "wrong")
     made.merge("side", "what was beside")
     expire(made, 3, "old")
+    for kind in ("tags", "branches"):
+        put_older_ref(made, kind, f"older-{kind}")
     return made
 
 
@@ -94,7 +97,7 @@ def of_the_lake(folder: Path) -> dict[str, Kept]:
         "log entries": log.glob("*.json"),
         "files of rows": (path / "catalog").glob("*.parquet"),
         "checkpoints": [*log.glob("*.checkpoint.parquet"), log / "_last_checkpoint"],
-        "tags and branches": (path / "refs").glob("*s/*.json"),
+        "tags and branches": (path / "refs").glob("*s/older-*.json"),
         "marks": (path / "refs" / "newest").iterdir(),
         "summaries of the log": (path / "refs" / "history").iterdir(),
     }
