@@ -29,12 +29,14 @@ from flagdata.findings import Severity
 from flagdata.lake import (
     Artifact,
     Lake,
+    Objects,
     catalog,
     clone,
     collect,
     difference,
     doctor,
     expire,
+    heal,
     is_healthy,
     labels_of,
     object_names,
@@ -44,6 +46,7 @@ from flagdata.lake import (
 )
 from flagdata.schema import Kind
 from flagdata.storage import Place
+from tests.flagdata.lake.conftest import overwrite
 from tests.flagdata.lake.crashes import Killed, dying
 from tests.flagdata.lake.lake_model import (
     ITEMS,
@@ -546,6 +549,47 @@ class LakeMachine(RuleBasedStateMachine):
         self.lakes[which] = Lake.open(self.places[which])
         self.check(which)
 
+    def common(self) -> int:
+        """How many versions both lakes have."""
+        pairs = zip(self.models[HERE].versions, self.models[THERE].versions, strict=False)
+        return sum(one is other for one, other in pairs)
+
+    def replaceable(self, kind: str) -> list[Place]:
+        """What is needed here that the other lake has, too: files of the catalog, or objects."""
+        lake, other = self.lakes[HERE], self.lakes[THERE]
+        if kind == "objects":
+            needed = self.models[HERE].needed() & self.models[THERE].stored
+            names = sorted(name for name, data in self.items.objects.items() if data in needed)
+            return [lake.objects.path(name) for name in names]
+        if kind == "entries":
+            return [lake.catalog.path / "_delta_log" / f"{version:020d}.json" for version in range(self.common())]
+        files = (other.catalog.entry(version)[1] for version in range(self.common()))
+        return [lake.catalog.path / name for names in files for name in names]
+
+    @rule(kind=st.sampled_from(["objects", "entries", "rows"]), is_lost=st.booleans(), pick=PICK, kill=KILL)
+    def heal(self, kind: str, is_lost: bool, pick: int, kill: int | None) -> None:
+        """Something is lost here, or changes, that the other lake has, older or newer: it is taken from there."""
+        paths = self.replaceable(kind)
+        if not paths:
+            return
+        self.is_sound = False
+        path = paths[pick % len(paths)]
+        if is_lost or path.suffix == ".zarr":
+            Objects.remove(path)
+        else:
+            overwrite(path, b"changed")
+        self.lakes[HERE] = Lake.found(self.places[HERE])
+        was_killed, refusal = self.run(HERE, lambda lake: heal(lake, self.lakes[THERE], bars=no_bar), kill)
+        assert refusal is None, refusal
+        if was_killed:
+            heal(Lake.found(self.places[HERE]), self.lakes[THERE], bars=no_bar)
+        self.tally[f"heal {kind} {'again after a kill' if was_killed else 'done'}"] += 1
+        self.lakes[HERE] = Lake.open(self.places[HERE])
+        assert self.stored(HERE) == self.models[HERE].stored
+        self.check(HERE)
+        self.check_findings(HERE)
+        self.is_sound = True
+
     @rule(which=LAKE, pick=PICK, back=st.integers(0, 2))
     def look_back(self, which: str, pick: int, back: int) -> None:
         lake, model, before, after = self.lakes[which], self.models[which], self.at(which, pick, back), MAIN
@@ -558,7 +602,7 @@ class LakeMachine(RuleBasedStateMachine):
 
 RULES = frozenset(
     {"ingest", "label", "withdraw", "erase", "tag", "branch", "delete", "merge", "expire", "gc", "transfer", "clone"}
-    | {"lose_refs", "look_back"}
+    | {"lose_refs", "heal", "look_back"}
 )
 """Names of the operations."""
 
