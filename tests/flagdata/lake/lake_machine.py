@@ -469,6 +469,7 @@ class LakeMachine(RuleBasedStateMachine):
             kill,
         )
 
+    @precondition(lambda self: any(self.models[which].has_old_data() for which in self.written))
     @rule(which=LAKE, back=st.integers(1, 6), kill=KILL)
     def expire(self, which: str, back: int, kill: int | None) -> None:
         up_to = len(self.models[which].versions) - 1 - back

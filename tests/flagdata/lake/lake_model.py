@@ -410,6 +410,10 @@ class LakeModel:
     def collect(self) -> Outcome:
         return Outcome(state=None, stored=self.stored & self.needed())
 
+    def has_old_data(self) -> bool:
+        """Whether any data go when all versions but the newest expire."""
+        return self.expire(len(self.versions) - 2).stored != self.stored
+
     def expire(self, up_to: int) -> Outcome:
         """The data go that only versions up to one show, and no branch or tag."""
         kept = set(self.needed())

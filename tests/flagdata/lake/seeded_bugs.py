@@ -133,6 +133,6 @@ BUGS = {
     "refs-are-files": Bug(put=_refs_are_files, among=frozenset({"branch", "tag", "lose_refs"})),
     "tag-names-free": Bug(put=_tag_names_are_free_again, among=frozenset({"ingest", "tag", "delete"})),
     "never-tidied": Bug(put=_never_tidied, among=frozenset({"label", "withdraw"})),
-    "silent-expiry": Bug(put=_silent("expiry"), among=frozenset({"withdraw", "ingest", "expire"})),
+    "silent-expiry": Bug(put=_silent("expiry"), among=frozenset({"withdraw", "delete", "expire"})),
     "silent-erasure": Bug(put=_silent("erasure"), among=frozenset({"erase", "ingest"})),
 }
