@@ -319,9 +319,9 @@ class LakeModel:
         erased = {**state.erased, **dict.fromkeys(going, len(self.versions))}
         after = self.copied(len(self.versions) - 1)
         after.versions.append(replace(state, erased=erased))
-        is_new = state is not self.head or any(
-            self.unerased(going & rows.keys(), self.shown(ref)) for ref, rows in refs.items()
-        )
+        wanted = self._wanted()
+        erased_before = {name for name in self.head.erased if not data_of([name]) & wanted}
+        is_new = state is not self.head or not going <= erased_before
         going_data = (data_of(going) - after.needed()) | rest
         return Outcome(state=after.head if is_new else None, stored=self.stored - going_data)
 
