@@ -124,6 +124,9 @@ def test_what_expired_keeps_its_lineage_here_and_in_clones(lake: Lake, tmp_path:
     for place in (lake.path, before, after):
         of_it = invoke("lineage", "clip", "--at", "3", "--lake", place, "--json").document
         assert {one["name"] for one in of_it["relatives"]} == {"log", "recording", "clip"}
+        kinds = {finding.kind for finding in doctor(Lake.open(place))}
+        assert ("expiry-unfinished" in kinds) == (place == before)  # its data are still there
+        collect(Lake.open(place), grace=timedelta(days=1))
         assert is_healthy(doctor(Lake.open(place)))
     put_text(Lake.open(after), "spare")
     assert invoke("push", lake.path, "--lake", after).code == 0
