@@ -188,10 +188,11 @@ def _is_recent(lake: Store, removal: Removal, since: float) -> bool:
 
 
 def _unexpired(lake: Store, rows: pa.Table, view: View) -> pa.Table:
-    """Returns the rows that no version after those of a view erased, and whose data did not go with versions that
-    expired since."""
+    """Returns the rows that no version after those of a view erased, and whose data did not go since: with versions
+    that expired, or with an erased artifact of the same bytes."""
     newest = max(part.version for part in view)
-    gone = {name for r in removals(lake.catalog.history()) if r.version > newest for name in r.expired[1]}
+    later = [removal for removal in removals(lake.catalog.history()) if removal.version > newest]
+    gone = {name for removal in later for name in (*removal.expired[1], *removal.erased.values()) if name is not None}
     rows = _unerased(lake, rows, view)
     return rows.filter(~pc.field("object").isin(pa.array(sorted(gone), pa.string()))) if gone else rows
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
@@ -136,6 +137,23 @@ def test_an_erasure_takes_its_artifacts_off_all_branches_by_one_commit(
     assert lake.rows(at=str(head))["artifact"].to_pylist() == [film.id]
     assert lake.merge("side", "nothing").added == ()
     assert {film.id, made.id}.isdisjoint(lake.rows()["artifact"].to_pylist())
+
+
+def test_an_erasure_that_was_killed_is_found_though_its_bytes_were_withdrawn_of_another_a_while_ago(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    film = put_text(lake, "film")
+    with lake.transaction("the same bytes") as transaction:
+        twin = replace(film, name="twin", recipe={"of": "twin"})
+        transaction.hold(str(film.object))
+        transaction.add(twin)
+    lake.withdraw([twin.id], "wrong")
+    head = lake.catalog.head()
+    assert stopped(monkeypatch, Objects, "delete", lambda: lake.erase([film.id], "asked"), at=0) == 1
+    assert "erasure-unfinished" in {finding.kind for finding in doctor(lake)}
+    assert lake.erase([film.id], "asked").objects == (film.object,)
+    assert lake.catalog.head() == head + 1
+    assert (stored(lake), is_whole(lake)) == (set(), True)
 
 
 def test_an_expiry_that_was_killed_is_found_and_finished_by_gc(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
