@@ -314,21 +314,22 @@ def _erased(lake: Lake, marked: Marked) -> list[Finding]:
     return findings
 
 
-_ENDED_BY = {
-    "erasure": "run flagdata gc, which deletes it at once; or the same flagdata withdraw --everywhere again",
-    "expiry": "run flagdata gc: what expired goes at once, whatever its age",
-}
-"""What ends a commit that was cut off, by its kind."""
-
-
 def _unfinished(lake: Lake, left: Unfinished) -> Finding:
-    done = {"erasure": "erased", "expiry": "let expire"}[left.kind]
+    """Warns of a commit that was cut off before all of its data were gone."""
+    where = str(lake.objects.path(left.name))
+    rest = f"what {left.name} holds ({left.reason}), and its bytes are still there: "
+    if left.kind == "erasure":
+        return Finding.of(
+            "erasure-unfinished",
+            f"version {left.version} erased {rest}the erasure was interrupted, or the disk refused it",
+            where=where,
+            fix="run flagdata gc, which deletes it at once; or the same flagdata withdraw --everywhere again",
+        )
     return Finding.of(
-        f"{left.kind}-unfinished",
-        f"version {left.version} {done} what {left.name} holds ({left.reason}), and its bytes are still there: the "
-        f"{left.kind} was interrupted, or the disk refused it",
-        where=str(lake.objects.path(left.name)),
-        fix=_ENDED_BY[left.kind],
+        "expiry-unfinished",
+        f"version {left.version} let expire {rest}the expiry was interrupted, or the disk refused it",
+        where=where,
+        fix="run flagdata gc: what expired goes at once, whatever its age",
     )
 
 

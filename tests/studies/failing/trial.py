@@ -13,8 +13,12 @@ from typing import Any
 
 from flagdata.findings import Finding, Severity
 from flagdata.lake import Lake, doctor, object_names, read_refs, verify, verify_catalog
+from flagdata.lake.layout import STAGING, STORES
 from tests.studies.failing.groups import PUBLISHING, kinds
 from tests.studies.failing.injector import Done, Fault, Injector
+
+_DELETING = tuple(f"fsync /lake/{folder} " for folder in (*STORES, STAGING))
+"""Calls that force a deletion to the disk. A command that deletes puts nothing in these folders."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +33,7 @@ class Command:
             in the process that it is forked from.
         again: what goes on where it was killed and that lake is there; `None` is the same once more.
         one_step: whether it changes all or nothing; else what it has done before an error stays, and a repeat goes on.
+        deletes: whether data go; where the disk does not flush a folder of them, it must end in an error.
         unfinished: kind of the finding by which doctor reports what it has begun and not done; empty where it begins
             nothing that it would have to finish.
     """
@@ -39,6 +44,7 @@ class Command:
     again: tuple[str, ...] | None = None
     stand_in: str | None = None
     one_step: bool = True
+    deletes: bool = False
     unfinished: str = ""
 
     def given(self, folder: Path, ids: Mapping[str, str]) -> list[str]:
@@ -103,7 +109,7 @@ class Trials:
         met = kinds(done.trace)[fault.call] if fault.call < len(done.trace) else "none: there were fewer"
         self.failed[met] += 1
         state = command.state(folder)
-        problems = self._lost(done, state) if fault.kills else self._report_against(done, state)
+        problems = self._lost(done, state) if fault.kills else self._report_against(done, state, met)
         found = _health(folder / command.lake)
         problems += _unhealthy(found, right=command.unfinished)
         if command.unfinished and state not in (self.whole.before, self.whole.after):
@@ -136,9 +142,11 @@ class Trials:
             return self._injector.run(folder, self._command.given(folder, self._ids))
         return again
 
-    def _report_against(self, done: Done, state: object) -> list[str]:
+    def _report_against(self, done: Done, state: object, met: str) -> list[str]:
         problems: list[str] = []
-        if (done.code == 0) != (state == self.whole.after):
+        if self._command.deletes and met.startswith(_DELETING):
+            problems += ["a deletion that the disk may undo is acknowledged"] * (done.code == 0)
+        elif (done.code == 0) != (state == self.whole.after):
             what = (
                 "all is" if state == self.whole.after else "nothing is" if state == self.whole.before else "a part is"
             )

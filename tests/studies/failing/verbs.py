@@ -116,6 +116,7 @@ def command(verb: Verb) -> Command:
         lake=verb.target.strip("{}"),
         again=verb.again and placed(verb.again),
         one_step=verb.one_step,
+        deletes=verb.deletes,
         unfinished=verb.unfinished,
     )
 
