@@ -252,12 +252,16 @@ class LakeModel:
     def _wanted(self) -> frozenset[str]:
         """The data of rows that a version showed since they were given up, if ever they were."""
         head = self.head
+        given_up = dict(head.expired)
+        for name, version in head.erased.items():
+            for data in data_of([name]):
+                given_up[data] = max(version, given_up.get(data, 0))
         shown = {
             data
             for version, state in enumerate(self.versions)
             for branch in state.branches
             for data in data_of(self.unerased(self.graph.rows(state.tip(branch)), Shown(commit=0, version=version)))
-            if version >= head.expired.get(data, 0)
+            if version >= given_up.get(data, 0)
         }
         return self.needed() | shown
 
