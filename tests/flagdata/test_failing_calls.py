@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.cli import GROUPS
 from tests.flagdata.conftest import write_video
+from tests.studies.failing import campaign, power_cut
 from tests.studies.failing.groups import grouped
 from tests.studies.failing.injector import Fault, Injector, injecting
 from tests.studies.failing.scenes import Scene, core_scene
@@ -55,6 +57,25 @@ def test_a_call_that_fails_before_publication_is_an_error_and_after_it_a_warning
         faults = [*(Fault(call=call) for call in calls), Fault(call=published + 1, stays=True)]
     wrong = [found for fault in faults if (found := trials.wrong(fault, repeated=EVERY))]
     assert not wrong, json.dumps(wrong, indent=1)
+
+
+NOT_TRIED = {
+    **dict.fromkeys(("ls", "show", "lineage", "view", "query", "log", "diff", "du", "catalog"), "only reads"),
+    **dict.fromkeys(("verify", "doctor"), "only reads, and notes beside an object that it is damaged"),
+    **dict.fromkeys(("completion", "help"), "only prints"),
+    "evaluate": "only reads a lake, and writes a table anew",
+    "demo": "calls what other commands call",
+    "blender-setup": "changes this installation alone",
+}
+
+
+def test_every_command_that_writes_is_tried_by_all_studies() -> None:
+    every = {name for _, commands in GROUPS.values() for name in commands}
+    failing = {command.arguments[0] for _, commands in campaign.SCENES.values() for command in commands.values()}
+    cut = {verb.arguments[0] for _, verbs in power_cut.ALL.values() for verb in verbs.values()}
+    assert failing.isdisjoint(NOT_TRIED)
+    assert failing | NOT_TRIED.keys() == every
+    assert cut == failing - {"propose"}  # which writes files of its own, and reads a lake
 
 
 def test_of_calls_that_are_alike_the_first_the_last_and_every_so_many_are_tried_and_all_after_the_publication() -> None:

@@ -93,6 +93,17 @@ def _files(folder: Path) -> set[str]:
     return files | {f"{'/'.join(name.split('/')[:2])}/{SUMS}" for name in files if name[:4] in ("zarr", "mode")}
 
 
+def damaged(whole: Path, hurt: Path) -> dict[str, bytes | None]:
+    """What differs between the files of a lake and those of the same lake with damage; `None` of what is missing."""
+    found: dict[str, bytes | None] = {}
+    for path in (one for one in whole.rglob("*") if one.is_file()):
+        name = path.relative_to(whole)
+        content = (hurt / name).read_bytes() if (hurt / name).exists() else None
+        if content != path.read_bytes():
+            found[f"/{name}"] = content
+    return found
+
+
 class Bucket:
     """Copies of a lake in a bucket of moto's, for trials."""
 
@@ -111,10 +122,12 @@ class Bucket:
             for one in listed
         }
 
-    def put(self, prefix: str) -> None:
-        """A copy at a prefix."""
+    def put(self, prefix: str, *, damage: Mapping[str, bytes | None]) -> None:
+        """A copy at a prefix, with other bytes for some of its files; `None` leaves one out."""
         connected = HTTPConnection(self._host)
-        for key, content in self.template.items():
+        for key, content in {**self.template, **damage}.items():
+            if content is None:
+                continue
             connected.request("PUT", f"/{BUCKET}/{prefix}{key}", content)
             connected.getresponse().read()
         connected.close()
@@ -149,6 +162,7 @@ class Trials:
         out = self.scratch / prefix.replace("/", "-") / "out"
         return {
             "lake": f"{lake}/lake",
+            "hurt": f"{lake}/hurt",
             "new": f"{lake}/new",
             "folder": str(self.scene.folder),
             "out": str(out),
@@ -158,6 +172,13 @@ class Trials:
     def _target(self, prefix: str) -> str:
         return self.verb.target.format(**self._places(prefix))
 
+    def _put(self, prefix: str) -> None:
+        """A copy of the lake, at what the verb writes to with the damage of the scene's lake of that name."""
+        place = self.verb.target.strip("{}")
+        if place == "new":
+            place = "lake"
+        self.bucket.put(f"{prefix}/{place}", damage=damaged(self.scene.folder / "lake", self.scene.folder / place))
+
     def _state(self, target: str) -> State:
         copied(target, self.scratch / "copy")
         return state(self.scratch / "copy", deletes=self.verb.deletes)
@@ -166,7 +187,7 @@ class Trials:
         """Whether doctor reports of the copied lake what the verb leaves if it is cut off."""
         copy = self.scratch / "copy"
         found = doctor(Lake.open(copy), grace=NOW) if self.verb.unfinished and (copy / "lake.json").exists() else ()
-        return self.verb.unfinished in {one.kind for one in found}
+        return bool(self.verb.unfinished & {one.kind for one in found})
 
     def whole(self) -> tuple[State, State, int]:
         """The state before and after the verb without a fault, and how many requests it made."""
@@ -179,7 +200,7 @@ class Trials:
             count = planned(self.proxy)["count"]
             return before, self._state(target), count, code
 
-        self.bucket.put("whole/lake")
+        self._put("whole")
         code, result, said = Child(work, self.scratch / "whole").ended()
         assert code == 0, said
         before, after, count, code = result
@@ -191,7 +212,7 @@ class Trials:
     def killed(self, number: int, call: int, before: State, after: State) -> dict[str, Any]:
         """One trial: what happened, and what was wrong."""
         prefix, answered = f"trial-{number}", number % 2 == 1
-        self.bucket.put(f"{prefix}/lake")
+        self._put(prefix)
 
         def first() -> int:
             planned(

@@ -40,7 +40,7 @@ from tests.studies.failing.disk import Disk, Tree, read, write
 from tests.studies.failing.forked import Child, stand_in
 from tests.studies.failing.recorder import Recorder
 from tests.studies.failing.scenes import Scene
-from tests.studies.failing.verbs import OUTSIDE, SCENES, State, Verb, state
+from tests.studies.failing.verbs import OUTSIDE, SCENES, UNREADABLE, State, Verb, state
 
 POINTS = 10
 """States of each verb that are examined."""
@@ -130,14 +130,6 @@ def heal(path: Path, backup: Path) -> tuple[list[Finding], list[str], list[Findi
                 Path(command[1]).unlink(missing_ok=True)
         found = look(path)
     return first, [command[0] for command in done], found
-
-
-def shown(path: Path, *, deletes: bool) -> State | None:
-    """What a lake shows; `None` where it cannot be read."""
-    try:
-        return state(path, deletes=deletes)
-    except FlagdataError:
-        return None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,13 +226,15 @@ class Trials:
         if self.verb.deletes and cut.answered:
             wrong += self._back(cut)
         there = (target / "lake.json").exists() or self.verb.target == "{lake}"
-        begun = self._own(shown(target, deletes=self.verb.deletes))
+        begun = self._own(state(target, deletes=self.verb.deletes))
         first, commands, left = heal(target, backup) if there else ([], [], [])
         wrong += [f"not healed: {one.kind}: {one.what} (fix: {one.fix})" for one in left]
-        healed = self._own(shown(target, deletes=self.verb.deletes))
-        if self.verb.unfinished and begun not in (None, self.before, self.after) and not first:
+        healed = self._own(state(target, deletes=self.verb.deletes))
+        if self.verb.unfinished and begun not in (UNREADABLE, self.before, self.after) and not first:
             wrong.append("silent: it has begun what it has not done, and nothing is found")
-        if healed is None:
+        if cut.answered and (undone := self.verb.unfinished & {one.kind for one in first}):
+            wrong.append(f"lost: answered, and not done: {sorted(undone)}")
+        if healed == UNREADABLE:
             wrong.append("lost: the lake cannot be read")
         elif cut.answered and self.after - healed:
             wrong.append(f"lost: answered, and not there: {sorted(self.after - healed)[:4]}")
@@ -252,14 +246,14 @@ class Trials:
             wrong.append(f"a part is published: {sorted(healed ^ self.before)[:4]}")
         ended, more = self._again(folder, healed)
         commands += more
-        end = self._own(shown(target, deletes=self.verb.deletes))
+        end = self._own(state(target, deletes=self.verb.deletes))
         if ended.code and healed != self.after:
             wrong.append(f"repeat: exit code {ended.code}: {ended.err[-600:]}")
         elif end != self.after:
-            wrong.append(f"repeat: ends otherwise: {sorted((end or frozenset()) ^ self.after)[:4]}")
+            wrong.append(f"repeat: ends otherwise: {sorted(end ^ self.after)[:4]}")
         later = heal(target, backup)[2]
         wrong += [f"unhealthy after the repeat: {one.kind}: {one.what}" for one in later]
-        if not later and end is not None:
+        if not later and end != UNREADABLE:
             wrong += self._collected(target)
         return {
             "wrong": wrong,
@@ -267,10 +261,10 @@ class Trials:
             "typed": sorted(commands),
         }
 
-    def _own(self, seen: State | None) -> State | None:
+    def _own(self, seen: State) -> State:
         """Without objects that no version before or after has: what is left of the verb that was cut off."""
         known = self.before | self.after
-        return seen and frozenset(one for one in seen if one[0] != "object" or one in known)
+        return frozenset(one for one in seen if one[0] != "object" or one in known)
 
     def _outside(self, cut: Cut) -> Iterator[str]:
         """What is wrong with files outside of lakes: each is as before or as after, and as after once it answered."""
@@ -293,7 +287,7 @@ class Trials:
             if path.split("/")[0] == "lake" and path.split("/")[1] in STORES:
                 yield f"erasure: {path} is back"
 
-    def _again(self, folder: Path, healed: State | None) -> tuple[Ended, list[str]]:
+    def _again(self, folder: Path, healed: State) -> tuple[Ended, list[str]]:
         """Give the verb again; where it says that what is there has to go, do that and give it once more."""
         again = self.verb.again if self.verb.again and healed != frozenset({("no lake",)}) else None
         command = given(again or self.verb.arguments, folder, self.scene)
@@ -306,7 +300,7 @@ class Trials:
     def _collected(self, target: Path) -> Iterator[str]:
         """What is wrong once all that no version needs was collected."""
         collect(Lake.open(target), grace=timedelta(0))
-        if shown(target, deletes=False) != frozenset(one for one in self.after if one[0] != "object"):
+        if state(target, deletes=False) != frozenset(one for one in self.after if one[0] != "object"):
             yield "collected: rows went"
         for one in doctor(Lake.open(target), grace=timedelta(0)):
             if one.severity is not Severity.NOTE:
@@ -315,7 +309,8 @@ class Trials:
 
 def places(folder: Path) -> dict[str, str]:
     """What a verb's places are in a folder."""
-    return {"lake": f"{folder}/lake", "new": f"{folder}/new", "folder": str(folder), "out": f"{folder}/{_OUT}"}
+    inside = {name: f"{folder}/{name}" for name in ("lake", "hurt", "new")}
+    return {**inside, "folder": str(folder), "out": f"{folder}/{_OUT}"}
 
 
 def given(arguments: Iterable[str], folder: Path, scene: Scene) -> list[str]:

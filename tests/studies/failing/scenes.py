@@ -29,8 +29,8 @@ class Scene:
 
 
 def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callable[..., Path]) -> Scene:
-    """A lake with films, a log, a branch, a tag and garbage, and one that is ahead of it; beside them what commands
-    read: films, logs, markers, meshes, records, of which one is cut off, and recipes."""
+    """A lake with films, a log, a branch, a tag and garbage, the same with damage, and one that is ahead of it; beside
+    them what commands read: films, logs, markers, meshes, records, of which one is cut off, and recipes."""
     lake = Lake.create(folder / "lake")
     camera = ingest_camera(lake, write_video(folder / "first.mp4", frames=30)).artifact
     wind = ingest_wind(lake, wind_log).artifact
@@ -70,6 +70,7 @@ def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callab
         "time,marker,u,v,x,y,z\n"
         + "".join(f"{k / 25},m{m},{m},0,{m},{k / 100},0\n" for k in range(30) for m in range(3))
     )
+    damage(shutil.copytree(folder / "lake", folder / "hurt"), missing=str(single.object))
     shutil.copytree(folder / "lake", folder / "ahead")
     ahead = Lake.open(folder / "ahead")
     film = ingest_camera(ahead, write_video(folder / "film.mp4", frames=34)).artifact
@@ -77,6 +78,14 @@ def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callab
     ahead.tag("later")
     ids = {"camera": camera.id, "wind": wind.id, "recording": recording, "single": single.id}
     return Scene(folder=folder, ids=ids)
+
+
+def damage(lake: Path, *, missing: str) -> None:
+    """Take an object, the end of a log entry and the folder of refs from a lake."""
+    Lake.open(lake).object_path(missing).unlink()
+    *_, entry, _ = sorted((lake / "catalog" / "_delta_log").glob("*.json"))
+    entry.write_bytes(entry.read_bytes()[:-40])
+    shutil.rmtree(lake / "refs")
 
 
 def core(folder: Path) -> Scene:

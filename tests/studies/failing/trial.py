@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import signal
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from pathlib import Path
@@ -34,7 +34,9 @@ class Command:
         again: what goes on where it was killed and that lake is there; `None` is the same once more.
         one_step: whether it changes all or nothing; else what it has done before an error stays, and a repeat goes on.
         deletes: whether data go; where the disk does not flush a folder of them, it must end in an error.
-        unfinished: kind of the finding by which doctor reports what it has begun and not done; empty where it begins
+        compares: whether it reads again all that it leaves: what the disk refuses then is an error though all is done,
+            or a finding and exit code 3.
+        unfinished: kinds of the findings by which doctor reports what it has not done yet; none where it begins
             nothing that it would have to finish.
     """
 
@@ -45,7 +47,8 @@ class Command:
     stand_in: str | None = None
     one_step: bool = True
     deletes: bool = False
-    unfinished: str = ""
+    compares: bool = False
+    unfinished: frozenset[str] = frozenset()
 
     def given(self, folder: Path, ids: Mapping[str, str]) -> list[str]:
         return [argument.format(folder=folder, **ids) for argument in self.arguments]
@@ -111,9 +114,9 @@ class Trials:
         state = command.state(folder)
         problems = self._lost(done, state) if fault.kills else self._report_against(done, state, met)
         found = _health(folder / command.lake)
-        problems += _unhealthy(found, right=command.unfinished)
+        problems += _unhealthy(found, right=command.unfinished if done.code else ())
         if command.unfinished and state not in (self.whole.before, self.whole.after):
-            reported = command.unfinished in {finding.kind for finding in found}
+            reported = command.unfinished & {finding.kind for finding in found}
             problems += ["silent: it has begun what it has not done, and doctor reports nothing"] * (not reported)
         if done.code and (repeated or fault.kills):
             again = self._repeat(folder)
@@ -144,18 +147,17 @@ class Trials:
 
     def _report_against(self, done: Done, state: object, met: str) -> list[str]:
         problems: list[str] = []
-        if self._command.deletes and met.startswith(_DELETING):
+        command, seen = self._command, state == self.whole.after
+        if command.deletes and met.startswith(_DELETING):
             problems += ["a deletion that the disk may undo is acknowledged"] * (done.code == 0)
-        elif (done.code == 0) != (state == self.whole.after):
-            what = (
-                "all is" if state == self.whole.after else "nothing is" if state == self.whole.before else "a part is"
-            )
+        elif (done.code == 0) != seen and not (command.compares and seen):
+            what = "all is" if seen else "nothing is" if state == self.whole.before else "a part is"
             problems.append(f"exit code {done.code}, and {what} published")
-        elif done.code and self._command.one_step and state != self.whole.before:
+        elif done.code and command.one_step and state != self.whole.before:
             problems.append("a part is published")
-        if done.code not in (0, 1):
+        if done.code not in ((0, 1, 3) if command.compares else (0, 1)):
             problems.append(f"exit code {done.code}")
-        if done.code and "fix:" not in done.stderr:
+        if done.code and "fix:" not in done.stderr + done.stdout:
             problems.append("no fix is named")
         return problems + [word for word in ("Traceback", "unforeseen", "interrupted") if word in done.stderr]
 
@@ -189,10 +191,10 @@ def _health(path: Path) -> tuple[Finding, ...]:
     )
 
 
-def _unhealthy(found: Iterable[Finding], *, right: str = "") -> list[str]:
-    """The errors among findings, but those of a kind that is right before the command is given once more."""
+def _unhealthy(found: Iterable[Finding], *, right: Collection[str] = ()) -> list[str]:
+    """The errors among findings, but those of kinds that are right before the command is given once more."""
     return [
         f"unhealthy: {finding.kind}: {finding.what}"
         for finding in found
-        if finding.severity is Severity.ERROR and finding.kind != right
+        if finding.severity is Severity.ERROR and finding.kind not in right
     ]

@@ -1,6 +1,6 @@
 """All verbs that write to a lake, each with a scene that is small enough to stop it at many places.
 
-A study gives the places: `{lake}`, `{new}` and `{out}` of a verb's arguments are in a folder or in a bucket.
+A study gives the places: `{lake}`, `{hurt}`, `{new}` and `{out}` of a verb's arguments are in a folder or in a bucket.
 """
 
 from __future__ import annotations
@@ -9,12 +9,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from flagdata.errors import FlagdataError
 from flagdata.lake import Lake, labels_of
 from tests.studies.failing import scenes, slow
 from tests.studies.failing.scenes import Scene, files
 from tests.studies.failing.trial import Command
 
 State = frozenset[tuple[str, ...]]
+UNREADABLE: State = frozenset({("not readable",)})
+"""What a lake shows that cannot be read."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,22 +25,24 @@ class Verb:
     """A command that writes to a lake.
 
     Attributes:
-        arguments: {lake} stands for the lake's address, {new} for one where nothing is, {folder} for the scene's
-            folder, {out} for one of the trial's own, other names in braces for the scene's ids.
+        arguments: {lake} stands for the lake's address, {hurt} for that of the same lake with damage, {new} for one
+            where nothing is, {folder} for the scene's folder, {out} for one of the trial's own, other names in braces
+            for the scene's ids.
         one_step: whether it changes all or nothing.
-        deletes: whether data go, so that the state is of objects too.
-        target: what it writes to, {lake} or {new}.
+        deletes: whether data go or come back, so that the state is of objects too.
+        compares, stand_in, unfinished: as of `tests.studies.failing.trial.Command`.
+        target: what it writes to, {lake}, {hurt} or {new}.
         again: what goes on where it was killed and the target is there, if that is another command.
-        stand_in, unfinished: as of `tests.studies.failing.trial.Command`.
     """
 
     arguments: tuple[str, ...]
     one_step: bool = True
     deletes: bool = False
+    compares: bool = False
     target: str = "{lake}"
     again: tuple[str, ...] | None = None
     stand_in: str | None = None
-    unfinished: str = ""
+    unfinished: frozenset[str] = frozenset()
 
 
 _LAKE = ("--lake", "{lake}")
@@ -86,11 +91,22 @@ CORE = {
         arguments=("withdraw", "{single}", "--everywhere", "-m", "wrong", *_LAKE),
         one_step=False,
         deletes=True,
-        unfinished="erasure-unfinished",
+        unfinished=frozenset({"erasure-unfinished"}),
     ),
     "gc": Verb(arguments=("gc", "--older-than", "0s", *_LAKE), one_step=False, deletes=True),
     "expire": Verb(
-        arguments=("expire", "--keep", "1", *_LAKE), one_step=False, deletes=True, unfinished="expiry-unfinished"
+        arguments=("expire", "--keep", "1", *_LAKE),
+        one_step=False,
+        deletes=True,
+        unfinished=frozenset({"expiry-unfinished"}),
+    ),
+    "heal": Verb(
+        arguments=("heal", "{folder}/ahead", "--lake", "{hurt}"),
+        target="{hurt}",
+        one_step=False,
+        deletes=True,
+        compares=True,
+        unfinished=frozenset({"log-damaged", "dangling-row", "object-missing"}),
     ),
     "simulate": Verb(arguments=("simulate", "{folder}/small.toml", "--workers", "1", *_LAKE)),
 }
@@ -103,7 +119,7 @@ OUTSIDE = {
 
 def command(verb: Verb) -> Command:
     """A verb in a folder, with the lake `lake` there."""
-    places = {"lake": "{folder}/lake", "new": "{folder}/new", "out": "{folder}/out"}
+    places = {name: f"{{folder}}/{name}" for name in ("lake", "hurt", "new", "out")}
 
     def placed(arguments: Sequence[str]) -> tuple[str, ...]:
         for name, place in places.items():
@@ -117,6 +133,7 @@ def command(verb: Verb) -> Command:
         again=verb.again and placed(verb.again),
         one_step=verb.one_step,
         deletes=verb.deletes,
+        compares=verb.compares,
         unfinished=verb.unfinished,
     )
 
@@ -147,6 +164,7 @@ SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Verb]]] = {
     "measure": _slow(slow.measure_scene, ["measure"]),
     "build": _slow(slow.build_scene, ["build"]),
     "loop": _slow(slow.loop_scene, ["close-loop"]),
+    "weigh": _slow(slow.weigh_scene, ["observe", "calibrate"]),
 }
 
 
@@ -154,7 +172,13 @@ def state(folder: Path, *, deletes: bool) -> State:
     """What a lake in a folder shows: rows by branch, with their labels, and by tag; and its objects."""
     if not (folder / "lake.json").exists():
         return frozenset({("no lake",)})
-    lake = Lake.open(folder)
+    try:
+        return _shown(Lake.open(folder), deletes=deletes)
+    except FlagdataError:
+        return UNREADABLE
+
+
+def _shown(lake: Lake, *, deletes: bool) -> State:
     found: set[tuple[str, ...]] = {("lake",)}
     for branch in ("main", *lake.refs.branches()):
         found.add(("branch", branch))
