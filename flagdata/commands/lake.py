@@ -100,13 +100,20 @@ def branch(chosen: NamingCommand) -> None:
 
     A branch that is deleted leaves its commits to the log, to its tags and to branches made from it.
     """
+    from flagdata.lake.refs import ERASED
+
     lake = chosen.opened()
     if chosen.name is not None and chosen.delete:
         version = lake.delete_branch(chosen.name, chosen.message, discard=chosen.discard)
         _report_deletion("branch", chosen.name, version, as_json=chosen.as_json)
         return
-    refs = lake.refs.branches().values() if chosen.name is None else [lake.branch(chosen.name, at=chosen.at)]
-    _print_refs("branches", refs, as_json=chosen.as_json)
+    if chosen.name is None:
+        _print_refs("branches", lake.refs.branches().values(), as_json=chosen.as_json)
+        return
+    begun = lake.branch(chosen.name, at=chosen.at)
+    _print_refs("branches", [begun], as_json=chosen.as_json)
+    if (count := begun.notes.get(ERASED)) is not None:
+        say(f"{begun.name} does not show {count} of the artifacts: they were erased")
 
 
 @options

@@ -144,7 +144,8 @@ def _check_rows(lake: Store, change: Change, branch: str, base: int) -> None:
         ConflictError, NotFoundError: they do not.
     """
     leaving = frozenset(change.leaving.get(branch, ()))
-    view = lake.refs.view(branch, base)
+    begun = change.made.get(("branches", branch))
+    view = lake.refs.view(branch, base) if begun is None else (Slice(branch=branch, version=base), *begun.view)
     staying = lake.identities(view) - leaving
     fresh = change.fresh.to_pylist() if branch == change.branch else []
     after = staying | {row["artifact"] for row in fresh}

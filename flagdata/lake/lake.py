@@ -272,17 +272,17 @@ class Lake(Store):
 
         Raises:
             UsageError: a name that cannot be one.
-            ConflictError: the name is taken, or was that of a tag that showed other artifacts; or data of an expired
-                version went.
+            ConflictError: the name is taken, or was that of a tag that showed other artifacts; or some of the data
+                went, with versions that expired or collected by gc.
         """
         return make_ref(self, "tags", name, at=at, notes=notes or {})
 
     def branch(self, name: str, *, at: str | None = None) -> Ref:
-        """Begin a branch from what `at` shows.
+        """Begin a branch from what `at` shows, without what was erased since, which is on no branch.
 
         Raises:
             UsageError: a name that cannot be one.
-            ConflictError: the name is taken; data of an expired version went.
+            ConflictError: the name is taken; some of the data went, as for a tag, or were made from what was erased.
         """
         return make_ref(self, "branches", name, at=at, notes={})
 

@@ -16,7 +16,7 @@ from flagdata.errors import CorruptError, FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.lineage import Removal, removals
 from flagdata.lake.log import LogGapError
-from flagdata.lake.refs import MAIN, Slice, View
+from flagdata.lake.refs import ERASED, MAIN, Slice, View, made_by
 from flagdata.lake.store import Store
 from flagdata.provenance import file_hash
 from flagdata.shell import command_line
@@ -90,7 +90,7 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
         try:
             view = lake.view(name)
             refs[name] = lake.table(view)
-            objects |= _objects(_unerased(lake, refs[name], view))
+            objects |= _objects(unerased(lake, refs[name], view))
         except FlagdataError as error:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
@@ -101,6 +101,13 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
     except FlagdataError as error:
         findings.append(_unreadable(error, "recent versions"))
     return Marked(refs=refs, objects=frozenset(objects), findings=tuple(findings))
+
+
+def unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
+    """Returns the rows that no version after those of a view erased."""
+    newest = max(part.version for part in view)
+    erased = {a for removal in removals(lake.catalog.history()) if removal.version > newest for a in removal.erased}
+    return rows.filter(~pc.field("artifact").isin(pa.array(sorted(erased), pa.string()))) if erased else rows
 
 
 def _objects(table: pa.Table) -> set[str]:
@@ -170,12 +177,17 @@ def _withdrawn(lake: Store, *, since: float, first: int | None) -> Iterator[pa.T
             continue
         if removal.withdrawn:
             yield _unexpired(lake, lake.catalog.rows(before), (Slice(branch=MAIN, version=before),))
-        for branch in removal.branches:
+        for branch in removal.branches - _begun_without(removal):
             if removal.hidden(branch):  # rows of a base, which may have left the table long ago
                 view = lake.lineage().view(Slice(branch=branch, version=before))
                 yield _unexpired(lake, lake.table(view), view)
         if recent and removal.deleted:
             yield _unexpired(lake, lake.table(removal.view), removal.view)
+
+
+def _begun_without(removal: Removal) -> frozenset[str]:
+    """Lists the branches that a commit began and that never showed what it hides on them: it was erased before."""
+    return frozenset(name for (_, name), ref in made_by(removal.entry).items() if ERASED in ref.notes)
 
 
 def _is_recent(lake: Store, removal: Removal, since: float) -> bool:
@@ -193,15 +205,8 @@ def _unexpired(lake: Store, rows: pa.Table, view: View) -> pa.Table:
     newest = max(part.version for part in view)
     later = [removal for removal in removals(lake.catalog.history()) if removal.version > newest]
     gone = {name for removal in later for name in (*removal.expired[1], *removal.erased.values()) if name is not None}
-    rows = _unerased(lake, rows, view)
+    rows = unerased(lake, rows, view)
     return rows.filter(~pc.field("object").isin(pa.array(sorted(gone), pa.string()))) if gone else rows
-
-
-def _unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
-    """Returns the rows that no version after those of a view erased."""
-    newest = max(part.version for part in view)
-    erased = {a for removal in removals(lake.catalog.history()) if removal.version > newest for a in removal.erased}
-    return rows.filter(~pc.field("artifact").isin(pa.array(sorted(erased), pa.string()))) if erased else rows
 
 
 def _unreadable(error: FlagdataError, where: str) -> Finding:

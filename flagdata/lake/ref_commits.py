@@ -1,5 +1,9 @@
 """Tags and branches are made and deleted, each by one commit that says what it shows.
 
+A tag lists what was erased since the version that it names, without data, as every older tag does. A branch hides it,
+by the commit that begins the branch: what was erased is on no branch. Other data that went are no longer to be had, so
+neither shows a version that lacks them.
+
 A name is taken from the commit on, whatever becomes of files; one that was deleted may be used again, for a tag if it
 shows the same artifacts. A process that is killed after the commit has made or deleted the ref; the file that repeats
 it is written by the next `flagdata doctor`.
@@ -8,9 +12,11 @@ it is written by the next `flagdata doctor`.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 
+import pyarrow as pa
 import pyarrow.compute as pc
 
 from flagdata.durable import confirming
@@ -18,11 +24,14 @@ from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, Usag
 from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
 from flagdata.lake.lineage import removals
-from flagdata.lake.refs import MAIN, NOUNS, Ref, View, as_json, check_name
-from flagdata.lake.removal import lost
+from flagdata.lake.marking import unerased
+from flagdata.lake.refs import ERASED, MAIN, NOUNS, Ref, View, as_json, check_name
+from flagdata.lake.removal import descendants, lost
 from flagdata.lake.store import Store
 
 _MESSAGES = {"tags": "tag {0}", "branches": "begin the branch {0}"}
+_NEWER = "choose a newer version, or one that a tag shows"
+_WITH_DATA = ["artifact", "object"]
 
 
 def make_ref(lake: Store, kind: str, name: str, *, at: str | None, notes: Mapping[str, str]) -> Ref:
@@ -44,11 +53,17 @@ def make_ref(lake: Store, kind: str, name: str, *, at: str | None, notes: Mappin
                 fix="choose another name; a tag never moves" if kind == "tags" else "choose another name",
             )
         view = lake.view(at)
-        check_whole(lake, view)
+        erased = _check_whole(lake, view, head)
+        change = Change(message=_MESSAGES[kind].format(name))
+        noted = dict(notes)
         if kind == "tags":
             _check_reuse(lake, name, view)
-        ref = Ref(name=name, created=datetime.now(UTC).isoformat(timespec="seconds"), view=view, notes=notes)
-        commit(lake, Change(message=_MESSAGES[kind].format(name), made={(kind, name): ref}), base=head)
+        elif erased:
+            _check_orphans(lake, view, erased)
+            noted[ERASED] = str(len(erased))
+            change = replace(change, leaving={name: erased})
+        ref = Ref(name=name, created=datetime.now(UTC).isoformat(timespec="seconds"), view=view, notes=noted)
+        commit(lake, replace(change, made={(kind, name): ref}), base=head)
         return ref
 
     with lake.changing("naming a version"):
@@ -58,16 +73,44 @@ def make_ref(lake: Store, kind: str, name: str, *, at: str | None, notes: Mappin
     return ref
 
 
-def check_whole(lake: Store, view: View) -> None:
-    """Checks whether a new tag or branch may show a view: not that of an expired version whose data went.
+def _check_whole(lake: Store, view: View, head: int) -> frozenset[str]:
+    """Checks whether a new tag or branch may show a view: not one that lacks data, unless they were erased. What a ref
+    shows already is not looked for.
+
+    Returns:
+        ids of the rows that were erased since, and did not come again.
 
     Raises:
-        ConflictError: some of its data are not in the lake.
+        ConflictError: some of its data went, with versions that expired or since gc collected them.
     """
-    newest = max(part.version for part in view)
-    if any(newest <= removal.expired[0] for removal in removals(lake.catalog.history())):
-        for why in lost(lake, lake.table(view)).values():
-            raise ConflictError(why.what, where=str(lake.path), fix="choose a newer version, or one that a tag shows")
+    branches = [lake.refs.view(name, head) for name in (MAIN, *lake.refs.branches())]
+    if view in branches:
+        return frozenset()
+    rows = lake.columns(view, _WITH_DATA)
+    whole = unerased(lake, rows, view)
+    on_branches = [lake.columns(each, _WITH_DATA) for each in branches]
+    of_tags = [unerased(lake, lake.columns(tag.view, _WITH_DATA), tag.view) for tag in lake.refs.tags().values()]
+    needed = {name for table in (*on_branches, *of_tags) for name in table["object"].to_pylist()}
+    for why in lost(lake, whole.filter(~pc.field("object").isin(pa.array(needed, pa.string())))).values():
+        raise ConflictError(why.what, where=str(lake.path), fix=_NEWER)
+    alive = {artifact for table in on_branches for artifact in table["artifact"].to_pylist()}
+    return frozenset(rows["artifact"].to_pylist()) - set(whole["artifact"].to_pylist()) - alive
+
+
+def _check_orphans(lake: Store, view: View, erased: Collection[str]) -> None:
+    """Checks whether nothing that a branch would show was made from what it hides.
+
+    Raises:
+        ConflictError: something was.
+    """
+    rows = lake.columns(view, ["artifact", "kind", "name", "parents"])
+    if orphans := descendants(rows, erased):
+        first = rows.filter(pc.field("artifact").isin(sorted(orphans))).to_pylist()[0]
+        raise ConflictError(
+            f"{first['kind']} {first['name']!r} of that version was made from what was erased since",
+            where=str(lake.path),
+            fix=_NEWER,
+        )
 
 
 def _check_reuse(lake: Store, name: str, view: View) -> None:

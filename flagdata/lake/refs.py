@@ -81,6 +81,8 @@ _VERSION = re.compile(r"[0-9]+")
 _SHOWN = 60  # characters of a name in a message
 NOUNS = {"tags": "tag", "branches": "branch"}
 """Kind of a ref, which is the folder of its file → what it is called."""
+ERASED = "erased"
+"""Note of a branch: how many artifacts of the version that it began from it hides, since they had been erased."""
 _HASH = "sha256"
 _COMMIT = re.compile(r"c[0-9a-f]{16}")
 

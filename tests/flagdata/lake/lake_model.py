@@ -332,7 +332,7 @@ class LakeModel:
     def _check_new(self, name: str, shown: Shown) -> None:
         if name in self.head.branches or name in self.head.tags:
             raise Refused("the name is taken")
-        if not data_of(self.graph.rows(shown.commit)) <= self.stored:
+        if not data_of(self.unerased(self.graph.rows(shown.commit), shown)) <= self.stored:
             raise Refused("its data are gone")
 
     def tag(self, name: str, at: str) -> Outcome:
@@ -344,9 +344,16 @@ class LakeModel:
         return Outcome(state=state, stored=self.stored)
 
     def branch(self, name: str, at: str) -> Outcome:
+        """What was erased since, and is on no branch, is not on the new one."""
         shown = self.shown(at)
         self._check_new(name, shown)
-        state = replace(self.head, branches={**self.head.branches, name: (shown.commit,)})
+        rows = self.graph.rows(shown.commit)
+        alive = {item for branch in self.head.branches for item in self.rows(branch)}
+        staying = {item: labels for item, labels in rows.items() if item in self.unerased(rows, shown) | alive}
+        if made_from(rows.keys() - staying.keys(), rows) & staying.keys():
+            raise Refused("something that was made from what was erased would stay")
+        hiding = () if len(staying) == len(rows) else (self.graph.add(staying, shown.commit),)
+        state = replace(self.head, branches={**self.head.branches, name: (shown.commit, *hiding)})
         return Outcome(state=state, stored=self.stored)
 
     def delete(self, name: str, *, discard: bool) -> Outcome:

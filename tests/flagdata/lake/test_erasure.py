@@ -111,3 +111,82 @@ def test_the_command_reports_what_it_erased_and_ls_marks_the_rows(lake: Lake) ->
     shown = run.invoke(root, ["ls", "--at", "v1", *where])
     assert "lost" in shown.stdout
     assert "without data: film" in shown.stderr
+
+
+def test_a_new_branch_shows_nothing_that_was_erased_and_a_new_tag_lists_it_as_older_tags_do(place: Lake) -> None:
+    lake = place
+    film, other = put_text(lake, "film"), put_text(lake, "other")  # versions 1 and 2
+    lake.tag("before", at="2")
+    lake.erase([film.id], "asked")
+    lake.tag("after", at="2")
+    begun = lake.branch("b", at="2")
+    lake.branch("of-a-tag", at="before")
+    assert begun.notes == {"erased": "1"}
+    for branch in ("b", "of-a-tag"):
+        assert lake.rows(at=branch)["artifact"].to_pylist() == [other.id]
+    for tag in ("before", "after"):
+        assert lake.rows(at=tag)["artifact"].to_pylist() == [film.id, other.id]
+    assert {(note.kind, note.where) for note in doctor(lake)} == {("erased", "ref before"), ("erased", "ref after")}
+    put_text(lake, "later", branch="b")
+    lake.merge("b", "bring in")
+    assert lake.rows()["name"].to_pylist() == ["other", "later"]
+
+
+def test_no_ref_keeps_the_bytes_of_an_erasure_that_was_killed(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+    film = put_text(lake, "film")
+    with monkeypatch.context() as patches:
+        patches.setattr("flagdata.lake.removal._delete", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            lake.erase([film.id], "asked")
+    lake.branch("b", at="1")
+    lake.tag("v1", at="1")
+    assert collect(lake, grace=timedelta(days=1)).objects == (film.object,)
+
+
+def test_what_came_again_since_it_was_erased_is_on_a_new_branch(lake: Lake) -> None:
+    film = put_text(lake, "film")
+    lake.erase([film.id], "asked")
+    put_text(lake, "film")
+    lake.branch("b", at="1")
+    assert lake.rows(at="b")["artifact"].to_pylist() == [film.id]
+    lake.merge("b", "nothing new")
+    assert lake.rows()["artifact"].to_pylist() == [film.id]
+
+
+def test_a_branch_of_what_was_made_from_what_was_erased_is_refused(lake: Lake) -> None:
+    film = put_text(lake, "film")
+    made = put_text(lake, "made", parents=(film.id,))
+    lake.withdraw([made.id], "blurred")
+    lake.erase([film.id], "asked")
+    with pytest.raises(ConflictError, match="wind 'made' of that version was made from what was erased since"):
+        lake.branch("b", at="2")
+
+
+def test_neither_tag_nor_branch_shows_a_version_whose_data_gc_took(place: Lake) -> None:
+    lake = place
+    film, other = put_text(lake, "film"), put_text(lake, "other")
+    lake.withdraw([film.id], "blurred")
+    lake.tag("young", at="1")  # within the grace period
+    lake.delete_tag("young", discard=True)
+    collect(lake, grace=timedelta(0))
+    for name in (lake.tag, lake.branch):
+        with pytest.raises(
+            ConflictError, match=r"withdrawn by version 3 \(blurred\), and gc has deleted it"
+        ) as refused:
+            name("old", at="2")
+        assert refused.value.fix == "choose a newer version, or one that a tag shows"
+    lake.tag("new")
+    assert lake.rows(at="new")["artifact"].to_pylist() == [other.id]
+    assert {note.severity for note in doctor(lake)} <= {Severity.NOTE}
+
+
+def test_a_tag_that_lists_erased_rows_does_not_stand_for_the_bytes_that_another_row_needs(lake: Lake) -> None:
+    film = put_text(lake, "film")
+    lake.tag("v1")
+    with lake.transaction("the same bytes") as tx:
+        twin = Artifact(kind=film.kind, name="twin", object=film.object, source_hash="b" * 64)
+        tx.add(twin)  # version 3
+    lake.withdraw([twin.id], "blurred")
+    lake.erase([film.id], "asked")
+    with pytest.raises(ConflictError, match="is gone"):
+        lake.tag("twins", at="3")
