@@ -123,16 +123,16 @@ def _silent(kind: str) -> Callable[[pytest.MonkeyPatch], None]:
 
 
 BUGS = {
-    "labels-by-capitals": Bug(put=_unchecked_at_a_merge(2), among=frozenset({"label", "merge"})),
-    "labels-by-type": Bug(put=_unchecked_at_a_merge(1), among=frozenset({"label", "merge"})),
-    "last-label-wins": Bug(put=_last_label_wins, among=frozenset({"label", "merge"})),
-    "made-again": Bug(put=_made_again_is_another, among=frozenset({"branch", "delete", "transfer"})),
+    "labels-by-capitals": Bug(put=_unchecked_at_a_merge(2), among=frozenset({"label", "merge"}), seed=3),
+    "labels-by-type": Bug(put=_unchecked_at_a_merge(1), among=frozenset({"label", "merge"}), seed=6),
+    "last-label-wins": Bug(put=_last_label_wins, among=frozenset({"label", "merge"}), seed=9),
+    "made-again": Bug(put=_made_again_is_another, among=frozenset({"branch", "delete", "transfer"}), seed=8),
     "erased-by-branch": Bug(put=_erased_branch_by_branch, among=frozenset({"erase", "ingest"})),
-    "deleted-by-two": Bug(put=_deleted_by_two_commits, among=frozenset({"ingest", "branch", "delete"})),
+    "deleted-by-two": Bug(put=_deleted_by_two_commits, among=frozenset({"ingest", "branch", "delete"}), seed=11),
     "not-flushed": Bug(put=_deletions_not_flushed, among=frozenset({"erase", "ingest"})),
-    "refs-are-files": Bug(put=_refs_are_files, among=frozenset({"branch", "tag", "lose_refs"})),
-    "tag-names-free": Bug(put=_tag_names_are_free_again, among=frozenset({"ingest", "tag", "delete"})),
-    "never-tidied": Bug(put=_never_tidied, among=frozenset({"label", "withdraw"})),
+    "refs-are-files": Bug(put=_refs_are_files, among=frozenset({"branch", "tag", "lose_refs"}), seed=6),
+    "tag-names-free": Bug(put=_tag_names_are_free_again, among=frozenset({"ingest", "tag", "delete"}), seed=2),
+    "never-tidied": Bug(put=_never_tidied, among=frozenset({"label", "withdraw"}), seed=5),
     "silent-expiry": Bug(put=_silent("expiry"), among=frozenset({"withdraw", "delete", "expire"})),
     "silent-erasure": Bug(put=_silent("erasure"), among=frozenset({"erase", "ingest"})),
 }

@@ -26,3 +26,10 @@ def test_the_machine_finds_a_seeded_bug(name: str, monkeypatch: pytest.MonkeyPat
     bug.put(monkeypatch)
     with pytest.raises((AssertionError, FlagdataError)):
         try_machine(machine_of(bug.among), examples=40, steps=12, number=bug.seed)
+
+
+def test_the_machine_finds_a_seeded_bug_in_a_bucket(bucket_folder: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    bug = BUGS["erased-by-branch"]
+    bug.put(monkeypatch)
+    with pytest.raises((AssertionError, FlagdataError)):
+        try_machine(machine_of(bug.among, in_bucket=bucket_folder), examples=10, steps=12, number=bug.seed)
