@@ -29,7 +29,6 @@ _LOG = logging.getLogger("flagdata")
 
 LACKS = frozenset(
     {
-        errno.EACCES,
         errno.EBADF,
         errno.EINVAL,
         errno.EMLINK,
@@ -37,11 +36,27 @@ LACKS = frozenset(
         errno.ENOSYS,
         errno.ENOTSUP,
         errno.EOPNOTSUPP,
-        errno.EPERM,
         errno.EXDEV,
     }
 )
 """What a file system answers where it lacks what it was asked for: a link, a lock, a flush."""
+DENIED = frozenset({errno.EACCES, errno.EPERM})
+"""What it answers where it lacks that (exFAT and FAT32 so refuse links; CIFS and FUSE as their servers do), and what it
+answers to a user who may not."""
+
+
+def lacks(error: OSError, folder: Path) -> bool:
+    """Checks whether a file system refused something in a folder since it lacks that: not where it takes no new file
+    from this user either, which is a matter of permissions."""
+    if error.errno not in DENIED:
+        return error.errno in LACKS
+    scratch = folder / f".{uuid.uuid4().hex}"
+    try:
+        scratch.touch(exist_ok=False)
+        scratch.unlink()
+    except OSError:
+        return False
+    return True
 
 
 def lacking(lack: str, where: Path, *, error: OSError | None = None) -> RefusedError:
@@ -80,7 +95,7 @@ def _flush(path: Path, noun: str) -> None:
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in LACKS:
+        if not lacks(error, path if path.is_dir() else path.parent):
             raise
         raise lacking(f"does not confirm that {noun} has reached it", path, error=error) from error
     finally:
@@ -175,9 +190,12 @@ def link(file: Path, path: Path) -> None:
     try:
         os.link(file, path)
     except OSError as error:
-        if error.errno not in LACKS:
+        if not lacks(error, path.parent):
             raise
-        raise lacking("has no hard links, as exFAT and FAT32 have none", path.parent, error=error) from error
+        lack = "has no hard links, as exFAT and FAT32 have none"
+        if error.errno in DENIED:
+            lack += ", or lets this user make none"
+        raise lacking(lack, path.parent, error=error) from error
 
 
 def replace_durably(path: Place, data: bytes) -> None:

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
-from flagdata.durable import LACKS, lacking
+from flagdata.durable import lacking, lacks
 
 LOCK = "lock"
 """Name of the file in a folder that is locked while a process works there."""
@@ -32,7 +32,7 @@ def lock(file: IO[Any], mode: int, *, where: Path) -> bool:
     except BlockingIOError:
         return False
     except OSError as error:
-        if error.errno not in LACKS:
+        if not lacks(error, where):
             raise
         raise lacking("refuses locks", where, error=error) from error
     return True

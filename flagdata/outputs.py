@@ -29,7 +29,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from flagdata.durable import LACKS, confirming, disk_errors, flush_file, flush_folder, make_folders
+from flagdata.durable import confirming, disk_errors, flush_file, flush_folder, lacks, make_folders
 from flagdata.errors import ConflictError, InputError
 from flagdata.manifest import remove_listed, unlisted, write_manifest
 
@@ -340,7 +340,7 @@ def _take(scratch: Path, path: Path) -> None:
     except FileExistsError:
         raise _taken(path) from None
     except OSError as error:
-        if error.errno not in LACKS:
+        if not lacks(error, path.absolute().parent):
             raise
         _check_free(path, None)  # a file system without hard links: a name taken in this very moment would be lost
         scratch.rename(path)

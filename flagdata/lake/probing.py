@@ -14,7 +14,7 @@ import uuid
 from functools import cache
 from pathlib import Path
 
-from flagdata.durable import LACKS, disk_errors, flush_file, flush_folder, lacking, link, make_folders
+from flagdata.durable import disk_errors, flush_file, flush_folder, lacking, lacks, link, make_folders
 from flagdata.errors import FlagdataError, RefusedError
 from flagdata.lake.locks import KernelLocks
 from flagdata.locks import check_locks
@@ -74,7 +74,7 @@ def _check_names(folder: Path) -> None:
             path.mkdir()
         first.rename(second)
     except OSError as error:
-        if error.errno not in {*LACKS, errno.EEXIST, errno.ENOTEMPTY, errno.EISDIR}:
+        if error.errno not in {errno.EEXIST, errno.ENOTEMPTY, errno.EISDIR} and not lacks(error, folder):
             raise
         raise lacking("does not replace a name that is taken by another in one step", folder, error=error) from error
     if name.read_bytes() != b"2":

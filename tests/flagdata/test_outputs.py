@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flagdata.durable import LACKS
+from flagdata.durable import DENIED, LACKS
 from flagdata.errors import ConflictError, FlagdataError, InputError
 from flagdata.manifest import MANIFEST
 from flagdata.outputs import (
@@ -127,7 +127,7 @@ def test_a_new_file_never_takes_a_name_that_was_taken_meanwhile(tmp_path: Path) 
     assert len(list(tmp_path.iterdir())) == 2
 
 
-@pytest.mark.parametrize("number", sorted(LACKS))
+@pytest.mark.parametrize("number", sorted(LACKS | DENIED))
 def test_a_file_system_without_hard_links_is_written_to(
     number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from flagdata.durable import DENIED
 from flagdata.errors import FlagdataError, RefusedError
 from flagdata.lake import Artifact, Lake, clone, doctor, probing
 from flagdata.lake.layout import FOLDERS
@@ -132,6 +133,38 @@ def test_a_full_disk_is_no_disk_that_lacks_something(lake: Lake, monkeypatch: py
     monkeypatch.setattr(os, "fsync", _refusing(errno.ENOSPC))
     with pytest.raises(FlagdataError, match=r"No space left.*free some space"):
         put_text(lake, "a")
+
+
+@pytest.mark.parametrize("number", sorted(DENIED))
+@pytest.mark.parametrize(("module", "name"), [(os, "link"), (os, "replace"), (fcntl, "flock")])
+def test_what_this_user_may_not_do_is_no_disk_that_lacks_something(
+    module: object, name: str, number: int, lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is closed to this user between the file that is written there and its name."""
+    probing.probe.cache_clear()
+    check_locks.cache_clear()
+
+    def close(*_: object, **__: object) -> None:
+        monkeypatch.setattr(Path, "touch", _refusing(number))
+        _refusing(number)()
+
+    monkeypatch.setattr(module, name, close)
+    with pytest.raises(FlagdataError) as refused:
+        put_text(lake, "a")
+    assert not isinstance(refused.value, RefusedError)
+    assert os.strerror(number) in refused.value.what
+    assert {errno.EACCES: "write permission", errno.EPERM: "your own"}[number] in refused.value.fix
+
+
+@pytest.mark.parametrize("number", sorted(DENIED))
+def test_a_disk_that_takes_files_and_denies_links_is_not_said_for_sure_to_have_none(
+    number: int, lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    probing.probe.cache_clear()
+    monkeypatch.setattr(os, "link", _refusing(number))
+    with pytest.raises(RefusedError, match="no hard links, .*, or lets this user make none"):
+        put_text(lake, "a")
+    assert [path for path in lake.staging.iterdir() if path.is_dir()] == []
 
 
 def test_a_network_that_locks_for_one_alone_what_that_one_may_write_carries_a_lake(
