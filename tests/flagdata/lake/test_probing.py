@@ -162,7 +162,7 @@ def test_a_disk_that_takes_files_and_denies_links_is_not_said_for_sure_to_have_n
 ) -> None:
     probing.probe.cache_clear()
     monkeypatch.setattr(os, "link", _refusing(number))
-    with pytest.raises(RefusedError, match="no hard links, .*, or lets this user make none"):
+    with pytest.raises(RefusedError, match=r"no hard links, .*, or lets this user make none"):
         put_text(lake, "a")
     assert [path for path in lake.staging.iterdir() if path.is_dir()] == []
 
