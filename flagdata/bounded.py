@@ -30,9 +30,13 @@ _LOOK = 1.0
 """Seconds between looks of a child whether its parent is still there."""
 _BY_MEMORY = 3
 """Exit code of a child that was refused memory."""
-_OF_MEMORY = ("bad_alloc", "memory allocation", "MemoryError")
-"""What libraries of C++, Rust and Python write last where they end their process for want of memory."""
-_SHOWN = 200  # letters of what a child wrote last
+_OF_MEMORY = ("bad_alloc", "memory allocation", "memoryerror", "out of memory", "cannot allocate memory")
+"""What libraries of C++, Rust, Python and C write last where they end their process for want of memory."""
+_ENDING = frozenset({signal.SIGABRT, signal.SIGILL, signal.SIGTRAP})
+"""Signals by which a library ends its own process: for want of memory, or of any other fault that it finds."""
+_LAST = 64 << 10
+"""Bytes within which a library writes why it ends its process, the frames of its stack after it [B]."""
+_SHOWN = 200  # letters of these for people
 
 
 class End(StrEnum):
@@ -148,15 +152,24 @@ class Child:
         return value
 
     def _ended(self) -> tuple[End, str]:
-        """Finds out how it ended without having been asked to: a library that is refused memory may say so last."""
+        """Finds out how it ended without having been asked to.
+
+        A limit of memory leaves no trace in the exit code: the library that is refused memory aborts, as for any other
+        fault. That it was memory is only known from what it wrote last.
+        """
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=_LOOK)
         code = self._process.poll()
-        self._said.seek(0)
-        lines = self._said.read().decode(errors="replace").split("\n")
-        said = " ".join(line for line in lines if line.strip())[-_SHOWN:]
-        if code == _BY_MEMORY or any(word in said for word in _OF_MEMORY):
+        size = self._said.seek(0, os.SEEK_END)
+        self._said.seek(max(0, size - _LAST))
+        lines = [line for line in self._said.read().decode(errors="replace").split("\n") if line.strip()]
+        said = " ".join(lines)[-_SHOWN:]
+        if code == _BY_MEMORY:
             return End.MEMORY, said
+        by_itself = code is not None and (code >= 0 or -code in _ENDING)
+        of_memory = [line for line in lines if any(word in line.lower() for word in _OF_MEMORY)]
+        if by_itself and of_memory:
+            return End.MEMORY, of_memory[-1].strip()[:_SHOWN]
         if code is not None and code < 0:
             return End.SIGNAL, signal.Signals(-code).name
         return End.EXIT, f"exit code {code}{said and f': {said}'}"

@@ -57,7 +57,7 @@ def simulate(chosen: SimulateCommand) -> Iterator[Result]:
 
 
 def _print(report: RunReport) -> None:
-    from flagdata.lake.healing import said
+    from flagdata.lake.remaking import said
 
     for artifact in report.added:
         echo(artifact)

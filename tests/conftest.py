@@ -38,7 +38,7 @@ LONGEST = (
     "flagdata/lake/test_unfinished.py",
     "measure/loop/test_carried.py",
     "flagdata/lake/test_integrity.py",
-    "flagdata/lake/test_healing.py",
+    "flagdata/lake/test_remaking.py",
     "flagdata/lake/test_killed_on_a_bucket.py",
     "contract/test_effects.py",
 )

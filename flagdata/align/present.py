@@ -7,7 +7,7 @@ from typing import Any
 
 from flagdata.errors import ConflictError
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.healing import ABSENT, Present, present
+from flagdata.lake.remaking import ABSENT, Present, present
 from flagdata.provenance import canonical, recipe_hash
 from flagdata.schema import Kind
 

@@ -26,7 +26,7 @@ from flagdata.dataset.clips import clip_rows
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake, Transaction
-from flagdata.lake.healing import Healing, Present
+from flagdata.lake.remaking import Present, Remade
 from flagdata.provenance import canonical
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import CAMERA, CLOCK, PROVENANCE
@@ -155,7 +155,7 @@ class RecordingResult:
     recording: Artifact
     clips: tuple[str, ...]
     created: bool
-    healed: Healing | None = None
+    healed: Remade | None = None
 
     def as_dict(self) -> dict[str, Any]:
         return {

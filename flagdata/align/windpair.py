@@ -17,7 +17,7 @@ from flagdata.align.present import find_made, provenance
 from flagdata.clock import NINETY
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.healing import Healing, Present
+from flagdata.lake.remaking import Present, Remade
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import PROVENANCE
 from flagdata.schema import Kind
@@ -97,7 +97,7 @@ def make_aligned(
     session: str | None,
     branch: str,
     code: str,
-) -> tuple[Artifact, Healing | None]:
+) -> tuple[Artifact, Remade | None]:
     """Write the sensor's log on the reference's clock and publish it in one commit.
 
     Args:

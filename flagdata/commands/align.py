@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from flagdata.align.methods import ClockOptions, Outcome
     from flagdata.align.recording import Pair, RecordingResult
     from flagdata.lake import Artifact, Lake
-    from flagdata.lake.healing import Healing
+    from flagdata.lake.remaking import Remade
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,7 +169,7 @@ def _of_logs(chosen: Aligning, lake: Lake, clock: ClockOptions, *, unused: tuple
     from flagdata.align.methods import Method
     from flagdata.align.windpair import WindPair, find_aligned, make_aligned
     from flagdata.errors import UsageError
-    from flagdata.lake.healing import ABSENT
+    from flagdata.lake.remaking import ABSENT
     from flagdata.rng import stream
 
     if clock.by is not Method.ESTIMATE:
@@ -210,9 +210,9 @@ def _of_logs(chosen: Aligning, lake: Lake, clock: ClockOptions, *, unused: tuple
     return _logs_report(made, found, created=there.artifact is None, healed=healed)
 
 
-def _logs_report(made: Artifact | None, found: LogClock | None, *, created: bool, healed: Healing | None) -> Report:
+def _logs_report(made: Artifact | None, found: LogClock | None, *, created: bool, healed: Remade | None) -> Report:
     from flagdata.align.windpair import summary
-    from flagdata.lake.healing import said
+    from flagdata.lake.remaking import said
 
     content: dict[str, Any] = {"wind": made.id if made is not None else None, "created": created}
     content["healed"] = None if healed is None else asdict(healed)

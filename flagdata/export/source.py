@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -159,7 +160,8 @@ def _strict(value: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class ExportRows:
-    """The rows of one export, in their order. Their identities name files: each is one that an artifact can have.
+    """The rows of one export, in their order. Their identities name files: each is one that an artifact can have, and
+    is there once.
 
     Attributes:
         lake: that they are in.
@@ -180,13 +182,17 @@ class ExportRows:
         """Checks the identities.
 
         Raises:
-            CorruptError: one could name a file elsewhere, as a path does.
+            CorruptError: one could name a file elsewhere, as a path does; or is there twice, so that a sample would
+                be written twice, or one in place of the other.
         """
-        for identity in self.rows["artifact"].to_pylist():
+        where, fix = str(self.lake.path), "run flagdata doctor"
+        identities = self.rows["artifact"].to_pylist()
+        for identity in identities:
             if identity is None or not ARTIFACT_ID.fullmatch(identity):
-                raise CorruptError(
-                    f"{identity!r} is not the id of an artifact", where=str(self.lake.path), fix="run flagdata doctor"
-                )
+                raise CorruptError(f"{identity!r} is not the id of an artifact", where=where, fix=fix)
+        if twice := [identity for identity, count in Counter(identities).items() if count > 1]:
+            more = f", and {len(twice) - 1} more," if len(twice) > 1 else ""
+            raise CorruptError(f"two rows have the identity {twice[0]}{more} in the catalog", where=where, fix=fix)
 
     def __len__(self) -> int:
         return self.rows.num_rows

@@ -28,7 +28,7 @@ from flagdata.ingest.mcap.bags import is_bag
 from flagdata.ingest.report import FrameTimes, camera_report, wind_report
 from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction
-from flagdata.lake.healing import ABSENT, Healing, Present, present
+from flagdata.lake.remaking import ABSENT, Present, Remade, present
 from flagdata.provenance import digest, recipe_hash
 from flagdata.record import Coding, Record, RecordWriter
 from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
@@ -101,7 +101,7 @@ class IngestResult:
     artifact: Artifact
     created: bool
     report: Mapping[str, Any]
-    healed: Healing | None = None
+    healed: Remade | None = None
 
     def as_dict(self) -> dict[str, Any]:
         return {

@@ -15,10 +15,10 @@ from pathlib import Path
 import pyarrow.compute as pc
 
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.healing import Healing, present
 from flagdata.lake.lake import Lake
 from flagdata.lake.naming import REVISION, revised
 from flagdata.lake.refs import MAIN
+from flagdata.lake.remaking import Remade, present
 from flagdata.lake.store import Store
 from flagdata.printable import SHORT
 from flagdata.schema import Kind
@@ -38,7 +38,7 @@ class Placed:
     artifact: Artifact
     others: tuple[Artifact, ...]
     new: bool
-    healed: Healing | None = None
+    healed: Remade | None = None
 
     @property
     def version(self) -> int:

@@ -23,9 +23,9 @@ from flagdata.lake.artifact import Artifact
 from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
 from flagdata.lake.deposit import Deposit, copy_object
-from flagdata.lake.healing import Healing, healing
 from flagdata.lake.leases import Lease
 from flagdata.lake.refs import Slice
+from flagdata.lake.remaking import Remade, describe_remade
 from flagdata.lake.store import Store
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
@@ -49,7 +49,7 @@ class CommitResult:
     added: tuple[str, ...]
     existing: tuple[str, ...]
     artifacts: Mapping[str, Artifact] = field(default_factory=dict)
-    healed: Mapping[str, Healing] = field(default_factory=dict)
+    healed: Mapping[str, Remade] = field(default_factory=dict)
 
 
 class Transaction:
@@ -65,7 +65,7 @@ class Transaction:
     existing. No reader ever sees an identity twice on one branch.
 
     Where the branch has an identity whose object is damaged or missing, what was put for it takes its place, see
-    `flagdata.lake.healing`.
+    `flagdata.lake.remaking`.
 
     Raises:
         UsageError: no message; or anything but `result` used outside the block.
@@ -132,11 +132,11 @@ class Transaction:
                 if self._result is None:
                     raise
 
-    def _healed(self) -> dict[str, Healing]:
+    def _healed(self) -> dict[str, Remade]:
         objects = {identity: (name, name) for identity, name in self._restored.items()}
         objects |= {identity: (before, str(row.object)) for identity, (before, row) in self._moved.items()}
-        healings = {pair: healing(self._lake, before=pair[0], now=pair[1]) for pair in set(objects.values())}
-        return {identity: healings[pair] for identity, pair in objects.items()}
+        remade = {pair: describe_remade(self._lake, before=pair[0], now=pair[1]) for pair in set(objects.values())}
+        return {identity: remade[pair] for identity, pair in objects.items()}
 
     def staging(self, suffix: str) -> Path:
         """Returns a fresh path with `suffix` (".mcap", ".zarr", ".model"), nothing at it yet; removed with the

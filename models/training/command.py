@@ -20,7 +20,7 @@ from flagdata.console import echo, progress, say
 from flagdata.dataset import Pairs
 from flagdata.errors import ConflictError, UsageError
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.healing import Healing
+from flagdata.lake.remaking import Remade
 from flagdata.options import Result, verb
 from flagdata.provenance import canonical, code_version
 from flagdata.schema import Kind
@@ -103,7 +103,7 @@ def publish(
     *,
     batches: dict[str, Any],
     branch: str,
-) -> tuple[Artifact, dict[str, Any], Healing | None]:
+) -> tuple[Artifact, dict[str, Any], Remade | None]:
     """Commits a model and returns its row and card; one that is there already is kept, unless its object is damaged or
     missing: what was done about that is returned, too. A recording that was withdrawn
     from the branch since the training began is not among its parents.
@@ -185,7 +185,7 @@ def trained(
     from torch import distributed as ranks
 
     from flagdata.dataset.source import opened
-    from flagdata.lake.healing import present, said
+    from flagdata.lake.remaking import present, said
     from flagdata.locks import alone_in
     from flagdata.provenance import digest
     from models.storage import read_card

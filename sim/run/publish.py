@@ -17,8 +17,8 @@ import torch
 from flagdata.errors import UsageError
 from flagdata.lake import Artifact, CommitResult, Lake
 from flagdata.lake.deposit import Deposit, deposit
-from flagdata.lake.healing import Healing, unsound
 from flagdata.lake.meshes import write_meshes
+from flagdata.lake.remaking import Remade, unsound
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from flagdata.workload import one_thread
@@ -49,7 +49,7 @@ class RunReport:
 
     added: tuple[str, ...]
     existing: tuple[str, ...]
-    healed: Mapping[str, Healing]
+    healed: Mapping[str, Remade]
     failed: tuple[Mapping[str, Any], ...]
     steps: Mapping[str, float]
     seconds: float
@@ -104,7 +104,7 @@ def simulate(
     if progress is not None:
         progress(len(existing))
     added: list[str] = []
-    healed: dict[str, Healing] = {}
+    healed: dict[str, Remade] = {}
     failed: list[Mapping[str, Any]] = []
     begun = time.perf_counter()
     # Each batch is a commit of its own: what is done stays where a run is stopped.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -29,7 +30,11 @@ def _act(message: tuple[str, Any]) -> Any:
         os.kill(os.getpid(), 9)
     if what == "bad_alloc":
         os.write(2, b"terminate called after throwing an instance of 'std::bad_alloc'\n")
+        os.write(2, b"frame\n" * value)
         os.abort()
+    if what == "said, and killed":
+        os.write(2, b"MemoryError: went on with less\n")
+        os.kill(os.getpid(), value)
     if what == "leave":
         os.write(2, b"for no reason\n")
         os._exit(value)
@@ -75,7 +80,10 @@ def test_a_child_answers_until_it_is_closed() -> None:
     ("message", "end", "detail"),
     [
         (("take", MEMORY + (64 << 20)), End.MEMORY, ""),
-        (("bad_alloc", None), End.MEMORY, "std::bad_alloc"),
+        (("bad_alloc", 0), End.MEMORY, "std::bad_alloc"),
+        (("bad_alloc", 2000), End.MEMORY, "std::bad_alloc"),
+        (("said, and killed", signal.SIGKILL), End.SIGNAL, "SIGKILL"),
+        (("said, and killed", signal.SIGSEGV), End.SIGNAL, "SIGSEGV"),
         (("abort", None), End.SIGNAL, "SIGABRT"),
         (("kill", None), End.SIGNAL, "SIGKILL"),
         (("leave", 5), End.EXIT, "exit code 5: for no reason"),

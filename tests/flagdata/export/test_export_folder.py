@@ -169,6 +169,20 @@ def test_an_id_that_could_name_a_file_elsewhere_leaves_no_lake(name: str, known:
     assert "row-malformed" in {finding.kind for finding in doctor(lake, grace=timedelta(0))}
 
 
+@pytest.mark.parametrize("name", FORMATS)
+def test_an_artifact_that_a_catalog_has_twice_leaves_no_lake(name: str, known: Any, tmp_path: Path) -> None:
+    shutil.copytree(known.lake.path, tmp_path / "lake")
+    lake = Lake.open(tmp_path / "lake")
+    row = known.lake.artifact(known.recording).row() | {"kind": min(Export(format=name).exporter().kinds).value}
+    twice = row | {"artifact": "0" * 32, "name": "twice"}
+    rows = pa.Table.from_pylist([twice, twice | {"object_bytes": 1}], schema=catalog_schema())
+    lake.catalog.append(rows, base=lake.catalog.head(), info={"commit": "c" * 17, "branch": "main", "rows": "2"})
+    with pytest.raises(CorruptError, match=f"two rows have the identity {'0' * 32} in the catalog"):
+        export(lake, Export(format=name, where="name = 'twice'"), tmp_path / "out")
+    assert [path.name for path in tmp_path.iterdir()] == ["lake"]
+    assert "identity-twice" in {finding.kind for finding in doctor(lake, grace=timedelta(0))}
+
+
 def test_nothing_to_export_is_an_error(known: Any, tmp_path: Path) -> None:
     with pytest.raises(NotFoundError, match="no rows match"):
         export(known.lake, Export(format="parquet", where="wind > 100"), tmp_path / "out")

@@ -67,7 +67,7 @@ def _read(where: str, limits: Limits) -> Sheet | None:
     except EndedError as ended:
         if ended.late:
             raise LimitError(f"reading it takes longer than {_SECONDS:g} s", where=where, fix=_FIX) from None
-        if ended.end is not End.MEMORY and ended.detail != "SIGABRT":  # which its library raises for want of memory
+        if ended.end is not End.MEMORY:
             message = f"the process that reads it has ended: {ended.detail or ended.end}"
             raise FlagdataError(message, where=where, fix=f"do it again, or {_FIX}") from None
         message = (

@@ -14,7 +14,8 @@ from typing import Any
 
 import pytest
 
-from flagdata.errors import InputError, LimitError
+from flagdata.bounded import Child, End, EndedError
+from flagdata.errors import FlagdataError, InputError, LimitError
 from flagdata.ingest import WindOptions, open_text, read_log, sniff
 from flagdata.ingest.anemometer import Limits
 from flagdata.lake import Lake
@@ -179,6 +180,39 @@ def test_a_cell_far_from_the_table_is_refused_with_bounded_memory(book: Book, ce
     words, _, peak = done.stdout.rpartition(" ")
     assert re.search(r"MiB|columns|cannot be read", words)
     assert int(peak) < 1 << 20  # KiB
+
+
+def test_other_members_of_a_workbook_name_no_file(book: Book, tmp_path: Path) -> None:
+    path = book(Log=PLAIN)
+    before = read_log(path, WindOptions(recipe="generic-csv", zone="UTC"))
+    with zipfile.ZipFile(path, "a") as archive:
+        for name in ("../elsewhere", "/elsewhere", "xl/../../elsewhere", "XL/WORKBOOK.XML", "\x1b[2J", "a\nb", "link"):
+            member = zipfile.ZipInfo(name)
+            member.external_attr = 0o120777 << 16  # of a link
+            archive.writestr(member, "/etc/passwd")
+    assert {one.name for one in tmp_path.iterdir()} == {path.name}
+    after = read_log(path, WindOptions(recipe="generic-csv", zone="UTC"))
+    assert after.series.time.tolist() == before.series.time.tolist()
+    assert {one.name for one in tmp_path.iterdir()} == {path.name}
+
+
+@pytest.mark.parametrize(
+    ("end", "detail", "said"),
+    [
+        (End.MEMORY, "memory allocation of 99 bytes failed", r"its sheets take more than \d+ MiB"),
+        (End.SIGNAL, "SIGABRT", r"the process that reads it has ended: SIGABRT"),
+    ],
+)
+def test_only_what_was_refused_memory_is_said_to_take_too_much(
+    book: Book, monkeypatch: pytest.MonkeyPatch, end: End, detail: str, said: str
+) -> None:
+    def ended(*_: object, **__: object) -> None:
+        raise EndedError(end, detail)
+
+    monkeypatch.setattr(Child, "ask", ended)
+    with pytest.raises(FlagdataError, match=said) as refused:
+        read_log(book(Log=PLAIN), WindOptions(zone="UTC"))
+    assert isinstance(refused.value, LimitError) == (end is End.MEMORY)
 
 
 _MEASURED = """

@@ -209,7 +209,7 @@ def test_a_record_that_is_made_again_by_later_code_has_the_bytes_that_tags_need(
     for one in made:
         lose(lake, str(one.object))
     monkeypatch.setattr(provenance, "code_version", lambda: "9.0.0")
-    for name in ("flagdata.ingest.store", "flagdata.lake.healing", "flagdata.lake.transaction"):
+    for name in ("flagdata.ingest.store", "flagdata.lake.remaking", "flagdata.lake.transaction"):
         monkeypatch.setattr(f"{name}.code_version", lambda: "9.0.0", raising=False)
     again = [ingest_camera(lake, video), ingest_wind(lake, wind_log)]
     assert [one.artifact.object for one in again] == [one.object for one in made]

@@ -20,7 +20,7 @@ from flagdata.provenance import code_version
 
 
 @dataclass(frozen=True, kw_only=True)
-class Healing:
+class Remade:
     """What was done about an artifact's object that was damaged or missing.
 
     Attributes:
@@ -87,15 +87,15 @@ def unsound(lake: Store, artifacts: Iterable[str], *, at: str | None) -> frozens
     return frozenset(row["artifact"] for row in rows if row["object"] in damaged)
 
 
-def healing(lake: Store, *, before: str, now: str) -> Healing:
-    """Finds what became of an object that was damaged or missing, by the refs that there are now."""
+def describe_remade(lake: Store, *, before: str, now: str) -> Remade:
+    """Describes what became of an object that was damaged or missing, by the refs that there are now."""
     if before == now:
-        return Healing(before=before, now=now)
+        return Remade(before=before, now=now)
     refs = (MAIN, *lake.refs.branches(), *lake.refs.tags())
     showing = [ref for ref in refs if before in lake.columns(lake.view(ref), ["object"])["object"].to_pylist()]
-    return Healing(before=before, now=now, refs=tuple(showing))
+    return Remade(before=before, now=now, refs=tuple(showing))
 
 
-def said(artifact: str, healed: Healing) -> str:
+def said(artifact: str, healed: Remade) -> str:
     """Writes what was done about an artifact, in a line for people."""
     return f"{artifact[:SHORT]}: {healed.sentence}"
