@@ -183,17 +183,23 @@ def test_a_cell_far_from_the_table_is_refused_with_bounded_memory(book: Book, ce
 
 
 def test_other_members_of_a_workbook_name_no_file(book: Book, tmp_path: Path) -> None:
+    options = WindOptions(recipe="generic-csv", zone="UTC")
     path = book(Log=PLAIN)
-    before = read_log(path, WindOptions(recipe="generic-csv", zone="UTC"))
+    before = read_log(path, options)
+    for name in ("../elsewhere", "/elsewhere", "xl/../../elsewhere", "\x1b[2J", "a\nb", "link"):
+        _add_link(path, name)
+    assert read_log(path, options).series.time.tolist() == before.series.time.tolist()
+    _add_link(path, "XL/WORKBOOK.XML")  # which the library takes for the workbook's own
+    with pytest.raises(InputError, match="the workbook cannot be read"):
+        read_log(path, options)
+    assert [one.name for one in tmp_path.iterdir()] == [path.name]
+
+
+def _add_link(path: Path, name: str) -> None:
+    member = zipfile.ZipInfo(name)
+    member.external_attr = 0o120777 << 16
     with zipfile.ZipFile(path, "a") as archive:
-        for name in ("../elsewhere", "/elsewhere", "xl/../../elsewhere", "XL/WORKBOOK.XML", "\x1b[2J", "a\nb", "link"):
-            member = zipfile.ZipInfo(name)
-            member.external_attr = 0o120777 << 16  # of a link
-            archive.writestr(member, "/etc/passwd")
-    assert {one.name for one in tmp_path.iterdir()} == {path.name}
-    after = read_log(path, WindOptions(recipe="generic-csv", zone="UTC"))
-    assert after.series.time.tolist() == before.series.time.tolist()
-    assert {one.name for one in tmp_path.iterdir()} == {path.name}
+        archive.writestr(member, "/etc/passwd")
 
 
 @pytest.mark.parametrize(
