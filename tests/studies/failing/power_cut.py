@@ -23,6 +23,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -208,12 +209,13 @@ class Trials:
         )
 
     def drawn(self, points: int, rng: np.random.Generator) -> list[Cut]:
-        """So many of the cuts: of each kind in turn, those after the answer first."""
+        """So many of the cuts: of each kind in turn, one after the answer and one before it."""
         groups: dict[tuple[bool, str], list[Cut]] = {}
         for place in rng.permutation(len(self.cuts)):
             cut = self.cuts[place]
-            groups.setdefault((not cut.answered, cut.kind), []).append(cut)
-        order = [groups[key] for key in sorted(groups)]
+            groups.setdefault((cut.answered, cut.kind), []).append(cut)
+        sides = [[group for (side, _), group in groups.items() if side is answered] for answered in (True, False)]
+        order = [group for pair in zip_longest(*sides, fillvalue=[]) for group in pair]
         turns = (group[turn] for turn in range(len(self.cuts)) for group in order if turn < len(group))
         return [cut for cut, _ in zip(turns, range(points), strict=False)]
 
