@@ -19,6 +19,7 @@ from flagdata.timebase import NANOSECONDS
 from measure.anemometer import calibration, making, measuring, network
 from measure.commands.calibrate import calibrate
 from measure.commands.measure import measure
+from tests.golden_answers import changes
 from tests.measure.anemometer.made import features, gusts, place
 
 _START = 1_700_000_000 * NANOSECONDS
@@ -70,6 +71,7 @@ def test_a_recording_becomes_a_model_by_which_another_film_is_read(
     assert done.exit_code == 0, done.output
     said = json.loads(done.stdout)["anemometer"]
     assert (said["name"], said["windows"]) == ("garden", 100)
+    assert changes("calibrate-anemometer", json.loads(done.stdout), relative=1e-5) == []
     row = Lake.open(lake).artifact(said["artifact"])
     recording = Lake.open(lake).rows({"kind": Kind.RECORDING})["artifact"][0].as_py()
     assert (row.kind, list(row.parents)) == (Kind.MEASUREMENT, [recording])
@@ -81,6 +83,7 @@ def test_a_recording_becomes_a_model_by_which_another_film_is_read(
     assert later.exit_code == 0, later.output
     found = json.loads(later.stdout)
     assert found["model"] == "garden"
+    assert changes("measure-anemometer", found, relative=1e-5) == []
     assert len(found["windows"]) == 100
     mean = gusts(float(_SECONDS), seed=2)[1][300:1500].mean()
     low, high = found["quantities"]["wind_speed"]["interval"]

@@ -11,7 +11,9 @@ import pytest
 from measure.closing import joined
 from measure.closing.joint import Joint, _combined
 from measure.closing.output import joint_page
+from measure.report.document import plain
 from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict
+from tests.golden_answers import changes
 from tests.measure.report.verdicts import verdict
 
 NOMINAL = {"area_weight": 0.2, "bending": 1e-4}
@@ -73,6 +75,11 @@ def test_what_may_be_missing_is_what_both_kinds_leave() -> None:
     assert (apart.conclusion, apart.named) == (Conclusion.OUTSIDE, ())
     alone = both(judged(Conclusion.SUFFICIENT, 0.5), films)
     assert alone.named == ("lift", "shear")
+
+
+def test_the_joint_document_is_what_it_was() -> None:
+    found = both(judged(Conclusion.ONE_OF, 0.02, named=("added-mass", "lift")), judged(Conclusion.ONE_OF, 0.02))
+    assert changes("joint-verdict", plain(found.as_dict()), relative=1e-9) == []
 
 
 def test_likelihoods_are_multiplied() -> None:

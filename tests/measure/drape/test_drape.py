@@ -19,6 +19,7 @@ from measure.commands.calibrate import calibrate
 from measure.drape import DrapeBatch, Face, Model, Surface, answered, fitted, material, ratio, rim_of, shape_of
 from sim.drape import disc
 from sim.mesh import Mesh
+from tests.golden_answers import changes
 from tests.measure.drape.conftest import COUNT, NOISE, scan, shapes, simulated
 
 G = 9.81
@@ -148,6 +149,7 @@ def test_folders_of_scans_give_bending_on_the_command_line_and_in_python(scanned
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     assert found["schema"] == "flagdata.calibrate/1"
+    assert changes("drape", found, relative=1e-5) == []
     assert found["drapes"][0]["count"] == 6
     assert found["drapes"][0]["drape_coefficient"] == pytest.approx(0.7, abs=0.03)
     low, high = found["cloth"]["bending"]["interval"]

@@ -14,6 +14,7 @@ from measure.forecasting import Segments
 from measure.observe import Trajectory, WindTrack
 from measure.propose import Decision, ProposalOutcome, proposal_log
 from measure.propose.propose import data_hash, split
+from tests.golden_answers import changes
 
 MARKERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
 
@@ -86,6 +87,7 @@ def test_the_proposal_log_keeps_earlier_entries(tmp_path: Path) -> None:
     kept = proposal_log.entries(path)
     assert [entry["seed"] for entry in kept] == [1, 2]
     assert kept[1]["effect"] == "file.py:X"
+    assert changes("proposals", kept, relative=0.0) == []
     assert kept[0]["decision"] == "rejected"
     assert json.loads(path.read_text(encoding="utf-8"))["schema"] == proposal_log.SCHEMA
 

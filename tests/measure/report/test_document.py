@@ -12,6 +12,7 @@ import pytest
 from flagdata.errors import InputError
 from measure.report import as_document, from_document
 from measure.verdict import Conclusion, Verdict
+from tests.golden_answers import changes
 from tests.measure.report.verdicts import Size, verdict, with_holes
 
 
@@ -37,6 +38,12 @@ def differences(a: Any, b: Any, where: str = "") -> list[str]:
 def test_every_field_of_every_kind_of_verdict_comes_back(conclusion: Conclusion) -> None:
     whole = verdict(conclusion)
     assert differences(from_document(written(whole)), whole) == []
+
+
+def test_documents_are_what_they_were() -> None:
+    kinds, size = (Conclusion.EFFECT, Conclusion.UNDECIDED), Size(across=2, up=2, frames=3, stretch=2)
+    documents = {conclusion.value: as_document(verdict(conclusion, size)) for conclusion in kinds}
+    assert changes("verdicts-of-markers", documents, relative=1e-9) == []
 
 
 def test_a_verdict_of_the_demonstrations_size_is_below_a_megabyte() -> None:

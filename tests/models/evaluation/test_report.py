@@ -18,6 +18,7 @@ from models.evaluation.curves import FramesPoint, LearningPoint
 from models.evaluation.evaluation import Evaluation, Read, as_document, evaluate
 from models.evaluation.report import markdown, page, write
 from models.evaluation.table import digits
+from tests.golden_answers import changes
 from tests.models.evaluation.made import generator, of_wind, posterior
 from tests.refusals import unrefused
 
@@ -210,6 +211,11 @@ def test_json_and_markdown_hold_the_same_scores(found: Evaluation, tmp_path: Pat
     assert f"| {rmse['value']:.3f}<br>[{rmse['interval'][0]:.3f}, {rmse['interval'][1]:.3f}]" in words
     widths = {line.count(" | ") for line in words.splitlines() if line.startswith("| SDN<br>mean")}
     assert widths == {10}
+
+
+def test_the_tables_are_what_they_were(found: Evaluation) -> None:
+    assert changes("evaluate", as_document(found), relative=1e-5) == []
+    assert changes("evaluate-words", {"lines": markdown(found).splitlines()}, relative=0.0) == []
 
 
 def test_points_of_curves_that_make_no_sense_are_refused() -> None:

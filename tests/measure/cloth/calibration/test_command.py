@@ -22,6 +22,7 @@ from flagdata.timebase import NANOSECONDS
 from measure.cloth import of_table
 from measure.commands.calibrate import calibrate
 from measure.film import FlagSize
+from tests.golden_answers import changes
 from tests.measure.cloth.calibration.conftest import readings
 
 
@@ -57,6 +58,7 @@ def test_a_table_is_weighed_kept_and_shown(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     assert found["schema"] == "flagdata.calibrate/1"
+    assert changes("calibrate", found, relative=1e-5) == []
     assert found["cloth"]["area_weight"]["value"] == pytest.approx(0.2, rel=0.08)
     assert found["recordings"][0]["observables"] == ["droop", "extension", "middle-speed"]
     row = Lake.open(lake).artifact(found["artifact"])

@@ -21,6 +21,7 @@ from measure.observables import WINDOW
 from measure.observe import Experiment
 from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict
 from sim.run import load
+from tests.golden_answers import changes
 from tests.measure.cloth.loop.conftest import EFFECTS, recording
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks
 from tests.measure.report.verdicts import verdict
@@ -60,6 +61,7 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
     assert done.exit_code == 0, done.output
     verdict = json.loads(done.stdout)
     assert verdict["schema"] == "flagdata.verdict/1"
+    assert changes("verdict-of-films", verdict, relative=1e-5) == []
     assert verdict["named"] == ["tangential-linear-drag"]
     assert 0 < verdict["seconds"] < 300
     assert {one["effect"] for one in verdict["power"]} == {"lift", "shear", "tangential-linear-drag"}
