@@ -6,42 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from flagdata.answer import Quantity
 from flagdata.arrays import FloatArray
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
 from flagdata.html import table
-
-
-@dataclass(frozen=True, kw_only=True)
-class Weighed:
-    """One quantity of a cloth, SI.
-
-    Attributes:
-        unit: of all numbers.
-        value: the posterior's median; None where the recordings do not determine it, or bound it on one side only.
-        sigma: its standard deviation; None of a bound.
-        interval: at `level`, of a bound with an infinite end or one that the quantity cannot pass.
-        assumed: what was assumed, at the level of the answer.
-        bound: in words, where only a bound is known: "at least 0.41 kg/m²".
-        level: of the interval, or of the bound.
-    """
-
-    unit: str
-    value: float | None
-    sigma: float | None
-    interval: tuple[float, float]
-    assumed: tuple[float, float]
-    bound: str | None = None
-    level: float = 0.9
-
-    @property
-    def text(self) -> str:
-        """Value, interval and unit, or the bound; what was assumed where nothing is determined."""
-        if self.bound is not None:
-            return f"{self.bound}, {self.level * 100:.3g} %"
-        if self.value is None:
-            return f"not determined (assumed: {self.assumed[0]:.4g} to {self.assumed[1]:.4g} {self.unit})"
-        return f"{self.value:.4g} [{self.interval[0]:.4g}, {self.interval[1]:.4g}] {self.unit}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -62,7 +31,7 @@ class Calibrated:
 
     sentence: str
     level: float
-    quantities: Mapping[str, Weighed]
+    quantities: Mapping[str, Quantity]
     draws: Mapping[str, FloatArray]
     withheld: str | None
     stated: str | None

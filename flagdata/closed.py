@@ -8,24 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata import html
-
-
-@dataclass(frozen=True, kw_only=True)
-class Strength:
-    """The strength of an effect that was named, with its interval, in the effect's own unit.
-
-    Attributes:
-        bound: "at-least" or "at-most" where it is known on one side only, and `value` is that bound; "nothing" where it
-            is not determined; None of an interval with two ends.
-    """
-
-    parameter: str
-    value: float
-    low: float
-    high: float
-    unit: str
-    level: float
-    bound: str | None = None
+from flagdata.answer import Quantity
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -39,7 +22,7 @@ class Closed:
         sentence: the verdict in one line.
         words: the verdict as `flagdata close-loop` prints it.
         p_value: of the base model against simulated nulls.
-        strengths: effect → strength, of those that were named.
+        strengths: effect → its parameter, of those that were named, in its own unit.
         document: all numbers, as the command writes them to verdict.json.
         page: the report, HTML that refers to no other file.
     """
@@ -49,7 +32,7 @@ class Closed:
     sentence: str
     words: str
     p_value: float
-    strengths: Mapping[str, Strength]
+    strengths: Mapping[str, Quantity]
     document: Mapping[str, Any]
     page: str
 
@@ -70,8 +53,8 @@ class Closed:
 
     def _repr_html_(self) -> str:
         effects = {
-            name: f"{fit.parameter} {fit.value:.3g} [{fit.low:.3g}, {fit.high:.3g}] {fit.unit}, {fit.level:.0%}"
-            for name, fit in self.strengths.items()
+            name: f"{strength.name} {strength.text}, {strength.span.percent}"
+            for name, strength in self.strengths.items()
         }
         return html.table(
             self.sentence, {"p of the base model": f"{self.p_value:.3g}", **effects, "verdict": self.words}

@@ -6,45 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from flagdata.answer import Quantity
 from flagdata.arrays import FloatArray
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
 from flagdata.html import table
 from flagdata.wind_elsewhere import WindComparison
-
-
-@dataclass(frozen=True, kw_only=True)
-class Estimate:
-    """One quantity of a film, SI.
-
-    Attributes:
-        unit: of all numbers.
-        value, sigma: mean and standard deviation of its posterior; None where only a bound is known.
-        interval: its central interval, or a bound: an end that nothing bounds is infinite.
-        level: probability that the interval contains the quantity.
-        bound: "at-least", "at-most" or "nothing"; None of an interval with two ends.
-        constrained: whether the film added anything to what was assumed.
-        assumed: the range that was simulated, or what was given.
-        given: whether it was given.
-    """
-
-    unit: str
-    value: float | None
-    sigma: float | None
-    interval: tuple[float, float]
-    level: float
-    bound: str | None
-    constrained: bool
-    assumed: tuple[float, float]
-    given: bool
-
-    @property
-    def text(self) -> str:
-        """Value, interval and unit; "as given" or "not constrained" where that is so."""
-        low, high = self.interval
-        value = "" if self.value is None else f"{self.value:.3g} "
-        remark = ", as given" if self.given else "" if self.constrained else ", not constrained by the film"
-        return f"{value}[{low:.3g}, {high:.3g}] {self.unit}{remark}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +39,7 @@ class Answer:
 
     Attributes:
         sentence: in one line, as `flagdata measure` prints it.
-        quantities: name → estimate: "wind_speed", "area_weight" (area weight) and what else the network estimates.
+        quantities: name → quantity: "wind_speed", "area_weight" (area weight) and what else the network estimates.
         draws: name → (n,) draws of the joint posterior, in the same order for all names.
         windows: each by itself.
         gusts: intensity of the gusts, standard deviation over mean wind [1]; None where the windows are not taken as
@@ -80,10 +47,10 @@ class Answer:
     """
 
     sentence: str
-    quantities: Mapping[str, Estimate]
+    quantities: Mapping[str, Quantity]
     draws: Mapping[str, FloatArray]
     windows: Windows
-    gusts: Estimate | None
+    gusts: Quantity | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -138,12 +105,12 @@ class Measured:
         return self.answer.sentence
 
     @property
-    def quantities(self) -> Mapping[str, Estimate]:
-        """Name → estimate. Raises as `answer`."""
+    def quantities(self) -> Mapping[str, Quantity]:
+        """Name → quantity. Raises as `answer`."""
         return self.answer.quantities
 
     @property
-    def wind(self) -> Estimate:
+    def wind(self) -> Quantity:
         """The wind speed [m/s], of a long film the mean over its windows. Raises as `answer`."""
         return self.answer.quantities["wind_speed"]
 
@@ -158,7 +125,7 @@ class Measured:
         return self.answer.windows
 
     @property
-    def gusts(self) -> Estimate | None:
+    def gusts(self) -> Quantity | None:
         """How strong the gusts are; None of a film whose windows are not taken as one series. Raises as `answer`."""
         return self.answer.gusts
 

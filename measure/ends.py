@@ -22,14 +22,12 @@ the limit, nothing lies beyond it, and the mean remains an estimate.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from enum import StrEnum
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
+
+from flagdata.answer import Bound, Span
 
 WITHIN = 0.03
 """Share of the range's width that counts as its end, fixed on 2026-11-27 before any film was judged by the rule. A
@@ -38,61 +36,6 @@ PILED = 0.10
 """Share of the draws in an end from which on they bound the quantity on one side only. Fixed with `WITHIN`."""
 LIMITS = {"wind_speed": (0.0, math.inf), "area_weight": (0.0, math.inf)}
 """Values that quantities can have at all; all others can have any."""
-
-
-class Bound(StrEnum):
-    """What draws say that pile up at an end of their range."""
-
-    LEAST = "at-least"
-    MOST = "at-most"
-    NOTHING = "nothing"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Span:
-    """An interval, of which an end may lie at infinity.
-
-    Attributes:
-        low, high: its ends.
-        level: probability that it holds.
-        bound: None of an interval with two ends.
-        estimated: whether draws beyond the range are impossible, so that their mean is an estimate.
-    """
-
-    low: float
-    high: float
-    level: float
-    bound: Bound | None
-    estimated: bool
-
-    def phrase(self, digits: int, unit: str = "") -> str:
-        """Phrases its ends, "at least 9.4 m/s" or "[3.9, 4.8]", without its level.
-
-        Args:
-            digits: behind the point.
-            unit: of a single end, with the space before it.
-        """
-        return self.worded(lambda value: f"{value:.{digits}f}", unit)
-
-    def worded(self, number: Callable[[float], str], unit: str = "") -> str:
-        """Phrases the same with ends as `number` writes them."""
-        if self.bound is Bound.LEAST:
-            return f"at least {number(self.low)}{unit}"
-        if self.bound is Bound.MOST:
-            return f"at most {number(self.high)}{unit}"
-        return "not constrained" if self.bound else f"[{number(self.low)}, {number(self.high)}]"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values: the interval, whose end is null where nothing bounds it, its level, and its bound."""
-        return {
-            "interval": self.ends(),
-            "level": self.level,
-            "bound": None if self.bound is None else self.bound.value,
-        }
-
-    def ends(self) -> list[float | None]:
-        """Returns both ends as JSON values; None for one at infinity."""
-        return [end if math.isfinite(end) else None for end in (self.low, self.high)]
 
 
 def limits_of(name: str) -> tuple[float, float]:

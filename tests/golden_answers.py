@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,8 +19,10 @@ from typing import Any
 KEPT = Path(__file__).parent / "golden"
 WRITING = bool(os.environ.get("FLAGDATA_WRITE_GOLDEN"))
 """Whether documents are written anew instead of compared: `FLAGDATA_WRITE_GOLDEN=1 pytest FILES`."""
-RENAMED: Mapping[str, str] = {}
-"""Path of a value in a kept document → its path today. Items of a list are numbered: `windows.0.wind`."""
+RENAMED = {r"((?:cloth|place)\.\w+)\.determined$": r"\1.constrained"}
+"""Pattern of a path in a kept document → its path today. Items of a list are numbered: `windows.0.wind`."""
+NEW = (r"(?:cloth|place)\.\w+\.given$",)
+"""Patterns of paths that kept documents lack."""
 _OF_A_RUN = {"seconds", "code", "code_version", "created", "version", "milliseconds"}
 """Keys of what another run has otherwise."""
 
@@ -38,11 +41,9 @@ def values(document: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def today(path: str) -> str:
-    """Returns the path that a value has today, by the longest beginning that was renamed."""
-    parts = path.split(".")
-    for count in range(len(parts), 0, -1):
-        if (start := ".".join(parts[:count])) in RENAMED:
-            return ".".join([RENAMED[start], *parts[count:]])
+    """Returns the path that a value has today."""
+    for former, present in RENAMED.items():
+        path = re.sub(former, present, path)
     return path
 
 
@@ -60,7 +61,9 @@ def changes(name: str, document: Any, *, relative: float) -> list[str]:
         return []
     kept = {today(path): value for path, value in json.loads(file.read_text(encoding="utf-8")).items()}
     missing = [f"{path} is gone" for path in kept.keys() - found.keys()]
-    added = [f"{path} is new" for path in found.keys() - kept.keys()]
+    added = [
+        f"{path} is new" for path in found.keys() - kept.keys() if not any(re.search(pattern, path) for pattern in NEW)
+    ]
     changed = [
         f"{path} was {kept[path]!r}, and is {found[path]!r}"
         for path in kept.keys() & found.keys()

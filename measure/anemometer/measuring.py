@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flagdata.answer import Quantity, Span
 from flagdata.arrays import FloatArray
 from flagdata.errors import UsageError
 from flagdata.findings import Finding
@@ -15,8 +16,8 @@ from measure.anemometer.features import Features, features_of
 from measure.anemometer.intervals import half_width, mean_errors
 from measure.anemometer.novelty import Compared
 from measure.anemometer.reading import ReadingModel
-from measure.ends import Span, limits_of
-from measure.estimate.answer import Quantity, information
+from measure.ends import limits_of
+from measure.estimate.answer import LEAST_INFORMATION, information
 from measure.estimate.combine import Dependence
 from measure.estimate.joint import DRAWS, WIND, WindowAnswer
 from measure.estimate.measuring import Measurement
@@ -91,6 +92,7 @@ def measured_from(
     errors = mean_errors(model.errors, count=len(read), length=model.block, draws=DRAWS, generator=rng)
     draws = np.maximum(winds[read].mean() + errors, 0.0)
     low, high = (float(end) for end in np.quantile(draws, [(1 - options.level) / 2, (1 + options.level) / 2]))
+    learned = information(draws, model.winds)
     mean_wind = Quantity(
         name=WIND,
         unit="m/s",
@@ -98,7 +100,8 @@ def measured_from(
         sigma=float(draws.std()),
         span=Span(low=low, high=high, level=options.level, bound=None, estimated=True),
         assumed=model.range,
-        information=information(draws, model.winds),
+        constrained=learned >= LEAST_INFORMATION,
+        information=learned,
     )
     middle = read[len(read) // 2]
     scale = model.size.scale(trained_on(estimator.targets))
@@ -194,6 +197,7 @@ def _window(
     least, _ = limits_of(WIND)
     value = max(wind, least)
     position = int(np.count_nonzero(features.whole[:k]))
+    learned = information(wind + model.errors, model.winds)
     quantity = Quantity(
         name=WIND,
         unit="m/s",
@@ -201,7 +205,8 @@ def _window(
         sigma=model.rmse,
         span=Span(low=max(wind - half, least), high=wind + half, level=options.level, bound=None, estimated=True),
         assumed=model.range,
-        information=information(wind + model.errors, model.winds),
+        constrained=learned >= LEAST_INFORMATION,
+        information=learned,
     )
     start = float(features.starts[k])
     return WindowAnswer(

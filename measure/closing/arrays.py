@@ -10,8 +10,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flagdata.answer import Bound, Quantity, Span
 from flagdata.api.measuring import Closing
-from flagdata.closed import Closed, Strength
+from flagdata.closed import Closed
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake.meshes import MeshSequence
 from flagdata.stated import Stated
@@ -26,7 +27,7 @@ from measure.report.document import as_document
 from measure.report.report_page import page
 from measure.report.words import words
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Verdict
+from measure.verdict.record import Estimate, Verdict
 from sim.material import MATERIALS, named
 
 Recordings: TypeAlias = ArrayLike | MeshSequence | Sequence[ArrayLike | MeshSequence]
@@ -113,15 +114,7 @@ def _track(wind: Any) -> WindTrack:
 
 def _answer(verdict: Verdict) -> Closed:
     strengths = {
-        candidate.effect: Strength(
-            parameter=candidate.parameter,
-            value=candidate.strength.value,
-            low=candidate.strength.low,
-            high=candidate.strength.high,
-            unit=candidate.strength.unit,
-            level=candidate.strength.level,
-            bound=candidate.strength.bound,
-        )
+        candidate.effect: _quantity(candidate.parameter, candidate.strength)
         for candidate in sentences.named_candidates(verdict)
     }
     return Closed(
@@ -133,4 +126,16 @@ def _answer(verdict: Verdict) -> Closed:
         strengths=strengths,
         document=as_document(verdict),
         page=page(verdict),
+    )
+
+
+def _quantity(name: str, strength: Estimate) -> Quantity:
+    bound = None if strength.bound is None else Bound(strength.bound)
+    return Quantity(
+        name=name,
+        unit=strength.unit,
+        value=strength.value if bound is None else None,
+        sigma=None,
+        span=Span(low=strength.low, high=strength.high, level=strength.level, bound=bound, estimated=bound is None),
+        constrained=bound is not Bound.NOTHING,
     )

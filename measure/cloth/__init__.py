@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.cloth.arrays import folder_of, options_of, sources_of, weighed_by_name
-    from measure.cloth.calibration import Calibration, Quantity, calibrate, quantity
+    from measure.cloth.arrays import folder_of, options_of, sources_of
+    from measure.cloth.calibration import Calibration, calibrate, quantity
     from measure.cloth.command import simulations_of
     from measure.cloth.design import (
         TOGETHER,

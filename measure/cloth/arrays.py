@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike
 
 from flagdata.api.measuring import Calibrating, OfFlag
 from flagdata.caches import user_cache
-from flagdata.calibrated import Calibrated, Weighed
+from flagdata.calibrated import Calibrated
 from flagdata.dataset.source import lake_of
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake import Lake
 from flagdata.provenance import array_hash
 from flagdata.shared_options import ATTACHMENTS
 from flagdata.stated import Stated
-from measure.cloth.calibration import Calibration, Quantity, calibrate
+from measure.cloth.calibration import Calibration, calibrate
 from measure.cloth.design import FAR, CalibrationOptions
 from measure.cloth.prior import AZIMUTH, ELEVATION, Uncertain, fabric, stated_angle
 from measure.cloth.recording import Observed, cut
@@ -139,24 +139,8 @@ def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
     return of_columns(table, name=name, identity=identity, wind_log=None)
 
 
-def weighed_by_name(quantities: Sequence[Quantity]) -> dict[str, Weighed]:
-    """Returns quantities by their names, as `flagdata.calibrate` does."""
-    return {
-        quantity.name: Weighed(
-            unit=quantity.unit,
-            value=quantity.value,
-            sigma=quantity.sigma,
-            interval=quantity.interval,
-            assumed=quantity.assumed,
-            bound=quantity.span.worded(lambda value: f"{value:.4g}", f" {quantity.unit}") if quantity.bounded else None,
-            level=quantity.span.level,
-        )
-        for quantity in quantities
-    }
-
-
 def _answer(calibration: Calibration) -> Calibrated:
-    quantities = weighed_by_name(calibration.cloth)
+    quantities = {quantity.name: quantity for quantity in calibration.cloth}
     return Calibrated(
         sentence=calibration.sentence,
         level=calibration.options.level,

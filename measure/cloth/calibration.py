@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.answer import Bound, Quantity
 from flagdata.arrays import BoolArray, FloatArray, IntArray
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
@@ -21,7 +22,7 @@ from measure.cloth.posterior import Posterior, Sight, posterior, weighed
 from measure.cloth.prior import CLOTH, NUISANCES, Uncertain
 from measure.cloth.recording import LEAST_IN_ALL, LEFT_OUT, Observed, check_in_all, constant_wind, shown, usable
 from measure.cloth.simulation import OBSERVED
-from measure.ends import PILED, WITHIN, Bound, Span, span
+from measure.ends import PILED, WITHIN, span
 from measure.observables.observable import WINDOW
 
 ANSWER = 5
@@ -43,49 +44,6 @@ _LOOK = (
 )
 _APART = 2.0
 """σ from which on a summary is named as what is unlike."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Quantity:
-    """One quantity of the answer.
-
-    Attributes:
-        name, unit: as in tables.
-        value: the posterior's median; None where the film does not determine it, or bounds it on one side only.
-        sigma: its standard deviation; None where it is bounded on one side only.
-        span: the interval at the level, or a bound (`measure.ends`).
-        assumed: the prior's interval at the same level.
-        range: the ends of the prior; None of a normal one.
-    """
-
-    name: str
-    unit: str
-    value: float | None
-    sigma: float | None
-    span: Span
-    assumed: tuple[float, float]
-    range: tuple[float, float] | None = None
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Returns its ends, of a bound one at infinity or where the quantity ends."""
-        return self.span.low, self.span.high
-
-    @property
-    def bounded(self) -> bool:
-        """Returns whether only a bound is known of it, since the posterior piles up where the prior ends."""
-        return self.value is None and self.span.bound in (Bound.LEAST, Bound.MOST)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values; an end of the interval that nothing bounds is null."""
-        return {
-            "unit": self.unit,
-            "value": self.value,
-            "sigma": self.sigma,
-            **self.span.as_dict(),
-            "assumed": list(self.assumed),
-            "determined": self.value is not None,
-        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,7 +155,7 @@ class Calibration:
     @property
     def weighs(self) -> bool:
         """Returns whether anything is given of the area weight: a value or a bound."""
-        return self.withheld is None and (self.weight.value is not None or self.weight.bounded)
+        return self.withheld is None and self.weight.constrained
 
     @property
     def sentence(self) -> str:
@@ -207,12 +165,12 @@ class Calibration:
         windows = sum(len(recording.observed.readings) for recording in self.recordings)
         if self.withheld is not None:
             return f"area weight: withheld, since no simulated flag looks like {self.withheld}"
-        if weight.bounded:
-            low, high = weight.range or weight.assumed
-            bound = f"{weight.span.phrase(3, ' kg/m²')}, {weight.span.level * 100:.3g} %"
+        if weight.is_bound:
+            low, high = CLOTH[0].ends or weight.interval
+            bound = f"{weight.span.phrase(3, ' kg/m²')}, {weight.span.percent}"
             return f"area weight {bound}, n = {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
         if weight.value is None:
-            low, high = weight.assumed
+            low, high = weight.assumed or weight.interval
             return f"area weight: not determined by {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
         low, high = weight.interval
         return f"area weight {weight.value:.3f} kg/m² [{low:.3f}, {high:.3f}] {level}, n = {windows} windows"
@@ -405,7 +363,7 @@ def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
         sigma=float(draws.std()) if interval.estimated else None,
         span=interval,
         assumed=(assumed[0], assumed[1]),
-        range=about.ends,
+        constrained=determined and interval.bound is not Bound.NOTHING,
     )
 
 
@@ -503,7 +461,7 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
         fix = "give more simulations with --simulations"
         findings.append(Finding.of("narrow-intervals", text, fix=fix))
     findings.extend(_leaning(calibration))
-    undetermined = [q.name.replace("_", " ") for q in calibration.cloth if q.value is None and not q.bounded]
+    undetermined = [q.name.replace("_", " ") for q in calibration.cloth if not q.constrained]
     if undetermined:
         text = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
         findings.append(Finding.of("not-determined", text))
@@ -523,11 +481,11 @@ def _unlike(recording: Fitted) -> str:
 def _leaning(calibration: Calibration) -> list[Finding]:
     """Quantities of which only a bound is known."""
     findings = []
-    for quantity in calibration.cloth:
-        if not quantity.bounded or quantity.range is None:
+    for quantity, about in zip(calibration.cloth, CLOTH, strict=True):
+        if not quantity.is_bound or about.ends is None:
             continue
-        most = quantity.span.bound is Bound.MOST
-        end = f"{quantity.range[0 if most else 1]:.3g} {quantity.unit}"
+        most = quantity.bound is Bound.MOST
+        end = f"{about.ends[0 if most else 1]:.3g} {quantity.unit}"
         text = (
             f"{quantity.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within {WITHIN:.0%} of the "
             f"end of what is assumed, {end}; {'less' if most else 'more'} would look the same, so that only a bound is "

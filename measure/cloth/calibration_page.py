@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flagdata.answer import Quantity
 from flagdata.arrays import FloatArray
 from flagdata.pages.pictures import figure_url, still
 from flagdata.pages.render import render
 from flagdata.provenance import code_version
 from flagdata.tables import Range, Scale
-from measure.cloth.calibration import Calibration, Fitted, Quantity
+from measure.cloth.calibration import Calibration, Fitted
 from measure.cloth.prior import CLOTH
 from measure.cloth.recording import Observed
 from measure.cloth.simulation import OBSERVED
@@ -117,16 +118,16 @@ def shown_quantity(quantity: Quantity) -> dict[str, str]:
     """Returns a quantity as text: angles in degrees, and as `interval` what its values can be: both ends, or a bound
     with its level."""
     turn = 180 / math.pi if quantity.name in _DEGREES else 1.0
-    least, most = quantity.assumed
+    least, most = quantity.assumed or quantity.interval
     unit = "" if quantity.unit == "1" else quantity.unit
     interval = quantity.span.worded(lambda value: f"{value * turn:.3g}")
     return {
         "name": quantity.name.replace("_", " "),
         "unit": "°" if quantity.name in _DEGREES else unit,
         "value": "" if quantity.value is None else f"{quantity.value * turn:.3g}",
-        "bounded": "yes" if quantity.bounded else "",
+        "bounded": "yes" if quantity.is_bound else "",
         "interval": interval,
-        "level": f"{quantity.span.level * 100:.3g} %",
+        "level": quantity.span.percent,
         "assumed": f"{least * turn:.3g} to {most * turn:.3g}",
     }
 
@@ -142,7 +143,7 @@ def _posterior(calibration: Calibration) -> str:
         edges = np.geomspace(low, high, 41) if logarithmic else np.linspace(low, high, 41)
         axes.hist(calibration.draws.cloth[about.name], bins=edges, color=_BLUE)
         quantity = next(one for one in calibration.cloth if one.name == about.name)
-        if quantity.value is not None or quantity.bounded:
+        if quantity.value is not None or quantity.is_bound:
             ends = max(low, quantity.span.low), min(high, quantity.span.high)
             axes.axvspan(*ends, color=_RUST, alpha=0.15, linewidth=0)
         axes.axhline(

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import ndtr
 
+from flagdata.answer import Bound
 from flagdata.arrays import FloatArray
 from flagdata.findings import Severity
 from flagdata.provenance import code_version
@@ -34,7 +35,7 @@ from measure.cloth.recording import Observed
 from measure.cloth.simulations import of_recordings
 from measure.cloth.statement import stated
 from measure.cloth.unseen import compared
-from measure.ends import Bound, span
+from measure.ends import span
 from measure.forecasting.setting import Stage
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED

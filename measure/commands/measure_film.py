@@ -14,15 +14,13 @@ from flagdata.errors import UsageError
 from flagdata.film_array import Frames
 from flagdata.findings import Finding, Severity
 from flagdata.lake import Lake
-from flagdata.measured import Answer, Estimate, Measured, Windows
+from flagdata.measured import Answer, Measured, Windows
 from flagdata.stated import Stated
 from flagdata.wind_elsewhere import WindComparison, compared
 from flagdata.workload import one_thread
 from measure.anemometer.measuring import measure_by
 from measure.anemometer.networks import Network, gate_beside, network
-from measure.estimate.answer import Quantity
 from measure.estimate.combine import of_model
-from measure.estimate.gusts import MOST_INTENSE, Gusts
 from measure.estimate.material import weight_of
 from measure.estimate.measuring import Measurement, Options, measure
 from measure.film.source import FilmReading, Subject, size_of, subjects
@@ -172,7 +170,7 @@ def _subjects(source: Path | str | Frames, *, lake: Lake | None, at: str | None,
 
 def answered(measurement: Measurement) -> Answer:
     """Returns what a film says, as arrays."""
-    quantities = {quantity.name: _estimate(quantity) for quantity in measurement.quantities}
+    quantities = {quantity.name: quantity for quantity in measurement.quantities}
     rows = {name: [window.quantity(name) for window in measurement.windows] for name in measurement.names}
     nan = float("nan")
     windows = Windows(
@@ -191,33 +189,5 @@ def answered(measurement: Measurement) -> Answer:
         quantities=quantities,
         draws=draws,
         windows=windows,
-        gusts=None if measurement.gusts is None else _gusts(measurement.gusts),
-    )
-
-
-def _gusts(gusts: Gusts) -> Estimate:
-    return Estimate(
-        unit="1",
-        value=gusts.value,
-        sigma=gusts.sigma,
-        interval=(gusts.low, gusts.high),
-        level=gusts.level,
-        bound=None,
-        constrained=gusts.constrained,
-        assumed=(0.0, MOST_INTENSE),
-        given=False,
-    )
-
-
-def _estimate(quantity: Quantity) -> Estimate:
-    return Estimate(
-        unit=quantity.unit,
-        value=quantity.value,
-        sigma=quantity.sigma,
-        interval=(quantity.span.low, quantity.span.high),
-        level=quantity.span.level,
-        bound=None if quantity.span.bound is None else quantity.span.bound.value,
-        constrained=quantity.constrained,
-        assumed=quantity.assumed,
-        given=quantity.given,
+        gusts=None if measurement.gusts is None else measurement.gusts.intensity,
     )

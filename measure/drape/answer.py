@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from flagdata.addresses import local_path
+from flagdata.answer import Quantity
 from flagdata.api.measuring import Calibrating
 from flagdata.arrays import FloatArray
 from flagdata.calibrated import Calibrated
@@ -19,7 +20,7 @@ from flagdata.ingest.meshes import read_obj
 from flagdata.rng import stream
 from flagdata.stated import Stated
 from flagdata.tables import Range, Scale
-from measure.cloth import Quantity, Uncertain, folder_of, quantity, weighed_by_name
+from measure.cloth import Uncertain, folder_of, quantity
 from measure.drape.fit import UNLIKE, Face, Fit, Model, Surface, fitted, together
 from measure.drape.shape import placed, shape_of
 from measure.drape.simulation import ANISOTROPY, BENDING_LENGTH, SHEAR, simulated
@@ -62,7 +63,7 @@ class Draped:
         length, bending, *_ = self.cloth
         if bending.value is None:
             phrase = length.span.worded(lambda value: f"{value * 1e3:.1f}", " mm")
-            return f"bending length {phrase}, {length.span.level * 100:.3g} %, n = {count} drapes"
+            return f"bending length {phrase}, {length.span.percent}, n = {count} drapes"
         low, high = bending.interval
         return (
             f"bending {bending.value:.3g} N·m [{low:.3g}, {high:.3g}] {self.level * 100:.3g} %, n = {count} drapes "
@@ -165,7 +166,7 @@ def calibrated(chosen: Calibrating) -> Calibrated:
     return Calibrated(
         sentence=found.sentence,
         level=found.level,
-        quantities=weighed_by_name(found.cloth),
+        quantities={about.name: about for about in found.cloth},
         draws=found.draws,
         withheld=None,
         stated=found.area_weight.text,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from flagdata.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.estimate.answer import SHORT, Quantity, information
+    from measure.estimate.answer import LEAST_INFORMATION, SHORT, information
     from measure.estimate.combine import CARD_KEY, OWN, UNKNOWN, Dependence, combined, of_model
     from measure.estimate.gusts import SERIES_KEY, Gusts, Pair, SeriesErrors, errors_of_model
     from measure.estimate.joint import DRAWS, FilmAnswer

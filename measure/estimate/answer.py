@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
 
+from flagdata.answer import Bound, Quantity, Span
 from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.stated import Stated
-from measure.ends import PILED, WITHIN, Bound, Span, limits_of, span
+from measure.ends import PILED, WITHIN, limits_of, span
 from models.targets import ASPECT, TARGETS
 
 LEAST_INFORMATION = 0.05
@@ -31,99 +30,56 @@ _UNITS = {target.name: target.unit for target in TARGETS.values()}
 _DIGITS = {"wind_speed": 1, "area_weight": 2, "bending_scale": 2, "anisotropy": 2, ASPECT: 2}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Quantity:
-    """One target, measured.
+def phrase(quantity: Quantity, *, first: bool) -> str:
+    """Phrases a quantity, without a full stop.
 
-    Attributes:
-        name: of `models.targets.TARGETS`.
-        unit: SI.
-        value: mean of the posterior; None where its draws pile up at an end of the range that is not one of the
-            quantity's own.
-        sigma: its standard deviation, likewise.
-        span: central interval of the measurement's level, or a bound on one side (`measure.ends`).
-        assumed: the range that the simulations covered, for this size of flag, or what was stated.
-        information: what the film added to that, see `LEAST_INFORMATION` [nat].
-        given: whether it was stated where it lies.
+    Args:
+        first: whether the level of an interval is stated; that of a bound always is.
     """
+    short, span, suffix = SHORT[quantity.name], quantity.span, quantity.suffix
+    if not quantity.constrained and quantity.assumed is not None:
+        if quantity.given and quantity.assumed[0] == quantity.assumed[1]:
+            return f"{short} {quantity.assumed[0]:g}{suffix}, as given"
+        low, high = (_number(quantity, end) for end in quantity.assumed)
+        if quantity.given:
+            return f"{short} {low} to {high}{suffix}, as given"
+        return f"{short}: not constrained by this clip (prior range {low} to {high}{suffix})"
+    digits = _digits_of(quantity)
+    if span.bound is None:
+        interval = span.phrase(digits)
+        return f"{short} {_number(quantity, quantity.value)}{suffix} {interval}" + (f" {span.percent}" if first else "")
+    why = "" if quantity.value is not None else f" ({_beyond(quantity)})"
+    return f"{short} {span.phrase(digits, suffix)}, {span.percent}{why}"
 
-    name: str
-    unit: str
-    value: float | None
-    sigma: float | None
-    span: Span
-    assumed: tuple[float, float]
-    information: float
-    given: bool = False
 
-    @property
-    def constrained(self) -> bool:
-        """Whether the film adds information to the prior."""
-        return self.information >= LEAST_INFORMATION and self.span.bound is not Bound.NOTHING
+def explain_bound(quantity: Quantity) -> Finding | None:
+    """Reports why a quantity has a bound on one side only; None where it has not, or where nothing lies beyond the
+    end."""
+    if quantity.value is not None or not quantity.constrained:
+        return None
+    beyond = "more" if quantity.bound is Bound.LEAST else "less"
+    return Finding(
+        kind=f"{quantity.name.replace('_', '-')}-at-end",
+        severity=Severity.WARNING,
+        what=f"{SHORT[quantity.name]}: {_beyond(quantity)}, and {PILED:.0%} of the draws or more lie within "
+        f"{WITHIN:.0%} of that end; {beyond} would look the same, so that only a bound is given",
+        fix="check --flag-size, with which the range grows",
+    )
 
-    def phrase(self, *, first: bool) -> str:
-        """Phrases the quantity, without a full stop.
 
-        Args:
-            first: whether the level of an interval is stated; that of a bound always is.
-        """
-        short, bound = SHORT[self.name], self.span.bound
-        if not self.constrained:
-            if self.given and self.assumed[0] == self.assumed[1]:
-                return f"{short} {self.value:g}{self._suffix}, as given"
-            low, high = (self._number(end) for end in self.assumed)
-            if self.given:
-                return f"{short} {low} to {high}{self._suffix}, as given"
-            return f"{short}: not constrained by this clip (prior range {low} to {high}{self._suffix})"
-        level = f"{self.span.level * 100:.3g} %"
-        if bound is None:
-            interval = self.span.phrase(self._digits)
-            return f"{short} {self._number(self.value)}{self._suffix} {interval}" + (f" {level}" if first else "")
-        why = "" if self.value is not None else f" ({self._beyond})"
-        return f"{short} {self.span.phrase(self._digits, self._suffix)}, {level}{why}"
+def _beyond(quantity: Quantity) -> str:
+    low, high = quantity.assumed or quantity.interval
+    verb, end = ("ends", high) if quantity.bound is Bound.LEAST else ("begins", low)
+    return f"the network's range {verb} at {_number(quantity, end)}{quantity.suffix}"
 
-    def finding(self) -> Finding | None:
-        """Reports why it has a bound on one side only; None where it has not, or where nothing lies beyond the end."""
-        if self.value is not None or not self.constrained:
-            return None
-        beyond = "more" if self.span.bound is Bound.LEAST else "less"
-        return Finding(
-            kind=f"{self.name.replace('_', '-')}-at-end",
-            severity=Severity.WARNING,
-            what=f"{SHORT[self.name]}: {self._beyond}, and {PILED:.0%} of the draws or more lie within {WITHIN:.0%} of "
-            f"that end; {beyond} would look the same, so that only a bound is given",
-            fix="check --flag-size, with which the range grows",
-        )
 
-    @property
-    def _beyond(self) -> str:
-        verb, end = ("ends", self.assumed[1]) if self.span.bound is Bound.LEAST else ("begins", self.assumed[0])
-        return f"the network's range {verb} at {self._number(end)}{self._suffix}"
+def _digits_of(quantity: Quantity) -> int:
+    small = quantity.name == "area_weight" and quantity.assumed is not None and quantity.assumed[1] < 0.1  # of a flag
+    return _DIGITS[quantity.name] + small
 
-    @property
-    def _digits(self) -> int:
-        light = self.name == "area_weight" and self.assumed[1] < 0.1  # of a small flag
-        return _DIGITS[self.name] + light
 
-    @property
-    def _suffix(self) -> str:
-        return "" if self.unit == "1" else f" {self.unit}"
-
-    def _number(self, value: float | None) -> str:
-        return "" if value is None else f"{value:.{self._digits}f}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values; an end of the interval that nothing bounds is null."""
-        return {
-            "unit": self.unit,
-            "value": self.value,
-            "sigma": self.sigma,
-            **self.span.as_dict(),
-            "assumed": list(self.assumed),
-            "information": self.information,
-            "constrained": self.constrained,
-            "given": self.given,
-        }
+def _number(quantity: Quantity, value: float | None) -> str:
+    return "" if value is None else f"{value:.{_digits_of(quantity)}f}"
 
 
 def quantities(
@@ -164,6 +120,7 @@ def quantities(
         if stated_value is not None and not stated_value.sigma:
             limits = stated_value.low, stated_value.high
         interval = span(draws[:, k], places[:, k], level=level, limits=limits, assumed=ends)
+        learned = information(draws[:, k], prior[:, k])
         answers.append(
             Quantity(
                 name=name,
@@ -172,7 +129,8 @@ def quantities(
                 sigma=float(draws[:, k].std()) if interval.estimated else None,
                 span=interval,
                 assumed=ends,
-                information=information(draws[:, k], prior[:, k]),
+                constrained=learned >= LEAST_INFORMATION and interval.bound is not Bound.NOTHING,
+                information=learned,
                 given=stated_value is not None,
             )
         )
@@ -189,6 +147,7 @@ def _exact(name: str, value: float, *, level: float) -> Quantity:
         sigma=0.0,
         span=exact,
         assumed=(value, value),
+        constrained=False,
         information=0.0,
         given=True,
     )
@@ -208,6 +167,6 @@ def sentence(quantities: Sequence[Quantity]) -> str:
     headline = [quantity for name in HEADLINE for quantity in quantities if quantity.name == name]
     constrained = [quantity for quantity in headline if quantity.constrained]
     leading = next((quantity for quantity in constrained if quantity.span.bound is None), None)
-    first = [quantity.phrase(first=quantity is leading) for quantity in constrained]
-    rest = [quantity.phrase(first=False) for quantity in headline if not quantity.constrained]
+    first = [phrase(quantity, first=quantity is leading) for quantity in constrained]
+    rest = [phrase(quantity, first=False) for quantity in headline if not quantity.constrained]
     return "; ".join([", ".join(first), *rest] if first else rest)

@@ -40,6 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cholesky
 
+from flagdata.answer import Quantity, Span
 from flagdata.arrays import FloatArray
 from flagdata.errors import InputError
 from measure.estimate.cards import card_entry
@@ -211,56 +212,46 @@ class Gusts:
     """How strong the gusts of a film are.
 
     Attributes:
-        value: mean of the posterior of their intensity, standard deviation over mean wind.
-        low, high: its central interval.
-        level: of it.
-        sigma: standard deviation of the posterior.
+        intensity: standard deviation over mean wind.
         windows: that it rests on.
     """
 
-    value: float
-    low: float
-    high: float
-    level: float
-    sigma: float
+    intensity: Quantity
     windows: int
 
     @classmethod
-    def of(cls, intensity: FloatArray, *, level: float, windows: int) -> Gusts:
-        """Summarises draws (n,) of the intensity."""
-        low, high = (float(end) for end in np.quantile(intensity, [(1 - level) / 2, (1 + level) / 2]))
-        return cls(
-            value=float(intensity.mean()),
-            low=low,
-            high=high,
-            level=level,
-            sigma=float(intensity.std()),
-            windows=windows,
+    def of(cls, draws: FloatArray, *, level: float, windows: int) -> Gusts:
+        """Summarises draws (n,) of the intensity. The film says something of it where the posterior is narrower than
+        the uniform prior."""
+        low, high = (float(end) for end in np.quantile(draws, [(1 - level) / 2, (1 + level) / 2]))
+        sigma = float(draws.std())
+        intensity = Quantity(
+            name="gust_intensity",
+            unit="1",
+            value=float(draws.mean()),
+            sigma=sigma,
+            span=Span(low=low, high=high, level=level, bound=None, estimated=True),
+            assumed=(0.0, MOST_INTENSE),
+            constrained=sigma <= LEAST_NARROWED * MOST_INTENSE / math.sqrt(12),
         )
-
-    @property
-    def constrained(self) -> bool:
-        """Decides whether the film says anything of them: the posterior is narrower than the uniform prior."""
-        return self.sigma <= LEAST_NARROWED * MOST_INTENSE / math.sqrt(12)
+        return cls(intensity=intensity, windows=windows)
 
     @property
     def sentence(self) -> str:
         """Phrases them, "gusts of 14 % [9, 21]" with the level; without a value where the film narrows nothing."""
-        if not self.constrained:
+        if not self.intensity.constrained or self.intensity.value is None:
             return f"gusts: {self.windows} windows do not constrain how strong they are"
-        return (
-            f"gusts of {100 * self.value:.0f} % [{100 * self.low:.0f}, {100 * self.high:.0f}] of the wind, "
-            f"{self.level * 100:.3g} %"
-        )
+        interval = self.intensity.span.worded(lambda share: f"{100 * share:.0f}")
+        return f"gusts of {100 * self.intensity.value:.0f} % {interval} of the wind, {self.intensity.span.percent}"
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
         return {
-            "intensity": self.value,
-            "interval": [self.low, self.high],
-            "level": self.level,
+            "intensity": self.intensity.value,
+            "interval": self.intensity.span.ends(),
+            "level": self.intensity.level,
             "windows": self.windows,
-            "constrained": self.constrained,
+            "constrained": self.intensity.constrained,
             "sentence": self.sentence,
         }
 

@@ -13,11 +13,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.answer import Quantity
 from flagdata.arrays import Float32Array, FloatArray
 from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
 from flagdata.stated import Stated
-from measure.estimate.answer import Quantity, quantities
+from measure.estimate.answer import quantities
 from measure.estimate.combine import OWN, Dependence, combined, effective
 from measure.estimate.gusts import Course, GustPrior, Gusty, SeriesErrors, log_moments
 from measure.estimate.options import Options

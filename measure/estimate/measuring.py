@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import torch
 
+from flagdata.answer import Quantity
 from flagdata.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.errors import FlagdataError, RefusedError, UsageError
 from flagdata.film import Film
 from flagdata.findings import Finding
 from flagdata.rng import child_seed, stream
-from measure.estimate.answer import Quantity, sentence
+from measure.estimate.answer import explain_bound, sentence
 from measure.estimate.combine import OWN, Dependence
 from measure.estimate.gusts import Gusts, SeriesErrors, errors_of_model
 from measure.estimate.joint import DRAWS, WEIGHT, WIND, Among, FilmAnswer, Look, WindowAnswer
@@ -462,7 +463,7 @@ def _about_windows(
 
 def _at_ends(quantities: Sequence[Quantity], windows: Sequence[WindowAnswer]) -> list[Finding]:
     """Reports quantities bounded on one side only, and how many windows bound the wind where the answer does not."""
-    findings = [finding for quantity in quantities if (finding := quantity.finding()) is not None]
+    findings = [finding for quantity in quantities if (finding := explain_bound(quantity)) is not None]
     bounded = [window.quantity(name).value is None for window in windows for name in OWN]
     if any(bounded) and not any(quantity.value is None for quantity in quantities if quantity.name in OWN):
         findings.append(

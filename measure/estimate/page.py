@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
+from flagdata.answer import Quantity
 from flagdata.pages.pictures import moving
 from flagdata.pages.render import render
 from flagdata.provenance import code_version
 from flagdata.wind_elsewhere import WindComparison
 from measure.estimate import pictures
-from measure.estimate.answer import SHORT, Quantity
+from measure.estimate.answer import SHORT
 from measure.estimate.measuring import Measurement
 from measure.estimate.nearest import Neighbour
 from measure.estimate.series import Agreement, Beside
@@ -113,17 +114,18 @@ def page(
 def _row(quantity: Quantity, truths: Mapping[str, float]) -> dict[str, str | bool]:
     digits = 3 if quantity.name == "area_weight" else 2
     truth = truths.get(quantity.name)
-    bound_level = "" if quantity.span.bound is None else f" ({quantity.span.level * 100:.3g} %)"
+    bound_level = "" if quantity.bound is None else f" ({quantity.span.percent})"
+    low, high = quantity.assumed or quantity.interval
     return {
         "name": SHORT[quantity.name],
         "unit": "" if quantity.unit == "1" else quantity.unit,
         "constrained": quantity.constrained,
         "value": "" if quantity.value is None else f"{quantity.value:.{digits}f}",
         "interval": quantity.span.phrase(digits) + bound_level,
-        "assumed": f"{quantity.assumed[0]:.{digits}f} to {quantity.assumed[1]:.{digits}f}",
-        "information": f"{quantity.information:.2f}",
+        "assumed": f"{low:.{digits}f} to {high:.{digits}f}",
+        "information": "" if quantity.information is None else f"{quantity.information:.2f}",
         "range": quantity.span.phrase(digits),
-        "level": f"{quantity.span.level * 100:.3g} %",
+        "level": quantity.span.percent,
         "known": "" if truth is None else f"{truth:.{digits}f}",
     }
 

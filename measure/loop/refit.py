@@ -21,8 +21,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from torch import Tensor
 
+from flagdata.answer import Bound, Span
 from flagdata.arrays import BoolArray, FloatArray
-from measure.ends import Bound, Span, of_profile
+from measure.ends import of_profile
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.model import Model, errors_of
 from measure.forecasting.observer import Forecaster

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.answer import Span
 from flagdata.arrays import FloatArray
 from flagdata.findings import Finding
 from flagdata.tables import Range
-from measure.ends import Span, span
+from measure.ends import span
 from measure.refine.evaluator import Evaluator
 from measure.refine.posterior import Posterior
 from measure.refine.space import QUANTITIES

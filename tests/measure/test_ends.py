@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from flagdata.answer import Bound, Span
 from flagdata.arrays import FloatArray
-from measure.ends import Bound, Span, bound_of, limits_of, of_profile, span
+from measure.ends import bound_of, limits_of, of_profile, span
 
 ANY = (-math.inf, math.inf)
 

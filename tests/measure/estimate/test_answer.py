@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from flagdata.answer import Bound, Quantity, Span
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from measure.ends import Bound, Span
-from measure.estimate import Quantity, information
-from measure.estimate.answer import quantities, sentence
+from measure.estimate import information
+from measure.estimate.answer import explain_bound, phrase, quantities, sentence
 
 
 def whole(low: float, high: float) -> Span:
@@ -40,6 +39,7 @@ UNCONSTRAINED = Quantity(
     sigma=0.02,
     span=whole(0.1, 0.17),
     assumed=(0.1, 0.17),
+    constrained=False,
     information=0.001,
 )
 STRONG = Quantity(
@@ -78,11 +78,11 @@ def test_a_wind_at_the_end_of_what_the_model_knows_is_bounded_on_one_side_with_t
         "wind at least 9.4 m/s, 95 % (the network's range ends at 10.0 m/s), area weight 0.13 kg/m² [0.11, 0.16] 90 %"
     )
     assert sentence([CALM, UNCONSTRAINED]).startswith("wind at most 0.5 m/s, 95 %; area weight: not constrained")
-    finding = STRONG.finding()
+    finding = explain_bound(STRONG)
     assert finding is not None
     assert finding.kind == "wind-speed-at-end"
     assert "ends at 10.0 m/s" in finding.what
-    assert CALM.finding() is WIND.finding() is None
+    assert explain_bound(CALM) is explain_bound(WIND) is None
 
 
 def test_an_end_that_nothing_bounds_is_null_in_json_and_no_value_is_given() -> None:
@@ -93,8 +93,9 @@ def test_an_end_that_nothing_bounds_is_null_in_json_and_no_value_is_given() -> N
 
 
 def test_draws_at_both_ends_of_the_range_give_no_value() -> None:
-    nothing = Span(low=0.0, high=math.inf, level=1.0, bound=Bound.NOTHING, estimated=False)
-    assert not replace(STRONG, span=nothing).constrained
+    draws = np.repeat([0.01, 9.99], 500)[:, None]
+    both = found(draws, np.linspace(0, 10, 1000)[:, None], "wind_speed", assumed=(0.0, 10.0))
+    assert (both.bound, both.constrained) == (Bound.NOTHING, False)
 
 
 def test_the_weight_of_a_small_flag_is_given_to_a_gram() -> None:
@@ -107,7 +108,7 @@ def test_the_weight_of_a_small_flag_is_given_to_a_gram() -> None:
         assumed=(0.025, 0.0425),
         information=0.4,
     )
-    assert small.phrase(first=False) == "area weight 0.033 kg/m² [0.028, 0.038]"
+    assert phrase(small, first=False) == "area weight 0.033 kg/m² [0.028, 0.038]"
 
 
 def test_information_is_the_divergence_of_gaussians() -> None:

@@ -172,8 +172,8 @@ def test_stronger_scatter_is_read_as_stronger_gusts() -> None:
     for scatter in (0.02, 0.1, 0.3):
         strengths = course(np.log(6.0) + scatter * normal, np.full(40, 0.1)).draws(2000, rng)[1]
         values.append(Gusts.of(strengths, level=0.9, windows=40))
-    assert values[0].value < values[1].value < values[2].value
-    assert values[0].high < values[2].low
+    assert values[0].intensity.value < values[1].intensity.value < values[2].intensity.value
+    assert values[0].intensity.span.high < values[2].intensity.span.low
     assert values[0].sentence.startswith("gusts of ")
 
 

@@ -16,6 +16,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.answer import Bound
 from flagdata.arrays import UInt8Array
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.film_array import Frames
@@ -23,7 +24,6 @@ from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed
 from flagdata.stated import Stated, parse
 from measure.commands.measure import _Done, _report
-from measure.ends import Bound
 from measure.estimate import DRAWS, Dependence, Measurement, Options, beside, measure
 from measure.film import FlagSize
 from measure.gate import Reason, gate_of

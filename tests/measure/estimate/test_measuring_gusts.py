@@ -127,7 +127,7 @@ def test_windows_that_overlap_are_as_wide_as_others_and_say_no_more_of_the_gusts
     assert overlapping.combined == 8
     assert apart.gusts is not None
     assert overlapping.gusts is not None
-    assert overlapping.gusts.value == pytest.approx(apart.gusts.value, abs=0.05)
+    assert overlapping.gusts.intensity.value == pytest.approx(apart.gusts.intensity.value, abs=0.05)
     width = [np.diff(winds(found)[:, 1:]).mean() for found in (apart, overlapping)]
     assert 0.7 * width[0] < width[1] <= 1.05 * width[0]
 
@@ -145,7 +145,7 @@ def test_the_gusts_are_in_the_json_and_in_the_terminal(
     assert found.gusts is not None
     told = found.as_dict(anyway=True)["gusts"]
     assert told["sentence"] == found.gusts.sentence
-    assert told["interval"] == [found.gusts.low, found.gusts.high]
+    assert told["interval"] == list(found.gusts.intensity.interval)
     subject: Any = SimpleNamespace(known=None)
     done = _Done(
         measured=found,
@@ -168,6 +168,6 @@ def test_python_has_the_gusts_with_their_interval(model: Estimator, series_model
     assert found.gusts is not None
     gusts = answered(found).gusts
     assert gusts is not None
-    assert (gusts.value, gusts.interval) == (found.gusts.value, (found.gusts.low, found.gusts.high))
+    assert (gusts.value, gusts.interval) == (found.gusts.intensity.value, found.gusts.intensity.interval)
     assert gusts.constrained == found.gusts.as_dict()["constrained"]
     assert answered(measured(film, model)).gusts is None

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.answer import Bound, Span
 from flagdata.stated import parse
-from measure.ends import Bound, Span
 from measure.estimate import Options
 from measure.estimate.refined import _searched, refined, scaled
 from measure.refine import Clip, Interval, Refinement, Round

@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flagdata.answer import Bound, Quantity, Span
 from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
-from measure.ends import Bound, Span
-from measure.estimate import Beside, Measurement, Quantity, beside
+from measure.estimate import Beside, Measurement, beside
 from measure.estimate.series import Spectrum, agreement, spectrum
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even

@@ -353,7 +353,7 @@ def weigh(
         "value": weight.value,
         "low": low,
         "high": high,
-        "bounded": weight.bounded,
+        "bounded": weight.is_bound,
         "misfit": fitted.misfit,
         "withheld": answer.withheld,
         "damping": truth["damping"],

@@ -133,7 +133,7 @@ def beside_truth(found: Measurement, film: LongFilm) -> Read:
         mean_error=float("nan") if mean.value is None else mean.value - float(truth.mean()),
         mean_inside=bool(mean.span.low <= truth.mean() <= mean.span.high),
         mean_width=mean.span.high - mean.span.low,
-        gusts=None if found.gusts is None else (found.gusts.value, found.gusts.low, found.gusts.high),
+        gusts=None if found.gusts is None else (found.gusts.intensity.value, *found.gusts.intensity.interval),
         intensity=film.parameters["gusts.intensity"],
     )
 

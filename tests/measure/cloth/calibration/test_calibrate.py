@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.answer import Bound
 from flagdata.arrays import FloatArray
 from flagdata.errors import InputError, RefusedError
 from flagdata.stated import parse
@@ -33,7 +34,6 @@ from measure.cloth import (
 from measure.cloth import calibration as module
 from measure.cloth import recording as observed
 from measure.cloth.calibration_page import calibration_page as written
-from measure.ends import Bound
 from tests.measure.cloth.calibration.conftest import readings
 from tests.studies.validation.looks import share, vtk
 
@@ -156,7 +156,7 @@ def test_of_a_cloth_beyond_the_prior_a_bound_is_reported_and_no_number(
     assert " kg/m², 95 %, n = 48 windows" in found.sentence
     said = found.as_dict()
     weight = said["cloth"]["area_weight"]
-    assert (weight["value"], weight["sigma"], weight["determined"], weight["level"]) == (None, None, False, 0.95)
+    assert (weight["value"], weight["sigma"], weight["constrained"], weight["level"]) == (None, None, True, 0.95)
     assert weight["bound"] == side.value
     assert weight["interval"][0 if side is Bound.LEAST else 1] == pytest.approx(float(end), rel=0.15)
     assert (said["area_weight_stated"], said["close_loop"], found.stated) == (None, None, None)
