@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 import re
+import shutil
+import subprocess
 import sys
 import textwrap
 from collections.abc import Callable, Iterator
@@ -31,7 +33,7 @@ def walk(title: str) -> str:
 
 def block(title: str) -> str:
     """The code of that title."""
-    found = re.search(rf'^ +```python title="{re.escape(title)}"\n(.*?)^ +```', PAGE, flags=re.DOTALL | re.MULTILINE)
+    found = re.search(rf'^ +```\w+ title="{re.escape(title)}"\n(.*?)^ +```', PAGE, flags=re.DOTALL | re.MULTILINE)
     assert found, title
     return textwrap.dedent(found[1])
 
@@ -86,3 +88,56 @@ def test_the_effect_of_the_walk_keeps_the_contract(fringe: str) -> None:
         law(fringe)
     assert list(lacking(EFFECTS[fringe])) == []
     assert "### fringe\n\nDrag of a fringe of threads on the cloth.\n" in reference()
+
+
+FORMATS = "flagdata/ingest/anemometer/formats"
+CLAIMS = "tests/flagdata/ingest/anemometer/test_format_claims.py"
+COPIED = ("flagdata", "catalogs", "pyproject.toml", "tests")
+VALUES = """
+from tests.flagdata.ingest.anemometer.conftest import read, shows
+from tests.flagdata.ingest.anemometer.test_format_claims import SAMPLES
+
+
+def test_harbour() -> None:
+    log = read(SAMPLES["harbour"])
+    {line}
+"""
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of what a log format touches."""
+    copy = tmp_path_factory.mktemp("checkout")
+    for path in (path for pattern in COPIED for path in ROOT.glob(pattern)):
+        target = copy / path.relative_to(ROOT)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_dir():
+            shutil.copytree(path, target, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy(path, target)
+    return copy
+
+
+def write_line(path: Path, line: str, *, below: str) -> None:
+    """Write a line of the walk below the only line that begins so."""
+    text = path.read_text(encoding="utf-8")
+    (first,) = re.findall(rf"^ *{re.escape(below)}.*$", text, flags=re.MULTILINE)
+    path.write_text(text.replace(first, f"{first}\n{line.rstrip()}", 1), encoding="utf-8")
+
+
+def test_the_log_format_of_the_walk_is_read_once_its_steps_are_done(checkout: Path) -> None:
+    described, registry = f"{FORMATS}/described.py", f"{FORMATS}/registry.py"
+    file = "catalogs/sensors/formats/harbour.toml"
+    (checkout / file).write_text(block(file), encoding="utf-8")
+    write_line(checkout / described, block(described), below="Zentra = ")
+    write_line(checkout / registry, f"    {block(f'FORMATS in {registry}')}", below='"zentra": ')
+    write_line(checkout / CLAIMS, f"    {block(f'SAMPLES in {CLAIMS}')}", below='"zentra": ')
+    (line,) = re.findall(r"`(shows\(.*?\))`", walk("A log format"))
+    (checkout / "tests/flagdata/ingest/anemometer/test_harbour.py").write_text(VALUES.format(line=line))
+    tests = [f"{CLAIMS}", "tests/flagdata/ingest/anemometer/test_harbour.py"]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "harbour or sample", *tests]
+    done = subprocess.run(command, cwd=checkout, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr
+    passed = re.search(r"(\d+) passed", done.stdout)
+    assert passed
+    assert int(passed[1]) >= 7
